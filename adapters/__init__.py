@@ -33,14 +33,14 @@ may be ranked with what a matter of a list.
 
 
 def engine(name: str, mode: str = "projection") -> Any:
-    """The engine of that name and mode, ready to use; its simulator is not imported yet."""
+    """Return the engine of a name and mode; its simulator is not imported yet."""
     module, maker = ENGINES[name] if mode == "projection" else SIMULATIONS[name]
     return getattr(importlib.import_module(f".{module}", __name__), maker)()
 
 
 WRITERS = ("mjcf", "exudyn", "urdf")
 """Formats, as on the command line; that of a name is the function `write` of the module
-write_NAME.
+writers.NAME.
 """
 
 

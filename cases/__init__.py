@@ -17,8 +17,7 @@ import numpy as np
 
 from ..core.case.case import Case, Origin, Output, Series, Truth
 from ..core.case.io.case_file import load_case
-from ..core.case.io.document import remedy
-from ..core.errors import CaseError
+from ..core.errors import CaseError, remedy
 from .jet import Jet, Motion
 
 FOLDER = Path(__file__).parent

@@ -1,6 +1,6 @@
-"""Closed form of Andrews' squeezing mechanism: from the crank, every further point is where two
-circles meet.
+"""Closed form of Andrews' squeezing mechanism.
 
+From the crank on, every further point is where two circles meet.
 Names and numbers are those of the Bari test set for initial value problems (problem andrews; Hairer
 and Wanner, Solving Ordinary Differential Equations II, VII.7). The crank leads from the origin to
 F, a rod from there to E; E is also on the circle of the triangle B D E about B. Two rods each lead

@@ -1,11 +1,14 @@
-"""Closed form of the Bennett linkage: four links and four hinges askew, no freedom by count and one
-by geometry.
+"""Closed form of the Bennett linkage: four links and four skew hinges, mobile by its geometry.
+
+By count the linkage has no freedom, by geometry one.
 
 Opposite links are alike, their lengths a and b in proportion to the sines of their twists alpha and
 beta. From hinge to hinge one turns by an angle about the axis z, goes the link's length along the
-new x, and turns by its twist about that. The angles are p, q,
--p and -q with  tan(p / 2) tan(q / 2) = K = sin((beta + alpha) / 2) / sin((beta - alpha) / 2)  (Bennett, A new mechanism,
-Engineering 76, 1903). Twists of sines 0.6 and 0.8 make K = 5.
+new x, and turns by its twist about that. The angles are p, q, -p and -q with
+
+    tan(p / 2) tan(q / 2) = K = sin((beta + alpha) / 2) / sin((beta - alpha) / 2)
+
+(Bennett, A new mechanism, Engineering 76, 1903). Twists of sines 0.6 and 0.8 make K = 5.
 """
 
 from __future__ import annotations

@@ -1,14 +1,14 @@
-"""Closed form of the threefold symmetric Bricard linkage: six links of 1 m, six revolutes,
-neighbouring axes at right angles.
+"""Closed form of the threefold symmetric Bricard linkage.
 
-The angles between neighbouring links are p and q in turns, with  cos p + cos q + cos p cos q = 0  (Chen, You and Tarnai,
-Threefold-symmetric Bricard linkages for deployable structures, Int. J. Solids Structures 42, 2005).
+Six links of 1 m and six revolutes, neighbouring axes at right angles. The angles between
+neighbouring links are alternately p and q, with  cos p + cos q + cos p cos q = 0  (Chen, You and
+Tarnai, Threefold-symmetric Bricard linkages for deployable structures, Int. J. Solids Structures
+42, 2005).
 At the benchmark's start, six edges of a cube, p = q = 90 degrees; q comes to zero, the driver's
 dead centre, at p = 120 degrees.
 
 From link to link the direction u turns about the axis z by the angle, and the axis about the new u
-by a right angle, to one
-side and the other: the next axis is  -u x z,  then  u x z.
+by a right angle, to one side and the other: the next axis is  -u x z,  then  u x z.
 """
 
 from __future__ import annotations

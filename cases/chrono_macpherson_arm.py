@@ -1,5 +1,6 @@
-"""Closed form of Project Chrono's generic MacPherson strut, driven at its arm; hardpoints
-(BSD-3-Clause) as in the case.
+"""Closed form of Project Chrono's generic MacPherson strut, driven at its arm.
+
+Hardpoints (BSD-3-Clause) as in the case.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Closed form of a delta robot (after R. Clavel): the platform keeps its orientation, so each pair
-of rods is one sphere.
+"""Closed form of a delta robot (after R. Clavel).
 
+The platform keeps its orientation, so each pair of rods is one sphere.
 Arm k hangs on the base at the angle 120 k degrees about z and swings in its own upright plane; a
 pair of equal parallel rods leads to the platform. Seen from the platform's centre X, the elbow less
 the rods' place on the platform, E_k - p_k, is the rods' length away: X is where three spheres meet,

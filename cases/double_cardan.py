@@ -1,7 +1,7 @@
-"""Closed form of two Hooke's joints in a row, bent alike, yokes between them parallel: the last
-shaft turns as the first.
+"""Closed form of two Hooke's joints in a row, bent alike: the last shaft turns as the first.
 
-tan t2 = tan t1 / cos b  at the first, and as its driving yoke is across the plane at design,  tan t3 = cos b tan t2  at the second.
+The yokes between the joints are parallel. At the first joint  tan t2 = tan t1 / cos b;  at the
+second  tan t3 = cos b tan t2,  as its driving yoke is across the plane at design.
 """
 
 from __future__ import annotations

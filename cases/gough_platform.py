@@ -1,5 +1,4 @@
-"""Closed form of a Gough platform of the 3-2-1 kind, six legs that change independently: the
-platform's points one after the other.
+"""Closed form of a Gough platform of the 3-2-1 kind, whose six legs change independently.
 
 Three legs lead to the first point, two to the second, one to the third. Each point is where three
 spheres meet, about feet of legs and about the points found before, from which it has constant

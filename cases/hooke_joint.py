@@ -1,7 +1,11 @@
-"""Closed form of Hooke's joint:  tan t2 = tan t1 / cos b,  the driving yoke in the plane of the shafts at t1 = 0 (any textbook).
+"""Closed form of Hooke's joint,  tan t2 = tan t1 / cos b  (any textbook).
 
-The driven yoke is normal to its own shaft and to the driving yoke, from which  cos t2 = cos b cos t1 / n,  sin t2 = sin t1 / n,
-n^2 = sin^2 t1 + cos^2 b cos^2 t1:  the same without a quadrant to choose.
+The driving yoke is in the plane of the shafts at t1 = 0. The driven yoke is normal to its own shaft
+and to the driving yoke, from which
+
+    cos t2 = cos b cos t1 / n,  sin t2 = sin t1 / n,  n^2 = sin^2 t1 + cos^2 b cos^2 t1:
+
+the same without a quadrant to choose.
 """
 
 from __future__ import annotations

@@ -1,5 +1,6 @@
-"""Closed form of the IFToMM benchmark A02, N four-bars in a row: all cranks stay parallel, the bars
-between them level.
+"""Closed form of the IFToMM benchmark A02, N four-bars in a row.
+
+All cranks stay parallel, the bars between them level.
 """
 
 from __future__ import annotations

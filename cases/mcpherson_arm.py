@@ -1,5 +1,6 @@
-"""Closed form of the McPherson strut of SAE 943745, joint points reconstructed as in
-mcpherson_strut, driven at arm and rack.
+"""Closed form of the McPherson strut of SAE 943745, driven at arm and rack.
+
+Joint points are reconstructed as in mcpherson_strut.
 """
 
 from __future__ import annotations

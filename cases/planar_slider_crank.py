@@ -1,5 +1,6 @@
-"""Closed form of the planar slider-crank: the slider is at  x = r cos t + sqrt(l^2 - r^2 sin^2 t)  (any
-textbook).
+"""Closed form of the planar slider-crank: x = r cos t + sqrt(l^2 - r^2 sin^2 t).
+
+x is the slider's position (any textbook).
 """
 
 from __future__ import annotations

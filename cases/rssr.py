@@ -1,8 +1,8 @@
 """Closed form of the RSSR linkage: two revolute pivots, joined by a rod between spherical joints.
 
-The crank pin is  a (cos t, sin t, 0),  the rocker pin on the circle  O + b (0, cos s, sin s)  where it is the rod's length from
-the crank pin. The two points of the circle that are belong to two assemblies; as the crank turns
-fully in both, neither ever comes to the other.
+The crank pin is  a (cos t, sin t, 0),  the rocker pin on the circle
+O + b (0, cos s, sin s)  at the rod's length from the crank pin. The circle has two such points, of
+two assemblies. The crank turns fully in both, so neither ever comes to the other.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Closed form of a Stewart platform whose legs change in two groups of three: it lifts and turns,
-and stays level and centred.
+"""Closed form of a Stewart platform whose legs change in two groups of three.
 
+The platform lifts and turns, and stays level and centred.
 Legs k = 0, 1, 2 of either group lead from the base circle, at 120 k + 10 and 120 k - 10 degrees, to
 the platform's circle, turned by +A and -A from there. With the platform turned by t and lifted to h
 their squared lengths are

@@ -73,12 +73,12 @@ def macpherson(
     """The points of a MacPherson strut, the arm turned by `turn` [rad] and the rack shifted along y
     by `rack` [m] from the design.
 
-    The strut's axis from its clamp to its top is a line of the upright. It slides through the top
-    as far as the distance from
-    top to ball says, of which the offset of the ball from the line is constant: in the upright's own axes the top is at  t u
-    from the foot of the ball on the line, with t^2 = distance^2 - offset^2. So the tie rod's outer
-    end has known distances from ball, top and inner end, and the upright is carried by ball, outer
-    end and, moving along u, the top.
+    The strut's axis from its clamp to its top is a line of the upright and slides through the top.
+    In the upright's own axes the top is at  t u  from the foot of the ball on the line, with
+    t^2 = distance^2 - offset^2,  the distance being that from top to ball and the offset, which is
+    constant, that of the ball from the line. So the tie rod's outer end has known
+    distances from ball, top and inner end, and the upright is carried by ball, outer end and,
+    moving along u, the top.
     """
     u = np.subtract(top, clamp) / np.linalg.norm(np.subtract(top, clamp))
     slid = float(np.subtract(top, arm.ball) @ u)

@@ -82,13 +82,15 @@ class Circle:
         return self.at(cos(angle), sin(angle))
 
     def meet(self, point: Vec, distance: float, side: float) -> Vec:
-        """The point of the circle at that distance from a point: |centre + u cos t + v sin t -
-        point| = distance, solved for t.
+        """Return the point of the circle at a distance from a point [m].
 
-        Squared it is  A cos t + B sin t + C = 0  (Hartenberg and Denavit, Kinematic Synthesis of Linkages, 1964, ch. 12).
+        The equation |centre + u cos t + v sin t - point| = distance, squared, is
+        A cos t + B sin t + C = 0  (Hartenberg and Denavit, Kinematic Synthesis of Linkages, 1964,
+        ch. 12).
 
         Args:
-            side: +1 or -1, the sign of  B cos t - A sin t : of the two answers, the later or the earlier on the circle.
+            side: +1 or -1, the sign of  B cos t - A sin t:  the later or the earlier of the two
+                answers on the circle.
         """
         like = point.x
         away, u, v = fixed(self.centre, like) - point, fixed(self.u, like), fixed(self.v, like)
@@ -105,7 +107,8 @@ class Circle:
 def meet_in_plane(a: Vec, aa: float, b: Vec, bb: float, side: float) -> Vec:
     """The point of the x-y plane with squared distances aa from a and bb from b.
 
-    It is  a + k p + h p_perp  with  p = b - a,  k = (p.p + aa - bb) / (2 p.p)  and  k^2 + h^2 = aa / p.p.
+    The point is  a + k p + h p_perp  with  p = b - a,  k = (p.p + aa - bb) / (2 p.p)  and
+    k^2 + h^2 = aa / p.p.
 
     Args:
         side: +1 to the left of the way from a to b, -1 to its right.
@@ -120,8 +123,8 @@ def meet_in_plane(a: Vec, aa: float, b: Vec, bb: float, side: float) -> Vec:
 def meet_in_space(a: Vec, aa: Jet, b: Vec, bb: Jet, c: Vec, cc: Jet, side: float) -> Vec:
     """The point with squared distances aa, bb and cc from three points (trilateration).
 
-    With p = b - a, q = c - a and n = p x q it is  a + k p + l q + h n:  its products with p and q,  (p.p + aa - bb) / 2  and
-    (q.q + aa - cc) / 2,  give k and l, and h is what is missing to aa.
+    With p = b - a, q = c - a and n = p x q the point is  a + k p + l q + h n.  Its products with p
+    and q,  (p.p + aa - bb) / 2  and  (q.q + aa - cc) / 2,  give k and l; h is the rest of aa.
 
     Args:
         side: +1 where n points to, seen from the three points; else -1.

@@ -100,11 +100,11 @@ _ROOMS = (
 
 
 def __getattr__(name: str) -> Any:
-    """Import a name when it is asked for: pytest loads its plugins every time, and would wait for
-    numpy and the solver else.
+    """Import a name on first use: pytest loads its plugins at every start and must not wait for
+    numpy.
     """
     if name in __all__:
-        for room in _ROOMS:  # what is quick to import first
+        for room in _ROOMS:  # # fastest imports first
             found = getattr(import_module(room, __name__), name, None)
             if found is not None:
                 globals()[name] = found

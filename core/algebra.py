@@ -15,25 +15,25 @@ from typing import Any, ClassVar, TypeAlias
 import numpy as np
 
 Scalar: TypeAlias = Any
-"""A number of any kind that knows + - * / and unary minus."""
+"""A number of any kind with + - * / and unary minus."""
 
 
 def root(a: Scalar) -> Scalar:
-    """The square root of a number, or of lanes."""
+    """Return the square root of a number, or of lanes."""
     if hasattr(a, "sqrt"):  # a number that knows its own
         return a.sqrt()
     return math.sqrt(a) if isinstance(a, int | float) else np.sqrt(a)
 
 
 def is_literal_zero(a: Scalar) -> bool:
-    """Whether it is a zero of Python's, known before anything is computed: what it multiplies
-    vanishes from every program.
+    """Return whether it is a Python zero, known before any computation: its products vanish from
+    every program.
     """
     return isinstance(a, int | float) and a == 0
 
 
 def where_larger(a: Scalar, b: Scalar, p: Scalar, q: Scalar) -> Scalar:
-    """p where |a| > |b|, else q; a number that is known only later decides then."""
+    """Return p if |a| > |b|, else q; a traced number decides at run time."""
     later = next((x for x in (a, b) if hasattr(x, "where_larger")), None)
     if later is not None:
         return later.where_larger(a, b, p, q)
@@ -42,7 +42,7 @@ def where_larger(a: Scalar, b: Scalar, p: Scalar, q: Scalar) -> Scalar:
 
 @dataclass(frozen=True, slots=True)
 class Vec3:
-    """A vector of three scalars, in whatever axes the context says."""
+    """A vector of three scalars; the context sets the axes."""
 
     __array_ufunc__: ClassVar[None] = None  # an array of lanes times a vector is a vector of arrays
     x: Scalar
@@ -65,7 +65,7 @@ class Vec3:
         return Vec3(k * self.x, k * self.y, k * self.z)
 
     def __matmul__(self, b: Vec3) -> Scalar:
-        """Scalar product."""
+        """Return the scalar product."""
         return self.x * b.x + self.y * b.y + self.z * b.z
 
 
@@ -74,13 +74,13 @@ X, Y, Z = Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0), Vec3(0.0, 0.0, 1.0)
 
 
 def vec(values: Sequence[Scalar]) -> Vec3:
-    """Three scalars as a vector."""
+    """Return three scalars as a vector."""
     x, y, z = values
     return Vec3(x, y, z)
 
 
 def cross(a: Vec3, b: Vec3) -> Vec3:
-    """Vector product a x b."""
+    """Return the vector product a x b."""
     return Vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
 
 
@@ -102,11 +102,11 @@ class Mat3:
         return Mat3(self.x + B.x, self.y + B.y, self.z + B.z)
 
     def __matmul__(self, a: Vec3) -> Vec3:
-        """Product with a vector."""
+        """Return the product with a vector."""
         return Vec3(self.x @ a, self.y @ a, self.z @ a)
 
     def times(self, B: Mat3) -> Mat3:
-        """Product with a matrix."""
+        """Return the product with a matrix."""
         columns = B.T
         return Mat3(self @ columns.x, self @ columns.y, self @ columns.z).T
 
@@ -125,13 +125,13 @@ class Quat:
         return iter((self.e0, self.e.x, self.e.y, self.e.z))
 
     def __mul__(self, b: Quat) -> Quat:
-        """Quaternion product: the rotation b followed, in the same axes, by this one."""
+        """Return the quaternion product: the rotation b followed, in the same axes, by this one."""
         return Quat(
             self.e0 * b.e0 - self.e @ b.e, self.e0 * b.e + b.e0 * self.e + cross(self.e, b.e)
         )
 
     def conjugate(self) -> Quat:
-        """The opposite rotation."""
+        """Return the opposite rotation."""
         return Quat(self.e0, -self.e)
 
 
@@ -139,25 +139,25 @@ IDENTITY = Quat(1.0, ZERO)
 
 
 def quat(values: Iterable[Scalar]) -> Quat:
-    """Euler parameters from a sequence e0, e1, e2, e3; of an array, its rows."""
+    """Return Euler parameters from a sequence e0, e1, e2, e3; of an array, its rows."""
     e0, x, y, z = values
     return Quat(e0, Vec3(x, y, z))
 
 
 def angle_about(axis: Vec3, q: Quat) -> Any:
-    """Return the angle of a rotation that is about a unit axis, along it [rad], from less than a
-    turn back to one on.
+    """Return the angle of a rotation about its unit axis [rad], in the range -2 pi to 2 pi.
 
-    The rotations q and -q are one, and their angles a turn apart.
+    The rotations q and -q are equal, and their angles differ by a turn.
     """
     return 2.0 * np.arctan2(axis @ q.e, q.e0)
 
 
 def turned_by(q: Quat, half: Vec3) -> Quat:
-    """The unit quaternion (1, half) q / |(1, half) q|: q turned by about 2 half, global axes.
+    """Return the unit quaternion (1, half) q / |(1, half) q|: q turned by about 2 half, global
+    axes.
 
-    The rotation applied is 2 atan|half|, which agrees with the exponential to second order;
-    renormalising each time keeps the length at one to round-off, whatever the number of steps.
+    The rotation applied is 2 atan|half|, which agrees with the exponential to second order. Each
+    call normalises, so the length stays one to round-off for any number of steps.
     """
     p = Quat(1.0, half) * q
     length = root(p.e0 * p.e0 + p.e @ p.e)
@@ -166,7 +166,7 @@ def turned_by(q: Quat, half: Vec3) -> Quat:
 
 
 def rotation_less_identity(q: Quat) -> Mat3:
-    """A(q) - I, eq. (1) of the paper with the identity taken off before rounding.
+    """Return A(q) - I, eq. (1) of the paper with the identity taken off before rounding.
 
     Near the design pose A - I is small; forming A first would round it at 1e-16 of one rather than
     of itself.

@@ -1,6 +1,4 @@
-"""The errors of kincheck, and how their messages name things: who, what was found, what was
-expected and what to do.
-"""
+"""Errors of kincheck. Their messages name the subject, found and expected values, and a remedy."""
 
 from __future__ import annotations
 
@@ -9,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from itertools import islice
 
 LONGEST_NAME = 200
-"""Characters of a name that a message repeats; what is longer hides the rest of it."""
+"""Characters of a name that a message repeats; a longer one hides the rest of the message."""
 # A message that lists all names of a large file is not read. The search for a similar name is cubic
 # in their lengths at worst.
 MOST_NAMED, MOST_SEARCHED = 50, 10_000
@@ -20,8 +18,7 @@ class KincheckError(Exception):
 
 
 class Phrase:
-    """A text with lengths in it, which a reader of files can write in the unit of the file; as a
-    text it has metres.
+    """A text with lengths; readers of files write them in the unit of the file, `str` in metres.
 
     Args:
         parts: texts, and lengths as numbers [m].
@@ -34,17 +31,16 @@ class Phrase:
         return self.within(lambda length: f"{length:.10g} m")
 
     def within(self, written: Callable[[float], str]) -> str:
-        """Return the text with the lengths as a function writes them."""
+        """Return the text with the lengths formatted by a function."""
         return "".join(part if isinstance(part, str) else written(part) for part in self.parts)
 
 
 class MechanismError(KincheckError, ValueError):
-    """The description of a mechanism does not make sense.
+    """The description of a mechanism is not valid.
 
     Attributes:
         phrase: the message.
-        key: of a case file, what is to blame there ("joints.pivot.bodies"); empty where that is not
-            known.
+        key: the faulty key of a case file ("joints.pivot.bodies"); empty if unknown.
     """
 
     def __init__(self, message: str | Phrase, key: str = "") -> None:
@@ -58,20 +54,16 @@ class CaseError(KincheckError, ValueError):
 
 
 class SolveError(KincheckError, RuntimeError):
-    """The mechanism cannot be solved as described: freedom left, contradiction, or no assembly at
-    the design.
-    """
+    """The mechanism cannot be solved as described: freedom left, contradiction, or no assembly."""
 
 
 def unknown(what: str, name: str, known: Iterable[str]) -> str:
-    """Say that there is nothing of that kind and name, and what to write instead."""
+    """Return the message for an unknown name of a kind, with a remedy."""
     return f"there is no {what} {name!r}; {remedy(name, known)}"
 
 
 def remedy(name: str, known: Iterable[str]) -> str:
-    """Say what to write instead of a name that is not known: the most similar one, else all of
-    them.
-    """
+    """Return the remedy for an unknown name: the most similar known one, else all of them."""
     names = sorted(known)
     close = similar(name, names)
     return (
@@ -82,7 +74,7 @@ def remedy(name: str, known: Iterable[str]) -> str:
 
 
 def similar(name: str, known: Iterable[str], cutoff: float = 0.6) -> str:
-    """Return the known name that is most like another one; an empty text where none is."""
+    """Return the most similar known name; an empty text if there is none."""
     short = islice((each for each in known if len(each) <= LONGEST_NAME), MOST_SEARCHED)
     return (
         next(iter(difflib.get_close_matches(name, short, 1, cutoff)), "")
@@ -92,11 +84,11 @@ def similar(name: str, known: Iterable[str], cutoff: float = 0.6) -> str:
 
 
 def brief(text: str) -> str:
-    """Return the beginning of a text, as much as a message has room for."""
+    """Return the text, cut to the length of a name in a message."""
     return text if len(text) <= LONGEST_NAME else f"{text[: LONGEST_NAME - 6]} [...]"
 
 
 def shortened(texts: Sequence[str], most: int) -> str:
-    """Return the first so many texts in a row, and how many more there are."""
+    """Return the first `most` texts, and the number of further ones."""
     more = f" and {len(texts) - most} more" if len(texts) > most else ""
     return ", ".join(texts[:most]) + more

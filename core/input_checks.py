@@ -1,6 +1,4 @@
-"""Checks of input: numbers of a description are finite Python numbers, directions have a length,
-arguments are real.
-"""
+"""Checks of input: finite Python numbers, directions with a length, real arguments."""
 
 from __future__ import annotations
 
@@ -15,11 +13,11 @@ from .errors import MechanismError, SolveError, unknown
 from .trajectory import Array
 
 SHORTEST = 1e-150
-"""Of a direction: the square of a shorter one has fewer digits than others, or none."""
+"""Shortest direction: the square of a shorter one loses digits or underflows."""
 
 
 def finite(number: Any) -> bool:
-    """Whether it is a finite number, or an array that is one."""
+    """Return whether it is a finite number, or an array of a single one."""
     try:
         # numpy's complex numbers would be taken by their real part; most are floats, of which large
         # mechanisms have ten thousands
@@ -29,11 +27,11 @@ def finite(number: Any) -> bool:
 
 
 def triple(who: str, value: Any, expected: str) -> tuple[Any, Any, Any]:
-    """Three numbers as a tuple, whatever sequence or array they are given as: that may change, a
-    mechanism does not.
+    """Return three numbers as a tuple, from any sequence or array: those may change, a mechanism
+    may not.
 
-    Of an array they are Python's own numbers: numpy's divide by zero without a word, and print
-    their type.
+    Elements of an array become Python numbers: numpy's divide by zero silently, and print their
+    type.
 
     Raises:
         MechanismError: there are not three.
@@ -43,8 +41,8 @@ def triple(who: str, value: Any, expected: str) -> tuple[Any, Any, Any]:
 
 
 def require_finite(who: str, numbers: Sequence[Any], expected: str) -> None:
-    """Raise MechanismError unless all are finite numbers, or of a kind that is computed with later
-    (traced, balls).
+    """Raise MechanismError unless all are finite numbers, or scalars of later evaluation (traced,
+    balls).
     """
     if not all(finite(number) or _of_later(number) for number in numbers):
         raise MechanismError(
@@ -57,16 +55,14 @@ def _of_later(number: Any) -> bool:
 
 
 def plain(number: Any) -> Any:
-    """A number as Python's own, where it is one of numpy's or an array that is one: arrays may
-    change, and have no hash.
+    """Return a numpy number or one-element array as Python's own: arrays are mutable and
+    unhashable.
     """
     return number.item() if type(number).__module__ == "numpy" and np.size(number) == 1 else number
 
 
 def require_direction(who: str, numbers: Sequence[float]) -> None:
-    """Raise MechanismError unless a vector has a direction: its length is not zero, nor so small or
-    large that its square is.
-    """
+    """Raise MechanismError unless a vector has a direction: its squared length must be normal."""
     length = math.hypot(*numbers)
     if length == 0.0:
         raise MechanismError(f"{who} is zero; give a direction of any other length")
@@ -78,8 +74,8 @@ def require_direction(who: str, numbers: Sequence[float]) -> None:
 
 
 def held(who: str, value: Any, count: int | None, expected: str) -> tuple[Any, ...]:
-    """A value as a tuple of so many items, or of any number, or an error that names what was
-    expected.
+    """Return a value as a tuple of `count` items (None: any number), or raise an error with the
+    expected form.
     """
     try:
         found = tuple(value.tolist() if hasattr(value, "tolist") else value)
@@ -97,15 +93,15 @@ def require_positive(who: str, what: str, number: Any) -> None:
 
 
 def no_such(who: str, what: str, name: str, known: Sequence[str]) -> SolveError:
-    """The error that there is nothing of a name."""
+    """Return the error for an unknown name."""
     return SolveError(f"{who}: {unknown(what, name, known)}")
 
 
 def real(who: str, what: str, given: Any, expected: str) -> Array:
-    """Numbers as an array of their own; an imaginary part is none to be lost.
+    """Return numbers as a new array; an imaginary part is an error, never dropped.
 
     Raises:
-        SolveError: they are no real numbers.
+        SolveError: they are not real numbers.
     """
     try:
         found = np.asarray(given)

@@ -1,8 +1,7 @@
-"""Jets: a number with its first and second derivative by time, so that any formula gives exact
-rates of what it computes.
+"""Jets: a number with its first and second time derivative, so any formula gives exact rates of its
+result.
 
-Vectors of jets are `algebra.Vec3`. A derivative that is not known is NaN, and whatever needs it
-becomes NaN by itself.
+Vectors of jets are `algebra.Vec3`. An unknown derivative is NaN, and propagates.
 """
 
 from __future__ import annotations
@@ -32,9 +31,7 @@ class Jet:
 
     @property
     def dot(self) -> Jet:
-        """The derivative by time as a jet of its own; its second derivative would be a third one,
-        which nobody knows.
-        """
+        """The time derivative as a jet; its second derivative is unknown (NaN)."""
         return Jet(self.v, self.a, np.full_like(self.a, np.nan))
 
     def __add__(self, b: Jet | float | Lanes) -> Jet:
@@ -77,14 +74,14 @@ class Jet:
 
 
 def sqrt(a: Jet) -> Jet:
-    """The square root; a must be positive."""
+    """Return the square root; a must be positive."""
     x = np.sqrt(a.x)  # x x = a, differentiated once and twice
     v = a.v / (2.0 * x)
     return Jet(x, v, (a.a - 2.0 * v * v) / (2.0 * x))
 
 
 def arctan2(y: Jet, x: Jet) -> Jet:
-    """The angle of the direction (x, y) [rad], in -pi..pi; x and y must not both vanish.
+    """Return the angle of the direction (x, y) [rad], in -pi..pi; x and y must not both vanish.
 
     Its rate is (x y' - y x') / (x x + y y): a jet of jets' values and rates, differentiated once
     more by the quotient rule.
@@ -94,5 +91,5 @@ def arctan2(y: Jet, x: Jet) -> Jet:
 
 
 def each(a: Vec3, do: Callable[[Jet], Jet]) -> Vec3:
-    """A vector of jets, changed component by component."""
+    """Return a vector of jets, changed component by component."""
     return Vec3(do(a.x), do(a.y), do(a.z))

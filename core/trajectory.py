@@ -1,4 +1,4 @@
-"""What solving a case gives, from any engine: the motion of points over the samples of a sweep."""
+"""Result of a case from any engine: the motion of points over the samples of a sweep."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 Array: TypeAlias = NDArray[np.float64]
 
 QUANTITIES = ("position", "velocity", "acceleration")
-"""What is known of a motion: each is the rate of the one before."""
+"""Quantities of a motion: each is the rate of the one before."""
 PER_TIME = ("", "/s", "/s^2")
-"""What their units end in."""
+"""Suffixes of their units."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,16 +35,14 @@ class PointMotion:
 
 @dataclass(frozen=True, eq=False)
 class BodyMotion:
-    """Motion of one body over n samples, in the paper's variables; NaN at samples that were not
-    reached.
+    """Motion of one body over n samples, in the paper's variables; NaN at samples not reached.
 
     Attributes:
         r: origin, global [m], shape (n, 3).
         p: Euler parameters e0..e3, body -> global [-], shape (n, 4).
-        v: [rdot global [m/s], omega' body frame [rad/s]], shape (n, 6), or None where it was not
-            asked for.
-        a: [rddot global [m/s^2], omega'dot body frame [rad/s^2]], shape (n, 6), or None where it
-            was not asked for.
+        v: [rdot global [m/s], omega' body frame [rad/s]], shape (n, 6), or None if not requested.
+        a: [rddot global [m/s^2], omega'dot body frame [rad/s^2]], shape (n, 6), or None if not
+            requested.
     """
 
     r: Array
@@ -57,13 +55,13 @@ _Motion = TypeVar("_Motion", PointMotion, BodyMotion)
 
 
 class Motions(Mapping[str, _Motion], Generic[_Motion]):
-    """Motions by name, as views of one table. Each is made when it is looked at: a sweep costs no
-    more than what is wanted of it.
+    """Motions by name, as views of one table, each created on access: a sweep pays only for those
+    in use.
 
     Args:
         kind: makes a motion of its arrays.
         table: shape (n, columns).
-        columns: by name, those of each array; None where there is none.
+        columns: by name, those of each array; None if there is none.
     """
 
     def __init__(
@@ -128,7 +126,7 @@ class Trajectory:
 
 
 def largest_found(values: Array) -> float:
-    """The largest of what was found at solved samples, or NaN where there are none: zero would be
-    praise.
+    """Return the largest value over solved samples, or NaN if there are none: zero would claim
+    success.
     """
     return float(values.max()) if values.size else math.nan

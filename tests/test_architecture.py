@@ -50,56 +50,56 @@ IMPORTS = {
         ". primitives program program/llvm mechanism kinematics/formulation kinematics/structure"
     ),
     "kinematics/assembly": (
-        ". primitives program joints mechanism kinematics/formulation kinematics/structure"
-        " kinematics/compiled"
+        ". primitives program joints mechanism kinematics/formulation "
+        "kinematics/structure kinematics/compiled"
     ),
     "kinematics/continuation": (
         ". program mechanism kinematics/formulation kinematics/structure kinematics/compiled"
     ),
     "kinematics/verified": (
-        ". primitives program mechanism kinematics/formulation kinematics/compiled"
-        " kinematics/continuation"
+        ". primitives program mechanism kinematics/formulation "
+        "kinematics/compiled kinematics/continuation"
+    ),
+    "kinematics/by_components": (
+        ". program mechanism kinematics/formulation kinematics/structure "
+        "kinematics/compiled kinematics/continuation"
     ),
     "kinematics/sparse": (
         ". primitives program program/llvm mechanism kinematics/formulation "
         "kinematics/structure kinematics/compiled kinematics/continuation"
     ),
-    "kinematics/by_components": (
-        ". program mechanism kinematics/formulation kinematics/structure kinematics/compiled"
-        " kinematics/continuation"
-    ),
     "kinematics/diagnosis": (
-        ". primitives joints mechanism kinematics/formulation kinematics/structure"
-        " kinematics/compiled kinematics/continuation"
+        ". primitives joints mechanism kinematics/formulation "
+        "kinematics/structure kinematics/compiled kinematics/continuation"
     ),
     "kinematics": (
         ". program mechanism kinematics/formulation kinematics/structure "
-        "kinematics/compiled kinematics/continuation kinematics/sparse "
-        "kinematics/by_components"
+        "kinematics/compiled kinematics/continuation kinematics/by_components "
+        "kinematics/sparse"
     ),
     "case/models/hardpoints/templates": "joints mechanism",
     "case": ". joints mechanism",
     "case/suspension": ". mechanism case",
     "case/io": ". joints mechanism kinematics/compiled kinematics case case/suspension",
-    "case/models/mjcf": ". joints mechanism kinematics/structure case case/io",
-    "case/variation": ". joints mechanism kinematics/formulation case case/io",
     "case/models/hardpoints": ". mechanism case/models/hardpoints/templates case case/io",
-    "case/models": "case case/io case/models/mjcf case/models/hardpoints",
+    "case/variation": ". joints mechanism kinematics/formulation case case/io",
+    "case/models/mjcf": ". joints mechanism kinematics/structure case case/io",
+    "case/models": "case case/io case/models/hardpoints case/models/mjcf",
     "harness": ". joints mechanism kinematics/compiled kinematics case case/io",
+    "harness/reporting": "",
     "harness/workers": ". harness",
     "history": ". case case/io harness",
     "history/regression": ". case case/io harness history",
     "report": ". joints mechanism case case/io harness history history/regression",
     "studies/stress/truth": (
-        ". program joints mechanism kinematics/formulation kinematics/structure"
-        " kinematics/continuation kinematics/verified case"
+        ". program joints mechanism kinematics/formulation kinematics/structure "
+        "kinematics/continuation kinematics/verified case"
     ),
     "studies/stress/families": ". joints mechanism case case/io studies/stress/truth",
-    "studies": (
-        ". program joints kinematics/compiled kinematics/assembly kinematics/verified case case/io"
-        " harness"
+    "studies": (". program joints kinematics/assembly kinematics/verified case case/io harness"),
+    "studies/joint_check": (
+        ". program joints mechanism kinematics/formulation kinematics case harness report"
     ),
-    "studies/diagnosis": ". joints kinematics/formulation kinematics/diagnosis case report studies",
     "studies/tolerance": (
         ". program program/llvm mechanism kinematics/formulation "
         "kinematics/compiled kinematics case case/io case/variation harness "
@@ -111,28 +111,26 @@ IMPORTS = {
         "harness/workers report studies/stress/truth studies/stress/families"
     ),
     "studies/paper": (
-        ". primitives program joints mechanism kinematics/formulation kinematics case harness"
-        " report"
+        ". primitives program joints mechanism kinematics/formulation kinematics "
+        "case harness report"
     ),
-    "studies/joint_check": (
-        ". program joints mechanism kinematics/formulation kinematics case harness report"
-    ),
+    "studies/diagnosis": ". joints kinematics/formulation kinematics/diagnosis case harness report",
     "studies/bench": (
         ". program/llvm joints mechanism kinematics/formulation "
-        "kinematics/compiled kinematics/continuation kinematics/sparse "
-        "kinematics/by_components kinematics case case/io case/variation harness "
-        "report studies studies/tolerance studies/paper"
+        "kinematics/compiled kinematics/continuation kinematics/by_components "
+        "kinematics/sparse kinematics case case/io case/variation harness report "
+        "studies studies/tolerance studies/paper"
     ),
     "cli": (
         ". program program/llvm kinematics/structure kinematics/continuation case "
         "case/io case/variation case/models harness harness/workers history "
         "history/regression report studies/stress/families studies "
-        "studies/diagnosis studies/tolerance studies/stress studies/paper "
-        "studies/joint_check studies/bench"
+        "studies/joint_check studies/tolerance studies/stress studies/paper "
+        "studies/diagnosis studies/bench"
     ),
     "__init__": (
-        ". joints mechanism kinematics/assembly kinematics/continuation kinematics"
-        " studies/joint_check"
+        ". joints mechanism kinematics/assembly kinematics/continuation "
+        "kinematics studies/joint_check"
     ),
 }
 """Folder of core: the folders it imports besides itself, whenever the import runs."""
@@ -209,9 +207,12 @@ def imports_against_the_table(path, syntax):
                 yield f"{mine} imports {other}"
         elif target[0] not in ("core", here):
             yield f"imports {'.'.join(target)}"
-        elif here == target[0] == "adapters" and len(path.parts) > 2:
-            if target[1] not in (path.parts[1], "shared"):
-                yield f"imports {'.'.join(target)}: engines share adapters/shared only"
+        elif (
+            here == target[0] == "adapters"
+            and len(path.parts) > 2
+            and target[1] not in (path.parts[1], "shared")
+        ):
+            yield f"imports {'.'.join(target)}: engines share adapters/shared only"
 
 
 def simulators_at_import(path, syntax):

@@ -1,5 +1,4 @@
-"""Drivers and relations as coordinate constraints that Exudyn's own solvers see; private to its
-adapter.
+"""Drivers and relations as coordinate constraints for Exudyn's own solvers; private to its adapter.
 
 A generic joint with a moving offset has no rate, so a driven coordinate is a constraint on Exudyn's
 relative coordinate of two bodies, and so are the relations of a screw, a gear, a rack and its
@@ -21,13 +20,13 @@ from .rows import Rows
 
 
 class DriverTable:
-    """Values and rates of the drivers at every step of a leg; Exudyn asks for them by its time."""
+    """Values and rates of the drivers at every step of a leg, read by Exudyn at its time."""
 
     def __init__(self) -> None:
         self.per_second, self.rows = 1.0, list[list[list[float]]]()
 
     def reader(self, order: int, value: int) -> Any:
-        """A user function of Exudyn."""
+        """Return a user function of Exudyn for one driver and order of derivative."""
 
         def at(mbs: Any, t: float, number: int, offset: float) -> float:
             return self.rows[order][value][round(t * self.per_second)]
@@ -36,10 +35,10 @@ class DriverTable:
 
 
 class Coordinates(Rows):
-    """The rows, with drivers and relations that Exudyn's own solvers see.
+    """The rows, with drivers and relations for Exudyn's own solvers.
 
     Attributes:
-        angles: relative angles, whose turns are counted: which driver's value each is, or None.
+        angles: the driver's number of each relative angle, or None; their turns are counted.
     """
 
     def __init__(self, mbs: Any, items: Any, case: Case, table: DriverTable) -> None:
@@ -48,7 +47,7 @@ class Coordinates(Rows):
         super().__init__(mbs, items, case.mechanism)
 
     def relative(self, name: str, freedom: str, value: int | None = None) -> int:
-        """A marker of the coordinate of a joint."""
+        """Return a new marker of the coordinate of a joint."""
         joint: Any = self.mechanism.joint(name)
         if freedom == "translation":
             return self.shift(joint.i, joint.j, joint.point, joint.axis)
@@ -64,7 +63,7 @@ class Coordinates(Rows):
         return self.mbs.AddMarker(marker)
 
     def shift(self, i: str, j: str, point: Sequence[float], axis: Sequence[float]) -> int:
-        """A marker of the displacement of a point of body j along an axis of body i."""
+        """Return a new marker of the displacement of a point of body j along an axis of body i."""
         numbers, origins = zip(*(self.bodies[body] for body in (i, j)), strict=True)
         arms = [np.subtract(point, origin) for origin in origins]
         marker = self.items.MarkerBodiesRelativeTranslationCoordinate(

@@ -2,8 +2,8 @@
 residual and Jacobian.
 
 Every moving body has a node of its own with Euler parameters, so a closed loop is no different from
-a chain. What the joints and drivers become is in `exudyn_rows`; a row may follow a driver's value
-or an unknown besides Exudyn's coordinates.
+a chain. `rows` and `joint_objects` have the objects for joints and drivers; a row may follow a
+driver's value or an unknown besides Exudyn's coordinates.
 """
 
 from __future__ import annotations
@@ -22,7 +22,9 @@ from ...core.trajectory import Array
 from ..shared.compiled_floor import floor_of
 from ..shared.length_scaling import in_own_frame
 from ..shared.projection_engine import ProjectionEngine
-from .rows import JOINTS, NO_ROTATION, Rows, turned
+from .equations import NO_ROTATION, turned
+from .joint_objects import JOINTS
+from .rows import Rows
 
 # Largest change of a coordinate per step of the differences of the Jacobian [units of length or -].
 # Round-off, 1e-16 / 1e-3, and truncation, (1e-3)^6 times the seventh derivative of the rows, are
@@ -39,7 +41,7 @@ class Exudyn(ProjectionEngine):
 
     @property
     def described(self) -> Mapping[str, Any]:
-        """What Exudyn's bodies are, and what its solver evaluates."""
+        """Exudyn's coordinates and the calls of its solver that give the rows."""
         return {
             "coordinates": "absolute, NodeRigidBodyEP, 7 per body",
             "residual": "ComputeAlgebraicEquations",
@@ -51,12 +53,13 @@ class Exudyn(ProjectionEngine):
         }
 
     def build(self, case: Case) -> ExudynModel:
-        """Exudyn's system of the case, at the design position."""
+        """Return Exudyn's system of the case, at the design position."""
         return ExudynModel(in_own_frame(case))
 
     def floor(self, case: Case) -> Floor:
-        """Bound it by the static solver's residual and Jacobian; rates take two more Jacobians,
-        which a difference needs.
+        """Return the floor from the static solver's residual and Jacobian.
+
+        Rates take two more Jacobians, because a difference needs two.
         """
         model = self.build(case)
         solved = self.solve(model, case, 1e-12)
@@ -77,9 +80,7 @@ class Exudyn(ProjectionEngine):
 
 
 def _least() -> tuple[Any, Any, Any, Any]:
-    """Container, system, settings and solver of the least that Exudyn takes: one free
-    coordinate.
-    """
+    """Return container, system, settings and solver of one free coordinate, the smallest model."""
     exu: Any = importlib.import_module("exudyn")
     items: Any = importlib.import_module("exudyn.itemInterface")
     exu.config.printToConsole = False
@@ -94,8 +95,11 @@ def _least() -> tuple[Any, Any, Any, Any]:
 
 
 class ExudynModel:
-    """A `ProjectionModel`; the unknowns: Exudyn's displacements of the node coordinates (position,
-    Euler parameters), then those that rows share (see `exudyn_rows`)."""
+    """A `ProjectionModel` of Exudyn's equations.
+
+    Unknowns: displacements of the node coordinates (position, Euler parameters), then the further
+    unknowns of the rows (see `equations`).
+    """
 
     def __init__(self, case: Case) -> None:
         exu: Any = importlib.import_module("exudyn")
@@ -187,7 +191,7 @@ class ExudynModel:
         return np.hstack([self._jacobian(), -self.shared])
 
     def _jacobian(self) -> Array:
-        """Derivative of the rows by Exudyn's coordinates."""
+        """Return the derivative of the rows by Exudyn's coordinates, shape (rows, coordinates)."""
         # ComputeJacobianAE would add to what is there; this call clears it first
         self.solver.ComputeNewtonJacobian(self.mbs, self.settings)
         return self.solver.GetSystemJacobian()[self.kept, : self.coordinates]

@@ -1,6 +1,6 @@
 """Exudyn in simulate mode: its own static and dynamic solvers over a whole leg of the sweep.
 
-Joints are those of projection, drivers and relations those of `exudyn_coordinates`.
+Joints are those of projection, drivers and relations those of `coordinates`.
 """
 
 from __future__ import annotations
@@ -12,22 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from ...core import joints
 from ...core.case.case import Case
-from ...core.joints.base import unit
-from ...core.kinematics.compiled.motion_start import start_of as where_from
 from ...core.trajectory import Array, Trajectory
 from ..shared.simulation import Leg, SimulatedPose, SimulationEndedError, simulated, start_of
 from .coordinates import Coordinates, DriverTable
 from .exudyn import Exudyn, ExudynModel
+from .limitations import limitation_of
 
-# Where a row keeps a number other than zero, Exudyn's objects do not; this much is round-off, and
-# below what a residual may be.
-NOTHING = 1e-12
-# Times of equidistant samples differ in their spacing by no more than their round-off, as part of
-# the spacing.
-EQUIDISTANT = 1e-6
-# Of its Newton iteration, relative and absolute: what leaves the constraints at round-off.
+# Relative and absolute tolerance of Newton; it leaves the constraints at round-off.
 TIGHT = 1e-12
 
 
@@ -55,7 +47,7 @@ class Solver:
 
     @property
     def settings(self) -> Mapping[str, Any]:
-        """Everything that is not as Exudyn has it."""
+        """Settings that differ from Exudyn's defaults."""
         return {
             "solver": {
                 "static": "SolveStatic",
@@ -80,33 +72,7 @@ class Solver:
 
     def unsupported(self, case: Case) -> str | None:
         """Return the joint, driver or grid of samples that has no counterpart here, or None."""
-        reason = Exudyn().unsupported(case)
-        if reason is not None:
-            return reason
-        for joint in case.mechanism.joints:
-            if isinstance(joint, joints.ConstantVelocity):
-                return (
-                    f"{joint}: Exudyn's own solvers have no object that ties two products, which"
-                    " the joint needs"
-                )
-            kept = _kept(joint)
-            if abs(kept) > NOTHING:
-                return (
-                    f"{joint} keeps a product at {kept:.3g}, at which Exudyn's own objects keep"
-                    " only zero; make its axes exact"
-                )
-        times = case.sweep.path.times
-        if len(times) > 1 and np.ptp(np.diff(times)) > EQUIDISTANT * np.abs(np.diff(times)).max():
-            return (
-                "samples are not equidistant in time, and Exudyn's steps are; give the sweep by"
-                " start, stop and steps"
-            )
-        if case.mechanism.couplers and not where_from(case.mechanism, case.sweep.path).stands:
-            return (
-                "turns of coupled joints are counted from the design, where this motion does not"
-                " begin"
-            )
-        return None
+        return Exudyn().unsupported(case) or limitation_of(case)
 
     def efforts(self) -> Mapping[str, Solver]:
         """Return the efforts by the tolerance of Newton, or by the number of steps."""
@@ -121,41 +87,32 @@ class Solver:
         """Return None: its loop is its own."""
 
     def build(self, case: Case) -> _Solved:
-        """Exudyn's system, and where it sets off."""
+        """Return Exudyn's system and its start."""
         return _Solved(case, self)
 
     def solve(self, model: _Solved, case: Case, tol: float) -> Trajectory:
-        """All samples that can be simulated; tol is not Exudyn's, see the settings."""
+        """Simulate all samples; Exudyn uses its own tolerance (see `settings`), not tol."""
         return simulated(case, model.start, model.run, model.details)
 
 
 def trapezoidal() -> Solver:
-    """Time steps, the only ones whose accelerations do not ring."""
+    """Return the time stepping of index 2, the only one whose accelerations do not oscillate."""
     return Solver("exudyn", "trapezoidal", steps=4)
 
 
 def generalized_alpha() -> Solver:
-    """Time steps that keep the constraints of the positions."""
+    """Return the time stepping that satisfies the position constraints."""
     return Solver("exudyn-alpha", "generalized alpha", steps=4)
 
 
 def static() -> Solver:
-    """Load steps, full Newton."""
+    """Return load steps with full Newton."""
     return Solver("exudyn-static", "static", modified=False)
 
 
 def static_modified() -> Solver:
-    """Load steps, modified Newton."""
+    """Return load steps with modified Newton."""
     return Solver("exudyn-static-modified", "static")
-
-
-def _kept(joint: joints.Joint) -> float:
-    """What the last row of a joint keeps [m or -]."""
-    if isinstance(joint, joints.Universal | joints.PerpendicularAxes):
-        return unit(joint.axes[0]) @ unit(joint.axes[1])
-    if isinstance(joint, joints.RevoluteSpherical):
-        return float(np.array([*unit(joint.axis)]) @ np.subtract(joint.points[1], joint.points[0]))
-    return 0.0
 
 
 class _Solved:
@@ -230,7 +187,7 @@ class _Solved:
         return settings
 
     def run(self, leg: Leg) -> Iterator[SimulatedPose]:
-        """The poses of a leg."""
+        """Yield the poses of a leg."""
         steps = self.how.steps
         n = (len(leg.samples) - 1) * steps
         # the times of all steps, those of the samples among them as they are
@@ -254,7 +211,7 @@ class _Solved:
             raise SimulationEndedError(f"Exudyn: {failed}")
 
     def set_off(self, leg: Leg, driven: Array) -> None:
-        """Exudyn's initial values."""
+        """Set Exudyn's initial values."""
         state, initial = self.mbs.systemData, self.exu.ConfigurationType.Initial
         n = self.of.coordinates
         state.SetODE2Coordinates(self.start.configuration[:n], initial)
@@ -266,7 +223,7 @@ class _Solved:
             )
 
     def advance(self, steps: int, duration: float) -> None:
-        """Let Exudyn go on to the end of the leg."""
+        """Run Exudyn's solver to the end of the leg."""
         if self.how.kind == "static":
             static = self.settings.staticSolver
             static.numberOfLoadSteps = static.loadStepDuration = steps
@@ -284,9 +241,7 @@ class _Solved:
             self.mbs.SolveDynamic(self.settings, solverType=solver, showHints=False)
 
     def poses(self, driven: Array) -> Iterator[SimulatedPose]:
-        """What Exudyn has stored, sample by sample; the residual is that of the last one, where
-        drift is largest.
-        """
+        """Yield the stored samples, all with the residual of the last, the one of largest drift."""
         steps = self.how.steps
         stored = [[self.stored(sensor)[::steps] for sensor in sensors] for sensors in self.sensors]
         state = np.hstack([self.stored(sensor) for sensor in self.nodes])[::steps]
@@ -306,5 +261,5 @@ class _Solved:
             yield SimulatedPose(points[:, k], residual, steps if k else 0)
 
     def stored(self, sensor: int) -> Array:
-        """All that a sensor has stored, without the times."""
+        """Return the stored values of a sensor without the times, shape (steps + 1, values)."""
         return np.array(self.mbs.GetSensorStoredData(sensor))[:, 1:]

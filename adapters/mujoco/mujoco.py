@@ -1,7 +1,7 @@
 """MuJoCo in projection mode: its tree kinematics and its equality constraints, solved by the Newton
 walk of `projection`.
 
-What joints and drivers become is in `mujoco_spec`.
+`spec` has the elements for joints and drivers.
 
 MuJoCo's time stepping treats equalities as soft, so it is not used: position is a root of
 `efc_pos`, velocity and acceleration follow from `efc_J` and its rate. MuJoCo puts that rate into
@@ -39,7 +39,7 @@ class MuJoCo(ProjectionEngine):
 
     @property
     def described(self) -> Mapping[str, Any]:
-        """What of MuJoCo's equalities is used, and how."""
+        """The quantities of MuJoCo's equalities in use."""
         return {
             "residual": (
                 "efc_pos: units of length; angles: sin(angle/2) of welds, rad of joints; drivers:"
@@ -55,13 +55,13 @@ class MuJoCo(ProjectionEngine):
         }
 
     def build(self, case: Case) -> MuJoCoModel:
-        """The compiled model and its rows."""
+        """Return the compiled model and its rows."""
         model = MuJoCoModel(mujoco(), in_own_frame(case))
         model.m.eq_solref[:] = 0.0  # no spring and no damper: aref is minus Jdot v, to the last bit
         return model
 
     def floor(self, case: Case) -> Floor:
-        """Bound it by `mj_kinematics` and what else a pose takes."""
+        """Return the floor from `mj_kinematics` and the other calls of a pose."""
         mj = mujoco()
         model = self.build(case)
         trajectory = self.solve(model, case, 1e-12)
@@ -81,7 +81,7 @@ class MuJoCo(ProjectionEngine):
 
 
 def mujoco() -> Any:
-    """The simulator, imported when it is first asked for."""
+    """Return the simulator, imported at the first call."""
     return importlib.import_module("mujoco")
 
 

@@ -1,7 +1,7 @@
 """A mechanism as a model specification of MuJoCo; private to its adapter.
 
 Every body frame lies on the global frame at design, so the geometry of a case enters as it stands.
-A joint is a chain of MuJoCo joints (see `chains`). In the spanning tree it carries one of its
+A joint is a chain of MuJoCo joints (see `joint_chains`). In the spanning tree it carries one of its
 bodies on the other. A cut joint carries an auxiliary body on its first body and closes its loop by
 one equality constraint with its second: a connect where the chain ends in a ball, else a weld; a
 distance is a tendon over two sites. These rows have full rank where the joint's own rows have; two
@@ -28,7 +28,7 @@ else.
 
 
 def coordinate(joint: str, name: str) -> str:
-    """The name in the model of a joint's coordinate."""
+    """Return the name in the model of a joint's coordinate."""
     return f"{joint} {name}"
 
 
@@ -86,26 +86,25 @@ class Sketch:
             )
 
     def body(self, parent: Any) -> Any:
-        """A body on its parent's frame. Mass and inertia do not enter kinematics, but MuJoCo wants
-        them positive definite.
+        """Add a body on its parent's frame.
+
+        Mass and inertia do not enter kinematics, but MuJoCo wants them positive definite.
         """
         body = parent.add_body()
         body.mass, body.inertia, body.explicitinertial = 1.0, [1.0, 1.0, 1.0], True
         return body
 
     def site(self, body: Any, position: Sequence[float]) -> Any:
-        """A new site of a body."""
+        """Add a site to a body."""
         return body.add_site(name=str(len(self.spec.sites)), pos=list(position))
 
     def near(self, joint: Joint) -> Vector:
-        """The joint's point, or where it has none, the origin of a moving body, which serves as
-        well.
-        """
+        """Return the joint's point, or else the origin of a moving body [m]."""
         moving = self.mechanism.body(joint.i if self.mechanism.is_fixed(joint.j) else joint.j)
         return getattr(joint, "point", None) or moving.origin
 
     def links(self, joint: Joint) -> list[Link]:
-        """A joint's chain, from its first body to its second."""
+        """Return a joint's chain, from its first body to its second."""
         return CHAINS[type(joint)](joint, self.near(joint))
 
     def attach(self, body: Any, links: Sequence[Link], joint: str = "") -> None:

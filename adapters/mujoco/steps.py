@@ -63,7 +63,7 @@ class Stepping:
 
     @property
     def settings(self) -> Mapping[str, Any]:
-        """Everything that is not as MuJoCo has it."""
+        """Settings that differ from MuJoCo's defaults."""
         own: Mapping[str, Mapping[str, Any]] = {
             "default": {"timestep": f"at most 0.002 s / {self.effort}"},
             "stiff": {
@@ -89,7 +89,7 @@ class Stepping:
         return {**own[self.kind], **shared, "options": "no gravity, no contact, no autoreset"}
 
     def version(self) -> str | None:
-        """MuJoCo's version, or None where it cannot be imported."""
+        """Return MuJoCo's version, or None if the import fails."""
         return MuJoCo().version()
 
     def unsupported(self, case: Case) -> str | None:
@@ -106,7 +106,7 @@ class Stepping:
         """Return None: its steps are its own."""
 
     def build(self, case: Case) -> _Steps:
-        """The compiled model, its settings and where it sets off."""
+        """Return the compiled model with its settings and start."""
         return _Steps(mujoco(), case, self)
 
     def solve(self, model: _Steps, case: Case, tol: float) -> Trajectory:
@@ -118,17 +118,17 @@ class Stepping:
 
 
 def stiff() -> Stepping:
-    """Time stepping at its most accurate."""
+    """Return the most accurate time stepping."""
     return Stepping("mujoco", "stiff", 4)
 
 
 def default() -> Stepping:
-    """Time stepping as it comes."""
+    """Return the time stepping with default settings."""
     return Stepping("mujoco-default", "default", 1)
 
 
 def projecting() -> Stepping:
-    """Time stepping made to project."""
+    """Return the time stepping that projects."""
     return Stepping("mujoco-projecting", "projecting", 5)
 
 
@@ -157,7 +157,7 @@ class _Steps:
         self.twist = np.zeros(6)  # angular over linear, global axes
 
     def count(self, gap: float) -> int:
-        """Steps over a gap between samples [s]."""
+        """Return the number of steps over a gap between samples [s]."""
         return self.how.effort * (
             math.ceil(gap / self.longest) if self.how.kind == "default" else 1
         )
@@ -173,7 +173,7 @@ class _Steps:
             self.mj.set_mju_user_warning(before)
 
     def run(self, leg: Leg) -> Iterator[SimulatedPose]:
-        """The poses of a leg."""
+        """Yield the poses of a leg."""
         mj, m, d = self.mj, self.m, self.of.d
         mj.mj_resetData(m, d)
         d.qpos[:], d.qvel[:] = self.start.configuration, leg.sign * self.start.v
@@ -214,13 +214,13 @@ class _Steps:
             self.mj.mj_step(self.m, self.of.d)
 
     def set(self, c: Array, c_t: Array, c_tt: Array) -> None:
-        """Put the driven coordinates where they belong."""
+        """Set the driven coordinates to their values, rates and forces."""
         d = self.of.d
         d.qpos[self.q], d.qvel[self.v] = self.sign * c, self.sign * c_t
         d.qfrc_applied[self.v] = ARMATURE * self.sign * c_tt
 
     def pose(self, driven: Array, steps: int) -> SimulatedPose:
-        """What MuJoCo says of this moment."""
+        """Return the pose at the present state, steps counted from the sample before."""
         mj, m, d = self.mj, self.m, self.of.d
         self.set(*driven)
         points = np.full((3, len(self.of.watched), 3), np.nan)

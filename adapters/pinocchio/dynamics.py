@@ -2,9 +2,9 @@
 Runge-Kutta method of fourth order.
 
 Pinocchio has no time stepping of its own; the loop over the steps is ours. Every joint is a chain
-of slides, hinges and balls (see `chains`), every loop is closed by one rigid constraint, of a point
-or of a whole frame. What is driven has an armature beside which all that moves is nothing, and is
-set to its value, rate and force at every step.
+of slides, hinges and balls (see `joint_chains`), every loop is closed by one rigid
+constraint, of a point or of a whole frame. Driven coordinates have an armature far above all moving
+masses, and are set to their values, rates and forces at every step.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class Dynamics:
 
     @property
     def settings(self) -> Mapping[str, Any]:
-        """How it is stepped."""
+        """Integrator, stabilisation and steps."""
         return {
             "acceleration": "constraintDynamics",
             "integrator": "Runge-Kutta, fourth order, of the adapter",
@@ -103,7 +103,7 @@ class Dynamics:
         """Return None: its steps are Python's; a bound would be that of projection."""
 
     def build(self, case: Case) -> _Model:
-        """Tree and constraints, and where it sets off."""
+        """Return tree, constraints and start."""
         return _Model(
             importlib.import_module("pinocchio"),
             replace(case, mechanism=jointed(case.mechanism)),
@@ -215,7 +215,7 @@ class _Model(PinocchioModel):
         )
 
     def run(self, leg: Leg) -> Iterator[SimulatedPose]:
-        """The poses of a leg."""
+        """Yield the poses of a leg."""
         q, v = self.start.configuration, leg.sign * self.start.v
         yield self.pose(*self.put(q, v, leg.drive(leg.times[:1])[..., 0]), 0)
         for t, until in pairwise(leg.times.tolist()):
@@ -232,16 +232,14 @@ class _Model(PinocchioModel):
             yield self.pose(*self.put(q, v, driven[..., -1]), self.steps)
 
     def stabilise(self, h: float) -> None:
-        """Let gaps close critically damped."""
+        """Set the stabilisation, critically damped, for steps of length h [s]."""
         rate = 1.0 / (DECAY * h)
         for constraint in self.constraints:
             parameters = constraint.m_baumgarte_parameters
             parameters.Kp, parameters.Kd = rate**2, 2.0 * rate
 
     def put(self, q: Array, v: Array, driven: Array) -> tuple[Array, Array, Array]:
-        """The state with the driven coordinates where they belong, and the force that keeps them
-        going.
-        """
+        """Return q, v and tau with the driven coordinates at their values, rates and forces."""
         q, v, tau = q.copy(), v.copy(), np.zeros(self.model.nv)
         q[self.driven_q], v[self.driven_v], tau[self.driven_v] = (
             self.sign * driven * np.array([[1.0], [1.0], [ARMATURE]])
@@ -277,7 +275,7 @@ class _Model(PinocchioModel):
         )
 
     def pose(self, q: Array, v: Array, tau: Array, steps: int) -> SimulatedPose:
-        """What Pinocchio says of this moment."""
+        """Return the pose at this state, steps counted from the sample before."""
         self.q = q
         a = self.acceleration(q, v, tau)
         self.pin.framesForwardKinematics(self.model, self.data, q)

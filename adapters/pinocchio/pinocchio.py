@@ -3,14 +3,14 @@ code for Pinocchio 3.9 and 4.
 
 Pinocchio's own constraint models are left alone: their signatures and the moment their data is
 fresh changed between 3 and 4, the axes of their rows depend on the kind, and none is a distance.
-What is used means the same in both: placement, Jacobian, velocity and classical acceleration of a
-frame, of which `closures` makes the rows of any joint.
+The adapter uses quantities with the same meaning in both: placement, Jacobian, velocity and
+classical acceleration of a frame. `loop_closures` makes the rows of any joint of them.
 """
 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from functools import partial
 from typing import Any
 
@@ -18,21 +18,8 @@ import numpy as np
 
 from ...core.case.case import Case
 from ...core.harness.engine import Floor
-from ...core.joints import (
-    AxialJoint,
-    ConstantVelocity,
-    Cylindrical,
-    Fixed,
-    Joint,
-    OrientationLock,
-    Planar,
-    Revolute,
-    Screw,
-    Spherical,
-    Translational,
-    Universal,
-)
-from ...core.joints.base import triad, unit
+from ...core.joints import AxialJoint, ConstantVelocity, Fixed, Joint
+from ...core.joints.base import unit
 from ...core.mechanism.drivers import JointDriver, PointCoordinate
 from ...core.mechanism.mechanism import GROUND, Mechanism, Vector
 from ...core.mechanism.topology import Branch, SpanningTree, spanning_tree
@@ -43,6 +30,7 @@ from ..shared.length_scaling import in_own_frame
 from ..shared.loop_closures import CLOSURES, ends_of, twistless
 from ..shared.projection_engine import ProjectionEngine
 from .rows import DrivenPoint, Frame, Linear
+from .tree_joints import TREE_JOINTS
 
 
 class Pinocchio(ProjectionEngine):
@@ -52,7 +40,7 @@ class Pinocchio(ProjectionEngine):
 
     @property
     def described(self) -> Mapping[str, Any]:
-        """What Pinocchio's tree is, and what closes the loops."""
+        """Coordinates of Pinocchio's tree and the equations of its loops."""
         return {
             "coordinates": (
                 "spanning tree of Pinocchio joints; a body that no joint carries is a free flyer"
@@ -61,17 +49,18 @@ class Pinocchio(ProjectionEngine):
         }
 
     def version_of(self, simulator: Any) -> str | None:
-        """PyPI's package "pinocchio" is something else and has no Model; the simulator's is
-        "pin".
+        """Return the version; None for PyPI's unrelated "pinocchio", which has no Model.
+
+        The simulator's package on PyPI is "pin".
         """
         return super().version_of(simulator) if hasattr(simulator, "Model") else None
 
     def build(self, case: Case) -> PinocchioModel:
-        """Tree, frames and conditions of the case, at the design position."""
+        """Return tree, frames and conditions of the case, at the design position."""
         return PinocchioModel(importlib.import_module("pinocchio"), in_own_frame(case))
 
     def floor(self, case: Case) -> Floor:
-        """Bound it by the Jacobians and placements of joints and frames."""
+        """Return the floor from the Jacobians and placements of joints and frames."""
         model = self.build(case)
         solved = self.solve(model, case, 1e-12)
         pin, least = model.pin, model.pin.Model()
@@ -103,35 +92,6 @@ class Pinocchio(ProjectionEngine):
         }
         rates = {"forwardKinematics": calls(pin.forwardKinematics, model.q, zero, zero, times=2)}
         return floor_of(self, solved, model.model.nv, pose, rates)
-
-
-# Axes are normalised, because Pinocchio takes others without a word and then shears the body.
-def _turns(pin: Any, *axes: Iterable[float]) -> list[Any]:
-    return [pin.JointModelRevoluteUnaligned(_unit(axis)) for axis in axes]
-
-
-def _slides(pin: Any, *axes: Iterable[float]) -> list[Any]:
-    return [pin.JointModelPrismaticUnaligned(_unit(axis)) for axis in axes]
-
-
-_TREE: dict[type[Joint], Callable[[Any, Any], Sequence[Any]]] = {
-    Spherical: lambda pin, joint: [pin.JointModelSpherical()],
-    Revolute: lambda pin, joint: _turns(pin, joint.axis),
-    Translational: lambda pin, joint: _slides(pin, joint.axis),
-    Cylindrical: lambda pin, joint: _turns(pin, joint.axis) + _slides(pin, joint.axis),
-    # its relation makes a row
-    Screw: lambda pin, joint: _turns(pin, joint.axis) + _slides(pin, joint.axis),
-    # two hinges keep the design angle of the cross where a table has rounded its right angle
-    Universal: lambda pin, joint: _turns(pin, *joint.axes),
-    # a row keeps it from twisting
-    ConstantVelocity: lambda pin, joint: [pin.JointModelSpherical()],
-    Planar: lambda pin, joint: _slides(pin, *triad(joint.axis)[:2]) + _turns(pin, joint.axis),
-    OrientationLock: lambda pin, joint: [pin.JointModelTranslation()],
-    Fixed: lambda pin, joint: [],
-}
-"""Pinocchio's joints that make a joint, from first body to second, one a freedom of an axial joint;
-other types are always cut.
-"""
 
 
 class PinocchioModel:
@@ -180,7 +140,9 @@ class PinocchioModel:
                 point = mechanism.point(driver.point)
                 frame = self._add_frame(self.carrier[point.body], point.position)
                 self.conditions.append(
-                    DrivenPoint(frame, _unit(driver.direction), np.array(point.position))
+                    DrivenPoint(
+                        frame, np.array([*unit(driver.direction)]), np.array(point.position)
+                    )
                 )
             elif isinstance(driver, JointDriver):
                 self.conditions.append(self._linear((driver.joint, driver.freedom, 1.0)))
@@ -208,7 +170,7 @@ class PinocchioModel:
     def _close(
         self, joint: Joint, i: int, j: int, ends: tuple[Vector, Vector], named: bool
     ) -> None:
-        """Rows for a joint that the tree has not, between what joints i and j carry."""
+        """Add the rows of a cut joint, between the bodies of Pinocchio's joints i and j."""
         closure, copied = CLOSURES[type(joint)], ""
         if named:
             # what is driven or coupled must be a coordinate, which counts the turns: it moves a
@@ -222,10 +184,11 @@ class PinocchioModel:
         self.conditions += closure.conditions(joint, *map(self._add_frame, (i, j), ends))
 
     def _add_chain(self, at: int, joint: Joint, P: Vector, sign: int) -> int:
-        """The number of the last of the joints that make a joint, from its first body on or (sign
-        -1) from its second.
+        """Add the joints that make a joint; return the number of the last.
+
+        The chain begins at the first body, or with sign -1 at the second.
         """
-        chain = list(enumerate(_TREE[type(joint)](self.pin, joint)))
+        chain = list(enumerate(TREE_JOINTS[type(joint)](self.pin, joint)))
         for k, each in chain[::sign]:
             at = self._add_joint(at, each, P)
             if isinstance(joint, AxialJoint):
@@ -237,7 +200,7 @@ class PinocchioModel:
         return at
 
     def _linear(self, *terms: tuple[str, str, float]) -> Linear:
-        """The weighted sum of coordinates, each given by joint, freedom and weight."""
+        """Return the weighted sum of coordinates, each given by joint, freedom and weight."""
         moved = [(*self.coordinates[joint, freedom], weight) for joint, freedom, weight in terms]
         joints = [self.model.joints[at] for at, _, _ in moved]
         weights = np.array([sign * weight for _, sign, weight in moved])
@@ -246,13 +209,13 @@ class PinocchioModel:
         )
 
     def _add_joint(self, parent: int, joint: Any, at: Vector) -> int:
-        """The number of a new joint at that point, global at design."""
+        """Add a joint at a point, global at design [m]; return its number."""
         placement = self.pin.SE3(np.eye(3), np.array(at) - self.origin[parent])
         self.origin.append(np.array(at))
         return self.model.addJoint(parent, joint, placement, f"joint {self.model.njoints}")
 
     def _add_frame(self, joint: int, at: Vector) -> Frame:
-        """A new frame on what the joint carries, at that point, global at design."""
+        """Add a frame to the body of a joint, at a point, global at design [m]."""
         placement = self.pin.SE3(np.eye(3), np.array(at) - self.origin[joint])
         # numbered, because a second frame of one name would silently be the first one
         name = f"frame {self.model.nframes}"
@@ -307,7 +270,3 @@ class PinocchioModel:
         return [
             (frame.position, frame.velocity[:3], frame.acceleration[:3]) for frame in self.wanted
         ]
-
-
-def _unit(a: Iterable[float]) -> Array:
-    return np.array([*unit(tuple(a))])

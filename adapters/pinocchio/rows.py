@@ -1,4 +1,4 @@
-"""What Pinocchio says of frames and coordinates, as rows; private to its adapter."""
+"""Frames and coordinates of Pinocchio as rows; private to its adapter."""
 
 from __future__ import annotations
 
@@ -11,9 +11,7 @@ from ...core.trajectory import Array
 
 
 class Moved(Protocol):
-    """A model of Pinocchio and its data in the current configuration q; axes: those in which frames
-    are told.
-    """
+    """A model of Pinocchio and its data in the current configuration q; axes: of its frames."""
 
     pin: Any
     model: Any
@@ -24,7 +22,7 @@ class Moved(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """A frame of the model, which it reads as last computed; see `closures.Frame`."""
+    """A frame of the model, as last computed; see `frame_constraints.Frame`."""
 
     of: Moved
     index: int

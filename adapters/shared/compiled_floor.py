@@ -1,4 +1,4 @@
-"""A simulator's floor: what its own compiled code needs for a sample, without the Python around it.
+"""A simulator's floor: the time of its compiled code for a sample, without the Python around it.
 
 Each call that the projection mode makes into the simulator is timed on the case's model and on the
 smallest model there is; the difference is the compiled work, the rest is Python and its binding. A
@@ -34,7 +34,7 @@ def floor_of(
     pose: Mapping[str, tuple[Call, Call, int]],
     rates: Mapping[str, tuple[Call, Call, int]],
 ) -> Floor:
-    """The floor of Newton's method with as many iterations as it took.
+    """Return the floor of Newton's method with the iterations of a solved trajectory.
 
     Args:
         pose: calls for the residual and Jacobian of a pose: by name, on the case's model, on the
@@ -67,6 +67,6 @@ def floor_of(
 
 
 def microseconds(call: Call, least: Call) -> float:
-    """What a call takes beyond that on the smallest model [us]."""
+    """Return the time of a call less that on the smallest model [us]."""
     fastest = [min(timeit.repeat(each, number=CALLS, repeat=ROUNDS)) for each in (call, least)]
     return max(0.0, 1e6 * (fastest[0] - fastest[1]) / CALLS)

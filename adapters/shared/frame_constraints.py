@@ -1,21 +1,23 @@
-"""Conditions between the bodies of a simulator: equations with their Jacobian and its rate, from
-what it says of two frames.
+"""Conditions between two frames of a simulator: equations with their Jacobian and its rate.
 
-The frames sit at points of two bodies, with axes that are global at design. From what a simulator
-says of them come two kinds of moving vectors (w, alpha: angular velocity and acceleration of the
-body; J_w: its angular Jacobian)
+The frames sit at points of two bodies, with axes that are global at design. The motion that a
+simulator reports for them gives two kinds of moving vectors (w, alpha: angular velocity and
+acceleration of the body; J_w: its angular Jacobian)
 
-                         vector x      Jacobian J_x     rate x'        bias b_x = x'' - J_x (coordinates)''
-    direction of a body  A a0          -skew(x) J_w     w × x          alpha × x + w × (w × x)
-    point i to point j   p_j - p_i     J_j - J_i        v_j - v_i      a_j - a_i
+                         vector x     Jacobian J_x    rate x'      bias b_x = x'' - J_x (coord.)''
+    direction of a body  A a0         -skew(x) J_w    w × x        alpha × x + w × (w × x)
+    point i to point j   p_j - p_i    J_j - J_i       v_j - v_i    a_j - a_i
 
 and conditions on them
 
-    x = 0               row  J_x                       bias b_x
-    x . y = c           row  y . J_x + x . J_y         bias y . b_x + x . b_y + 2 x' . y'
-    |x| = L             row  u . J_x,  u = x / |x|     bias u . b_x + x' . x' / |x|      with u . x' = 0 already
+    x = 0               row  J_x                     bias b_x
+    x . y = c           row  y . J_x + x . J_y       bias y . b_x + x . b_y + 2 x' . y'
+    |x| = L             row  u . J_x                 bias u . b_x + x' . x' / |x|
     x . y - u . v = 0   the difference of two such rows
-    h . x - p turn = 0  row of h . x - p h . (J_wj - J_wi)     bias of h . x - p h . (alpha_j - alpha_i)
+    h . x - p turn = 0  row of h . x - p h . (J_wj - J_wi)
+                        bias of h . x - p h . (alpha_j - alpha_i)
+
+In the row of |x| = L, u = x / |x|, and u . x' = 0 already.
 """
 
 from __future__ import annotations
@@ -36,7 +38,7 @@ class Frame(Protocol):
 
     @property
     def position(self) -> Array:
-        """Where the point is [m], shape (3,)."""
+        """The position of the point [m], shape (3,)."""
         ...
 
     @property
@@ -66,26 +68,26 @@ class Vector(Protocol):
     """A vector that moves with the mechanism."""
 
     def placed(self) -> tuple[Array, Array]:
-        """x and J_x, shapes (3,) and (3, unknowns)."""
+        """Return x and J_x, shapes (3,) and (3, unknowns)."""
         ...
 
     def moving(self) -> tuple[Array, Array, Array]:
-        """x, its rate and its bias, each of shape (3,)."""
+        """Return x, its rate and its bias, each of shape (3,)."""
         ...
 
 
 class Condition(Protocol):
-    """n equations; zero where they hold."""
+    """n equations; their residuals are zero when they hold."""
 
     @property
     def n(self) -> int: ...
 
     def rows(self) -> tuple[Any, Array]:
-        """Residuals [m or -], n of them, and their Jacobian, n rows."""
+        """Return n residuals [m or -] and their Jacobian, shape (n, unknowns)."""
         ...
 
     def bias(self) -> Any:
-        """Jdot v, n numbers."""
+        """Return Jdot v, n numbers."""
         ...
 
 
@@ -227,6 +229,6 @@ class Thread:
 
 
 def _skew(a: Array) -> Array:
-    """The matrix that multiplies by a from the left in a vector product."""
+    """Return the matrix of the vector product a × , shape (3, 3)."""
     x, y, z = a.tolist()
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

@@ -95,7 +95,7 @@ def _bends(joint: ConstantVelocity, P: Vector) -> list[Link]:
 
 
 def free(P: Vector) -> list[Link]:
-    """The chain of a body that no joint carries; it turns about P."""
+    """Return the chain of a body without a joint; it turns about P."""
     return [*_shift(P), _ball(P)]
 
 
@@ -127,8 +127,7 @@ distance is no chain.
 
 
 def relations(joint: Joint) -> list[list[tuple[str, str, float]]]:
-    """The linear relations between the coordinates of a joint's links, each as joint, freedom and
-    weight of its terms.
+    """Return the linear relations between a joint's coordinates: joint, freedom, weight of terms.
 
     The weighted sum of the terms stays zero, as that of `Coupler.terms` does.
     """
@@ -157,8 +156,7 @@ def dependence(terms: Iterable[tuple[Coordinate, float]]) -> tuple[Coordinate, C
 
 
 def end_of_loop(links: Sequence[Link], P: Vector) -> tuple[Sequence[Link], Vector, bool]:
-    """What closes a loop by a joint's chain: the links that remain, and the point where the last of
-    their bodies is tied.
+    """Return the links of a chain that closes a loop, and the point that ties its last body.
 
     Returns:
         The links, the point (P, or the centre of a ball), and whether the bodies may turn about it:

@@ -26,8 +26,9 @@ ALONG = 0.3
 
 
 def jointed(mechanism: Mechanism) -> Mechanism:
-    """The mechanism with joint drivers only and without rods; rods of another length than at design
-    stay.
+    """Return the mechanism with joint drivers only and without rods.
+
+    Rods whose length differs from the design stay.
     """
     bodies, joints, drivers = list(mechanism.bodies), list[Joint](), list[Driver]()
     for joint in mechanism.joints:
@@ -57,7 +58,7 @@ def jointed(mechanism: Mechanism) -> Mechanism:
 
 
 def fits(rod: Distance) -> bool:
-    """Whether a rod has its length at design."""
+    """Return whether a rod has its length at design."""
     return abs(rod.rod_length - rod.design_distance) <= SAME_LENGTH * rod.design_distance
 
 

@@ -1,5 +1,4 @@
-"""The frame that projection gives a simulator its mechanism in: a unit of length near the
-mechanism's size, an origin beside it.
+"""Frame of a mechanism in projection: a length unit near its size, an origin beside it.
 
 Simulators know metres and their origin only. A residual of 1e-12 m is a millionth of a mechanism of
 a micrometre, and ten thousand kilometres from the origin no residual is that small: they stopped
@@ -34,16 +33,16 @@ class OwnFrame:
     origin: Vector
 
     def there(self, position: Sequence[float]) -> Vector:
-        """A global position [m] in this frame [units]."""
+        """Return a global position [m] in this frame [units]."""
         x, y, z = ((x - o) / self.unit for x, o in zip(position, self.origin, strict=True))
         return x, y, z
 
     def units(self, length: float) -> float:
-        """A length [m] in units."""
+        """Return a length [m] in units."""
         return length / self.unit
 
     def back(self, position: Array) -> Array:
-        """Positions in this frame [units], shape (..., 3), as global ones [m]."""
+        """Return positions in this frame [units], shape (..., 3), as global ones [m]."""
         return self.unit * position + np.array(self.origin)
 
 
@@ -51,8 +50,9 @@ GLOBAL = OwnFrame(1.0, (0.0, 0.0, 0.0))
 
 
 def own_frame(case: Case) -> OwnFrame:
-    """The frame of a case; about the global origin where the mechanism's middle is within half a
-    unit of it along every axis.
+    """Return the frame of a case.
+
+    The origin is the global one if the mechanism's middle is within half a unit of it on each axis.
     """
     mechanism, unit = case.mechanism, unit_near(size(case))
     positions = [at for joint in mechanism.joints for at in joint.points_on()] + [
@@ -66,7 +66,7 @@ def own_frame(case: Case) -> OwnFrame:
 
 
 def in_own_frame(case: Case) -> Case:
-    """The case, its mechanism in its own frame; what drives it and what is compared stay in SI."""
+    """Return the case with its mechanism in its own frame; drivers and outputs stay in SI."""
     mechanism, frame = case.mechanism, own_frame(case)
     ways: dict[Kind, Any] = {Kind.POSITION: frame.there, Kind.LENGTH: frame.units}
     return replace(

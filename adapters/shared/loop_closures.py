@@ -52,10 +52,7 @@ from .frame_constraints import (
 
 @dataclass(frozen=True)
 class Closure:
-    """How a joint type is cut: what its rows say, and the rows.
-
-    The frames are where `ends_of` says.
-    """
+    """The rows of a cut joint type and their description; `ends_of` gives the frames' points."""
 
     text: str
     conditions: Callable[[Any, Frame, Frame], Sequence[Condition]]
@@ -101,8 +98,9 @@ def _link(joint: Any, i: Frame, j: Frame) -> list[Condition]:
 
 
 def twistless(joint: Any, i: Frame, j: Frame) -> list[Condition]:
-    """The row of a constant-velocity joint about its shafts: with f × g along each of them, f_i .
-    g_j = g_i . f_j.
+    """Return the row of a constant-velocity joint about its shafts.
+
+    With f × g along each shaft, f_i . g_j = g_i . f_j.
     """
     f, g, h = triad(joint.axes[0])
     # the shortest rotation from h to the other shaft acts on what is normal to h as the reflection
@@ -169,7 +167,7 @@ CLOSURES: dict[type[Joint], Closure] = {
 
 
 def ends_of(mechanism: Mechanism, joint: Joint) -> tuple[Vector, Vector]:
-    """Where the frames of a joint are on its first and second body, global at design [m]."""
+    """Return the points of a joint's frames on its first and second body, global at design [m]."""
     # a fixed joint may come without a point and some types have none: any serves, the origin of a
     # moving body is near
     P = vars(joint).get("point") or next(

@@ -1,10 +1,9 @@
-"""Poses of bodies as displacements from design, and the coordinates that a chain of links has in
-them.
+"""Poses of bodies as displacements from design, and the coordinates of chains of links.
 
-A displacement takes every point of a body from where it is at design to where it is now, x -> q x +
-s, in global axes. So a chain of links (see `chains`) displaces its second body against its first by
-the product of its links' displacements, and backwards its coordinates are those of the forward
-chain with other signs.
+A displacement takes every point of a body from its design position to its present one, x -> q x +
+s, in global axes. So a chain of links (see `joint_chains`) displaces its second body against its
+first by the product of its links' displacements, and backwards its coordinates are those of the
+forward chain with other signs.
 """
 
 from __future__ import annotations
@@ -23,45 +22,45 @@ from .joint_chains import Link
 
 
 def rotated(q: Quat, a: Vec3) -> Vec3:
-    """The vector a turned by the unit quaternion q."""
+    """Return the vector a turned by the unit quaternion q."""
     return (q * Quat(0.0, a) * q.conjugate()).e
 
 
 @dataclass(frozen=True)
 class Displacement:
-    """What has become of a body since design: x -> turn x + shift, global [m]; scalars are of shape
-    (n,), or the same for all.
+    """Displacement of a body since design: x -> turn x + shift, global [m].
+
+    Scalars are of shape (n,), or the same for all.
     """
 
     turn: Quat = IDENTITY
     shift: Vec3 = ZERO
 
     def of(self, P: Vec3) -> Vec3:
-        """Where a point of the body is now, from where it is at design."""
+        """Return the present position of a point of the body from its design position P [m]."""
         return rotated(self.turn, P) + self.shift
 
     def relative_to(self, other: Displacement) -> Displacement:
-        """This displacement as a body with the other one sees it: what follows the other to make
-        this one's.
-        """
+        """Return this displacement relative to another: applied after it, it gives this one."""
         back = other.turn.conjugate()
         return Displacement(back * self.turn, rotated(back, self.shift - other.shift))
 
     def then_about(self, axis: Vec3, P: Vec3, angle: Scalar) -> Displacement:
-        """What a hinge adds that this displacement carries along; its unit axis and a point on it
-        are those at design.
+        """Return this displacement followed by a hinge on it.
+
+        The unit axis and the point P on it are those at design.
         """
         turn = self.turn * about(axis, angle)
         return Displacement(turn, self.of(P) - rotated(turn, P))
 
 
 def frame_along(axis: Sequence[float], column: int) -> Array:
-    """A right-handed frame that has the axis, made a unit vector, in this column; shape (3, 3)."""
+    """Return a right-handed frame with the unit vector of the axis in a column, shape (3, 3)."""
     return np.roll(np.column_stack([tuple(e) for e in triad(axis)]), column - 2, axis=1)
 
 
 def middle(mechanism: Mechanism, body: Body) -> Array:
-    """The mean of a body's joint points, or its origin where it has none; global at design [m],
+    """Return the mean of a body's joint points, or its origin without any; global at design [m],
     shape (3,).
     """
     points = [
@@ -74,7 +73,7 @@ def middle(mechanism: Mechanism, body: Body) -> Array:
 
 
 def attitude(body: Body) -> Quat:
-    """The rotation of a body's frame at design, body -> global."""
+    """Return the rotation of a body's frame at design, body -> global."""
     return quat(body.euler_parameters)
 
 
@@ -132,7 +131,7 @@ def link_motions(
 def link_coordinates(
     joint: Joint, links: Sequence[Link], placed: Mapping[str, Displacement]
 ) -> list[tuple[float, ...]]:
-    """The same at the end of the way."""
+    """Return the coordinates of a joint's links at the last sample."""
     return [
         tuple(float(each[-1]) for each in coordinate)
         for coordinate in link_motions(joint, links, placed)
@@ -140,7 +139,7 @@ def link_coordinates(
 
 
 def backwards(link: Link, value: tuple[float, ...]) -> tuple[float, ...]:
-    """The coordinate of the same link where the second body of a chain carries the first."""
+    """Return the coordinate of a link for the reversed chain, from second body to first."""
     if link.move != "ball":
         return (-value[0],)
     e0, *e = value
@@ -148,12 +147,12 @@ def backwards(link: Link, value: tuple[float, ...]) -> tuple[float, ...]:
 
 
 def about(axis: Vec3, angle: Scalar) -> Quat:
-    """The turn about a unit axis [rad]."""
+    """Return the rotation about a unit axis by an angle [rad]."""
     return Quat(np.cos(0.5 * angle), np.sin(0.5 * angle) * axis)
 
 
 def _turns(axes: Sequence[Vec3], q: Quat) -> list[Array]:
-    """The angles of hinges, one after the other, that make up the rotation q."""
+    """Return the angles of successive hinges with the rotation q [rad]."""
     match axes:
         case []:
             return []
@@ -174,17 +173,17 @@ def _turns(axes: Sequence[Vec3], q: Quat) -> list[Array]:
 
 
 def _angle(axis: Vec3, a: Vec3, b: Vec3) -> Array:
-    """From a to b about the unit axis."""
+    """Return the angle from a to b about the unit axis [rad]."""
     across = a - (axis @ a) * axis
     return np.arctan2(cross(axis, across) @ b, across @ b)
 
 
 def local(body: Body, P: Sequence[float]) -> Vector:
-    """A point, global at design, in the frame of a body [m]."""
+    """Return a point, global at design, in the frame of a body [m]."""
     return direction(body, [*(vec(P) - vec(body.origin))])
 
 
 def direction(body: Body, a: Sequence[float]) -> Vector:
-    """A vector, global at design, in the axes of a body."""
+    """Return a vector, global at design, in the axes of a body."""
     x, y, z = rotated(attitude(body).conjugate(), vec(a))
     return x, y, z

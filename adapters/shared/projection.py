@@ -10,29 +10,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from ...core.case.case import Case, size
-from ...core.errors import SolveError
+from ...core.case.case import Case
 from ...core.joints import Joint
 from ...core.kinematics.compiled.motion_start import Start, by_ways, start_of
 from ...core.kinematics.formulation.acceptance_criteria import (
     LONGEST_TURN,
-    ROUNDING,
     continued,
     continuous,
     regular_between,
 )
 from ...core.mechanism.drivers import Driver
 from ...core.mechanism.motions import Path, outwards
-from ...core.trajectory import Array, PointMotion, Trajectory, largest_found
+from ...core.trajectory import PointMotion, Trajectory, largest_found
 from .length_scaling import GLOBAL, OwnFrame
+from .pose_solver import LOST, STUCK, PoseSolver, Sample
 from .projection_model import ProjectionModel
 
-MAX_ITERATIONS = 20
 # Newton steps of the efforts of a projection, after one tangent predictor; none is Euler's method.
 # None is as many as it takes.
 EFFORTS: Mapping[str, int | None] = {
@@ -45,9 +42,6 @@ EFFORTS: Mapping[str, int | None] = {
 # not a coarse grid. Change points that are missed by a part d of the size ask for steps of the root
 # of d; with 2^-10 those by 1e-8 were ends, or passed over.
 SMALLEST_STEP = 2.0**-20
-# Singular values below this part of the largest count as zero: far above round-off (1e-15), far
-# below a sound mechanism (1e-2).
-RANK_TOLERANCE = 1e-9
 # Where a singular value of the Jacobian may have been zero on the way, a step is shortened to this
 # part of the sample distance before it is believed. Beside a fold the motion turns round, and
 # another assembly goes straight on. A motion that really passes a singular pose passes it in such a
@@ -55,33 +49,14 @@ RANK_TOLERANCE = 1e-9
 # approached. Closer to a singular pose than the root of round-off, rounding would choose the
 # assembly.
 FOLD = 8.0 * SMALLEST_STEP
-# Least squares have arrived where a step is this short: no more is to be gained, and what is left
-# are rows that contradict others.
-ARRIVED = 1e-6
-
-
-@dataclass(frozen=True, eq=False)
-class _Sample:
-    """A solved pose: everything the walk needs to go on from there."""
-
-    t: float
-    c: Array  # of the drivers
-    saved: Any
-    x: Array
-    v: Array
-    a: Array
-    rows: tuple[Array, Array, Array]
-    jacobian: Array
-    corrected: Array
-    iterations: int
-    residual: float
 
 
 def without_counterpart(
     case: Case, simulator: str, joints: Collection[type[Joint]], drivers: Collection[type[Driver]]
 ) -> str | None:
-    """Say which joint or driver of the case is of none of these exact types, or None; a subclass
-    may mean something else.
+    """Return a message for the first joint or driver of none of these exact types, or None.
+
+    A subclass may mean something else.
     """
     for what, known in (
         *((joint, joints) for joint in case.mechanism.joints),
@@ -122,148 +97,11 @@ def solve_by_projection(
     )
 
 
-LOST = "Newton does not converge or jumps to another assembly"
-"""Why a motion ends, where nothing more is known."""
-STUCK = (
-    "drivers cannot move: it is a dead centre, or the motions that joints leave contradict each"
-    " other"
-)
-"""Why it ends where it closes."""
+class Walk(PoseSolver):
+    """The walk of a model along the motion of a case, sample by sample."""
 
-
-class Walk:
-    """The way of a model through a case, sample by sample."""
-
-    def __init__(
-        self,
-        model: ProjectionModel,
-        case: Case,
-        tol: float,
-        corrections: int | None = None,
-        frame: OwnFrame = GLOBAL,
-    ) -> None:
-        self.model, self.case, self.tol, self.corrections, self.frame = (
-            model,
-            case,
-            tol,
-            corrections,
-            frame,
-        )
-        self.drivers = [driver.name for driver in case.mechanism.drivers]
-        self.turns = np.array([driver.turns for driver in case.mechanism.drivers], dtype=np.bool_)
-        self.units = np.where(self.turns, 1.0, frame.unit)[:, None]
-        self.size = size(case) / frame.unit
-        self.lost = LOST  # why the last pose that was looked for was not found
-        model.reset()
-        model.residual(np.zeros(len(case.mechanism.drivers)))
-        jacobian = model.jacobian()
-        singular = np.linalg.svd(jacobian, compute_uv=False)
-        self.rank = int((singular > RANK_TOLERANCE * singular[0]).sum())
-        joints = jacobian[~np.any(model.driver_columns(), axis=1)]
-        self.dof = jacobian.shape[1] - (
-            int(np.linalg.matrix_rank(joints, tol=RANK_TOLERANCE * singular[0]))
-            if len(joints)
-            else 0
-        )
-        self.square = jacobian.shape == (self.rank, self.rank)
-        self.rows, self.unknowns = jacobian.shape
-        if self.rank < self.unknowns:
-            raise SolveError(
-                f"case {case.name!r}: {self.unknowns - self.rank} of the {self.unknowns}"
-                " coordinates of the simulator's model are left free by joints and drivers at the"
-                " design position; add a driver, or join what moves freely; if their number is"
-                " right a driver does not move it there (a lock-up): give the design in another"
-                " pose"
-            )
-
-    def linear(self, A: Array, b: Array) -> Array:
-        """Solve A x = b; never assumed square: point closures of a planar loop are redundant."""
-        if self.square:
-            return np.asarray(np.linalg.solve(A, b), dtype=np.float64)
-        return np.asarray(np.linalg.lstsq(A, b, rcond=RANK_TOLERANCE)[0], dtype=np.float64)
-
-    def newton(self, c: Array) -> tuple[Array, int, float] | None:
-        """Sum of all steps, iterations and final residual at driver values c, or None."""
-        self.lost = LOST
-        met, worst, step, corrected = (
-            False,
-            math.inf,
-            np.full(self.unknowns, math.inf),
-            np.zeros(self.unknowns),
-        )
-        for iteration in range(1, MAX_ITERATIONS + 1):
-            r = self.model.residual(c)
-            worst = float(np.abs(r).max()) if np.isfinite(r).all() else math.inf
-            if not math.isfinite(worst):
-                return None
-            if iteration - 1 == self.corrections:
-                return corrected, iteration - 1, worst
-            # one step after meeting the tolerance: quadratic convergence makes it exact to
-            # round-off
-            if met and self.corrections is None:
-                if worst <= self.tol:
-                    return corrected, iteration - 1, worst
-                break
-            met = worst <= self.tol
-            try:
-                step = self.linear(self.model.jacobian(), -r)
-            except np.linalg.LinAlgError:
-                return None
-            if not np.isfinite(step).all():
-                return None
-            self.model.move(step)
-            corrected += step
-        if worst <= ROUNDING:
-            self.lost = (
-                f"the residual {worst:.3g} is rounding, and the tolerance {self.tol:.3g} is less;"
-                " allow more"
-            )
-        elif not self.square and np.abs(step).max() <= ARRIVED:
-            ends = "the motion ends, or joints contradict each other"
-            self.lost = (
-                f"no pose near there closes better than to {worst:.3g} of the mechanism's size:"
-                f" {ends}"
-            )
-        return None
-
-    def solve(self, path: Path, t: float) -> _Sample | None:
-        """Position, velocity and acceleration on a path at time t from the current configuration,
-        or None.
-        """
-        c, c_t, c_tt = (path.drive(self.drivers, np.array([t])) / self.units)[..., 0]
-        done = self.newton(c)
-        if done is None:
-            return None
-        jacobian, columns = np.array(self.model.jacobian()), self.model.driver_columns()
-        nu = columns @ c_t
-        try:
-            v = self.linear(jacobian, nu)
-            gamma = columns @ c_tt - self.model.bias(v)
-            a = self.linear(jacobian, gamma)
-        except np.linalg.LinAlgError:
-            return None
-        # least squares would hide rates that no row set can meet (a driver pushed at a dead centre)
-        if not (_met(jacobian, v, nu) and _met(jacobian, a, gamma)):
-            self.lost = STUCK
-            return None
-        position, velocity, acceleration = (
-            np.array(each, dtype=float) for each in zip(*self.model.points(v, a), strict=True)
-        )
-        return _Sample(
-            t,
-            c,
-            self.model.save(),
-            position.ravel(),
-            v,
-            a,
-            (position, velocity, acceleration),
-            jacobian,
-            *done,
-        )
-
-    def advance(self, path: Path, start: _Sample, t: float, step: float) -> tuple[_Sample, bool]:
-        """Walk a path from start to time t, halving steps that fail; (where it ended, whether that
-        is t).
+    def advance(self, path: Path, start: Sample, t: float, step: float) -> tuple[Sample, bool]:
+        """Walk a path from start to time t, halving steps that fail; return the end, whether at t.
 
         Args:
             step: between samples; zero where all are one.
@@ -284,11 +122,10 @@ class Walk:
                     return at, False
         return at, True
 
-    def connected(self, at: _Sample, new: _Sample) -> bool:
-        """Whether the points that are watched, and all coordinates, went from one pose to the other
-        as their rates say.
+    def connected(self, at: Sample, new: Sample) -> bool:
+        """Return whether output points and coordinates moved between two poses by their rates.
 
-        Where all stands still they say nothing of a driver that made whole turns in between.
+        At rest they do not show whole turns of a driver, so turns have a limit of their own.
         """
         if np.abs(new.c - at.c)[self.turns].max(initial=0.0) > LONGEST_TURN:
             return False
@@ -298,15 +135,15 @@ class Walk:
         everything = continuous(change, new.v, at.v, dt, self.size)
         return bool(watched & everything) and continued(change, new.v, at.v, dt)
 
-    def regular(self, at: _Sample, new: _Sample) -> bool:
+    def regular(self, at: Sample, new: Sample) -> bool:
         """Return whether no singular value of the Jacobian can have been zero between two poses."""
         try:
             return regular_between(self.linear(at.jacobian, new.jacobian))
         except np.linalg.LinAlgError:
             return False
 
-    def start(self, path: Path, begin: Start) -> tuple[_Sample | None, str]:
-        """Return the pose the samples are reached from, and why there is none."""
+    def start(self, path: Path, begin: Start) -> tuple[Sample | None, str]:
+        """Return the first pose of the walk, or None with the reason."""
         self.model.reset()
         design = self.solve(begin.lead, 0.0) if begin.lead else self.solve(path, begin.time)
         if design is None:
@@ -392,8 +229,3 @@ class Walk:
             "; ".join(messages),
             facts,
         )
-
-
-def _met(jacobian: Array, v: Array, wanted: Array) -> bool:
-    # a millionth: far above round-off, far below a row that is not met
-    return bool(np.abs(jacobian @ v - wanted).max() <= 1e-6 * (1.0 + np.abs(wanted).max()))

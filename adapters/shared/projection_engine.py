@@ -1,6 +1,4 @@
-"""What the engines in projection mode have in common: all but what they are called, what they know,
-and the model they make.
-"""
+"""Base of the engines in projection mode; each adds its name, its joints and its model."""
 
 from __future__ import annotations
 
@@ -44,17 +42,17 @@ class ProjectionEngine(ABC):
     @property
     @abstractmethod
     def described(self) -> Mapping[str, Any]:
-        """What of the simulator is used, and how."""
+        """The quantities of the simulator in use."""
 
     @property
     def settings(self) -> Mapping[str, Any]:
-        """What is solved and how."""
+        """The quantities in use, the linear solver and the Newton steps."""
         solver = "numpy LU where the rows are square and of full rank at design, else least squares"
         steps = {} if self.corrections is None else {"newton_steps": self.corrections}
         return {**self.described, "linear solver": solver, **steps}
 
     def version(self) -> str | None:
-        """The simulator's version, or None where it cannot be imported."""
+        """Return the simulator's version, or None if the import fails."""
         try:
             return self.version_of(importlib.import_module(self.name))
         except (
@@ -75,10 +73,10 @@ class ProjectionEngine(ABC):
 
     @abstractmethod
     def build(self, case: Case) -> ProjectionModel:
-        """The simulator's model of the case in its own frame, at the design position."""
+        """Return the simulator's model of the case in its own frame, at the design position."""
 
     def solve(self, model: ProjectionModel, case: Case, tol: float) -> Trajectory:
-        """All samples; see `Engine.solve`."""
+        """Solve all samples; see `Engine.solve`."""
         return solve_by_projection(
             model, case, tol, model.details, self.corrections, own_frame(case)
         )
@@ -89,4 +87,4 @@ class ProjectionEngine(ABC):
 
     @abstractmethod
     def floor(self, case: Case) -> Floor:
-        """What its compiled code alone needs for a sample."""
+        """Return the time of the simulator's compiled code for a sample."""

@@ -1,4 +1,4 @@
-"""What the projection mode asks of a simulator."""
+"""Interface of a simulator's kinematics in projection mode."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ class ProjectionModel(Protocol):
     drivers.
 
     Lengths are in the unit of the mechanism it was made of, metres or others. All methods speak of
-    the current configuration. `residual` updates whatever the other methods read.
+    the current configuration. `residual` updates the data of the other methods.
 
     Attributes:
-        details: what a record says of it.
+        details: facts for the record.
     """
 
     @property
@@ -27,7 +27,7 @@ class ProjectionModel(Protocol):
         ...
 
     def save(self) -> Any:
-        """A copy of the configuration."""
+        """Return a copy of the configuration."""
         ...
 
     def restore(self, saved: Any) -> None:
@@ -45,8 +45,9 @@ class ProjectionModel(Protocol):
         ...
 
     def jacobian(self) -> Array:
-        """Derivative of the rows by dx, shape (rows, unknowns); a copy, or valid until the next
-        call.
+        """Return the derivative of the rows by dx, shape (rows, unknowns).
+
+        The array is a copy, or valid until the next call.
         """
         ...
 
@@ -55,7 +56,7 @@ class ProjectionModel(Protocol):
         ...
 
     def bias(self, v: Array) -> Array:
-        """Jdot v of all rows, shape (rows,)."""
+        """Return Jdot v of all rows, shape (rows,)."""
         ...
 
     def points(self, v: Array, a: Array) -> Sequence[tuple[Array, Array, Array]]:

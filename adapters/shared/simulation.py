@@ -1,5 +1,4 @@
-"""Simulate mode, shared by the simulators: where they set off, which way, and what counts as having
-arrived.
+"""Simulate mode, shared by the simulators: start, direction and acceptance of samples.
 
 A simulator starts at the sample nearest to the design that can be reached, in a pose and at rates
 that its projection model gives, because none of them checks its initial values, and goes from there
@@ -44,14 +43,14 @@ class Start:
 
     Attributes:
         sample: its index.
-        configuration: what the model's `save` gave there.
+        configuration: the result of the model's `save` there.
         v, a: rates of the unknowns there, and theirs.
         points: position, velocity and acceleration of each of case.points there, shape (3, points,
             3).
         residual: of the projection model there [m or -].
         size: of the mechanism [m].
         independent: whether the rows of the model are.
-        facts: how the model came there, for the record.
+        facts: on the way to the start, for the record.
     """
 
     sample: int
@@ -96,7 +95,7 @@ class Leg:
 
 @dataclass(frozen=True, eq=False)
 class SimulatedPose:
-    """What a simulator gives at a sample, as its leg sees it.
+    """The result of a simulator at a sample, in the time of its leg.
 
     Attributes:
         points: position, velocity and acceleration of each of case.points, shape (3, points, 3);
@@ -117,7 +116,7 @@ on.
 
 
 def start_of(model: ProjectionModel, case: Case) -> Start:
-    """Where to set off.
+    """Return the start of a simulation.
 
     Raises:
         SolveError: the design does not close, or the samples next to it, on either side, cannot be
@@ -209,10 +208,10 @@ def simulated(
 
 
 def legs(case: Case, start: int) -> list[Leg]:
-    """The ways from a sample to both ends of the sweep; samples at the same time as the start come
-    in the first.
+    """Return the legs from a sample to both ends of the sweep.
 
-    Where there is none but the start, it is a leg of its own.
+    Samples at the same time as the start are in the first leg. A start without other samples is a
+    leg of its own.
     """
     times = case.sweep.path.times
     sides = [

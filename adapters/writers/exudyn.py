@@ -28,69 +28,10 @@ from ...core.trajectory import Array, BodyMotion
 from ..shared.joint_chains import CHAINS, dependence, relations
 from ..shared.loop_closures import ends_of
 from ..shared.poses import Displacement, displacements, frame_along, link_coordinates, link_motions
+from .exudyn_preamble import BEGINNING, END
 
 # Round-off of a right angle between unit vectors; a generic joint leaves as much as a residual.
 RIGHT_ANGLE = 1e-15
-
-BEGINNING = '''\
-"""A mechanism in Exudyn, written by kincheck. Lengths are in m, angles in rad.
-
-Masses and inertias stand in for missing ones. Drivers are not part of the model: the initial coordinates are consistent with the
-driver values below. All bodies are parallel to the global axes at design, in their reference coordinates, from which the state of
-Exudyn is measured; `frames` has the Euler parameters of the bodies' own axes in these.
-"""
-
-import exudyn as exu
-import numpy as np
-from exudyn.itemInterface import *
-
-SC = exu.SystemContainer()
-mbs = SC.AddSystem()
-ground = mbs.AddObject(ObjectGround())
-nodes, bodies, frames, joints, coordinates, points = {}, {}, {}, {}, {}, {}
-
-
-def body(name, position, initial, frame):
-    frames[name], reference = frame, [*position, 1, 0, 0, 0]
-    nodes[name] = mbs.AddNode(NodeRigidBodyEP(name=name, referenceCoordinates=reference, initialCoordinates=initial))
-    rigid = ObjectRigidBody(name=name, mass=1, inertia=[1, 1, 1, 0, 0, 0], nodeNumber=nodes[name])
-    bodies[name] = mbs.AddObject(rigid)
-
-
-def marker(name, position, rotation=np.eye(3)):
-    frame = np.eye(4)
-    frame[:3, :3], frame[:3, 3] = rotation, position
-    return mbs.AddMarker(MarkerBodyRigid(bodyNumber=bodies[name], localHT=frame))
-
-
-def joint(name, kind, first, second, **options):
-    item = kind(markerNumbers=[marker(*first), marker(*second)], **options)
-    joints.setdefault(name, []).append(mbs.AddObject(item))
-
-
-def translation(name, first, second, axis):
-    """The displacement of the second point against the first along an axis of the first body."""
-    (one, at), (two, there) = first, second
-    measured = dict(bodyNumbers=[bodies[one], bodies[two]], localPosition0=at, localPosition1=there, axis0=axis)
-    coordinates[name] = mbs.AddMarker(MarkerBodiesRelativeTranslationCoordinate(**measured))
-
-
-def rotation(name, first, second, axis, initial):
-    """The turn of the second body against the first; a node keeps it, so that it counts the turns."""
-    (one, at), (two, there) = first, second
-    turns = mbs.AddNode(NodeGenericData(numberOfDataCoordinates=1, initialCoordinates=[initial]))
-    measured = dict(bodyNumbers=[bodies[one], bodies[two]], localPosition0=at, localPosition1=there, axis0=axis)
-    coordinates[name] = mbs.AddMarker(MarkerBodiesRelativeRotationCoordinate(nodeNumber=turns, **measured))
-
-
-def relation(name, one, other, factor):
-    """One coordinate is the factor times the other."""
-    markers = [coordinates[one], coordinates[other]]
-    joints.setdefault(name, []).append(mbs.AddObject(ObjectConnectorCoordinate(markerNumbers=markers, factor1=factor)))
-
-
-'''
-END = "\nmbs.Assemble()\n"
 
 GENERIC: Mapping[type[j.Joint], tuple[int, Sequence[int]]] = {
     j.Cylindrical: (2, (1, 1, 0, 1, 1, 0)),
@@ -123,7 +64,7 @@ def write(
 
 
 class _Script:
-    """The lines that differ from script to script."""
+    """The lines of one mechanism's script."""
 
     def __init__(self, mechanism: Mechanism, way: Mapping[str, BodyMotion]) -> None:
         self.mechanism, self.way, self.placed = mechanism, way, displacements(mechanism, way)
@@ -153,7 +94,7 @@ class _Script:
         return BEGINNING + "\n".join(self.lines) + "\n" + END
 
     def call(self, function: str, *values: Any, **options: Any) -> None:
-        """A call, as a line."""
+        """Add a call as a line."""
         texts = [
             *map(_text, values),
             *(f"{name}={_text(value)}" for name, value in options.items()),
@@ -173,9 +114,8 @@ class _Script:
         """A frame on a body, global at design; the columns are its axes, the global ones if none
         are given.
         """
-        return _Code(
-            f"({', '.join([repr(body), self.arm(body, P), *([] if axes is None else [_text(axes)])])})"
-        )
+        frame = [] if axes is None else [_text(axes)]
+        return _Code(f"({', '.join([repr(body), self.arm(body, P), *frame])})")
 
     def add(
         self,
@@ -262,11 +202,11 @@ class _Script:
 
 
 class _Code(str):
-    """Text that is code already."""
+    """Text that is already code."""
 
 
 def _text(value: Any) -> str:
-    """A value as Python has it, numbers so that they are read back as the same doubles."""
+    """Return a value as Python text; numbers are read back as the same doubles."""
     if isinstance(value, _Code):
         return value
     if isinstance(value, np.ndarray | list | tuple):

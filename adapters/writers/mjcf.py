@@ -2,9 +2,9 @@
 would keep six digits.
 
 A body is a <body> with the frame that the case gives it. A joint is a chain of MuJoCo joints (see
-`chains`), in the tree or, where it closes a loop, on an auxiliary body that an equality ties to the
-second body; a distance is a tendon of constant length. What ties coordinates to one another is a
-joint equality. Bodies have a unit mass and inertia, for want of any.
+`joint_chains`), in the tree or, if it closes a loop, on an auxiliary body that an equality ties to
+the second body; a distance is a tendon of constant length. Joint equalities tie coordinates to one
+another. Bodies have a unit mass and inertia, for want of any.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def write(
 
 
 class _Model:
-    """The document while it is made."""
+    """The document during its construction."""
 
     def __init__(self, mechanism: Mechanism, way: Mapping[str, BodyMotion]) -> None:
         self.mechanism, self.way, self.placed = mechanism, way, displacements(mechanism, way)
@@ -152,7 +152,7 @@ class _Model:
         self.qpos[name] = [*motion.r[-1], *motion.p[-1]]
 
     def links(self, joint: Joint) -> list[Link]:
-        """A joint's chain, from its first body to its second."""
+        """Return a joint's chain, from its first body to its second."""
         return CHAINS[type(joint)](joint, ends_of(self.mechanism, joint)[0])
 
     def carry(self, body: str, joint: Joint, links: Sequence[Link], sign: int = 1) -> None:
@@ -201,7 +201,7 @@ class _Model:
     def add_ends(
         self, joint: str, bodies: Sequence[str], points: Sequence[Sequence[float]]
     ) -> list[str]:
-        """A site at either end of what closes a loop."""
+        """Add a site at either end of a loop closure; return their names."""
         ends = zip(("first", "second"), bodies, points, strict=True)
         return [
             self.add_site(f"{joint}.{which}", body, point, aligned=True)

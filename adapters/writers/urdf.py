@@ -3,9 +3,9 @@ close its loops.
 
 Every link is parallel to the global axes at design, so axes and arms are the case's numbers, and
 has its origin in its joint's point. A joint is a chain of URDF's revolute and prismatic joints (see
-`chains`). URDF has no ball joint; three hinges would lock at a quarter turn, so a body that no
-chain without a ball carries floats, and its joints are conditions (see `closures`). Hinges are
-"revolute", not "continuous", with limits beyond all reach: their coordinate is then the angle
+`joint_chains`). URDF has no ball joint; three hinges would lock at a quarter turn, so a body that
+no chain without a ball carries floats, and its joints are conditions (see `loop_closures`). Hinges
+are "revolute", not "continuous", with limits beyond all reach: their coordinate is then the angle
 itself, which counts turns.
 """
 
@@ -91,7 +91,7 @@ def write(
 
 
 def _json(table: Mapping[str, Any]) -> str:
-    """JSON with an entry a line."""
+    """Return JSON text with an entry a line."""
 
     def lines(value: Any) -> str:
         if isinstance(value, dict):
@@ -128,7 +128,7 @@ class _End:
 
 
 class _Model:
-    """The document, and what goes beside it, while they are made."""
+    """The document and the file beside it during their construction."""
 
     def __init__(self, mechanism: Mechanism, way: Mapping[str, BodyMotion]) -> None:
         self.mechanism, self.way, self.placed = mechanism, way, displacements(mechanism, way)
@@ -254,7 +254,7 @@ class _Model:
 
 
 def _written(condition: Condition) -> Iterator[dict[str, Any]]:
-    """A condition as data."""
+    """Yield a condition as data."""
 
     def end(frame: Any) -> dict[str, Any]:
         return {"link": frame.link, "point": frame.point}

@@ -11,7 +11,7 @@ from ..shared.joint_chains import Link
 
 
 def numbers(values: Iterable[Any]) -> str:
-    """The shortest text that is read back as the same doubles, 17 digits where they are needed."""
+    """Return the shortest text of the same doubles, with up to 17 digits."""
     # minus zero reads like a mistake
     return " ".join(repr(float(value) + 0.0).removesuffix(".0") for value in values)
 
@@ -26,7 +26,7 @@ def link_names(joint: str, links: Sequence[Link]) -> list[str]:
 
 
 def document(root: ET.Element, kinds: Sequence[Sequence[str]], reserved: Sequence[str] = ()) -> str:
-    """The text of a document.
+    """Return the text of a document.
 
     Args:
         kinds: tags of elements whose names are known by them, those that share their names

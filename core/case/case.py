@@ -1,4 +1,4 @@
-"""A case: a mechanism, a sweep of one driver, the outputs to compare, and the truth about them."""
+"""A case: a mechanism, a sweep of one driver, the outputs to compare, and their reference."""
 
 from __future__ import annotations
 
@@ -19,26 +19,22 @@ from ..mechanism.motions import Absolute, Motion, Path, Ramp
 from ..trajectory import Array
 
 TIME = "time"
-"""The name a sweep has instead of a driver's where time itself is swept."""
+"""Name of the driver in a sweep of time."""
 
 MARKER = "~"
-"""Begins the names of points that the reading of a case adds to a body, to see how it turns; they
-are no hardpoints.
-"""
+"""Prefix of the points that the case reader adds to measure a body's rotation; no hardpoints."""
 
 PER_TRAVEL = ".per_travel"
-"""Ends the names of derivatives by wheel travel, which the reading of a case adds to its
-outputs.
-"""
+"""Suffix of derivatives by wheel travel, which the case reader adds to the outputs."""
 
 
 NO_SIZE = 1e-3
-"""Size of a mechanism whose points all coincide, to rounding [m]."""
+"""Size of a mechanism whose points all coincide within rounding [m]."""
 _COINCIDE = 1e-12
 
 
 class Truth(StrEnum):
-    """Where the reference of a case comes from. Only the first two validate anything."""
+    """Kind of the reference of a case. Only the first two count as validation."""
 
     CLOSED_FORM = "closed_form"
     THIRD_PARTY_DATA = "third_party_data"
@@ -47,24 +43,22 @@ class Truth(StrEnum):
 
     @property
     def validates(self) -> bool:
-        """Whether agreement with it may be called validation."""
+        """Whether agreement with the reference counts as validation."""
         return self in (Truth.CLOSED_FORM, Truth.THIRD_PARTY_DATA)
 
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """One driver moved over a grid of values at a constant rate, or time; other drivers follow
-    motions of their own, or hold.
+    """One driver moved over a grid of values at a constant rate, or time. Other drivers follow
+    their own motions or hold.
 
     Attributes:
-        driver: name of the swept driver, or "time" where drivers follow their motions only.
+        driver: name of the swept driver, or "time" if drivers only follow their motions.
         values: driver values in the order start..stop [m or rad], or times [s], shape (n,).
-        rate: driver units per second; velocities and accelerations are per second at this constant
-            rate.
-        design: the driver's value at the design position: zero unless its values are absolute [m or
-            rad].
-        motions: of the drivers other than the swept one, from their design values, over the time in
-            which the swept one goes from its design value at the rate.
+        rate: driver units per second, constant; velocities and accelerations are per second at it.
+        design: driver value at the design position [m or rad]; zero unless its values are absolute.
+        motions: motions of the other drivers, from their design values. Time is zero at the design
+            value of the swept driver, which moves at the rate.
     """
 
     driver: str
@@ -75,12 +69,12 @@ class Sweep:
 
     @property
     def change(self) -> Array:
-        """Driver values measured from the design position, shape (n,); what an engine sets."""
+        """Driver values relative to the design position, shape (n,), as engines set them."""
         return self.values - self.design
 
     @property
     def path(self) -> Path:
-        """How all moving drivers go with time, and the times of the samples."""
+        """Motions of all moving drivers over time, and the times of the samples."""
         design = {
             name: motion.design
             for name, motion in self.motions.items()
@@ -93,8 +87,8 @@ class Sweep:
 
     @property
     def moved(self) -> dict[str, Array]:
-        """What is swept [m, rad or s], then every further moving driver [m or rad], at the samples,
-        shape (n,) each.
+        """Swept values [m, rad or s], then values of each further moving driver [m or rad], at the
+        samples, shape (n,) each.
         """
         path = self.path
         further = {
@@ -105,23 +99,22 @@ class Sweep:
 
 
 ORDERS = 3
-"""Of an output that is a function of the pose alone: value, velocity and acceleration follow."""
+"""Orders of an output of the pose alone: value, velocity and acceleration."""
 
 
 class Quantity(Protocol):
-    """What is compared: a function of the motion of points.
+    """An output to compare: a function of the motion of points.
 
     Attributes:
         points: names of the points it reads.
-        unit: of its value, SI: m, rad, 1, or one of these by m.
-        orders: how many of value, first and second derivative by time follow from what engines
-            give.
-        atol, rtol: an error is accepted up to atol [unit, unit/s, unit/s^2] + rtol * range of the
-            reference.
-        why: the reason for the tolerance.
-        sense: what a positive value means; empty where unit and name say it.
-        signs: the convention of signs and axes; empty where the case's own axes are all there is.
-        facts: what a reader of results needs to know of it.
+        unit: SI unit of its value: m, rad, 1, or one of these per m.
+        orders: number of orders (value, first and second time derivative) computable from results.
+        atol, rtol: an error is accepted up to atol [unit, unit/s, unit/s^2] + rtol * the range of
+            the reference.
+        why: reason for the tolerance.
+        sense: meaning of a positive value; empty if name and unit state it.
+        signs: convention of signs and axes; empty if only the case's own axes apply.
+        facts: properties for readers of results.
     """
 
     @property
@@ -146,22 +139,22 @@ class Quantity(Protocol):
     def facts(self) -> Mapping[str, Any]: ...
 
     def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
-        """The quantity over the samples; what is not known is NaN.
+        """Return the quantity over the samples; unknown values are NaN.
 
         Args:
             at: global positions of its points as jets [m].
-            design: the same at the design position, where they stand still.
+            design: the same at the design position, at rest.
         """
         ...
 
 
 @dataclass(frozen=True)
 class Output:
-    """The plain quantity: a point's coordinate along a direction.
+    """A plain output: a point's coordinate along a direction.
 
     Attributes:
         direction: global unit vector [-].
-        relative: measured from the design position.
+        relative: whether the coordinate is measured from the design position.
     """
 
     name: str
@@ -180,12 +173,12 @@ class Output:
 
     @property
     def sense(self) -> str:
-        """The direction says it."""
+        """Empty: the direction states it."""
         return ""
 
     @property
     def signs(self) -> str:
-        """The convention of signs of the outputs: none but the case's own axes."""
+        """Empty: only the case's own axes apply."""
         return ""
 
     @property
@@ -195,11 +188,11 @@ class Output:
 
     @property
     def facts(self) -> Mapping[str, Any]:
-        """All there is to it."""
+        """All fields."""
         return asdict(self)
 
     def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
-        """The coordinate [m]; of components that do not count nothing is computed, for there may be
+        """Return the coordinate [m]; components of zero weight are skipped, because there may be
         very many samples.
         """
         each = zip(self.direction, at[self.point], design[self.point], strict=True)
@@ -209,12 +202,11 @@ class Output:
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """One output over the samples: value [unit], and derivatives by time where they are known, each
-    of shape (n,).
+    """One output over the samples: value [unit], and time derivatives if known, each of shape (n,).
 
     Attributes:
-        possible: whether the engine gives what the value is made of; that of a derivative takes
-            velocities.
+        possible: whether the engine returns the inputs of the value; an output that is a derivative
+            needs velocities.
     """
 
     position: Array
@@ -225,13 +217,13 @@ class Series:
 
 @dataclass(frozen=True)
 class Origin:
-    """Where the reference of a case comes from, and which one it is.
+    """Source of the reference of a case.
 
     Attributes:
-        citation: author, title, page or address; empty where nobody says.
-        file: name of the file that holds the reference; empty where none does.
+        citation: author, title, page or address; empty if unknown.
+        file: name of the file of the reference; empty without a file.
         sha256: digest of that file.
-        own: kincheck has made it.
+        own: whether kincheck computed the reference.
     """
 
     citation: str
@@ -242,14 +234,13 @@ class Origin:
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """All that an engine needs to solve it and the harness needs to judge it. SI units throughout.
+    """The input of engines, and of the harness that judges their results, in SI units.
 
     Attributes:
-        truth: the kind of the reference; consensus_only where there is none.
+        truth: kind of the reference; consensus_only without one.
         reference: true values by output name, on the grid of the sweep.
-        origin: of the reference; without, it comes from where the case does.
-        length_unit, angle_unit: of the numbers in the file that it was read from, by their names in
-            `units`.
+        origin: source of the reference; None for the source of the case itself.
+        length_unit, angle_unit: units of the file of the case, by their names in `units`.
     """
 
     name: str
@@ -265,22 +256,20 @@ class Case:
 
     @property
     def points(self) -> tuple[str, ...]:
-        """Names of the points that outputs read; the motion of no other is needed."""
+        """Names of the points that outputs read; no other motion is needed."""
         return tuple(dict.fromkeys(point for output in self.outputs for point in output.points))
 
     @property
     def signs(self) -> str:
-        """The convention of signs of the outputs that have one, in words; what heads every table of
-        them. Empty without.
-        """
+        """Sign conventions of the outputs in words, for the head of each table, or empty."""
         return "; ".join(dict.fromkeys(output.signs for output in self.outputs if output.signs))
 
 
 def size(case: Case) -> float:
-    """Return the largest extent along a global axis of the joints and the compared points at
-    design, or of the drivers' shifts [m].
+    """Return the largest extent along a global axis of joints and compared points at design, or the
+    largest displacement of a driver [m].
 
-    Where nothing is compared yet, all points count.
+    All points count if nothing is compared yet.
     """
     path = case.sweep.path
     values, _, _ = path.drive(list(path.motions), path.times)
@@ -295,7 +284,7 @@ def size(case: Case) -> float:
 
 
 def turning(case: Case) -> NDArray[np.bool_]:
-    """Which of the moving drivers turn, shape (drivers,)."""
+    """Return whether each moving driver turns, shape (drivers,)."""
     return np.array(
         [case.mechanism.driver(name).turns for name in case.sweep.path.motions], dtype=np.bool_
     )

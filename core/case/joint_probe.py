@@ -1,9 +1,9 @@
-"""Probes: one small closed-loop case for any type of joint or coupler, built from the class alone.
+"""Joint probes: one small closed-loop case for any type of joint or coupler, from the class alone.
 
-Body a turns about a hinge on the ground and is driven; the joint under test carries body b on it,
-and as many rods as the joint has freedoms tie b to the ground, so that every freedom moves and
-nothing but the joint can move it. A coupler sits between two joints of a: a rod to the ground moves
-the first, the coupler the second.
+A driven hinge joins body a to the ground. The joint under test carries body b on body a. One rod
+for each freedom of the joint ties b to the ground, so every freedom moves, and the joint alone
+moves it. A coupler sits between two joints of a: a rod to the ground moves the first, and the
+coupler moves the second.
 """
 
 from __future__ import annotations
@@ -22,8 +22,7 @@ from ..mechanism.drivers import JointAngle
 from ..mechanism.mechanism import GROUND, Body, Mechanism, Point, Vector
 from .case import Case, Output, Sweep, Truth
 
-# The design position: skew axes and uneven numbers, so that no row vanishes by symmetry. All in
-# metres, global.
+# Design position: skew axes and uneven numbers, so no row vanishes by symmetry. Global, in metres.
 HINGE = Revolute("hinge", GROUND, "a", (0.1, -0.2, 0.3), (1.0, 2.0, 2.0))
 POINT: Vector = (0.2, -0.1, 0.2)
 LINK: Vector = (0.33, -0.18, 0.34)
@@ -31,8 +30,8 @@ AXIS: Vector = (2.0, -1.0, 2.0)
 LENGTH = 0.05
 NUMBER = 1.5
 
-# A perpendicular pair, and one 40 degrees apart, for joints that need shafts pointing the same way
-# on.
+# A perpendicular pair, and one 40 degrees apart for joints whose shafts must point in one
+# direction.
 _H, _F = np.array(AXIS) / 3.0, np.array([1.0, 4.0, 1.0]) / math.sqrt(18.0)
 PAIRS = tuple(
     (
@@ -44,8 +43,8 @@ PAIRS = tuple(
     for degrees in (90, 40)
 )
 
-# Ends on b and on the ground. Drawn at random and chosen so that, whatever number of them a
-# built-in joint takes, the mechanism stays far from lock-up over the sweep and every freedom moves.
+# Ends on b and on the ground. Drawn at random and selected: for each number of rods that a built-in
+# joint needs, the mechanism stays far from lock-up over the sweep and every freedom moves.
 RODS: Sequence[tuple[Vector, Vector]] = (
     ((0.49, 0.09, 0.28), (0.8, -0.47, 0.26)),
     ((0.06, -0.32, 0.56), (1.02, -0.46, 0.73)),
@@ -56,9 +55,9 @@ RODS: Sequence[tuple[Vector, Vector]] = (
 TIPS: Sequence[Vector] = ((0.35, -0.05, 0.4), (0.1, 0.15, 0.15))
 
 TURN = np.linspace(-0.4, 0.4, 41)
-"""Of the hinge [rad], at 1 rad/s."""
+"""Angle of the hinge [rad], at 1 rad/s."""
 
-# Residuals of 1e-12 of a metre-sized mechanism, times the condition of its rows (a hundred at most,
+# Residuals of 1e-12 of a metre-sized mechanism, times the condition of its rows (at most a hundred,
 # by sigma), times ten.
 ATOL = 1e-9
 WHY = (
@@ -70,42 +69,39 @@ _Tested = TypeVar("_Tested", bound=Joint | Coupler)
 
 
 def probe(tested: Joint | Coupler | type[Joint] | type[Coupler]) -> Case:
-    """The closed-loop case of a joint, of a coupler, or of the specimen of a type of them.
+    """Return the closed-loop case of a joint, of a coupler, or of a specimen of their type.
 
     Args:
-        tested: its geometry is kept; the bodies or joints it is between become those of the probe.
+        tested: its geometry is kept; its bodies or joints are replaced by those of the probe.
 
     Raises:
-        MechanismError: no specimen of the type can be made.
+        MechanismError: no specimen of the type can be built.
     """
     return next(alternatives(tested))
 
 
 def alternatives(tested: Joint | Coupler | type[Joint] | type[Coupler]) -> Iterator[Case]:
-    """The same with others of the rods, which may not lock the joint where the first do; those that
-    are chosen first are first.
+    """Yield the probe with each choice of rods, the preferred one first. Another choice may not
+    lock the joint if the first does.
     """
     one = specimen(tested) if isinstance(tested, type) else tested
     return _of_joint(one) if isinstance(one, Joint) else iter([_of_coupler(one)])
 
 
 def probes() -> list[Case]:
-    """A probe of every registered type, joints first, then couplers, each in the order of their
-    names.
-    """
+    """Return a probe of each registered type: joints, then couplers, each sorted by name."""
     registries: Sequence[Mapping[str, type[Joint | Coupler]]] = (Joint.registry, Coupler.registry)
     return [probe(registry[name]) for registry in registries for name in sorted(registry)]
 
 
 def specimen(of: type[_Tested]) -> _Tested:
-    """An instance between bodies a and b (a coupler: between joints first and second), its geometry
-    made from the fields' kinds.
+    """Return an instance between bodies a and b (a coupler: between joints first and second), with
+    geometry from the kinds of its fields.
 
     Fields with a default keep it; numbers without a kind are ratios.
 
     Raises:
-        MechanismError: the class accepts neither of the pairs of directions, or has a field of
-            unknown kind.
+        MechanismError: the class rejects both pairs of directions, or has a field of unknown kind.
     """
     between: dict[str, Any] = (
         {"i": "a", "j": "b"} if issubclass(of, Joint) else {"joints": ("first", "second")}

@@ -1,6 +1,4 @@
-"""Notes on a case: what a reader of its results should know, where a file can be meant, and yet be
-a mistake.
-"""
+"""Notes on a case for readers of its results: input that may be intended, but may be a mistake."""
 
 from __future__ import annotations
 
@@ -11,8 +9,8 @@ from .units import LENGTHS
 
 
 def notes(case: Case) -> list[str]:
-    """Return the notes on a case: on lengths of rods, on sizes, and on the source of its reference;
-    in the units of its file.
+    """Return the notes on rod lengths, sizes and the source of the reference, in the units of the
+    case's file.
     """
     written = LENGTHS[case.length_unit].written
     joints = [note for joint in case.mechanism.joints for note in joint.notes]

@@ -1,4 +1,4 @@
-"""Sizes that are improbable for their unit: most often the numbers are of another one."""
+"""Improbable sizes of mechanisms and drives, most often a sign of a wrong unit."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..mechanism.mechanism import Vector
 from .case import MARKER, Case
 from .units import ANGLES, LENGTHS, Unit
 
-# Points that are closer than this part of their coordinates coincide.
+# Points closer than this fraction of their coordinates coincide.
 ROUNDING = 1e-12
 _TAKEN_FOR: dict[tuple[str, bool], str] = {
     ("mm", True): "metres declared as mm",
@@ -25,20 +25,20 @@ _TAKEN_FOR: dict[tuple[str, bool], str] = {
     ("rad", False): "degrees declared as rad",
     ("rad", True): "degrees converted to radians twice",
 }
-"""What an improbable size in a unit may be, by the unit and whether it is too small."""
+"""Probable cause of an improbable size, by its unit and whether it is too small."""
 
 
 @dataclass(frozen=True)
 class Range:
-    """Sizes that are probable [SI], and of what, where that is not said elsewhere."""
+    """Probable sizes [SI], and their description if the message needs one."""
 
     least: float
     most: float
     what: str = ""
 
     def improbable(self, size: float, unit: Unit) -> str:
-        """Return the size in its unit, what was expected, and what it may be; empty where it is
-        probable.
+        """Return the size in its unit, the expected range and a probable cause; empty for a
+        probable size.
         """
         if self.least <= size <= self.most:
             return ""
@@ -53,17 +53,16 @@ class Range:
 
 MECHANISMS = Range(5e-3, 100.0)
 SUSPENSIONS = Range(0.03, 10.0, "a suspension of ")
-"""Those of model cars and of haulage trucks; a unit taken for another is a thousandfold mistake, or
-forty at least.
+"""From model cars to haulage trucks. A wrong unit is an error by a factor of 1000, or at least 40.
 """
-# Of the mechanism's size: strokes are some hundredths to some times as long.
+# Strokes relative to the mechanism's size, from some hundredths to some times as long.
 STROKES = Range(5e-4, 20.0)
-# From degrees taken for radians twice over, or once, up to a few turns.
+# From degrees converted to radians twice, or once, up to a few turns.
 TURNS = {"rad": Range(1.7e-3, 38.0), "deg": Range(math.radians(1.0), math.inf)}
 
 
 def size_notes(case: Case) -> Iterator[str]:
-    """Yield what is improbable of the size of a mechanism, and of the way of each moving driver."""
+    """Yield notes on an improbable size of the mechanism or range of a moving driver."""
     length, angle = LENGTHS[case.length_unit], ANGLES[case.angle_unit]
     positions = [
         point.position for point in case.mechanism.points if not point.name.startswith(MARKER)
@@ -91,7 +90,7 @@ def size_notes(case: Case) -> Iterator[str]:
 
 
 def spanned(positions: Sequence[Vector]) -> float:
-    """Return the largest extent of positions along a global axis [m]; zero where all coincide, to
+    """Return the largest extent of positions along a global axis [m], zero if all coincide but for
     rounding.
     """
     if not positions:

@@ -1,4 +1,4 @@
-"""Units of files: numbers to SI, and back to what the file has, for messages."""
+"""Units of length, angle and time in files: conversion to SI, and back for messages."""
 
 from __future__ import annotations
 
@@ -6,18 +6,17 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
-# Digits of a decimal that a double holds whatever they are; what needs more was computed, and is
-# rounded.
+# A double holds any decimal of 15 digits. Numbers with more digits are computed ones: 10 are shown.
 DIGITS, ROUNDED = 15, 10
 
 
 @dataclass(frozen=True)
 class Unit:
-    """A unit of length, angle or time; called with a number of it, it gives SI.
+    """A unit of length, angle or time; a call converts a number of it to SI.
 
     Attributes:
-        size: of one [m, rad or s].
-        convert: a number of it to SI.
+        size: one unit in SI [m, rad or s].
+        convert: conversion of a number to SI.
     """
 
     name: str
@@ -28,11 +27,11 @@ class Unit:
         return self.convert(number)
 
     def written(self, value: float, among: Iterable[float] = ()) -> str:
-        """Return a value in SI as the file has it, with the unit.
+        """Return a value in SI as the file writes it, with the unit.
 
         Args:
-            among: numbers of the file; the first of this value is quoted. Else it is the shortest
-                decimal of this value, or if that is long, a rounded one.
+            among: numbers of the file; the first one equal to the value is quoted. Otherwise the
+                shortest exact decimal is used, or a rounded one if that is too long.
         """
         for number in among:
             if self.convert(number) == value:
@@ -46,7 +45,7 @@ class Unit:
 
 
 def plain(number: float) -> str:
-    """Return a number in the fewest digits that are it; a whole one without a point."""
+    """Return the shortest decimal of a number; whole numbers have no point."""
     return repr(float(number)).removesuffix(".0")
 
 

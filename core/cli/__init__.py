@@ -1,8 +1,7 @@
-"""Commands: a file each, with `add` (its options, on the parser) and what it does, from the options
+"""The command line: one module a command, with `add` (its options) and a function from the options
 to an exit status.
 
-A new command is one such file and its name in `COMMANDS`. What is slow to import is imported when
-the command is carried out.
+A new command is a module and its name in `COMMANDS`. Slow imports wait until the command runs.
 """
 
 COMMANDS = (
@@ -21,4 +20,4 @@ COMMANDS = (
     "report",
     "stress",
 )
-"""Modules of this room, in the order of the help."""
+"""Modules of the commands, in the order of the help."""

@@ -1,6 +1,4 @@
-"""kincheck assemblies: list the ways a mechanism can be put together, and start a simulator in one
-of them.
-"""
+"""kincheck assemblies: list the assemblies of a mechanism, and start a simulator in one of them."""
 
 from __future__ import annotations
 
@@ -16,7 +14,7 @@ from .registry import House, Status, given, whole
 if TYPE_CHECKING:
     from ..studies.assemblies import Survey
 
-# Singular values below this mean that assemblies meet there; sound linkages stay above 1e-2.
+# Assemblies meet where the smallest singular value is below this; sound linkages stay above 1e-2.
 MEETING = 1e-6
 
 
@@ -73,7 +71,7 @@ def add(commands: Any) -> None:
 
 
 def _assemblies(options: argparse.Namespace, house: House) -> int:
-    """List the assemblies that random starts lead to at a driver value, the intended one first.
+    """List the assemblies that random starts find at a driver value, the intended one first.
 
     Exit status: 0 some are found, 1 none is, 2 the tool could not do its work.
     """

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import KincheckError
 from ..report.progress import complain, how_to_install
 from .registry import House, Status, add_joint_types, whole
-from .run import TOL
+from .run_options import TOL
 
 if TYPE_CHECKING:
     from ..studies.bench.engines import Bench
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 SEED = 943745
 STRUT = "mcpherson_strut"
 CASES = (STRUT, "stewart_platform")
-"""Of the benchmark of everything: a suspension, and a mechanism of thirteen bodies whose six loops
-move at once.
+"""Cases of the full benchmark: a suspension, and a mechanism of thirteen bodies with
+six coupled loops.
 """
-# As many rounds settle a median to a tenth of the quartiles' distance.
+# This many rounds settle a median to a tenth of the distance between the quartiles.
 ROUNDS = 20
 
 _MAIN = "import sys; from kincheck.core.cli.main import main; sys.exit(main(sys.argv[1:]))"
@@ -100,7 +100,7 @@ def add(commands: Any) -> None:
         help="of the random states; default %(default)s",
     )
     for each, names in ((engines, "bench"), (formulation, "bench_formulation")):
-        # no defaults: they would take the place of what was given before the name of the benchmark
+        # No defaults: they would overwrite the options before the benchmark's name.
         given: dict[str, Any] = {"default": argparse.SUPPRESS}
         each.add_argument(
             "--out",
@@ -118,14 +118,14 @@ def add(commands: Any) -> None:
 
 
 def _all(options: argparse.Namespace, house: House) -> int:
-    """Measure everything: the engines on a few cases, and the formulation. Takes some minutes."""
+    """Measure the engines on a few cases, and the formulation. Takes some minutes."""
     options.cases, options.engine, options.rounds, options.parts = CASES, [], ROUNDS, None
     return _measured(options, house, formulation=True)
 
 
 def _engines(options: argparse.Namespace, house: House) -> int:
-    """Measure run time against error for every engine and mode, at several efforts, contestants
-    taking turns in one process.
+    """Measure run time against error for every engine and mode, at several efforts. The contestants
+    take turns in one process.
     """
     return _measured(options, house, formulation=False)
 
@@ -152,7 +152,7 @@ def _measured(options: argparse.Namespace, house: House, *, formulation: bool) -
             [name for name in known if name in options.engine or not options.engine], problems, mode
         )
     ]
-    house.find_engines(options.engine, problems)  # for names that are none
+    house.find_engines(options.engine, problems)  # finds unknown names
     if problems:
         raise KincheckError("\n".join(problems))
     with json_only() if options.json == "-" else nullcontext():
@@ -182,11 +182,11 @@ def _measured(options: argparse.Namespace, house: House, *, formulation: bool) -
 
 
 def _with_one_thread(command: str, variables: Sequence[str]) -> int:
-    """The same command, its linear algebra on one thread: it reads how many when it is loaded, so
-    the process is a new one.
+    """Run the command again in a new process whose linear algebra uses one thread. Libraries read
+    the number of threads when they are loaded.
 
-    The native engine has one, and threads that wait for each other would make the simulators' times
-    those of the machine's load.
+    The native engine has one thread. Threads waiting for each other would make the simulators'
+    times depend on the machine's load.
     """
     environment = {**os.environ, **dict.fromkeys(variables, "1")}
     return subprocess.run(

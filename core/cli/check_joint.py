@@ -1,4 +1,4 @@
-"""kincheck check-joint: check a joint type of one's own."""
+"""kincheck check-joint: check a user's joint type."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Results to where they were asked for: standard output, files, a folder."""
+"""Destinations of results: standard output, files, a folder."""
 
 from __future__ import annotations
 
@@ -14,21 +14,19 @@ from typing import TYPE_CHECKING, TypeAlias
 from ..case.io.atomic_files import Content, Named, to_standard_output, unwritable, write_all
 from ..harness.record import Results, to_json
 
-if TYPE_CHECKING:  # what draws is imported where a report is asked for
+if TYPE_CHECKING:  # drawing code is imported only for a report
     from ..report.figure_data import Effort, Past
 
     Trends: TypeAlias = Mapping[str, Sequence[Past]] | None
-    """What the engines made of each case in the runs up to this one; None where that is not
-    known.
-    """
+    """Earlier results of each case up to this run; None where they are not known."""
 
 REPORT = ("results.json", "report.html")
-"""The files of a folder of results."""
+"""File names in a folder of results."""
 
 
 @dataclass(frozen=True)
 class Destinations:
-    """Where results are to go; None where they are not wanted.
+    """Destinations of results; None where not wanted.
 
     Attributes:
         out: folder for the results and the report.
@@ -46,17 +44,20 @@ class Destinations:
 
     @classmethod
     def of(cls, options: argparse.Namespace) -> Destinations:
-        """Return the destinations that a command's options name."""
+        """Return the destinations named by a command's options."""
         return cls(**{each.name: getattr(options, each.name, None) for each in fields(cls)})
 
     @property
     def wanted(self) -> bool:
-        """Whether there are any."""
+        """Whether any destination is wanted."""
         return any(getattr(self, each.name) is not None for each in fields(self))
 
     def problems(self, names: Sequence[str] = REPORT, history: Path | None = None) -> list[str]:
-        """What cannot be written, found before the work and not after it; makes the folder, for
-        files of these names.
+        """Return the destinations that cannot be written, before the work starts.
+        Creates the folder.
+
+        Args:
+            names: files of the folder.
         """
         found, files = list[str](), list[Named]()
         if self.out is not None:
@@ -79,8 +80,8 @@ class Destinations:
 
 @contextmanager
 def json_only() -> Generator[None]:
-    """Keep standard output for the JSON: what simulators print meanwhile, from Python or from C,
-    goes to standard error.
+    """Reserve standard output for the JSON. Prints of simulators, from Python or C, go
+    to standard error.
     """
     import ctypes
 
@@ -92,7 +93,7 @@ def json_only() -> Generator[None]:
             yield
     finally:
         if os.name == "posix":
-            ctypes.CDLL(None).fflush(None)  # C keeps what it prints until it has a bufferful
+            ctypes.CDLL(None).fflush(None)  # C buffers its output
         os.dup2(kept, 1)
         os.close(kept)
 
@@ -106,21 +107,19 @@ def deliver(
     precision: Mapping[str, Sequence[Effort]] | None = None,
     history: Callable[[], Trends] | None = None,
 ) -> None:
-    """Print the table and write what was asked for; a file that cannot be written does not keep
-    back the others.
+    """Print the table and write the requested files; a file that cannot be written does not
+    stop the others.
 
     Args:
-        matrix: print a line for each case, and a column for each engine, rather than a line for
-            each pair.
+        matrix: print a line for each case and a column for each engine, not a line for each pair.
         precision: error against time at several efforts, by case, for the report.
-        history: reads the trends for the report, after all else is written; None where no history
-            is kept.
+        history: reads the trends for the report, after all other files; None without a history.
     """
     from ..report.matrix import print_matrix, to_markdown
     from ..report.table import print_table
 
     encoded = to_json(results) if to.out is not None or to.json is not None else b""
-    contents = list[tuple[Path, Content]]()  # several may be for one pipe
+    contents = list[tuple[Path, Content]]()  # several may go to one pipe
     if to.junit is not None:
         from ..report.junit import to_junit
 
@@ -135,7 +134,7 @@ def deliver(
             (to.out / "report.html", lambda path: _write_page(results, path, precision, history))
         )
     problems += write_all(contents)
-    # last: who reads it may have gone
+    # last: the reader of standard output may have closed it
     (print_matrix if matrix else print_table)(results, sys.stderr if to.json == "-" else sys.stdout)
     if to.json == "-":
         to_standard_output(encoded)
@@ -147,7 +146,7 @@ def _write_page(
     precision: Mapping[str, Sequence[Effort]] | None,
     history: Callable[[], Trends] | None,
 ) -> None:
-    """Write the report, without trends where the history has a fault, which it then says."""
+    """Write the report; without trends, and with a note about it, where the history is damaged."""
     from ..report.report import WITHOUT_TRENDS, write_report
 
     past = None if history is None else history()

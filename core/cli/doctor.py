@@ -1,5 +1,6 @@
-"""kincheck doctor: what is installed, what is missing and how to get it, and whether the tool works
-here.
+"""kincheck doctor: list installed and missing parts with remedies, and check that the tool works.
+
+The self-check solves one case.
 """
 
 from __future__ import annotations
@@ -8,13 +9,13 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from .registry import House, Status
-from .run import TOL
+from .run_options import TOL
 
 if TYPE_CHECKING:
     from .installation import Examination
 
 SAMPLE = "mcpherson_strut"
-"""The case that is solved: the paper's own, with a reference of 17 digits."""
+"""Case of the self-check: the paper's strut, with a reference of 17 digits."""
 
 
 def add(commands: Any) -> None:
@@ -32,8 +33,7 @@ def add(commands: Any) -> None:
 
 
 def _doctor(options: argparse.Namespace, house: House) -> int:
-    """Say what is installed, what is missing and how to get it, and solve a case with the native
-    engine.
+    """List installed and missing parts with remedies, and solve a case with the native engine.
 
     Exit status: 0 the tool can do its work, 2 something essential is missing or broken.
     """

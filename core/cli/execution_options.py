@@ -1,4 +1,4 @@
-"""Options of isolation: where pairs are solved, how many at a time, and what each may take."""
+"""Options of isolation: where pairs are solved, how many at a time, and with which limits."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def add_options(parser: argparse.ArgumentParser, positive: Callable[[str], float]) -> None:
-    """Add the options to a command that solves pairs."""
+    """Add the options to a command that solves pairs of case and engine."""
 
     def limit(text: str) -> float:
         number = positive(text)
@@ -64,7 +64,7 @@ def add_options(parser: argparse.ArgumentParser, positive: Callable[[str], float
 
 
 def contradictions(options: argparse.Namespace) -> list[str]:
-    """What is wrong with the options together."""
+    """Return the contradictions between the options."""
     problems: list[str] = []
     if options.scheduler is not None and options.jobs is not None:
         problems.append(
@@ -79,8 +79,8 @@ def contradictions(options: argparse.Namespace) -> list[str]:
 
 
 def unreachable(options: argparse.Namespace) -> list[str]:
-    """Why there is no cluster, where one is asked for: found before the work, and after all other
-    problems, for it takes time.
+    """Return why the requested cluster cannot be reached. Takes time, so it comes before the work
+    and after all other checks.
     """
     if options.scheduler is None:
         return []
@@ -94,7 +94,7 @@ def unreachable(options: argparse.Namespace) -> list[str]:
 
 
 def solver(options: argparse.Namespace, engines: Sequence[Engine]) -> tuple[Solver, dict[str, Any]]:
-    """Where the pairs are solved, and what the results say of it."""
+    """Return the solver of the pairs, and its settings for the results."""
     from ..harness.execution import here
     from ..harness.run import NATIVE
     from ..harness.workers.distributed import on_cluster
@@ -106,8 +106,8 @@ def solver(options: argparse.Namespace, engines: Sequence[Engine]) -> tuple[Solv
         return on_cluster(options.scheduler, limits), {"scheduler": options.scheduler, **limited}
     jobs: int | None = options.jobs
     if jobs is None:
-        # a process would cost the native engine more time than most cases do, and it has no foreign
-        # code to be kept apart
+        # A process would cost more time than most cases take natively, and the native engine runs
+        # no foreign code that needs isolation.
         ours = all(engine.name == NATIVE for engine in engines) and not (
             options.timeout or options.memory
         )

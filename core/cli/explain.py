@@ -1,4 +1,4 @@
-"""kincheck explain: why a case cannot be solved, or how well it can."""
+"""kincheck explain: find why a case cannot be solved, or how well conditioned it is."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 from . import import_options
 from .registry import House, Status, whole
-from .run import TOL, positive
+from .run_options import TOL, positive
 
 
 def add(commands: Any) -> None:
@@ -44,8 +44,8 @@ def add(commands: Any) -> None:
 
 def _explain(options: argparse.Namespace, house: House) -> int:
     """Diagnose a case: degrees of freedom, redundant and contradictory rows by name, conditioning
-    along the sweep, tolerances that follow from it, sensitivity of the outputs to hardpoints, and
-    what the native engine computes.
+    along the sweep, resulting tolerances, sensitivity of the outputs to hardpoints, and the
+    programs of the native engine.
 
     Exit status: 0 it can be solved, 1 it contradicts itself or is not determined, 2 the tool could
     not do its work.

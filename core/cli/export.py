@@ -14,13 +14,11 @@ from . import import_options
 from .registry import House, Status
 
 FORMATS = {"mjcf": "MuJoCo", "exudyn": "a Python script", "urdf": "Pinocchio"}
-"""The formats that the adapters write, for help texts: those are made before adapters are loaded. A
-test has them equal.
-"""
+"""Formats of the adapters' writers, for help texts: adapters load later. A test compares both."""
 
 
 def formats() -> str:
-    """The formats in words."""
+    """Return the formats as text for the help."""
     *first, last = (f"{name} ({what})" for name, what in FORMATS.items())
     return f"{', '.join(first)} or {last}"
 
@@ -54,8 +52,8 @@ def add(commands: Any) -> None:
 def _export(options: argparse.Namespace, house: House) -> int:
     """Write a case's mechanism in a simulator's format, with a consistent start.
 
-    What the format has no place for goes into a second file beside the first: the constraints of a
-    URDF.
+    A second file beside the first holds parts that do not fit the format, such as the constraints
+    of a URDF.
     """
     from ..case.io.model_writer import written
 
@@ -70,15 +68,14 @@ def _export(options: argparse.Namespace, house: House) -> int:
 def keep_texts(
     texts: Mapping[str, str], name: str, out: Path | None, json: str | None = None
 ) -> None:
-    """Write texts, given by the endings of their files, beside each other, and print the files'
-    names.
+    """Write texts, keyed by file suffix, side by side, and print the files' names.
 
     Args:
-        json: where the JSON is written; "-" for standard output, which then has nothing else.
+        json: destination of the JSON; "-" for standard output, which then has nothing else.
 
     Raises:
-        KincheckError: a file cannot be written, would be over the JSON, or without `out` over what
-            is there.
+        KincheckError: a file cannot be written, would overwrite the JSON, or exists and
+            `out` is None.
     """
     from ..case.io.atomic_files import unwritable, write
 

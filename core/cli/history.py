@@ -1,4 +1,4 @@
-"""kincheck history: the runs that were kept, and what they say of a case and an engine."""
+"""kincheck history: list the stored runs, and the trends of a case and an engine."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any
 from ..errors import KincheckError, unknown
 from ..report.progress import complain
 from .registry import House, Status, whole
-from .run import HISTORY
+from .run_options import HISTORY
 
 if TYPE_CHECKING:
     from ..history.queries import History
     from ..history.store import RunRow, Store
 
-LAST = 20  # runs: what a terminal shows at once
+LAST = 20  # runs shown by default
 
 
 def add(commands: Any) -> None:
@@ -75,7 +75,7 @@ def add(commands: Any) -> None:
 
 
 def add_history(parser: argparse.ArgumentParser, what: str) -> None:
-    """Add the option that says where the history is."""
+    """Add the option that names the history file."""
     parser.add_argument(
         "--history",
         type=Path,
@@ -89,8 +89,8 @@ def add_history(parser: argparse.ArgumentParser, what: str) -> None:
 
 
 def _history(options: argparse.Namespace, house: House) -> int:
-    """List the runs, the latest first; for a case or an engine, its errors and times in them and
-    the steps in these.
+    """List the runs, the latest first; for a case or an engine, its errors and times in the runs,
+    and the steps in these.
     """
     from ..case.io.atomic_files import unwritable
     from ..history.queries import read

@@ -1,5 +1,5 @@
-"""A run's place in the history: kept while it is made, and drawn as trends in the end. A history
-that fails costs no result.
+"""Connection of a run to the history: records are stored as they come, and trends are read at the
+end. A failing history costs no result.
 """
 
 from __future__ import annotations
@@ -24,9 +24,7 @@ def keeping(
     unread: Sequence[str],
     settings: dict[str, Any],
 ) -> tuple[Keeping | None, list[str]]:
-    """Return the run in its history, None without one; and why it cannot be kept there, in which
-    case it goes on without.
-    """
+    """Return the run in its history, or None, and the reasons why the history cannot store it."""
     if options.history is None:
         return None, []
     from ..history.run_recorder import keep
@@ -50,7 +48,7 @@ def keeping(
 
 
 def past(keeping: Keeping, problems: list[str]) -> Trends:
-    """Return the runs up to this one by case, for its report; what cannot be read of them is added
+    """Return the runs up to this one by case, for its report; unreadable parts are added
     to the problems.
     """
     from ..history.queries import NIGHTS, read

@@ -1,5 +1,5 @@
-"""Options of commands that take files: joint types of one's own, and what files of other tools do
-not say.
+"""Options of commands that read files: a user's joint types, and facts missing in files
+of other tools.
 """
 
 from __future__ import annotations
@@ -65,8 +65,8 @@ def add_options(command: argparse.ArgumentParser) -> None:
 
 
 def return_cases(options: argparse.Namespace) -> None:
-    """Give back the files that --hold, which takes several names, has swallowed: `run --hold knee
-    hip model.xml`.
+    """Move files from --hold back to the cases: in `run --hold knee hip model.xml` the option,
+    which takes several names, would take the file too.
     """
     files = [name for name in options.hold if Path(name).is_file()]
     options.case += files
@@ -74,7 +74,7 @@ def return_cases(options: argparse.Namespace) -> None:
 
 
 def supplied(options: argparse.Namespace) -> Supplied:
-    """What the options say."""
+    """Return the facts that the options supply."""
     return Supplied(
         options.template,
         options.units,
@@ -86,5 +86,5 @@ def supplied(options: argparse.Namespace) -> Supplied:
 
 
 def tell_left_out(cases: Iterable[Case]) -> None:
-    """Say on standard error what was read of files of other tools, and what was left out."""
+    """Print on standard error which parts of other tools' files were read and left out."""
     complain(f"{case.name}: {case.source}" for case in cases if LEFT_OUT in case.source)

@@ -1,6 +1,4 @@
-"""What is installed, what is missing and how to get it, and whether the tool can do its work
-here.
-"""
+"""Examination of the installation: installed and missing parts, remedies, and a self-check."""
 
 from __future__ import annotations
 
@@ -27,27 +25,26 @@ from ..program.llvm import compiler
 from ..report.progress import how_to_install
 
 SCHEMA = "kincheck-doctor/1"
-# Extra of the package -> what it is for, but for those of engines. What the package itself requires
-# is essential.
+# Extras of the package and their purposes; engines' extras are added. Requirements without an extra
+# are essential.
 PURPOSES = {
     "fast": "machine code",
     "proofs": "proved references",
     "parquet": "history as Parquet",
     "distributed": "runs on many machines",
 }
-# What is imported of distributions that are not imported by their own name; of a simulator's it is
-# the engine's name.
+# Modules of distributions whose import name differs; of a simulator it is the engine's name.
 MODULES = {"python-flint": "flint", "llvmlite": "llvmlite.binding"}
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
 
 class Part(msgspec.Struct, frozen=True):
-    """Something installed, or not.
+    """A part of the installation, present or missing.
 
     Attributes:
         version: null where it is not installed.
-        purpose: what it is for.
-        essential: without it the tool can do nothing.
+        purpose: use of the part.
+        essential: the tool cannot work without it.
         problem: why it cannot be used; empty where it can.
         remedy: how to get it; empty where nothing is to be done.
     """
@@ -61,9 +58,7 @@ class Part(msgspec.Struct, frozen=True):
 
 
 class Machine(msgspec.Struct, frozen=True):
-    """What it runs on. vector_width: doubles that machine code computes at a time; null without
-    it.
-    """
+    """The machine. vector_width: doubles in a vector of machine code; null without machine code."""
 
     python: str
     platform: str
@@ -77,8 +72,8 @@ class Machine(msgspec.Struct, frozen=True):
 
 
 class Check(msgspec.Struct, frozen=True):
-    """A case solved here and now; error: the largest against its reference [its output's unit],
-    with the tolerance.
+    """Result of the self-check; error: the largest against the reference [unit of its output],
+    with its tolerance.
     """
 
     case: str
@@ -91,7 +86,7 @@ class Check(msgspec.Struct, frozen=True):
 
 
 class Examination(msgspec.Struct, frozen=True):
-    """All that was found."""
+    """All findings of the examination."""
 
     schema: str
     kincheck: str
@@ -101,18 +96,14 @@ class Examination(msgspec.Struct, frozen=True):
 
     @property
     def able(self) -> bool:
-        """Whether the tool can do its work: nothing essential is missing, and the native engine is
-        right.
-        """
+        """Whether nothing essential is missing and the native engine passes the self-check."""
         return self.check.outcome == Outcome.PASS and not any(
             part.essential and part.problem for part in self.parts
         )
 
 
 def examine(case: Case, native: Engine, tol: float, engines: Collection[str]) -> Examination:
-    """Look at the installation, of the engines of these names too, and solve a case with the native
-    engine.
-    """
+    """Examine the installation, with the named engines, and solve a case with the native engine."""
     problem = _cache_problem()
     about = circumstances([], started=datetime.now(UTC), tol=tol, command="kincheck doctor")
     machine = Machine(
@@ -136,10 +127,10 @@ def examine(case: Case, native: Engine, tol: float, engines: Collection[str]) ->
 
 
 def parts(engines: Collection[str]) -> list[Part]:
-    """Everything that kincheck requires or can use, from its own metadata, and a browser.
+    """Return the parts that kincheck requires or can use, from its own metadata, and a browser.
 
     Args:
-        engines: by name; an engine's simulator is the extra of that name.
+        engines: names of engines; the extra of an engine's simulator has the same name.
     """
     purposes, modules = PURPOSES | dict.fromkeys(engines, "engine"), dict(MODULES)
     found: list[Part] = []
@@ -183,8 +174,8 @@ def _version(name: str) -> str | None:
 
 
 def _imported(found: Sequence[Part], modules: Mapping[str, str]) -> list[Part]:
-    """The parts, with what goes wrong when their modules are imported, in processes of their own: a
-    broken library may end one.
+    """Return the parts with the problems of importing their modules. Each import runs in its own
+    process, because a broken library can end it.
     """
     running = {
         part.name: subprocess.Popen(
@@ -221,7 +212,7 @@ def _ended(importing: subprocess.Popen[str]) -> str:
 
 
 def _cache_problem() -> str:
-    """Why compiled code cannot be kept; empty where it can."""
+    """Return why compiled code cannot be cached; empty where it can."""
     folder, remedy = (
         disk_cache.folder(),
         "every process compiles anew: make it writable, or set XDG_CACHE_HOME to a folder that is",
@@ -245,7 +236,7 @@ def _check(case: Case, native: Engine, tol: float) -> Check:
 
 
 def _largest(record: Record) -> tuple[float | None, float | None]:
-    """The largest error of a position, as a share of its tolerance, and that tolerance."""
+    """Return the position error with the largest share of its tolerance, and the tolerance."""
     found = [each.position for each in record.errors.values() if each.position is not None]
     if not found:
         return None, None

@@ -1,4 +1,4 @@
-"""kincheck list: what there is, cases and engines, or the types a case file can name."""
+"""kincheck list: list cases and engines, or the types known to case files."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ def add(commands: Any) -> None:
 
 
 def _list(options: argparse.Namespace, house: House) -> int:
-    """List the built-in cases with truth and source, and the engines with their versions; or what a
-    file may hold.
+    """List the built-in cases with reference kind and source, and the engines with their versions;
+    or the keys and types of files.
     """
     from ..case.io.catalogue import catalogue, output_catalogue
     from ..harness.engine_versions import versions
@@ -79,10 +79,10 @@ def _list(options: argparse.Namespace, house: House) -> int:
 
 
 def _references() -> Iterator[str]:
-    """What the modules that read these files say of their keys."""
+    """Yield the descriptions of the keys of case and variation files, from their readers."""
     from ..case.io import schema
-    from ..case.variation import variation_file
+    from ..case.variation import variation_schema
 
-    for module in (schema, variation_file):
+    for module in (schema, variation_schema):
         what, _, keys = (module.__doc__ or "").partition("Reference. ")
         yield f"{what.splitlines()[0]}\n\n{keys}"

@@ -1,5 +1,5 @@
-"""The command line. The only place that knows adapters and cases; they, and all that is slow to
-import, are loaded on use.
+"""The command line. Only this module knows adapters and cases; they, and all slow imports, are
+loaded on use.
 """
 
 from __future__ import annotations
@@ -24,9 +24,7 @@ if TYPE_CHECKING:
     from .registry import House
 
 FULL = errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO
-"""What a standard output that takes no more says: files that an option names have messages of their
-own.
-"""
+"""Error numbers of a full standard output; files named by options have their own messages."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -40,14 +38,14 @@ def main(argv: Sequence[str] | None = None) -> int:
         interrupt, status = raised, 0
     if interrupt is None:
         return status
-    # else the command has said it
+    # otherwise the command has printed it
     if status not in (ended := (status_of(KeyboardInterrupt()), status_of(Terminated()))):
         print(f"kincheck: {words_of(interrupt)}", file=sys.stderr)
     return status if status in ended else status_of(interrupt)
 
 
 def _done(argv: list[str]) -> int:
-    """Return the status of the command that the arguments give."""
+    """Return the exit status of the command in the arguments."""
     _be_able_to_print()
     from ..report.progress import complain
     from .registry import Status
@@ -56,7 +54,7 @@ def _done(argv: list[str]) -> int:
         options = _parser(argv).parse_args(
             argv, argparse.Namespace(command=shlex.join(["kincheck", *argv]))
         )
-    except SystemExit as end:  # argparse has said why
+    except SystemExit as end:  # argparse has printed why
         return int(end.code or 0)
     try:
         if getattr(options, "joint_type", ()):
@@ -67,9 +65,7 @@ def _done(argv: list[str]) -> int:
         return _printed(int(options.do(options, house())))
     except KincheckError as error:
         complain(str(error).splitlines())
-    except (
-        SystemExit
-    ) as end:  # an engine's, or a module's that was named: ours come from the parser alone
+    except SystemExit as end:  # raised by an engine or a user's module: ours come from the parser
         where = traceback.extract_tb(end.__traceback__)[-1]
         complain(
             [
@@ -77,7 +73,7 @@ def _done(argv: list[str]) -> int:
                 f" {end.code!r}; mend it, or leave it out"
             ]
         )
-    except BrokenPipeError:  # the reader of our output has gone; what it wanted is what it got
+    except BrokenPipeError:  # the reader has closed our output
         _print_no_more()
     except OSError as error:
         if error.errno in FULL and error.filename is None:
@@ -90,26 +86,26 @@ def _done(argv: list[str]) -> int:
             _print_no_more()
         else:
             traceback.print_exc()
-    except Exception:  # a defect of ours: shown in full, and never taken for a deviation (Python's own status would be 1)
+    except Exception:  # a defect in kincheck: never status 1, a deviation
         traceback.print_exc()
     return Status.FAILED
 
 
 def _be_able_to_print() -> None:
-    """Print what an encoding lacks as question marks: no finished run shall end at a dash. What is
-    closed has nobody to read it.
+    """Print characters that the encoding lacks as question marks, so that no finished run ends at a
+    dash. A closed stream is replaced by the null device.
     """
     for name in ("stdout", "stderr"):
         stream: TextIO | None = getattr(sys, name)
         if stream is None:
             setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), "w", encoding="utf-8"))
-        elif isinstance(stream, TextIOWrapper):  # and not what a caller has put in its place
+        elif isinstance(stream, TextIOWrapper):  # not a caller's replacement
             stream.reconfigure(errors="replace")
 
 
 def _printed(status: int) -> int:
-    """The status of a command that has come to its end, when all it said is out; that its reader
-    has gone is no failure.
+    """Return the status of a finished command after its output is flushed. A closed reader
+    is no failure.
     """
     try:
         sys.stdout.flush()
@@ -125,7 +121,7 @@ def _print_no_more() -> None:
 
 
 def house() -> House:
-    """The engines, cases and writers there are."""
+    """Return the registry of engines, cases and writers."""
     from ... import adapters, cases
     from .registry import House
 
@@ -141,8 +137,8 @@ def house() -> House:
 
 
 def _parser(argv: Sequence[str]) -> argparse.ArgumentParser:
-    """Of the command that the arguments begin with; of all, where they begin with none: to make
-    each takes a millisecond.
+    """Return the parser of the command that the arguments begin with, or of all commands. Each
+    takes a millisecond to build.
     """
     parser = argparse.ArgumentParser(
         prog="kincheck", description="Cross-validation of the kinematics of multibody systems."

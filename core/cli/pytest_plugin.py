@@ -4,9 +4,9 @@
     pytest --kincheck --kincheck-engine mujoco          # this one only, and it must be there
 
 Files are TOML or JSON with the schema kincheck-case/1, anywhere pytest looks. A test fails where an
-output is out of tolerance or an engine breaks, and is skipped where an engine is missing, cannot
-express the case, or where nothing was compared (not judged). pytest loads this file every time: all
-that is slow to import waits for --kincheck.
+output is out of tolerance or an engine breaks. A test is skipped where an engine is missing or
+cannot express the case, or nothing was compared (not judged). pytest loads this file every time, so
+slow imports wait for --kincheck.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from .registry import House
 
 SCHEMA = re.compile(rb"""(^\s*|["'])schema["']?\s*[=:]\s*["']kincheck-case/""", re.MULTILINE)
-"""What makes a TOML or JSON file a case file, of whatever version: an unknown one is to be told,
-not passed by.
+"""Mark of a TOML or JSON case file of any version: an unknown version gets a message, and
+is not ignored.
 """
 SUFFIXES = ".toml", ".json"
 
@@ -53,7 +53,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Find out about the engines before anything is collected."""
+    """Check the engines before collection."""
     names = _required(config)
     if names and not config.getoption("--kincheck"):
         raise pytest.UsageError("--kincheck-engine: give --kincheck too")
@@ -65,7 +65,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
-    """Take what is a case file."""
+    """Collect a case file."""
     if (
         parent.config.getoption("--kincheck")
         and file_path.suffix.lower() in SUFFIXES
@@ -76,18 +76,16 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Col
 
 
 def _required(config: pytest.Config) -> list[str]:
-    """The engines asked for by name."""
+    """Return the engines requested by name."""
     names: Any = config.getoption("--kincheck-engine")
     return [*names]
 
 
 class CaseFile(pytest.File):
-    """A case file: a test for each engine."""
+    """A case file with a test for each engine."""
 
     def collect(self) -> Iterator[pytest.Item]:
-        """The engines' tests; a file that makes no sense is an error of the collection, with its
-        message.
-        """
+        """Yield the engines' tests; an invalid file is a collection error with its message."""
         from ..errors import KincheckError
 
         house = _house()
@@ -97,16 +95,16 @@ class CaseFile(pytest.File):
             raise self.CollectError(str(error)) from None
         required = _required(self.config)
         for engine in house.find_engines(required or house.engines, []):
-            yield EngineTest.from_parent(
+            yield EngineTest.from_parent(  # pyright: ignore[reportUnknownMemberType]
                 self, name=engine.name, case=case, engine=engine, required=bool(required)
-            )  # pyright: ignore[reportUnknownMemberType]
+            )
 
 
 class EngineTest(pytest.Item):
-    """One engine on one case.
+    """A test of one engine on one case.
 
     Attributes:
-        required: it was asked for by name: to be missing is a failure.
+        required: the engine was requested by name, so a missing engine is a failure.
     """
 
     def __init__(self, *, case: Case, engine: Engine, required: bool, **whole: Any) -> None:
@@ -128,31 +126,29 @@ class EngineTest(pytest.Item):
             pytest.skip(f"{record.outcome.shown}: {record.message}")
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], *_: Any, **__: Any) -> Any:
-        """What the case's record says; where in the harness it was found is of no interest."""
+        """Return the message of the case's record, without a traceback through the harness."""
         if isinstance(excinfo.value, CaseFailedError):
             return f"{self.path.name}: {self.engine.name}: {excinfo.value}"
         return super().repr_failure(excinfo)
 
     def reportinfo(self) -> tuple[Path, None, str]:
-        """The file, and the test in it: pytest prints them as the id that it takes,
-        FILE::ENGINE.
-        """
+        """Return the file and the test's name: pytest prints them as its id, FILE::ENGINE."""
         return self.path, None, self.name
 
 
 class CaseFailedError(Exception):
-    """An engine has failed a case."""
+    """Failure of an engine on a case."""
 
 
 def _solved(case: Case, engine: Engine) -> Record:
-    """The record of the pair; a simulator is kept in a process of its own: it may take the tests
-    down with it.
+    """Return the record of the pair. A simulator runs in its own process, because a crash would
+    end the tests.
     """
     from ..harness.execution import here
     from ..harness.resource_limits import Limits
     from ..harness.run import NATIVE, run
     from ..harness.workers.pool import in_workers
-    from .run import TOL
+    from .run_options import TOL
 
     native = engine.name == NATIVE
     solver = here if native else in_workers(1, Limits())

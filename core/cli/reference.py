@@ -1,5 +1,5 @@
 """kincheck reference: prove the samples of cases, write them as references, and measure the native
-engine by them.
+engine's errors against them.
 """
 
 from __future__ import annotations
@@ -12,15 +12,15 @@ from ..case.io.escape import file_name
 from ..errors import KincheckError
 from ..trajectory import QUANTITIES
 from .registry import House, Status, add_joint_types, whole
-from .run import TOL
+from .run_options import TOL
 
 if TYPE_CHECKING:
     from ..case.io.reference_file import Reference
-    from ..studies.verified_reference import NativeError
+    from ..studies.native_error import NativeError
 
-# A double has 17 digits; beyond 1000 nothing but time is gained.
+# A double has 17 digits; beyond 1000 digits only the time grows.
 FEWEST, DIGITS, MOST = 17, 30, 1000
-# Samples without a proof that are named one by one; the file has all of them.
+# Unproved samples listed one by one; the file has all of them.
 NAMED = 5
 
 
@@ -64,11 +64,11 @@ def add(commands: Any) -> None:
 
 
 def _prove(options: argparse.Namespace, house: House) -> int:
-    """Prove that exactly one solution is near each sample of the native engine, and enclose its
-    outputs.
+    """Prove that exactly one solution is near each sample of the native engine, and
+    enclose its outputs.
 
-    Exit status: 0 all samples are proved, 1 some are not (singular poses), 2 the tool could not do
-    its work.
+    Exit status: 0 all samples are proved, 1 some are not (singular poses), 2 the tool could not
+    do its work.
     """
     from ..case.io.atomic_files import unwritable, write
     from ..harness.record import to_json
@@ -103,7 +103,7 @@ def _prove(options: argparse.Namespace, house: House) -> int:
 
 
 def _lines(found: Reference, errors: list[NativeError]) -> list[str]:
-    """What was proved, what was not, and how far the native engine is from it."""
+    """Return the lines of a report: proved and unproved samples, and the native engine's errors."""
     count, proved = len(found.samples), [sample for sample in found.samples if sample.proved]
     each = 1e3 * found.seconds / max(1, count)
     lines = [
@@ -159,7 +159,7 @@ def _cell(largest: float | None, ulps: float | None) -> str:
 
 
 def _missing(found: Reference) -> list[str]:
-    """The samples without a proof."""
+    """Return the lines about samples without a proof."""
     name, values = next(iter(found.driver.items()))
     missing = [(k, sample.reason) for k, sample in enumerate(found.samples) if not sample.proved]
     lines = [

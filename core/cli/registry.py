@@ -1,5 +1,5 @@
-"""What commands know of the house they work in, and how they find the cases and engines that a user
-has named.
+"""Registry of engines, cases and writers for the commands, and the search for named
+cases and engines.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class Status(IntEnum):
     """Exit status: all within tolerance; something deviates, fails or errs; the tool could not do
     its work, or part of it.
 
-    A command that is interrupted ends as shells have it: see `interrupts`.
+    An interrupted command exits with the shell's status for the signal: see `interrupts`.
     """
 
     WITHIN = 0
@@ -35,15 +35,15 @@ class Status(IntEnum):
 
 @dataclass(frozen=True)
 class House:
-    """The engines and built-in cases there are, loaded when they are asked for.
+    """The available engines and built-in cases, loaded on use.
 
     Attributes:
         engines: names of the engines in projection mode, in the order of the results.
-        engine: the engine of a name, and of a mode unless it is projection.
-        cases: names of the built-in cases.
-        case: the built-in case of a name, with its truth.
-        writers: names of the formats that a mechanism can be written in.
-        writer: the writer of a format.
+        engine: returns the engine of a name, and of a mode other than projection.
+        cases: returns the names of the built-in cases.
+        case: returns the built-in case of a name, with its reference.
+        writers: names of the export formats.
+        writer: returns the writer of a format.
         simulations: names of the engines in simulate mode.
     """
 
@@ -56,14 +56,15 @@ class House:
     simulations: Sequence[str] = ()
 
     def find_case(self, name: str, supplied: Supplied = NOTHING, *, driven: bool = True) -> Case:
-        """The case of that name or in that file; `supplied` is what a file of another tool does not
-        say.
+        """Return the case of a name or in a file.
 
-        Unless it must be driven, its drivers need not match its freedom.
+        Args:
+            supplied: facts missing in a file of another tool.
+            driven: require drivers for all degrees of freedom.
 
         Raises:
-            KincheckError: there is none, its file does not make sense, or its drivers do not match
-                its freedom.
+            KincheckError: there is no such case, its file is invalid, or its drivers do not match
+                its degrees of freedom.
         """
         from ..case.models.files import SUFFIXES, load
         from ..kinematics.structure.driver_count import require_driven
@@ -86,9 +87,7 @@ class House:
             return case
         try:
             require_driven(case.mechanism)
-        except (
-            SolveError
-        ) as error:  # it names the mechanism; the file is what the reader has to open
+        except SolveError as error:  # The error names the mechanism; the user knows the file.
             raise KincheckError(
                 f"{name}: {'drivers' if case.mechanism.moving else 'bodies'}: {error}"
             ) from error
@@ -101,8 +100,10 @@ class House:
         found: Sequence[Case] = (),
         supplied: Supplied = NOTHING,
     ) -> list[Case]:
-        """The cases found already and those named; what is wrong with the others is put beside
-        their names as given.
+        """Return the cases already found and the named ones.
+
+        Args:
+            unread: receives the messages of unreadable cases, by their names as given.
         """
         cases = {case.name: case for case in found}
         for name in dict.fromkeys(names):
@@ -123,8 +124,11 @@ class House:
     def find_engines(
         self, names: Sequence[str], problems: list[str], mode: str | None = None
     ) -> list[Engine]:
-        """The engines named, each once, in a mode or in the first that they have; what is none is
-        added to the problems.
+        """Return the named engines, each once.
+
+        Args:
+            problems: receives the messages of unknown names and missing modes.
+            mode: the mode; None for the first mode of each engine.
         """
         engines: list[Engine] = []
         for name in dict.fromkeys(names):
@@ -147,8 +151,8 @@ class House:
         return engines
 
     def _loaded(self, name: str, mode: str) -> Engine:
-        """The engine, or what stands for it where loading it fails: one broken adapter must not end
-        a run of all.
+        """Return the engine, or a stand-in if it fails to load: one broken adapter must not end a
+        run of all engines.
         """
         from ..harness.unloadable import Unloadable
 
@@ -159,7 +163,7 @@ class House:
 
 
 def add_joint_types(command: argparse.ArgumentParser) -> None:
-    """Add the option to a command that takes case files; `main` loads what it names."""
+    """Add the option for joint types to a command for case files; `main` loads the classes."""
     command.add_argument(
         "--joint-type",
         action="append",
@@ -173,8 +177,8 @@ def add_joint_types(command: argparse.ArgumentParser) -> None:
 
 
 def given(options: argparse.Namespace, names: Iterable[str]) -> str:
-    """Return those of the options that were given, to be named in a message; they have no default,
-    or false, or no names.
+    """Return the names of the options that were set, for a message. Their defaults are None,
+    False or [].
     """
     found = (
         name
@@ -185,7 +189,7 @@ def given(options: argparse.Namespace, names: Iterable[str]) -> str:
 
 
 def whole(least: int, most: int | None = None) -> Callable[[str], int]:
-    """A whole number of so much or more, and maybe not beyond a limit, as an option gives it."""
+    """Return the parser of a whole number between two limits for an option."""
     expected = f"of {least} or more" if most is None else f"from {least} to {most}"
 
     def read(text: str) -> int:

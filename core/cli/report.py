@@ -1,4 +1,4 @@
-"""kincheck report: what changed since another run."""
+"""kincheck report: show changes since another run."""
 
 from __future__ import annotations
 
@@ -75,8 +75,8 @@ def add(commands: Any) -> None:
 
 
 def _report(options: argparse.Namespace, house: House) -> int:
-    """Say what changed: new failures, fixed, lost, less accurate, slower, versions, since when, and
-    tolerances to tighten.
+    """Report changes since another run: new failures, fixes, lost results, lower accuracy, longer
+    times, versions, the run of each change, and tolerances to tighten.
 
     Exit status: 0 nothing regressed, 1 something did, 2 the tool could not do its work.
     """
@@ -115,7 +115,7 @@ def _write(
     store: Store | None,
     problems: list[str],
 ) -> None:
-    """Write what was asked for; a file that cannot be written does not keep back the others."""
+    """Write the requested files; a file that cannot be written does not stop the others."""
     from ..case.io.atomic_files import to_standard_output, written
     from ..harness.record import to_json
     from ..history.queries import NIGHTS, read

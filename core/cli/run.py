@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import math
-import os
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
@@ -20,6 +18,7 @@ from ..harness.interrupts import hold, status_of, words_of
 from ..report.progress import complain, lacking, progress, uncompared
 from . import execution_options, history_options, import_options
 from .registry import House, Status
+from .run_options import HISTORY, add_options
 
 if TYPE_CHECKING:
     from ..case.case import Case
@@ -27,16 +26,6 @@ if TYPE_CHECKING:
     from ..harness.record import Record, Results
     from ..history.run_recorder import Keeping
     from .destinations import Destinations
-
-# Largest accepted constraint residual [m or -]: a thousand times the round-off of metre-sized
-# coordinates, and a thousandth of the 1e-9 m that outputs are held to, so that a residual amplified
-# a hundredfold by the mechanism still cannot be seen.
-TOL = 1e-12
-
-MODES = ("projection", "simulate")
-
-HISTORY = "KINCHECK_HISTORY"
-"""Environment variable: the history file where --history is not given."""
 
 
 def add(commands: Any) -> None:
@@ -46,118 +35,16 @@ def add(commands: Any) -> None:
         "run", help="solve cases with engines and judge the results", description=_run.__doc__
     )
     run.set_defaults(do=_run)
-    run.add_argument(
-        "case",
-        nargs="*",
-        metavar="CASE",
-        help="built-in name, or path to a case file; default: all built-in cases",
-    )
-    run.add_argument(
-        "--joints",
-        action="store_true",
-        help="run a small closed loop around every joint type, and the cases named",
-    )
-    must = "only these, which must be installed (else status 2); default: all engines"
-    run.add_argument("--engine", nargs="+", action="extend", default=[], metavar="NAME", help=must)
-    run.add_argument(
-        "--mode",
-        choices=MODES,
-        help="the engines' mode; projection, unless an engine named has only the other",
-    )
-    run.add_argument(
-        "--tol",
-        type=positive,
-        default=TOL,
-        metavar="X",
-        help=f"largest constraint residual [m or -]; default {TOL:g}",
-    )
-    run.add_argument(
-        "--out", type=Path, metavar="DIR", help="write results.json and report.html there"
-    )
-    run.add_argument(
-        "--bench",
-        type=Path,
-        metavar="FILE",
-        help="show the work-precision data of this bench.json in the report",
-    )
-    run.add_argument(
-        "--json", metavar="FILE", help="write the results as JSON; - for standard output"
-    )
-    run.add_argument("--junit", type=Path, metavar="FILE", help="write the results as JUnit XML")
-    run.add_argument(
-        "--markdown",
-        type=Path,
-        metavar="FILE",
-        help="write the table of cases and engines as Markdown",
-    )
-    run.add_argument(
-        "--reference",
-        nargs="+",
-        action="extend",
-        default=[],
-        type=Path,
-        metavar="FILE",
-        help=(
-            "judge cases by these proved references, which kincheck reference wrote, instead of"
-            " their own"
-        ),
-    )
-    run.add_argument(
-        "--explain",
-        action="store_true",
-        help="print what the native engine computes for each case, and leaves out",
-    )
-    run.add_argument(
-        "--require",
-        nargs="+",
-        action="extend",
-        default=[],
-        metavar="NAME",
-        help="engines that must be there and able (else status 2)",
-    )
-    import_options.add_options(run)
-    execution_options.add_options(run, positive)
-    run.add_argument(
-        "--history",
-        type=Path,
-        metavar="FILE",
-        default=os.environ.get(HISTORY) or None,
-        help=(
-            "keep the run in this file, each record as it is made; default: the environment"
-            f" variable {HISTORY}, else not at all"
-        ),
-    )
-    run.add_argument(
-        "--resume",
-        action="store_true",
-        help=(
-            "go on with the last run in the history of the same cases, engines, tolerance, limits,"
-            " versions and commit that has no end"
-        ),
-    )
-
-
-def positive(text: str) -> float:
-    """A positive number, as an option gives it."""
-    try:
-        tol = float(text)
-    except ValueError:
-        tol = math.nan
-    if not (math.isfinite(tol) and tol > 0):
-        raise argparse.ArgumentTypeError(
-            f"{text!r} is not a positive number; give one such as 1, 0.5 or 1e-12"
-        )
-    return tol
+    add_options(run)
 
 
 @dataclass(frozen=True)
 class _Plan:
-    """What is to be run.
+    """The cases and engines of a run.
 
     Attributes:
-        baseline: what to compare with, where that is not among the engines.
-        unread: cases that make no sense, by their names as given, and why: the others are run all
-            the same.
+        baseline: native engine to compare with, if it is not among the engines.
+        unread: messages of unreadable cases, by their names as given; the other cases are run.
     """
 
     cases: Sequence[Case]
@@ -167,13 +54,13 @@ class _Plan:
 
 
 def _run(options: argparse.Namespace, house: House) -> int:
-    """Solve every case with every engine, judge each, print a table and write what was asked for.
+    """Solve every case with every engine, judge each, print a table and write the requested files.
 
     Exit status: 0 all within tolerance, 1 something deviates or ends in an error, a timeout or a
     crash, 2 the tool could not do its work: a case cannot be read (the others are run), a file
     cannot be written, an engine that is named or required is missing, or nothing at all was solved
-    or compared. Pairs with nothing to compare are not judged, and change no status as long as
-    others are.
+    or compared. Pairs with nothing to compare are not judged, and do not change the status if
+    others are judged.
     """
     from . import destinations as delivery
 
@@ -194,7 +81,7 @@ def _run(options: argparse.Namespace, house: House) -> int:
     if keeping:
         keeping.end(results, interrupted=stopped is not None)
         problems += keeping.problems + keeping.store.damage
-    # read last, for the page alone: what is damaged there costs no result
+    # read last, for the page alone: damage there costs no result
     if options.history is not None:
         history = partial(history_options.past, keeping, problems) if keeping else lambda: None
     delivery.deliver(
@@ -214,10 +101,10 @@ def _run(options: argparse.Namespace, house: House) -> int:
 
 
 def _planned(options: argparse.Namespace, house: House, to: Destinations) -> _Plan:
-    """What is to be run; cases that make no sense are told at once, before anything is computed.
+    """Return the plan of the run; messages of unreadable cases are printed before any computation.
 
     Raises:
-        KincheckError: what cannot be done, all of it, where no case is left or an option is wrong.
+        KincheckError: all problems, if no case is left or an option is wrong.
     """
     from ..case.joint_probe import probes
 
@@ -239,16 +126,15 @@ def _planned(options: argparse.Namespace, house: House, to: Destinations) -> _Pl
         from ..case.io.reference_file import judged_by
 
         try:
-            # a reference names its case, which may be the one that cannot be read: that ends no run
-            # of the others
+            # a reference may name an unreadable case: that does not stop the others
             cases = judged_by(cases, options.reference, unused if unread else None)
         except KincheckError as error:
             problems += str(error).splitlines()
     engines, baseline = _engines(options, house, problems)
     problems += to.problems(history=options.history)
     problems = problems or execution_options.unreachable(options)
-    # what could not be read at all is recorded too, where records are kept: a night that ran
-    # nothing is not the night before
+    # With outputs or a history, a run without readable cases is recorded too: it must not look like
+    # the run before.
     if problems or not (cases or to.wanted or options.history is not None):
         raise KincheckError("\n".join([*unread.values(), *problems]))
     complain(line for message in (*unread.values(), *unused) for line in message.splitlines())
@@ -264,7 +150,7 @@ def _solved(
     options: argparse.Namespace, plan: _Plan
 ) -> tuple[Results, list[str], Keeping | None, int | None]:
     """Return the results, the problems, the place in the history, and the status if something
-    stopped the run before its end.
+    stopped the run early.
     """
     from ..harness import run as running
     from ..harness.workers.distributed import ClusterError
@@ -284,7 +170,7 @@ def _solved(
             keeping.add(record)
         tell(record, done, total)
 
-    # results that may be compared with later ones
+    # results for later comparison
     if keeping is None and (options.out or options.json):
         from ..harness.provenance import conditions
 
@@ -304,7 +190,7 @@ def _solved(
             **about,
         }
         results = running.run(plan.cases, plan.engines, progress=keep, **how)
-        # also where the signal comes between the last record and here, all of them are kept below
+        # a signal between the last record and here also keeps all records below
         hold()
         return results, problems, keeping, None
     except (KeyboardInterrupt, ClusterError) as reason:
@@ -322,24 +208,22 @@ def _solved(
 
 
 def _explained(cases: Sequence[Case]) -> Iterator[str]:
-    """What the native engine computes for each case, or why nothing, and what is to be known of its
-    geometry.
+    """Yield the native engine's programs for each case, or why there are none, and notes
+    on its geometry.
     """
     from ..case.notes import notes
-    from ..studies.explain import explain
+    from ..harness.program_account import explain
 
     for case in cases:
         try:
             yield from explain(case)
-        except SolveError as error:  # of this case alone: its records are there, and say it too
+        except SolveError as error:  # this case alone: its records have the message too
             yield f"{case.name}: nothing is computed: {error}"
         yield from (f"  note: {note}" for note in notes(case))
 
 
 def _return_cases(options: argparse.Namespace, house: House) -> None:
-    """Give back the cases that an option taking several names has swallowed: `run --engine native
-    my_case.toml`.
-    """
+    """Move cases back from options that take several names: `run --engine native my_case.toml`."""
     for names in (options.engine, options.require):
         swallowed = [
             name
@@ -354,7 +238,7 @@ def _return_cases(options: argparse.Namespace, house: House) -> None:
 def _engines(
     options: argparse.Namespace, house: House, problems: list[str]
 ) -> tuple[list[Engine], Engine | None]:
-    """The engines asked for, and the native one to compare with where it is not among them."""
+    """Return the requested engines, and the native engine as baseline if it is not among them."""
     from ..harness.run import NATIVE
 
     named = [*options.engine, *options.require]

@@ -1,6 +1,4 @@
-"""kincheck stress: situations that break kinematic solvers, and whether any answer is wrong without
-saying so.
-"""
+"""kincheck stress: test engines with random degenerate mechanisms for silently wrong answers."""
 
 from __future__ import annotations
 
@@ -12,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import KincheckError, unknown
 from .registry import House, Status, given, whole
-from .run import MODES, TOL, positive
+from .run_options import MODES, TOL, positive
 
 if TYPE_CHECKING:
     from ..harness.engine import Engine
@@ -22,7 +20,7 @@ if TYPE_CHECKING:
 SAMPLES = 2000
 FILES = ("stress.json", "stress.html", "stress.md")
 OF_FAMILIES = ("family", "samples", "seed", "no_proofs")
-"""Options of what is made up."""
+"""Options of random mechanisms."""
 
 
 def add(commands: Any) -> None:
@@ -150,7 +148,7 @@ def _stress(options: argparse.Namespace, house: House) -> int:
 
 
 def _run(options: argparse.Namespace, families: list[Family], engines: list[Engine]) -> Stress:
-    """Run, and reduce and save what is bad."""
+    """Run the families; reduce and save bad examples."""
     from msgspec.structs import replace
 
     from ..studies.stress.reproducers import save

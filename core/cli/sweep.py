@@ -1,4 +1,4 @@
-"""kincheck sweep: solve many variants of a case's design and see what they make of its outputs."""
+"""kincheck sweep: solve many variants of a case's design and reduce its outputs over them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import sys
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from ..errors import KincheckError, unknown
@@ -16,8 +15,9 @@ from ..harness.interrupts import hold, status_of, words_of
 from ..report.progress import complain, lacking, uncompared
 from ..version import VERSION
 from . import execution_options, import_options
-from .registry import House, Status, whole
-from .run import TOL, positive
+from .registry import House, Status
+from .sweep_options import FILES, PART, add_options
+from .sweep_progress import Teller
 
 if TYPE_CHECKING:
     from ..case.case import Case
@@ -26,17 +26,6 @@ if TYPE_CHECKING:
     from ..studies.tolerance.part_file import Part
     from ..studies.tolerance.results import SweepResults
     from ..studies.tolerance.study import Study
-    from ..studies.tolerance.sweep import Progress
-
-# Seconds between lines of progress where they do not overwrite each other.
-EVERY = 10.0
-
-PART = "sweep.part"
-"""File of the finished part of a sweep, in the folder of its results until it has come to its
-end.
-"""
-
-FILES = ("sweep.json", "sweep.html", "envelope.csv", "gradients.csv")
 
 
 def add(commands: Any) -> None:
@@ -46,84 +35,7 @@ def add(commands: Any) -> None:
         "sweep", help="solve many variants of a design", description=_sweep.__doc__
     )
     sweep.set_defaults(do=_sweep)
-    sweep.add_argument(
-        "case", metavar="CASE", help="built-in name, or path to a case file or another tool's"
-    )
-    sweep.add_argument(
-        "--vary",
-        type=Path,
-        required=True,
-        metavar="FILE",
-        help="what varies, and by how much (kincheck-vary/1)",
-    )
-    sweep.add_argument("--samples", type=whole(1), metavar="N", help="variants that are drawn")
-    sweep.add_argument(
-        "--seed", type=whole(0), default=0, metavar="S", help="of the draws; default %(default)s"
-    )
-    sweep.add_argument(
-        "--output",
-        nargs="+",
-        action="extend",
-        default=[],
-        metavar="NAME",
-        help="only these outputs; default: all",
-    )
-    sweep.add_argument(
-        "--order",
-        type=int,
-        choices=(0, 1, 2),
-        default=0,
-        help="derivatives of the outputs by time too; default %(default)s",
-    )
-    sweep.add_argument(
-        "--tol",
-        type=positive,
-        default=TOL,
-        metavar="X",
-        help=f"largest constraint residual; default {TOL:g}",
-    )
-    sweep.add_argument(
-        "--jobs", type=whole(1), metavar="N", help="threads; default: half the processors"
-    )
-    sweep.add_argument(
-        "--scheduler",
-        metavar="ADDRESS",
-        help="solve on the workers of this dask.distributed scheduler instead",
-    )
-    sweep.add_argument(
-        "--check",
-        metavar="ENGINE[:SHARE]",
-        help=(
-            "rebuild a share of the variants as cases of their own, at least one, and solve them"
-            " with this engine; default 0.01"
-        ),
-    )
-    sweep.add_argument(
-        "--replay",
-        type=whole(0),
-        nargs="+",
-        metavar="INDEX",
-        help=(
-            "solve only these variants of the seed, each as a case of its own, as kincheck run"
-            " does; with --check its engine too"
-        ),
-    )
-    sweep.add_argument(
-        "--store", type=Path, metavar="FILE", help="write the values of all variants as Parquet"
-    )
-    sweep.add_argument("--out", type=Path, metavar="DIR", help=f"write {', '.join(FILES)} there")
-    sweep.add_argument(
-        "--json", metavar="FILE", help="write the results as JSON; - for standard output"
-    )
-    sweep.add_argument(
-        "--resume",
-        action="store_true",
-        help=(
-            f"go on from the finished part of the same sweep, which is {PART} in the folder of"
-            " --out"
-        ),
-    )
-    import_options.add_options(sweep)
+    add_options(sweep)
 
 
 def _sweep(options: argparse.Namespace, house: House) -> int:
@@ -131,7 +43,7 @@ def _sweep(options: argparse.Namespace, house: House) -> int:
     outputs over them.
 
     Exit status: 0 if every variant has a solution and every cross-check agrees, 1 if not, 2 if the
-    work could not be done. A sweep that is interrupted writes what it has, and ends with 130.
+    work could not be done. An interrupted sweep writes what it has, and ends with 130.
     """
     from ..case.variation.variation_file import read_variation
     from ..studies.tolerance.study import Study
@@ -195,7 +107,7 @@ def _sweep(options: argparse.Namespace, house: House) -> int:
 def _check(
     options: argparse.Namespace, house: House, problems: list[str]
 ) -> tuple[Engine | None, float]:
-    """The engine to check with, and the share of the variants."""
+    """Return the engine of the cross-check, and the share of the variants."""
     if options.check is None:
         return None, 0.0
     name, _, text = options.check.partition(":")
@@ -213,7 +125,7 @@ def _check(
 
 
 def _only(case: Case, names: list[str], problems: list[str]) -> Case:
-    """The case with the named outputs only; all of them unless some are named."""
+    """Return the case with the named outputs only, or with all if none is named."""
     there = [output.name for output in case.outputs]
     problems += [unknown("output", name, there) for name in names if name not in there]
     return (
@@ -224,7 +136,7 @@ def _only(case: Case, names: list[str], problems: list[str]) -> Case:
 
 
 def _solver(options: argparse.Namespace, engine: Engine) -> Solver:
-    """Where an engine solves checked variants: in processes of its own, unless it is ours."""
+    """Return the solver of checked variants: worker processes, except for the native engine."""
     from ..harness.execution import here
     from ..harness.resource_limits import Limits, default_jobs
     from ..harness.run import NATIVE
@@ -237,7 +149,9 @@ def _solver(options: argparse.Namespace, engine: Engine) -> Solver:
 
 
 def _part(options: argparse.Namespace) -> Part:
-    """The file of the finished part, with what its numbers depend on besides the study."""
+    """Return the file of the finished part, with the facts besides the study that its
+    numbers depend on.
+    """
     import numpy as np
 
     from ..harness.provenance import processor
@@ -332,7 +246,7 @@ def _replay(options: argparse.Namespace, house: House, study: Study, engine: Eng
 
 
 def _deliver(options: argparse.Namespace, results: SweepResults) -> list[str]:
-    """Print the table and write what was asked for; why some of it could not be written."""
+    """Print the table and write the requested files; return the problems of writing."""
     from ..case.io.atomic_files import to_standard_output, write_all
     from ..harness.record import to_json
     from ..studies.tolerance.page import page
@@ -348,47 +262,8 @@ def _deliver(options: argparse.Namespace, results: SweepResults) -> list[str]:
             gradient_csv(results).encode(),
         )
         contents += [(options.out / name, text) for name, text in zip(FILES, texts, strict=True)]
-    problems = write_all(contents)  # before anything is printed: who reads it may have gone
+    problems = write_all(contents)  # first: the reader of standard output may have closed it
     print_sweep(results, sys.stderr if options.json == "-" else sys.stdout)
     if options.json == "-":
         to_standard_output(encoded)
     return problems
-
-
-class Teller:
-    """Tells on standard error how far a sweep is: one line that changes on a terminal, now and then
-    a line elsewhere.
-    """
-
-    def __init__(self) -> None:
-        self.terminal = sys.stderr.isatty()
-        self.told = perf_counter()
-
-    def solved(self, progress: Progress) -> None:
-        """Told after every chunk."""
-        rate = progress.solved / progress.seconds
-        left = (progress.total - progress.done) / rate
-        part = f"[{progress.done}/{progress.total}] {100 * progress.done / progress.total:.0f} %"
-        line = f"{part}, {rate:.3g} variants/s, {left:.0f} s left"
-        self._tell(line + (f", {progress.unsolved} unsolved" if progress.unsolved else ""))
-
-    def checked(self, done: int, total: int) -> None:
-        """Told after every checked variant."""
-        self._tell(f"[{done}/{total}] checked")
-
-    def _tell(self, line: str) -> None:
-        now = perf_counter()
-        if now - self.told < (0.1 if self.terminal else EVERY):
-            return
-        self.told = now
-        print(
-            f"\r\x1b[2K{line}" if self.terminal else line,
-            end="" if self.terminal else "\n",
-            file=sys.stderr,
-            flush=True,
-        )
-
-    def end(self) -> None:
-        """Leave the line to what comes."""
-        if self.terminal:
-            print("\r\x1b[2K", end="", file=sys.stderr, flush=True)

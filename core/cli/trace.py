@@ -1,4 +1,4 @@
-"""kincheck trace: follow a motion by its own length, beyond where a driver locks up."""
+"""kincheck trace: follow a motion by its arc length, beyond lock-ups of a driver."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 from ..errors import KincheckError, unknown
 from . import import_options
 from .registry import House, Status
-from .run import positive
+from .run_options import positive
 
 if TYPE_CHECKING:
     from ..kinematics.continuation.trace import Curve, Event
 
 LENGTH = 5.0
-"""Default length either way: a few whole turns of the bodies together."""
+"""Default length in each direction: a few whole turns of the bodies together."""
 WAYS = {1: "growing", -1: "falling"}
 
 
@@ -50,13 +50,13 @@ def add(commands: Any) -> None:
 
 
 def _trace(options: argparse.Namespace, house: House) -> int:
-    """Follow a case's motion from its design position both ways by its length, and name the
-    singular poses on it.
+    """Follow a case's motion from its design position in both directions by arc length, and name
+    the singular poses on it.
 
-    A limit point is where the driver's value turns back (lock-up); beyond it the motion goes on
-    with the value going the other way. A branch point is where the joints let the motion go on in
-    more ways than one (bifurcation); it is followed straight on. Exit status: 0 the whole length
-    was traced, or a closed curve; 1 the curve ends before; 2 the tool could not do its work.
+    A limit point is a lock-up: the driver's value turns back there, and the motion goes on with the
+    value changing in the other direction. A branch point is a bifurcation: the joints allow several
+    continuations there, and the curve goes straight on. Exit status: 0 the whole length was traced,
+    or a closed curve; 1 the curve ends before; 2 the tool could not do its work.
     """
     from ..case.io.atomic_files import unwritable
     from ..kinematics.continuation.trace import trace
@@ -101,7 +101,7 @@ def _lines(case: str, curve: Curve, direction: int, design: float, unit: str) ->
 
 
 def _facts(case: str, curves: list[Curve], design: float, unit: str) -> dict[str, Any]:
-    """All curves as plain data [m, rad]."""
+    """Return all curves as plain data [m, rad]."""
 
     def event(each: Event) -> dict[str, Any]:
         place = {"kind": each.kind, "arc": each.arc, "value": each.value + design}

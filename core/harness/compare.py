@@ -1,24 +1,24 @@
-"""Comparing: the outputs of a trajectory, and how far they are from a reference or from another
-engine's.
+"""Comparison: outputs of a trajectory, and their deviations from a reference or another engine.
 
-Same samples, no interpolation, and outputs only: generalized coordinates differ legally between
-engines. A deviation is accepted up to atol + rtol * range, the range being that of the reference
-over the samples compared.
+Deviations are taken at the same samples, without interpolation, and of outputs only: generalized
+coordinates may differ between correct engines. A deviation is accepted up to atol + rtol * range,
+with the range of the reference over the compared samples.
 
-An output's atol is given for positions. A wrong pose passes its error on: the velocities of a
-mechanism are its driver's rate times functions of the pose, so moving the pose by d, small against
-the size D of the mechanism, changes a velocity by about d * rate / D and an acceleration by d *
-(rate / D)^2. Hence velocities are held to atol * pace, accelerations to atol * pace^2, with pace =
-rate / D [1/s]; D is a radian for a driver that turns and the mechanism's size for one that shifts.
-A driver with a motion adds d * s / D to an acceleration, s being its own: pace is then sqrt(s / D)
-if that is more, the rate being its fastest; both are the largest over the samples, and of all
-drivers the one that goes fastest through D counts. So the same relative accuracy is asked of all
-three, at any scale and any rate: with atol = 1e-9 m, a mechanism of 1 m and a drive of 1 m/s, an
-acceleration of 1 m/s^2 that is wrong by 1e-6 of itself is a thousand times out of tolerance.
+An output's atol applies to positions. A wrong pose propagates: the velocities of a mechanism are
+its driver's rate times functions of the pose. Moving the pose by d, small against the size D of the
+mechanism, changes a velocity by about d * rate / D and an acceleration by d * (rate / D)^2. Hence
+velocities are held to atol * pace and accelerations to atol * pace^2, with pace = rate / D [1/s]. D
+is a radian for a rotational driver and the mechanism's size for a translational one. A driver with
+a motion adds d * s / D to an acceleration, s being its own acceleration: the pace is then sqrt(s /
+D) if this is larger. The rate is the driver's fastest; both are maxima over the samples, and the
+driver with the largest pace counts. The same relative accuracy is thus required of all three
+quantities, at any scale and any rate. Example: with atol = 1e-9 m, a mechanism of 1 m and a drive
+of 1 m/s, a relative error of 1e-6 in an acceleration of 1 m/s^2 is a thousand times out of
+tolerance.
 
-The same holds for outputs in other units, an angle for one: they too are functions of the pose. The
-derivative of an output by wheel travel is one with an atol of its own, that of the output over D;
-its rate is held to that times the pace.
+The same holds for outputs in other units, such as angles: they too are functions of the pose. The
+derivative of an output by wheel travel has an atol of its own, the output's atol over D; its rate
+is held to this atol times the pace.
 """
 
 from __future__ import annotations
@@ -39,11 +39,11 @@ from ..trajectory import PER_TIME, QUANTITIES, Array, PointMotion, Trajectory
 from .record import Deviation, Deviations, OutputSeries
 
 NO_VALUE = "has no value at"
-"""What a reason says of a standard that lacks samples, which are not judged."""
+"""Phrase in the reason of a standard without values at some samples, which are not judged."""
 
 
 def pace(case: Case) -> float:
-    """How fast the mechanism goes through itself [1/s]: see the head of this file."""
+    """Return the pace of the mechanism [1/s]: see the head of this file."""
     path, turns = case.sweep.path, turning(case)
     _, rates, seconds = path.drive(list(path.motions), path.times)
     extent = np.where(turns, 1.0, size(case))
@@ -52,11 +52,13 @@ def pace(case: Case) -> float:
 
 
 def output_series(case: Case, output: Quantity, trajectory: Trajectory) -> Series:
-    """The output over the samples of a trajectory: NaN where the sample was not solved, None where
-    the engine has none.
+    """Return an output over the samples of a trajectory.
+
+    Values are NaN at unsolved samples. A quantity is None if the engine does not give it.
     """
     at = {name: _moving(trajectory.points[name]) for name in output.points}
-    with np.errstate(all="ignore"):  # what is not known is NaN, and what is made of it becomes NaN
+    # unknown values are NaN, and so is everything computed from them
+    with np.errstate(all="ignore"):
         jet = output.of(
             at, {name: _standing(case.mechanism.point(name).position) for name in output.points}
         )
@@ -68,7 +70,7 @@ def output_series(case: Case, output: Quantity, trajectory: Trajectory) -> Serie
     given = 1 + sum(
         all(getattr(each, quantity) is not None for each in motions) for quantity in QUANTITIES[1:]
     )
-    # the value of a derivative takes what the engine gives as a rate
+    # the value of a derivative output needs the rate given by the engine
     known = given - (ORDERS - output.orders)
     return Series(
         position,
@@ -78,7 +80,7 @@ def output_series(case: Case, output: Quantity, trajectory: Trajectory) -> Serie
 
 
 def _moving(motion: PointMotion) -> Vec3:
-    """A point's position as jets, NaN for derivatives that the engine does not give."""
+    """Return a point's position as jets, with NaN for derivatives that the engine does not give."""
     given = (motion.position, motion.velocity, motion.acceleration)
     x, v, a = (
         (
@@ -96,7 +98,7 @@ def _standing(position: Vector) -> Vec3:
 
 
 def as_numbers(series: Series, output: Quantity) -> OutputSeries:
-    """The series as plain numbers, null for NaN, with the reason for what is missing."""
+    """Return the series as plain numbers, null for NaN, with the reason for missing values."""
     reasons = [] if np.isfinite(series.position).all() else ["samples without a value are null"]
     reasons += [f"there is no {name}" for name in QUANTITIES[1:] if getattr(series, name) is None]
     return OutputSeries(
@@ -122,15 +124,15 @@ def deviations(
     complete: bool = False,
     refused: NDArray[np.bool_] | None = None,
 ) -> Deviations:
-    """How far an output is off in position, velocity and acceleration.
+    """Return the deviations of an output in position, velocity and acceleration.
 
     Args:
         found: the engine's output.
-        standards: what it may be compared with, (name, series), best first; each quantity takes the
-            first that has it.
-        complete: every sample was solved: one without a value where the standard has one is out of
-            tolerance.
-        refused: samples that the standard's solver cannot reach, shape (n,): a value there
+        standards: possible standards, (name, series), best first; each quantity takes the first one
+            that has it.
+        complete: every sample was solved: a missing value is then out of tolerance if the standard
+            has one.
+        refused: samples out of reach of the standard's solver, shape (n,); a value there
             contradicts it.
     """
     beat = pace(case)
@@ -191,11 +193,11 @@ def deviations(
 def deviation(
     values: Array, reference: Array, atol: float, rtol: float, against: str
 ) -> Deviation | None:
-    """How far values are from a reference, over the samples both have; None where there is no such
-    sample.
+    """Return the deviation of values from a reference over the samples known to both; None if there
+    are none.
 
     Args:
-        values, reference: shape (n,), NaN at samples that are not known.
+        values, reference: shape (n,), NaN at unknown samples.
 
     Raises:
         CaseError: the shapes differ.
@@ -212,7 +214,7 @@ def deviation(
     largest, tolerance = float(error.max()), atol + rtol * float(np.ptp(reference[both]))
     return Deviation(
         max_abs=largest,
-        # the largest is taken out so that no square can overflow or vanish
+        # scaled by the largest, so that no square can overflow or vanish
         rms=largest * math.sqrt(float(np.mean((error[both] / largest) ** 2))) if largest else 0.0,
         worst_step=int(np.argmax(error)),
         tolerance=tolerance,
@@ -229,8 +231,10 @@ def describe(
     values: Sequence[float],
     unit: str = "m",
 ) -> str:
-    """One line that says how far off an output is, and where, or that it has no value somewhere;
-    `unit` is the output's.
+    """Return one line with the deviation and its sample, or the note that values are missing.
+
+    Args:
+        unit: of the output.
     """
     if worst.max_abs <= worst.tolerance:
         return f"{output}: {quantity} has no value at samples where {worst.against} has one"

@@ -1,5 +1,5 @@
-"""The door every engine enters by, the native one included. The harness knows nothing else of
-them.
+"""The engine protocol. Every engine enters by it, the native one included; the harness knows
+nothing else of them.
 """
 
 from __future__ import annotations
@@ -13,16 +13,16 @@ from ..trajectory import Trajectory
 
 
 class Engine(Protocol):
-    """A way to solve a case.
+    """A solver of cases.
 
     Attributes:
         name: as on the command line.
         mode: "projection" (the simulator's kinematics, residuals and Jacobians in a Newton loop) or
             "simulate" (its own solver or time stepping). Modes are different products and never
-            share a ranking. Name and mode together are an engine's identity: the simulate mode that
-            is recommended has the simulator's name, variants of it have one of their own.
-        loop: where the loop over samples and iterations runs: "python", "simulator" or "compiled".
-        settings: what the report prints so that a reader can repeat the run.
+            share a ranking. Name and mode together identify an engine: the recommended simulate
+            mode has the simulator's name, its variants have names of their own.
+        loop: place of the loop over samples and iterations: "python", "simulator" or "compiled".
+        settings: printed by the report, so that a reader can repeat the run.
     """
 
     @property
@@ -35,30 +35,28 @@ class Engine(Protocol):
     def settings(self) -> Mapping[str, Any]: ...
 
     def version(self) -> str | None:
-        """Version of the simulator, or None where it is not installed. Never raises."""
+        """Return the version of the simulator, or None if it is not installed. Never raises."""
         ...
 
     def unsupported(self, case: Case) -> str | None:
-        """Return the reason why this engine cannot express the case, naming the joint or driver;
-        None where it can.
-        """
+        """Return why the engine cannot express the case, with the joint or driver; else None."""
         ...
 
     def build(self, case: Case) -> Any:
-        """The engine's model of the case, at the design position. Not timed."""
+        """Return the engine's model of the case, at the design position. Not timed."""
         ...
 
     def solve(self, model: Any, case: Case, tol: float) -> Trajectory:
         """Solve all samples, from the design position outwards. Timed after a warm-up.
 
         Args:
-            model: what `build` gave; may be used for several solves.
+            model: the result of `build`; may be used for several solves.
             tol: largest accepted constraint residual, relative to the mechanism's size. A pair
-                whose solved samples have a larger one fails. In simulate mode the simulator's own
-                settings say what it accepts, and the residual tells what came of it.
+                fails if a solved sample has a larger one. In simulate mode the simulator's own
+                settings decide what is accepted, and the residual shows the result.
 
         Returns:
-            A trajectory of case.points; samples that cannot be reached are NaN and explained, never
+            A trajectory of case.points. Samples out of reach are NaN with an explanation, never
             numbers. Its iterations are Newton's; in simulate mode, time or load steps.
         """
         ...
@@ -66,12 +64,12 @@ class Engine(Protocol):
 
 @dataclass(frozen=True)
 class Floor:
-    """A bound from below on what an engine can take for a sample.
+    """A lower bound of an engine's time per sample.
 
     Attributes:
         us_per_sample: the sum of the parts [us].
-        counted: what was counted and how, for a reader.
-        parts: time by what takes it [us].
+        counted: a description of the counted parts and of the method.
+        parts: time of each part [us].
     """
 
     us_per_sample: float
@@ -81,18 +79,17 @@ class Floor:
 
 @runtime_checkable
 class Measurable(Engine, Protocol):
-    """An engine that a diagram of work against precision can be drawn of.
+    """An engine with a work-precision diagram.
 
-    The predictor and the warm start are the same for all its efforts; what an effort spares or
-    spends is in its settings.
+    Predictor and warm start are the same for all efforts; an effort differs only by its settings.
     """
 
     def efforts(self) -> Mapping[str, Engine]:
-        """The same engine at several efforts, from coarse to fine, by what tells them apart."""
+        """Return the engine at several efforts, coarse to fine, by their distinguishing setting."""
         ...
 
     def floor(self, case: Case) -> Floor | None:
-        """What its compiled code alone needs for a sample; None where the loop is compiled and its
-        time is the floor itself.
+        """Return the time of its compiled code alone; None if the loop is compiled and its time is
+        the floor.
         """
         ...

@@ -1,5 +1,5 @@
-"""Versions of engines, asked in processes of their own: a broken library ends, blocks or kills the
-process that loads it.
+"""Versions of engines, each queried in a process of its own: a broken library ends, blocks or kills
+the process that loads it.
 """
 
 from __future__ import annotations
@@ -14,8 +14,7 @@ from functools import partial
 from .engine import Engine
 from .run import NATIVE
 
-# A library may print too, and end its process as if all were well: what is told has these words
-# before it.
+# A library may also print, and end its process with status 0: this marker precedes the version.
 TOLD = "its version is "
 COMMAND = f"""
 import pickle, sys
@@ -24,23 +23,23 @@ version = pickle.load(sys.stdin.buffer).version()
 print({TOLD!r}, version or "", sep="")
 """
 
-# An import that takes longer than this hangs [s]; the slowest needs some seconds on a cold disk.
+# Longest import [s]; a longer one hangs. The slowest needs some seconds on a cold disk.
 PATIENCE = 60.0
 
 
 def versions(engines: Sequence[Engine], patience: float = PATIENCE) -> list[str | None]:
-    """The version of each engine, in their order; None where it is not installed, or where its
-    process has no answer.
+    """Return the version of each engine, in order; None if not installed, or if its process gives
+    no answer.
 
     Args:
-        patience: for an answer [s].
+        patience: longest time for an answer [s].
     """
     with ThreadPoolExecutor(max(1, len(engines))) as threads:
         return list(threads.map(partial(_version, patience=patience), engines))
 
 
 def _version(engine: Engine, patience: float) -> str | None:
-    if engine.name == NATIVE:  # it has no foreign code to be kept apart
+    if engine.name == NATIVE:  # it loads no foreign code
         return engine.version()
     ask = partial(
         subprocess.run, [sys.executable, "-P", "-c", COMMAND], capture_output=True, check=True
@@ -53,7 +52,7 @@ def _version(engine: Engine, patience: float) -> str | None:
         pickle.PicklingError,
         AttributeError,
         TypeError,
-    ):  # its pairs cannot be sent either, and will say so
+    ):  # its pairs cannot be sent either, and their records say so
         return None
     _, told, version = ended.stdout.decode("utf-8", "replace").rpartition(TOLD)
     return version.strip() or None if told else None

@@ -1,6 +1,4 @@
-"""What is known of the reference of a case: where it comes from, which one it was, and whether it
-is to be suspected.
-"""
+"""Evidence on the reference of a case: its origin, its digest, and whether it is suspected."""
 
 from __future__ import annotations
 
@@ -14,24 +12,23 @@ from ..case.case import Case, Origin, Series, Truth
 from ..trajectory import QUANTITIES, Array
 
 VALUES = "values"
-"""What a digest is of where no file holds the reference."""
+"""Subject of a digest if no file holds the reference."""
 IDENTICAL = (
     "the reference is identical to native's own result in every bit, which no data of others is: no"
     " pass is called validated; give the data of their source"
 )
-# A straight line through the samples is met by rounding, and a driven coordinate is one.
+# Straight series prove nothing: rounding alone reproduces them, and a driven coordinate is one.
 FEWEST, STRAIGHT = 3, 1e-9
 
 
 class Evidence(msgspec.Struct, frozen=True, kw_only=True):
-    """The reference that a record was judged against.
+    """The reference used to judge a record.
 
     Attributes:
-        citation: where it comes from; empty where nobody says.
+        citation: its source; empty if none is given.
         sha256: digest of its content.
-        of: the content: the name of a file, whose bytes they are, or "values", which `digest`
-            describes.
-        own: it claims to be of others, and is native's own result in every bit.
+        of: the content: the name of a file, digested by its bytes, or "values", as in `digest`.
+        own: claimed as data of others, but equal to native's own result in every bit.
     """
 
     citation: str
@@ -41,14 +38,14 @@ class Evidence(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def sound(self) -> bool:
-        """Whether agreement with it can validate: it says where it comes from, and is not
-        kincheck's own.
+        """Whether agreement with the reference can validate: its source is cited, and is not
+        kincheck itself.
         """
         return bool(self.citation and self.sha256) and not self.own
 
 
 def evidence(case: Case, native: Mapping[str, Series]) -> Evidence | None:
-    """Return the evidence that the reference of a case is; None where it has none.
+    """Return the evidence on the reference of a case; None without a reference.
 
     Args:
         native: outputs of the native engine, as far as they are known.
@@ -65,8 +62,8 @@ def evidence(case: Case, native: Mapping[str, Series]) -> Evidence | None:
 
 
 def _identical(case: Case, native: Mapping[str, Series]) -> bool:
-    """Whether every value of the reference equals native's in every bit, of series that are neither
-    constant nor straight.
+    """Return whether every reference value equals native's in every bit, in at least one series
+    that is not straight.
     """
     telling = False
     for name, series in case.reference.items():
@@ -95,8 +92,9 @@ def _straight(x: Array, y: Array) -> bool:
 
 
 def digest(reference: Mapping[str, Series]) -> str:
-    """Return the SHA-256 of true values: names of outputs and quantities in order, and after each
-    its little-endian doubles, SI.
+    """Return the SHA-256 of reference values.
+
+    Order: outputs by name, then quantities; after each name its values as little-endian SI doubles.
     """
     whole = hashlib.sha256()
     for name, series in sorted(reference.items()):
@@ -111,9 +109,9 @@ class Explanation(msgspec.Struct, frozen=True, kw_only=True):
     """A change of the reference that brings these quantities of these outputs within tolerance.
 
     Attributes:
-        change: in words, after "the reference"; several that do, with "or" between them.
-        difference, tolerance: the largest difference that is left in the first of the quantities,
-            and what it is within [unit].
+        change: in words, after "the reference"; alternatives are joined with "or".
+        difference, tolerance: the largest remaining difference in the first of the quantities, and
+            its tolerance [unit].
     """
 
     outputs: list[str]
@@ -129,10 +127,10 @@ class Suspect(msgspec.Struct, frozen=True, kw_only=True):
 
     Attributes:
         agreement: largest difference between engines in the output and quantity named [unit].
-        output, quantity, sample: where the reference is off most, in tolerances.
-        difference, tolerance: how far it is off there, and what it is held to [unit].
-        explanations: simple changes of the reference that make it fit.
-        unexplained: outputs and quantities for which there is none.
+        output, quantity, sample: place of the reference's largest deviation, in tolerances.
+        difference, tolerance: the deviation there, and its tolerance [unit].
+        explanations: simple changes that make the reference fit.
+        unexplained: outputs and quantities without such a change.
         message: all of it in one sentence.
     """
 

@@ -1,5 +1,5 @@
-"""One pair: what an engine makes of a case, as plain data that can be sent between processes.
-Judging it is done elsewhere.
+"""Execution of one pair: an engine's answer to a case, as plain data that processes can exchange.
+The verdict follows elsewhere.
 """
 
 from __future__ import annotations
@@ -21,19 +21,18 @@ from .record import Outcome, Seconds
 from .resource_limits import memory_limit
 from .scheduler_delay import waited
 
-# Enough solves for a median that one interruption cannot move; slow engines stop after the budget
-# [s], but not between two of which one took so many times as long as the other: in it something was
-# compiled.
+# Enough solves for a median that one interruption cannot move. Slow engines stop after the budget
+# [s], except between two solves whose times differ by UNLIKE: the slow one included a compilation.
 WARM_SOLVES = 5
 WARM_BUDGET = 0.5
 UNLIKE = 2.0
 
-# Of a message, in characters: a page. An engine may put all its data into one.
+# Longest message [characters]: a page. An engine may put all its data into one.
 LONGEST_MESSAGE = 2000
 
 
 class BadTrajectoryError(KincheckError):
-    """An engine's answer is not what the engine protocol promises."""
+    """An engine's answer violates the engine protocol."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +41,7 @@ class Pair:
 
     Attributes:
         tol: the largest accepted constraint residual, as for `Engine.solve`.
-        timed: solve again for the time; else the first answer is the answer.
+        timed: solve again for the time; otherwise the first answer is kept.
     """
 
     case: Case
@@ -53,7 +52,7 @@ class Pair:
 
 @dataclass(frozen=True)
 class Facts:
-    """What an engine says of itself: see `Engine` and `Record`."""
+    """The properties an engine reports about itself: see `Engine` and `Record`."""
 
     loop: str
     settings: Mapping[str, Any] = field(default_factory=dict[str, Any])
@@ -62,11 +61,11 @@ class Facts:
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """What an engine made of a case.
+    """An engine's answer to a case.
 
     Attributes:
-        outputs: by name, NaN at samples that were not solved.
-        solved: how many samples were.
+        outputs: by name, NaN at unsolved samples.
+        solved: number of solved samples.
         iterations: sum over the solved samples.
         residual, message, details: as of the trajectory.
     """
@@ -81,7 +80,7 @@ class Answer:
 
 @dataclass(frozen=True)
 class Failure:
-    """Why there is no answer, and the end of what the engine printed."""
+    """The reason for a missing answer, and the end of the engine's printed output."""
 
     outcome: Outcome
     message: str
@@ -89,17 +88,17 @@ class Failure:
 
     @property
     def harmful(self) -> bool:
-        """Whether something broke, after which the process may be in any state."""
+        """Whether something broke; the process may then be in any state."""
         return self.outcome.bad
 
 
 @dataclass(frozen=True, eq=False)
 class Attempt:
-    """What became of a pair.
+    """The result of one pair.
 
     Attributes:
-        facts: of the engine; None where it went down before it could tell.
-        seconds: of the phases that were passed.
+        facts: of the engine; None if it ended before it could report them.
+        seconds: of the completed phases.
     """
 
     facts: Facts | None
@@ -109,24 +108,23 @@ class Attempt:
 
 Attempts: TypeAlias = Generator[tuple[int, Attempt]]
 Solver: TypeAlias = Callable[[Sequence[Pair]], Attempts]
-"""Solves pairs somewhere: gives the index of each and what became of it, once each, in any
-order.
-"""
+"""Solves pairs somewhere, and yields the index and the result of each pair once, in any order."""
 
 
 def here(pairs: Sequence[Pair]) -> Attempts:
-    """The solver of this process: one pair after the other. What kills or blocks an engine, does so
-    to the run.
+    """Solve the pairs in this process, one after the other.
+
+    An engine that crashes or hangs takes the whole run with it.
     """
     for index, pair in enumerate(pairs):
         yield index, attempt(pair)
 
 
 def attempt(pair: Pair, tell: Callable[[Facts], object] = lambda facts: None) -> Attempt:
-    """Solve a pair. Whatever the engine raises becomes a failure, KeyboardInterrupt excepted.
+    """Solve a pair. Everything the engine raises becomes a failure, KeyboardInterrupt excepted.
 
     Args:
-        tell: told of the engine before it does what may end the process.
+        tell: receives the engine's facts before any step that may end the process.
     """
     case, engine = pair.case, pair.engine
     seconds = dict[str, float]()
@@ -155,16 +153,12 @@ def attempt(pair: Pair, tell: Callable[[Facts], object] = lambda facts: None) ->
         return become(_solve(pair, seconds))
     except KeyboardInterrupt:
         raise
-    except (
-        BaseException
-    ) as error:  # anything a simulator may raise: some end the interpreter where they should raise
+    except BaseException as error:  # simulators may raise anything; some raise SystemExit
         return become(Failure(Outcome.ERROR, said(error)))
 
 
 def _solve(pair: Pair, seconds: dict[str, float]) -> Answer:
-    """Build once, solve, and solve again for the time. The answer kept is the last: the one that
-    was timed.
-    """
+    """Build once, solve, and solve again for the time. The last answer, the timed one, is kept."""
     case, engine = pair.case, pair.engine
     begin = perf_counter()
     model = engine.build(case)
@@ -200,17 +194,16 @@ def _solve(pair: Pair, seconds: dict[str, float]) -> Answer:
 
 
 def _more(first: float, warm: Sequence[float]) -> bool:
-    """Whether to solve again for a time to go by."""
+    """Return whether to solve again for the time."""
     unlike = len(warm) < 3 and max(warm) > UNLIKE * min(first, *warm)
     return len(warm) < WARM_SOLVES and (unlike or sum(warm) + min(warm) <= WARM_BUDGET)
 
 
 def check(case: Case, engine: str, trajectory: Trajectory) -> None:
-    """Hold an answer to the engine protocol.
+    """Check an answer against the engine protocol.
 
     Raises:
-        BadTrajectoryError: a point is missing, a shape is wrong, or a sample that is called solved
-            is not finite.
+        BadTrajectoryError: a point is missing, a shape is wrong, or a solved sample is not finite.
     """
     n = len(case.sweep.values)
     for name in ("solved", "iterations"):
@@ -251,10 +244,10 @@ def _check_shape(what: str, values: Any, expected: tuple[int, ...]) -> None:
 
 
 def said(error: BaseException) -> str:
-    """An exception in words, whatever it carries."""
+    """Return an exception as text, whatever it carries."""
     try:
         text = str(error)
-    except Exception as another:  # its own text is code of the engine too
+    except Exception as another:  # __str__ is code of the engine too
         text = f"its text cannot be had ({type(another).__name__})"
     told = bounded(f"{type(error).__name__}: {text}" if text else type(error).__name__)
     if isinstance(error, MemoryError) and (limit := memory_limit()):
@@ -263,7 +256,7 @@ def said(error: BaseException) -> str:
 
 
 def bounded(text: Any) -> str:
-    """Text of any origin as a record has it: readable, and not without end."""
+    """Return text of any origin as a record has it: readable, and of bounded length."""
     whole = text if isinstance(text, str) else str(text)
     if len(whole) > LONGEST_MESSAGE:
         half = LONGEST_MESSAGE // 2

@@ -1,6 +1,4 @@
-"""Interrupts: Ctrl-C and SIGTERM stop the work of a command, and never what it writes of the work
-that is done.
-"""
+"""Interrupts: Ctrl-C and SIGTERM stop the work of a command, never the writing of its results."""
 
 from __future__ import annotations
 
@@ -17,23 +15,23 @@ class Terminated(KeyboardInterrupt):
 
 
 def status_of(interrupt: KeyboardInterrupt) -> int:
-    """Return the exit status of a command that was interrupted, as shells have it."""
+    """Return the exit status of an interrupted command, as shells define it."""
     return 128 + (signal.SIGTERM if isinstance(interrupt, Terminated) else signal.SIGINT)
 
 
 def words_of(interrupt: KeyboardInterrupt) -> str:
-    """Return what a message says of an interrupt."""
+    """Return the text of a message about an interrupt."""
     return str(interrupt) or ("terminated" if isinstance(interrupt, Terminated) else "interrupted")
 
 
 class Interrupts:
-    """What a command does at Ctrl-C and SIGTERM.
+    """The response of a command to Ctrl-C and SIGTERM.
 
-    The first one raises KeyboardInterrupt. One more is only noted, so that results are written; the
-    next raises again.
+    The first signal raises KeyboardInterrupt. The second is only noted, so that results are
+    written; the third raises again.
 
     Attributes:
-        held: the one that was noted, None without.
+        held: the noted interrupt; None if there is none.
     """
 
     def __init__(self) -> None:
@@ -41,12 +39,12 @@ class Interrupts:
         self._holding = False
 
     def hold(self) -> None:
-        """From now on results are written: note the first interrupt."""
+        """Note the first interrupt from now on: results are being written."""
         self._holding = True
 
     @contextmanager
     def deferred(self) -> Generator[None]:
-        """Raise an interrupt that comes meanwhile only in the end."""
+        """Raise an interrupt that comes meanwhile only at the end."""
         holding, self._holding = self._holding, True
         try:
             yield
@@ -57,7 +55,7 @@ class Interrupts:
             raise held
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
-        """Take a signal."""
+        """Handle a signal."""
         interrupt = Terminated() if number == signal.SIGTERM else KeyboardInterrupt()
         if self._holding and self.held is None:
             self.held = interrupt
@@ -70,22 +68,18 @@ _current = Interrupts()
 
 
 def hold() -> None:
-    """From now on the command writes its results: the first interrupt is noted, and acted on when
-    they are written.
-    """
+    """Note the first interrupt from now on, and act on it after the results are written."""
     _current.hold()
 
 
 def deferred() -> AbstractContextManager[None]:
-    """What is done meanwhile is done whole: an interrupt is raised only in the end."""
+    """Complete the work inside: an interrupt is raised only at its end."""
     return _current.deferred()
 
 
 @contextmanager
 def listening() -> Generator[Interrupts]:
-    """Take the signals of this process for a command; those that the process was started to ignore
-    stay ignored.
-    """
+    """Handle the signals of this process for a command. Signals ignored before stay ignored."""
     global _current
     _current = found = Interrupts()
     before: dict[int, Any] = {}

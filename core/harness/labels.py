@@ -7,7 +7,7 @@ from typing import Any, cast
 
 from ..case.case import PER_TRAVEL, Truth
 from ..trajectory import PER_TIME, QUANTITIES
-from .record import Record, Results
+from .record import Outcome, Record, Results
 
 TRUTHS = {
     Truth.CLOSED_FORM: "closed form",
@@ -17,33 +17,33 @@ TRUTHS = {
 }
 
 UNMADE = "asked for and never made: the run ended before it"
-"""Of a pair that has no record, unless its case cannot be read."""
+"""Message of a pair without a record, unless its case cannot be read."""
 
 _LABELS = {"half_track_change": "half-track change", "wheelbase_change": "wheel-base change"}
 
 
 def engine_name(record: Record) -> str:
-    """The record's engine, as `product` names it."""
+    """Return the label of the record's engine, as `product` names it."""
     return product(record.engine, record.mode)
 
 
 def product(engine: str, mode: str) -> str:
-    """The engine, with its mode unless it is projection: the same engine in another mode is another
-    product.
+    """Return the engine's name, with the mode unless it is projection: each mode is a product of
+    its own.
     """
     return engine if mode == "projection" else f"{engine} · {mode}"
 
 
 def output_label(name: str) -> str:
-    """An output's name as suspension engineers write it."""
+    """Return an output's name as suspension engineers write it."""
     if name.endswith(PER_TRAVEL):
         return f"{output_label(name.removesuffix(PER_TRAVEL))} per travel"
     return _LABELS.get(name, name.replace("_", " "))
 
 
 def signs(run: Mapping[str, Any]) -> list[str]:
-    """The conventions of signs that outputs have, a line each with the cases that they are of, by
-    the circumstances of a run.
+    """Return the sign conventions of outputs, a line each with its cases, from the circumstances of
+    a run.
     """
     said: dict[str, list[str]] = {}
     for case, facts in run.get("cases", {}).items():
@@ -53,7 +53,7 @@ def signs(run: Mapping[str, Any]) -> list[str]:
 
 
 def notes(run: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Cases and what is to be known of their geometry, by the circumstances of a run."""
+    """Return cases and notes on their geometry, from the circumstances of a run."""
     return [
         (case, note)
         for case, facts in run.get("cases", {}).items()
@@ -62,37 +62,35 @@ def notes(run: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 
 def suspects(results: Results) -> list[tuple[str, str]]:
-    """Cases whose reference is to be suspected, and why."""
+    """Return the cases with a suspected reference, and the reason."""
     return [(case, each.message) for case, each in results.suspects.items()]
 
 
 def unsound(record: Record) -> str:
-    """Why the reference cannot validate though its kind could; empty where it can, or never
-    could.
-    """
+    """Return why the reference cannot validate although its kind could; empty if it can."""
     if not Truth(record.truth).validates or record.evidence is None or record.evidence.sound:
         return ""
     return "kincheck's own" if record.evidence.own else "uncited"
 
 
 def unread(run: Mapping[str, Any]) -> str:
-    """Which cases could not be read, by the circumstances of a run; empty where all could."""
+    """Return the unreadable cases of a run, from its circumstances; empty if there are none."""
     names = run.get("unread", {})
     return f"{unread_count(len(names))}: {', '.join(names)}" if names else ""
 
 
 def unread_count(count: int) -> str:
-    """So many cases could not be read."""
+    """Return the phrase for a number of unreadable cases."""
     return f"{count} {'case' if count == 1 else 'cases'} could not be read"
 
 
 def motion_unit(unit: str, motion: str) -> str:
-    """The unit of a motion's derivative, e.g. m/s for a velocity in m."""
+    """Return the unit of a motion's derivative, e.g. m/s for a velocity in m."""
     return unit + PER_TIME[QUANTITIES.index(motion)].replace("^2", "²")
 
 
 def number(value: float | None) -> str:
-    """A number to three digits for a table; a dash where it was not computed."""
+    """Return a number to three digits for a table; a dash if it was not computed."""
     if value is None:
         return "–"
     if value == 0 or 1e-3 <= abs(value) < 1e5:
@@ -102,7 +100,7 @@ def number(value: float | None) -> str:
 
 
 def known(value: Any) -> Any:
-    """A value of any kind from a results file, in words."""
+    """Return a value of any type from a results file, in words."""
     if isinstance(value, Mapping):
         return (
             "; ".join(
@@ -118,6 +116,23 @@ def known(value: Any) -> Any:
 
 
 def against(name: str) -> str:
-    """What an output was compared with: a kind of truth in words, or an engine by its name."""
+    """Return the label of a standard: a kind of reference in words, or an engine by its name."""
     kinds = {kind.value: words for kind, words in TRUTHS.items()}
     return kinds.get(name, name)
+
+
+def validation(record: Record) -> str:
+    """Return the label of the validation of a record; empty if there is none."""
+    if not record.validated:
+        return (
+            f"{said}: not validated"
+            if record.outcome is Outcome.PASS and (said := unsound(record))
+            else ""
+        )
+    standards = {
+        deviation.against for errors in record.errors.values() for _, deviation in errors.items()
+    }
+    whole = standards == {record.truth} and all(
+        len(errors.items()) == len(QUANTITIES) for errors in record.errors.values()
+    )
+    return "validated" if whole else "validated, positions only"

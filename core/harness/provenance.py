@@ -1,4 +1,4 @@
-"""The circumstances of a run: what a reader needs to repeat it and to understand its records."""
+"""The circumstances of a run: everything needed to repeat it and to understand its records."""
 
 from __future__ import annotations
 
@@ -26,9 +26,7 @@ from .scheduler_delay import waited
 from .suspect import suspect
 
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
-"""Environment variables by which linear algebra learns how many threads it may use, when numpy is
-loaded.
-"""
+"""Environment variables that set the number of linear algebra threads when numpy is loaded."""
 
 
 def results(
@@ -41,13 +39,12 @@ def results(
     facts: Mapping[str, Any] | None = None,
     plan: Sequence[tuple[str, str, str]] = (),
 ) -> Results:
-    """The records, with what a reader needs to repeat the run: versions, machine, settings, cases
-    and their references.
+    """Return the results of a run: its records, circumstances and references.
 
     Args:
-        facts: further circumstances; they come before those found here, for a run that began in
-            another process.
-        plan: the pairs that there were to be, of a run that does not have them all.
+        facts: further circumstances, from the process in which the run began. They replace those
+            found here.
+        plan: the planned pairs of a run that does not have them all.
     """
     known = {**circumstances(cases, started=started, tol=tol, command=command), **(facts or {})}
     known["cases"] = _with_identical(
@@ -67,9 +64,7 @@ def results(
 def _with_identical(
     cases: Mapping[str, Any], records: Sequence[Record], of_others: Sequence[str]
 ) -> dict[str, Any]:
-    """The facts of the cases, with a note on each whose reference has turned out to be native's own
-    result.
-    """
+    """Return the facts of the cases, with a note on each whose reference is native's own result."""
     own = {
         record.case
         for record in records
@@ -86,7 +81,7 @@ def _with_identical(
 def circumstances(
     cases: Sequence[Case], *, started: datetime, tol: float, command: str
 ) -> dict[str, Any]:
-    """What is known of a run before it begins, as JSON has it."""
+    """Return the circumstances known before a run begins, as JSON has them."""
     return plain(
         {
             "kincheck": VERSION,
@@ -105,28 +100,27 @@ def circumstances(
 
 
 def versions(records: Sequence[Record]) -> dict[str, str | None]:
-    """The version of each engine, by name: all of them, where a run that was resumed found another;
-    None where none is known.
+    """Return the version of each engine, by name; None if unknown.
+
+    A resumed run may have found several versions: all are given.
     """
     found: dict[str, list[str]] = {record.engine: [] for record in records}
     for record in records:
-        # one that crashed may not have told it
+        # an engine that crashed may not have reported it
         if record.version is not None and record.version not in found[record.engine]:
             found[record.engine].append(record.version)
     return {engine: " and ".join(each) or None for engine, each in found.items()}
 
 
 def missing(plan: Sequence[tuple[str, str, str]], records: Sequence[Record]) -> dict[str, Any]:
-    """Case, engine and mode of the pairs that a run was to make and did not, as `run` has them;
-    empty where all are there.
-    """
+    """Return case, engine and mode of planned pairs without a record, or an empty mapping."""
     made = {(record.case, record.engine, record.mode) for record in records}
     pairs = [list(pair) for pair in plan if pair not in made]
     return {"missing": pairs} if pairs else {}
 
 
 def references(cases: Sequence[Case]) -> dict[str, dict[str, OutputSeries]]:
-    """The true values of each case that has any, by case and output."""
+    """Return the reference values of each case that has any, by case and output."""
     return {
         case.name: {
             output.name: as_numbers(case.reference[output.name], output)
@@ -139,10 +133,10 @@ def references(cases: Sequence[Case]) -> dict[str, dict[str, OutputSeries]]:
 
 
 def git_state(folder: Path) -> dict[str, Any] | None:
-    """Commit, branch (null where none is checked out), whether files differ from it, and a digest
-    of how where they do.
+    """Return the commit, the branch (null if none is checked out), and whether files differ from
+    the commit.
 
-    None where there is no repository.
+    Changed files add a digest of the difference. None if there is no repository.
     """
 
     def git(*arguments: str) -> str | None:
@@ -157,7 +151,7 @@ def git_state(folder: Path) -> dict[str, Any] | None:
         except (
             OSError,
             subprocess.TimeoutExpired,
-        ):  # no git, or a repository on a drive that does not answer
+        ):  # no git, or a drive that does not answer
             return None
         return done.stdout.strip() if done.returncode == 0 else None
 
@@ -179,18 +173,15 @@ def git_state(folder: Path) -> dict[str, Any] | None:
 
 
 def conditions() -> dict[str, Any]:
-    """What a later run is compared by, and takes a moment to find out: the state of the files, and
-    how fast this machine is now.
-    """
+    """Return the facts that later runs are compared by: state of files, speed of the machine."""
     return {"git": git_state(Path.cwd()), "calibration_seconds": calibration()}
 
 
 def calibration() -> float:
-    """Seconds of a fixed piece of work, the median of five: what times are divided by to be
-    compared with another day's.
+    """Return the seconds of a fixed piece of work, median of five, to compare different days.
 
-    Without those in which others had the processor. About 20 ms: interpreter steps and small linear
-    solves in turn, which is what the engines' loops consist of.
+    Time spent waiting for a processor does not count. The work takes about 20 ms: interpreter steps
+    and small linear solves in turn, like the engines' loops.
     """
     matrix, column = np.eye(12) + 0.01 * np.arange(144.0).reshape(12, 12) / 144.0, np.ones(12)
     times: list[float] = []
@@ -241,8 +232,9 @@ def _motion(motion: Motion) -> dict[str, Any]:
 
 
 def plain(facts: Mapping[str, Any]) -> dict[str, Any]:
-    """Facts of any origin as JSON has them: what is read equals what was written. What has no
-    counterpart becomes its text.
+    """Return facts of any origin as JSON has them: the values read equal the values written.
+
+    A value without a counterpart in JSON becomes its text.
     """
 
     def instead(value: Any) -> Any:
@@ -252,16 +244,12 @@ def plain(facts: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def readable(text: str) -> str:
-    """Text that UTF-8 can hold: file names and foreign messages may be undecodable bytes in
-    disguise.
-    """
+    """Return text that UTF-8 can hold: file names and messages may contain undecodable bytes."""
     return text.encode("utf-8", "replace").decode("utf-8")
 
 
 def truth_of(case: Case) -> Truth:
-    """Return the kind of truth of a case: without a reference there is only consensus, whatever it
-    claims.
-    """
+    """Return the kind of a case's reference; consensus without one, whatever the case claims."""
     return case.truth if case.reference else Truth.CONSENSUS_ONLY
 
 

@@ -1,5 +1,5 @@
-"""Results as data: the record of one (case, engine) pair and of a whole run; the JSON schema
-kincheck-results/1.
+"""Results as data: the record of one (case, engine) pair, the results of a whole run, and the JSON
+schema kincheck-results/1.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ import msgspec
 from ..case.case import Truth
 from ..trajectory import QUANTITIES
 from .evidence import Evidence, Suspect
+from .scene_record import Scene
 
 
 class Outcome(StrEnum):
-    """What became of a pair. Every pair gets exactly one.
+    """The outcome of a (case, engine) pair. Every pair has exactly one.
 
-    UNJUDGED is a pair that was solved and that nothing could be compared with: neither a pass nor a
-    fault.
+    UNJUDGED is a solved pair without anything to compare it with: neither a pass nor a fault.
     """
 
     PASS = "pass"
@@ -34,9 +34,7 @@ class Outcome(StrEnum):
 
     @property
     def bad(self) -> bool:
-        """Whether something was run and went wrong; a missing engine or feature is no fault of a
-        result.
-        """
+        """Whether the pair ran and went wrong. A missing engine or feature is no fault."""
         return self not in (
             Outcome.PASS,
             Outcome.UNJUDGED,
@@ -51,16 +49,16 @@ class Outcome(StrEnum):
 
     @property
     def shown(self) -> str:
-        """The outcome in the words of every table, page and message."""
+        """The outcome as every table, page and message prints it."""
         return "not judged" if self is Outcome.UNJUDGED else self.value
 
 
 class OutputSeries(msgspec.Struct, frozen=True, kw_only=True):
-    """One output over the samples, in SI. A sample, or a whole series, that was not computed is
-    null; `reason` says why.
+    """One output over the samples, in SI. A sample or series without a value is null; `reason`
+    explains it.
 
     Attributes:
-        sense: what a positive value means, where name and unit do not say it.
+        sense: the meaning of a positive value, if name and unit do not show it.
     """
 
     position: list[float | None]
@@ -72,7 +70,7 @@ class OutputSeries(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Deviation(msgspec.Struct, frozen=True, kw_only=True):
-    """How far an output is from what it is compared with, over the samples both have.
+    """The deviation of an output from its standard, over the samples known to both.
 
     Attributes:
         worst_step: index of the sample with the largest deviation.
@@ -88,13 +86,14 @@ class Deviation(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Deviations(msgspec.Struct, frozen=True, kw_only=True):
-    """Deviations of one output; null where there is nothing to compare, and `reason` says why.
+    """Deviations of one output. A quantity that was not compared is null, and `reason` explains it.
 
     Attributes:
-        lost: how many values there are none of where what they are compared with has one, all
-            samples being solved; absent where none are. Where all are there is no deviation either.
-        contradicted: how many samples have a value although the standard's solver cannot reach
-            them; absent where none have.
+        lost: number of values missing at samples with a value in the standard, although all samples
+            are solved; absent if there are none. If all values are missing, the deviation is null
+            too.
+        contradicted: number of samples with a value that the standard's solver cannot reach; absent
+            if there are none.
     """
 
     position: Deviation | None
@@ -111,23 +110,23 @@ class Deviations(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def within(self) -> bool:
-        """Whether all that was compared is within tolerance."""
+        """Whether every compared quantity is within tolerance."""
         return all(each.within for _, each in self.items())
 
     def items(self) -> list[tuple[str, Deviation]]:
-        """Quantity and deviation of what was compared."""
+        """Return the quantity and the deviation of each compared quantity."""
         every = zip(QUANTITIES, (self.position, self.velocity, self.acceleration), strict=True)
         return [(quantity, deviation) for quantity, deviation in every if deviation is not None]
 
 
 class Seconds(msgspec.Struct, frozen=True, kw_only=True):
-    """Wall-clock seconds: making the model, the first solve, a solve after it (median of several),
-    and judging the answer.
+    """Wall-clock seconds of the phases of a pair: build, first solve, warm solve, comparison.
 
-    A phase that was not reached is null, and so are those after it.
+    `warm` is the median of several solves after the first. A phase that was not reached is null,
+    and so are the later ones.
 
     Attributes:
-        waited: the part of `warm` in which others had the processor.
+        waited: the part of `warm` in which other processes had the processor.
     """
 
     build: float | None = None
@@ -138,28 +137,28 @@ class Seconds(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Record(msgspec.Struct, frozen=True, kw_only=True):
-    """The result of one (case, engine) pair. What was not computed is null, never zero; `message`
-    says why.
+    """The result of one (case, engine) pair. A number that was not computed is null, never zero;
+    `reasons` and `message` explain it.
 
     Attributes:
-        truth: kind of the case's reference; consensus_only where it has none, whatever the case
+        truth: kind of the case's reference; consensus_only without a reference, whatever the case
             claims.
-        driver: values at the samples by name: of what is swept [m, rad or s] first, then of every
-            further moving driver.
+        driver: values at the samples by driver: first the swept one [m, rad or s], then every
+            further moving one.
         errors: one entry for every output of the case, whatever the outcome.
         residual_max: the engine's own largest constraint residual over the solved samples [m or -].
-        rank: of the rows that the engine solves, at the design: native's are those of the joints,
-            Cartesian and without drivers (unknowns less rank is dof), a simulator's those of its
-            own model, loops, relations and drivers. Ranks of different engines are not to be
-            compared.
-        dof: degrees of freedom, drivers apart; the same in all engines.
+        rank: rank of the rows solved by the engine, at the design. Native: the joints' rows,
+            Cartesian and without drivers (unknowns less rank is dof). A simulator: the rows of its
+            own model, with loops, relations and drivers. Ranks of different engines are not
+            comparable.
+        dof: degrees of freedom without drivers; the same in all engines.
         iterations: Newton iterations, sum over the solved samples.
-        solved, samples: how many samples were reached, out of how many.
-        us_per_step: warm solve by sample [us]; null unless all samples were reached.
-        evidence: of the reference that it was judged against; null where there is none, and in
-            records of before.
+        solved, samples: number of samples reached, and number of samples.
+        us_per_step: time of the warm solve per sample [us]; null unless all samples were reached.
+        evidence: of the reference used for the verdict; null without a reference, and in records of
+            older versions.
         reasons: why a number is null, by its key: residual_max, rank, dof, iterations, us_per_step.
-            Records of before have none.
+            Empty in records of older versions.
     """
 
     case: str
@@ -188,8 +187,8 @@ class Record(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def validated(self) -> bool:
-        """Whether it passed, and every output was judged against a truth that nobody here made and
-        whose source is cited.
+        """Whether the pair passed and every output was judged against a cited reference from
+        outside kincheck.
         """
         judged = [deviations.position for deviations in self.errors.values()]
         return (
@@ -207,75 +206,15 @@ class Record(msgspec.Struct, frozen=True, kw_only=True):
         return any(deviations.items() for deviations in self.errors.values())
 
 
-class SceneBody(msgspec.Struct, frozen=True, kw_only=True):
-    """A body as drawn: its frame at the design, and at every frame of the scene.
-
-    Attributes:
-        origin, euler_parameters: at the design, global [m, -].
-        r: origins, global [m], shape (frames, 3); empty where only the design is known, or the body
-            is fixed.
-        p: Euler parameters e0..e3, body -> global [-], shape (frames, 4); empty as r.
-    """
-
-    name: str
-    fixed: bool
-    origin: list[float]
-    euler_parameters: list[float]
-    r: list[list[float]] = []
-    p: list[list[float]] = []
-
-
-class SceneJoint(msgspec.Struct, frozen=True, kw_only=True):
-    """A joint's geometry, global at the design [m].
-
-    Attributes:
-        bodies: names of the first and the second body.
-        points: none, one common to both bodies, or one on each.
-        axes: directions of any length: none, one common to both bodies, or one on each.
-    """
-
-    name: str
-    type: str
-    bodies: list[str]
-    points: list[list[float]] = []
-    axes: list[list[float]] = []
-
-
-class ScenePoint(msgspec.Struct, frozen=True, kw_only=True):
-    """A named point of a body, global at the design [m], and whether an output reads it."""
-
-    name: str
-    body: str
-    position: list[float]
-    output: bool
-
-
-class Scene(msgspec.Struct, frozen=True, kw_only=True):
-    """A case's mechanism to look at. Poses are rounded to what a screen shows, and never compared
-    with anything.
-
-    Attributes:
-        frames: indices of the samples at which there are poses; empty where only the design
-            position is known.
-        message: empty, or why samples have no pose.
-    """
-
-    bodies: list[SceneBody]
-    joints: list[SceneJoint]
-    points: list[ScenePoint]
-    frames: list[int] = []
-    message: str = ""
-
-
 class Results(msgspec.Struct, frozen=True, kw_only=True):
-    """A run.
+    """The results of a run.
 
     Attributes:
-        run: its circumstances: versions, machine, settings, what the cases are, and where it ended
-            early, what is missing.
+        run: its circumstances: versions, machine, settings and facts of the cases; if the run ended
+            early, also the missing pairs.
         records: one per (case, engine) pair.
-        references: the true values of each case that has any, by case and output.
-        scenes: the mechanism of each case, by case; a run made without them has none.
+        references: the reference values of each case that has any, by case and output.
+        scenes: the mechanism of each case, by case; empty in a run without scenes.
         suspects: cases whose engines agree with each other and not with the reference, by name.
     """
 
@@ -287,8 +226,8 @@ class Results(msgspec.Struct, frozen=True, kw_only=True):
     suspects: dict[str, Suspect] = {}
 
     def blames_reference(self, record: Record) -> bool:
-        """Whether a failure is told by what is said of its case's reference, and not by its own
-        message.
+        """Return whether the suspected reference of the case explains a failure, so that its own
+        message is not needed.
         """
         whole = record.solved == record.samples and not any(
             each.lost for each in record.errors.values()
@@ -297,21 +236,21 @@ class Results(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def missing(self) -> list[tuple[str, str, str]]:
-        """Case, engine and mode of the pairs that were asked for and have no record: the run ended
-        before them, or see `unread`.
+        """Case, engine and mode of the requested pairs without a record: the run ended first, or
+        see `unread`.
         """
         return [(case, engine, mode) for case, engine, mode in self.run.get("missing", [])]
 
     @property
     def unread(self) -> dict[str, str]:
-        """Cases that were asked for and make no sense, by their names as given, and why."""
+        """Requested cases that could not be read, by their names as given, and the reason."""
         return self.run.get("unread", {})
 
 
 def to_json(results: msgspec.Struct | Mapping[str, Any]) -> bytes:
-    """Indented JSON; floats keep all their digits, a list of numbers stays on one line."""
+    """Return indented JSON. Floats keep all their digits; a list of numbers stays on one line."""
     text = msgspec.json.format(msgspec.json.encode(results), indent=2)
-    # a string cannot hold a bare line break, so only white space between numbers is touched
+    # a string cannot hold a bare line break: only white space between numbers is touched
     rows = re.compile(rb"\[[^][{}\"]*\]")
     return (
         rows.sub(lambda row: re.sub(rb"\n *", b"", row[0].replace(b",\n", b", \n")), text) + b"\n"
@@ -319,16 +258,14 @@ def to_json(results: msgspec.Struct | Mapping[str, Any]) -> bytes:
 
 
 def settled(record: Record) -> Record:
-    """Return a record with the outcome that it has today: older files call it a pass where nothing
-    was compared.
-    """
+    """Return a record with its present outcome. Older files call an uncompared pair a pass."""
     if record.outcome is Outcome.PASS and not record.compared:
         return msgspec.structs.replace(record, outcome=Outcome.UNJUDGED)
     return record
 
 
 def from_json(text: bytes) -> Results:
-    """The results that `to_json` wrote, now or with an older version.
+    """Return the results that this or an older version of `to_json` wrote.
 
     Raises:
         msgspec.ValidationError: not the schema kincheck-results/1; the message names the key.

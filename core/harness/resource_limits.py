@@ -1,4 +1,4 @@
-"""What a pair may take before it is given up."""
+"""Limits of time and memory for one pair."""
 
 from __future__ import annotations
 
@@ -6,26 +6,30 @@ import os
 import sys
 from dataclasses import dataclass
 
-# The slowest pair of the built-in cases takes 3 s. A hundred times that leaves room for a large
-# mechanism on a busy machine, and ten pairs that hang are still over within the hour.
+# Longest time of a pair [s]. The slowest pair of the built-in cases takes 3 s. A factor of a
+# hundred leaves room for a large mechanism on a busy machine, and ten hanging pairs still end
+# within the hour.
 TIMEOUT = 300.0
 
-# A simulator that has solved all built-in cases may write to 0.15 to 0.25 GB, as the data limit
-# counts. Sixteen times that is a leak or a wrong size, and most machines have it to spare.
+# Memory of a process [GB]. A simulator that has solved all built-in cases can write to 0.15 to 0.25
+# GB, by the data limit's count. Sixteen times as much is a leak or a wrong size, and most machines
+# have it to spare.
 MEMORY = 4.0
 
-# Of either: bytes are counted to 9.2e18, and a thread waits for 9.2e9 s at the most.
+# Largest value of either: bytes are counted to 9.2e18, and a thread waits for at most 9.2e9 s.
 MOST = 1e9
 
-# For an interpreter to start and load numpy on a machine that is busy with other things [s]; it
-# takes a third of a second.
+# Longest start of an interpreter with numpy [s], on a busy machine; usually a third of a second.
 STARTUP = 120.0
 
 
 @dataclass(frozen=True)
 class Limits:
-    """Wall-clock seconds of a pair, and memory of its process in GB (1e9 bytes), which Linux alone
-    enforces.
+    """The limits of a pair.
+
+    Attributes:
+        timeout: wall-clock time [s].
+        memory: memory of its process [GB, 1e9 bytes]; enforced on Linux only.
     """
 
     timeout: float = TIMEOUT
@@ -33,10 +37,10 @@ class Limits:
 
 
 def default_jobs() -> int:
-    """Half the processors this process may use.
+    """Return half the number of processors usable by this process.
 
-    Two of them are often one core, and the parent judges and writes while a worker solves: times
-    are those of a quiet machine.
+    Two of them often share a core, and the parent judges and writes while a worker solves. Measured
+    times are thus those of a quiet machine.
     """
     usable = (
         len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
@@ -45,11 +49,10 @@ def default_jobs() -> int:
 
 
 def restrict(gigabytes: float) -> None:
-    """Let this process have no more memory than that; asking for more then fails there, as
-    MemoryError or std::bad_alloc.
+    """Limit the memory of this process [GB].
 
-    The data limit, not the address space: that one counts libraries and what threads reserve and
-    never touch.
+    A request beyond the limit fails with MemoryError or std::bad_alloc. The data limit is set, not
+    the address space: the latter also counts libraries and the reserved, unused memory of threads.
     """
     if sys.platform == "linux":
         import resource
@@ -58,13 +61,12 @@ def restrict(gigabytes: float) -> None:
         most = int(gigabytes * 1e9)
         soft = most if hard == resource.RLIM_INFINITY else min(most, hard)
         resource.setrlimit(resource.RLIMIT_DATA, (soft, hard))
-        # a crash is told by its signal and stack; the image of the memory would fill the working
-        # folder
+        # signal and stack describe a crash; core files would fill the working folder
         resource.setrlimit(resource.RLIMIT_CORE, (0, resource.getrlimit(resource.RLIMIT_CORE)[1]))
 
 
 def memory_limit() -> float | None:
-    """What `restrict` has left this process [GB]; None where it was not restricted."""
+    """Return the memory limit of this process [GB]; None if it is not limited."""
     if sys.platform == "linux":
         import resource
 

@@ -1,5 +1,5 @@
-"""Results in a file, kincheck-results/1, read so that nothing made of them can fail: a file may be
-cut, edited, or made up.
+"""Results files, kincheck-results/1, checked on reading so that no later step can fail: a file may
+be cut, edited or invented.
 """
 
 from __future__ import annotations
@@ -15,17 +15,17 @@ from ..case.case import Truth
 from ..case.io.document import fault, join, read_text, shown
 from ..mechanism.mechanism import GROUND
 from ..trajectory import QUANTITIES
-from .record import Outcome, OutputSeries, Record, Results, Scene, from_json
+from .record import Outcome, OutputSeries, Record, Results, from_json
+from .scene_record import Scene
 
 LARGEST_FILE = 512_000_000
-# Numbers are shown in thousandths and degrees, and subtracted: within this bound that does not
-# overflow.
+# Numbers are shown in thousandths and degrees, and subtracted: up to this bound nothing overflows.
 LARGEST = 1e300
 _ADVICE = "make it anew with kincheck run --json"
 
 
 class _Driver(msgspec.Struct, frozen=True):
-    """What is told of a driver; further keys may be there."""
+    """The known keys of a driver; further keys are allowed."""
 
     name: str = ""
     type: str = ""
@@ -36,7 +36,7 @@ class _Driver(msgspec.Struct, frozen=True):
 
 
 class _About(msgspec.Struct):
-    """What is told of a case; further keys may be there."""
+    """The known keys of a case; further keys are allowed."""
 
     source: str = ""
     signs: str = ""
@@ -46,18 +46,18 @@ class _About(msgspec.Struct):
 
 
 class _Details(msgspec.Struct):
-    """What an engine tells, where the report has a table for it; further keys may be there."""
+    """An engine's details with a table in the report; further keys are allowed."""
 
     dof_account: dict[str, int | float | str | list[str] | None] | None = None
     program: dict[str, dict[str, int | float | str | None]] | None = None
 
 
 def read_results(file: Path) -> Results:
-    """The results in a file.
+    """Return the results in a file.
 
     Raises:
-        CaseError: it cannot be read, is none, or contradicts itself: series of other lengths than
-            the driver's, names that are not there.
+        CaseError: the file cannot be read, holds no results, or contradicts itself: series of other
+            lengths than the driver's, unknown names.
     """
     text = read_text(file, LARGEST_FILE, "give results that kincheck run wrote")
     try:

@@ -1,6 +1,4 @@
-"""Running: every case with every engine, each pair judged and timed, exactly one record per
-pair.
-"""
+"""The run: every case with every engine, each pair judged and timed, one record per pair."""
 
 from __future__ import annotations
 
@@ -31,16 +29,19 @@ UNTOLD = {
     "iterations": "no sample was solved",
     "us_per_step": "known only where all samples are solved, and solved again for the time",
 }
-"""Why a number of a record is null, by its key, where the engine has answered."""
+"""Why a number of a record is null, by its key, if the engine has answered."""
 
 Progress = Callable[[Record, int, int], None]
-"""Told of each record as it is made, how many there are now, and how many there will be."""
+"""Called with each new record, the number of records so far, and their final number."""
 
 
 @dataclass(eq=False)
 class _Judging:
-    """A case being judged: what to compare with, None until the native engine is through, and the
-    pairs that wait for it.
+    """A case being judged.
+
+    Attributes:
+        standard: None until the native engine has finished.
+        waiting: pairs that wait for the standard.
     """
 
     standard: Standard | None
@@ -63,31 +64,30 @@ def run(
 ) -> Results:
     """Solve every case with every engine and judge each answer.
 
-    An output is judged against the case's reference. An output, velocity or acceleration that the
-    reference does not have is compared with the native engine's. A pair with nothing to compare is
-    `unjudged`, and so is the native engine itself on a case without a reference. An engine that
-    has values at samples that neither the reference nor the native engine reaches fails.
+    An output is judged against the case's reference. An output, velocity or acceleration missing
+    there is compared with the native engine's. A pair with nothing to compare is `unjudged`, and so
+    is the native engine itself on a case without a reference. An engine fails if it has values at
+    samples that neither the reference nor the native engine reaches.
 
-    The records are in the order of cases and engines, the native engine first, whatever the order
-    in which the solver is through with them.
+    The records are in the order of cases and engines, the native engine first, in whatever order
+    the solver finishes them.
 
     Args:
         tol: largest accepted constraint residual, as for `Engine.solve`.
-        baseline: the native engine, to compare with, where it is not among the engines; it gets no
+        baseline: the native engine as a standard, if it is not among the engines; it gets no
             records.
         command: the command line, kept with the results.
-        solver: where pairs are solved: in this process, in worker processes, on a cluster.
-        made: records made earlier, by a run of the same cases and engines; their pairs are not
-            solved again.
-        facts: further circumstances, kept with the results; they come before those of now.
-        unread: names of cases that were asked for and make no sense; their pairs are among those
-            that are missing.
-        residuals: fail an engine in projection mode that calls samples solved whose residual is
-            above `tol`; not for efforts that leave a residual on purpose.
+        solver: solves the pairs: in this process, in worker processes, on a cluster.
+        made: records of an earlier run of the same cases and engines; their pairs are not solved
+            again.
+        facts: further circumstances, kept with the results; they replace the present ones.
+        unread: names of requested cases that could not be read; their pairs count as missing.
+        residuals: fail an engine in projection mode if a solved sample has a residual above `tol`.
+            False for efforts with an intentional residual.
 
     Raises:
-        CaseError: two cases share their name, or two engines theirs and the mode: records go by
-            names.
+        CaseError: two cases have the same name, or two engines the same name and mode; records go
+            by names.
     """
     started = datetime.now(UTC)
     _distinct("cases", [case.name for case in cases])
@@ -138,9 +138,7 @@ def _distinct(what: str, names: Sequence[str]) -> None:
 def planned(
     cases: Sequence[Case], engines: Sequence[Engine], unread: Sequence[str] = ()
 ) -> list[tuple[str, str, str]]:
-    """Case, engine and mode of every pair, in the order of the records; last those of cases that
-    cannot be read.
-    """
+    """Return case, engine and mode of every pair in the order of records, unread cases last."""
     names = [*(case.name for case in cases), *unread]
     return [
         (name, engine.name, engine.mode)
@@ -164,7 +162,7 @@ def _to_solve(
     made: Mapping[tuple[str, str, str], Record],
     judging: Mapping[str, _Judging],
 ) -> Iterator[tuple[Case, Engine]]:
-    """Every pair that has no record, and the baseline where it is to be compared with."""
+    """Yield every pair without a record, and the baseline if it is needed as a standard."""
     for case in cases:
         missing = [
             engine for engine in engines if (case.name, engine.name, engine.mode) not in made
@@ -180,8 +178,8 @@ def _standard_known(
     baseline: Engine | None,
     made: Mapping[tuple[str, str, str], Record],
 ) -> Standard | None:
-    """What to compare with, if it is known before anything is solved."""
-    # of data of others it has to be known whether they are native's own
+    """Return the standard of a case if it is known before anything is solved."""
+    # third-party data must first be checked for equality with native's result
     if has_everything(case) and case.truth is not Truth.THIRD_PARTY_DATA:
         return Standard({})
     native = next((engine for engine in engines if engine.name == NATIVE), None)
@@ -207,7 +205,7 @@ def _record(pair: Pair, attempt: Attempt, native: Standard, *, residuals: bool) 
             return _answered(
                 case, engine, facts, result, attempt.seconds or Seconds(), verdict, own
             )
-        except Exception as error:  # a reference that does not fit, for one
+        except Exception as error:  # for example a reference that does not fit
             result = Failure(Outcome.ERROR, said(error))
     nothing = Deviations(
         position=None,
@@ -241,7 +239,7 @@ def _answered(
     """Return the record of an answer."""
     solved, samples = answer.solved, len(case.sweep.values)
     details = dict(answer.details)
-    # a right answer that passed a singular pose says so
+    # a correct answer that passed a singular pose says so
     messages = [*verdict.messages, *details.pop("notes", [])]
     numbers = {
         "residual_max": answer.residual if solved else None,

@@ -1,4 +1,4 @@
-"""Scenes: the mechanism of each case to look at, at a few samples of its sweep."""
+"""Scenes: the mechanism of each case as drawn, at a few samples of its sweep."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ from ..kinematics.compiled.request import Request
 from ..kinematics.solver_selection import prepare
 from ..mechanism.mechanism import Vector
 from ..trajectory import Array, BodyMotion
-from .record import Record, Results, Scene, SceneBody, SceneJoint, ScenePoint
+from .record import Record, Results
 from .run import NATIVE
+from .scene_record import Scene, SceneBody, SceneJoint, ScenePoint
 
 FRAMES = 61  # a few seconds of animation, and a few kilobytes a body
 POSES = 3000  # frames times bodies, at most: a quarter of a megabyte of results
 LARGEST = 200  # moving bodies; no picture shows more
 DIGITS = 6  # of the mechanism's size: a thousandth of a pixel
 
-# Looser than a comparison's, for a pose is only drawn: a thousandth of the digits that are kept.
+# Looser than for a comparison, since poses are only drawn: a thousandth of the digits kept.
 TOL = 1e-9
 
 
 def with_scenes(results: Results, cases: Sequence[Case]) -> Results:
-    """The same results with a scene of every case, but for mechanisms of more than `LARGEST` moving
-    bodies.
+    """Return the results with a scene of every case of at most `LARGEST` moving bodies.
 
-    Poses over the sweep are solved for only where the native engine has an answer in these results:
-    what it has been seen to manage, in a process of its own perhaps, will neither hang nor end this
-    one.
+    Poses over the sweep are solved here only if these results hold an answer of the native engine.
+    The native engine may have solved them in a process of its own; a case that it has solved can
+    neither hang nor end this process.
     """
     answered = {record.case for record in results.records if _answers(record)}
     asked = any(record.engine == NATIVE for record in results.records)
@@ -50,11 +50,12 @@ def _answers(record: Record) -> bool:
 
 
 def scene(case: Case, *, poses: bool = True, asked: bool = True) -> Scene:
-    """The mechanism of a case.
+    """Return the scene of a case.
 
     Args:
-        poses: solve for the bodies' poses over the sweep; else the scene is the design position.
-        asked: the native engine was, and had no answer, where there are no poses.
+        poses: solve for the bodies' poses over the sweep; otherwise the scene is the design
+            position.
+        asked: without poses: whether the native engine was run and had no answer.
     """
     mechanism = case.mechanism
     frames, motions = list[int](), dict[str, BodyMotion]()
@@ -109,12 +110,12 @@ def scene(case: Case, *, poses: bool = True, asked: bool = True) -> Scene:
 
 
 def _poses(case: Case) -> tuple[list[int], dict[str, BodyMotion], str]:
-    """The samples reached, of `FRAMES` evenly taken ones, and every moving body there."""
+    """Return the samples reached, of `FRAMES` evenly spaced ones, and the moving bodies there."""
     path, count = case.sweep.path, len(case.sweep.values)
     bodies = tuple(body.name for body in case.mechanism.moving)
     frames = min(FRAMES, count, POSES // max(1, len(bodies)))
     taken = np.unique(np.linspace(0, count - 1, frames).round().astype(int))
-    # not compiled: for so few samples the compiler takes longer than numpy
+    # not compiled: for so few samples compilation takes longer than numpy
     request = Request(tuple(path.motions), (), bodies, order=0, compiled=False)
     found = prepare(case.mechanism, request, replace(path, times=path.times[taken]))(TOL)
     reached = {
@@ -125,7 +126,7 @@ def _poses(case: Case) -> tuple[list[int], dict[str, BodyMotion], str]:
 
 
 def _size(points: Sequence[Vector]) -> float:
-    """The largest extent of the design position [m]; one where there is none."""
+    """Return the largest extent of the design position [m]; 1 if there is none."""
     return float(np.ptp(np.array(points), axis=0).max()) or 1.0 if points else 1.0
 
 

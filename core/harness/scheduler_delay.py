@@ -1,6 +1,4 @@
-"""How long this thread was kept from running by others: what a time is freed of before it is
-compared with another day's.
-"""
+"""Time spent waiting for a processor, subtracted before times of different days are compared."""
 
 from __future__ import annotations
 
@@ -10,14 +8,13 @@ _ACCOUNT = Path("/proc/thread-self/schedstat")
 
 
 def waited() -> float:
-    """Seconds this thread has been ready to run and waited for a processor; always 0 where the
-    system keeps no account (not Linux).
+    """Return the seconds this thread was ready and waited for a processor; 0 except on Linux.
 
-    Not the processor time instead of the clock's: a solve that sleeps, or waits for a disk or a
-    lock, would count for nothing.
+    Processor time is no substitute for wall-clock time: a solve that sleeps, or waits for a disk or
+    a lock, would count for nothing.
     """
     try:
-        # fields: nanoseconds run, nanoseconds waited, number of turns (Linux,
+        # fields: nanoseconds run, nanoseconds waited, time slices (Linux,
         # Documentation/scheduler/sched-stats.rst)
         return 1e-9 * int(_ACCOUNT.read_text("ascii").split()[1])
     except (OSError, IndexError, ValueError):

@@ -1,8 +1,8 @@
 """Slips: simple mistakes in a reference, tried on the whole series: sign, unit, offset, order of
 samples, exchanged columns.
 
-A slip is named only where undoing it brings the reference within the tolerance, and where that says
-something: a series of zeros fits with either sign, a constant one fits after any offset, and two
+A slip is reported only if its correction brings the reference within the tolerance and is
+significant. A series of zeros fits with either sign, a constant one fits after any offset, and two
 samples prove nothing.
 """
 
@@ -17,10 +17,10 @@ import numpy as np
 from ..trajectory import Array
 from .compare import deviation
 
-# Two samples are met by too many changes.
+# Fewest samples: two are fitted by too many changes.
 FEWEST = 3
-# A series whose values, or whose changes, are smaller than so many tolerances is met by too many
-# changes, too.
+# Smallest size of a series' values, or of their changes, in tolerances: a smaller one is fitted by
+# too many changes, too.
 MEANINGFUL = 10.0
 OTHER_SIGN = "with the other sign"
 FACTORS: Mapping[str, float] = {
@@ -43,16 +43,14 @@ FACTORS: Mapping[str, float] = {
     "2": 2.0,
     "1/2": 0.5,
 }
-"""Between units of length and of angle, percent and parts, half and whole; by their names in
-messages.
+"""Factors between units of length and of angle, percent and parts, half and whole, by their names
+in messages.
 """
 
 
 @dataclass(frozen=True, eq=False)
 class Held:
-    """The values of one output, and what they are held to: atol + rtol * range of what they are
-    compared with.
-    """
+    """The values of one output, and their tolerance: atol + rtol * range of the standard."""
 
     values: Array
     atol: float
@@ -62,12 +60,12 @@ class Held:
 
 @dataclass(frozen=True)
 class Slip:
-    """A change of the reference that makes it fit.
+    """A change that makes the reference fit.
 
     Attributes:
         change: in words, after "the reference".
-        difference: the largest one that is left.
-        tolerance: that it is within.
+        difference: the largest remaining difference.
+        tolerance: its tolerance.
     """
 
     change: str
@@ -76,7 +74,7 @@ class Slip:
 
     @property
     def ratio(self) -> float:
-        """What is left, in tolerances."""
+        """The remaining difference in tolerances."""
         return self.difference / self.tolerance if self.tolerance else 0.0
 
 
@@ -86,14 +84,13 @@ _Change = tuple[str, Callable[[Array], Array]]
 def slips(
     held: Held, reference: Array, others: Mapping[str, Held], *, offsets: bool = True
 ) -> list[Slip]:
-    """Return all single changes that make the reference fit, or where there are none, all pairs of
-    changes.
+    """Return all single changes that make the reference fit; if there are none, all pairs of them.
 
     Args:
         held: the values that the engines agree on.
         reference: of the same output, out of tolerance, shape (n,).
-        others: values of the other outputs, by name, which the reference may be of.
-        offsets: whether a constant may be added; to a derivative nobody adds one.
+        others: values of the other outputs, by name, possibly confused with this one.
+        offsets: whether a constant may be added; False for derivatives.
     """
     return list(_single(held, reference, others, offsets)) or list(
         _pairs(held, reference, others, offsets)
@@ -156,10 +153,10 @@ def _fitting(
     *,
     constant: bool = False,
 ) -> Iterator[Slip]:
-    """The changes after which the reference fits.
+    """Yield the changes after which the reference fits.
 
     Args:
-        constant: whether a constant series says something, unless it is one of zeros.
+        constant: whether a constant series is significant, unless all its values are zero.
     """
     for words, change in changes:
         changed = change(reference)
@@ -175,7 +172,7 @@ def _fitting(
 
 
 def _exchanged(reference: Array, others: Mapping[str, Held], before: str) -> Iterator[Slip]:
-    """The outputs of which the reference is, where it varies."""
+    """Yield the other outputs that the reference fits, if it varies."""
     for name, other in others.items():
         yield from _fitting(
             other, reference, [(f"{before}taken as that of output {name}", lambda x: x)], ""

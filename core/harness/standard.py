@@ -1,6 +1,4 @@
-"""Standards: what the native engine gives or refuses where the reference of a case does not say it
-all.
-"""
+"""Standards: values and refusals of the native engine, used if a reference is incomplete."""
 
 from __future__ import annotations
 
@@ -14,11 +12,11 @@ from ..case.case import Case, Series
 from .record import OutputSeries, Record
 
 NATIVE = "native"
-"""Name of the engine that stands in where a case has no reference."""
+"""Name of the engine used as standard without a reference."""
 
 
 UNCERTAIN = "uncertain_samples"
-"""Key of a record's details: samples that were reached, and refused because they are uncertain."""
+"""Key of a record's details: samples that were reached, and refused as uncertain."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,11 +24,11 @@ class Standard:
     """The native engine's answer to a case.
 
     Attributes:
-        outputs: by name; empty where there are none.
+        outputs: by name; empty if there are none.
         absent: why there are none, as the end of a sentence on the missing reference.
-        refused: samples that the native engine cannot reach, shape (n,); None where there are none.
-            Samples that it reaches, and refuses because the pose or its rates are uncertain beside
-            a singular pose, are not among them: it says nothing of the values of others there.
+        refused: samples out of the native engine's reach, shape (n,); None if there are none.
+            Samples that it reaches and refuses, because the pose or its rates are uncertain near a
+            singular pose, are not included: other engines' values there are not contradicted.
         why: its own message.
     """
 
@@ -40,16 +38,14 @@ class Standard:
     why: str = ""
 
     def refuses(self, case: Case) -> NDArray[np.bool_] | None:
-        """Return the samples that the native engine cannot reach and the reference does not have,
-        shape (n,).
-        """
+        """Return the samples reached by neither the native engine nor the reference, shape (n,)."""
         if self.refused is None:
             return None
         return self.refused & ~known(case.reference.values(), len(self.refused))
 
 
 def standard_of(native: Record) -> Standard:
-    """Return the standard that a record of the native engine makes."""
+    """Return the standard given by a record of the native engine."""
     if not native.outputs:
         why = f", and the native engine has no answer ({native.outcome.shown}: {native.message})"
         return Standard({}, why)
@@ -62,9 +58,7 @@ def standard_of(native: Record) -> Standard:
 
 
 def has_everything(case: Case) -> bool:
-    """Return whether the reference has a value of everything there is to compare, at every
-    sample.
-    """
+    """Return whether the reference has a value of every comparable quantity at every sample."""
     return all(
         (series := case.reference.get(output.name)) is not None
         and all(
@@ -85,7 +79,7 @@ def known(outputs: Iterable[Series], samples: int) -> NDArray[np.bool_]:
 
 
 def _series(output: OutputSeries) -> Series:
-    """Return what `as_numbers` wrote down, without loss: NaN for null."""
+    """Return the inverse of `as_numbers`, without loss: NaN for null."""
     rates = [
         None if each is None else np.array(each, dtype=np.float64)
         for each in (output.velocity, output.acceleration)

@@ -1,6 +1,4 @@
-"""Suspecting the reference: where all engines of a case agree with each other and not with it, it
-is the odd one out.
-"""
+"""Suspicion of a reference: the engines of a case agree with each other and not with it."""
 
 from __future__ import annotations
 
@@ -18,7 +16,7 @@ from .evidence import Explanation, Suspect
 from .record import Deviation, Deviations, OutputSeries, Record
 from .slips import Held, Slip, slips
 
-# A sentence that explains more outputs than these is not read; further ones are counted.
+# Most outputs explained in a sentence; further ones are counted.
 MOST_EXPLAINED = 12
 ADVICE = "suspect the reference, the output's component or a sign"
 UNEXPLAINED = (
@@ -43,11 +41,10 @@ class _Off:
 
 
 def suspect(case: Case, records: Sequence[Record]) -> Suspect | None:
-    """Return what there is to be said where the engines agree within tolerance and the reference
-    does not fit; else None.
+    """Return the suspicion of a reference; None unless the engines agree within tolerance and it
+    does not fit.
 
-    One engine alone agrees with nobody: its reference is suspected only where a slip explains all
-    of it.
+    A single engine agrees with no other: then a slip must explain all deviations.
     """
     mine = [record for record in records if record.case == case.name and record.solved]
     whole = [record for record in mine if record.solved == record.samples]
@@ -107,7 +104,7 @@ def _difference(case: Case, worst: _Off) -> str:
 
 
 def _unit(case: Case) -> Unit:
-    """The unit of what is swept, in the file of the case."""
+    """Return the unit of the swept driver, in the file of the case."""
     if case.sweep.driver == TIME:
         return SECOND
     turns = case.mechanism.driver(case.sweep.driver).turns
@@ -131,7 +128,7 @@ def _number(value: float) -> str:
 
 
 def _against(errors: Deviations, case: Case) -> bool:
-    """Whether something of an output is out of tolerance against the reference."""
+    """Return whether any quantity of an output is out of tolerance against the reference."""
     return any(not each.within and each.against == case.truth for _, each in errors.items())
 
 
@@ -141,7 +138,7 @@ def _series(output: OutputSeries, order: int) -> Array | None:
 
 
 def _held(case: Case, beat: float, record: Record, order: int) -> dict[str, Held]:
-    """The values of a record by output, and what they are held to."""
+    """Return the values of a record by output, with their tolerances."""
     found: dict[str, Held] = {}
     for output in case.outputs:
         if (
@@ -157,8 +154,9 @@ def _held(case: Case, beat: float, record: Record, order: int) -> dict[str, Held
 def _agreement(
     case: Case, beat: float, first: Record, records: Sequence[Record]
 ) -> dict[tuple[str, int], float] | None:
-    """The largest difference between the first engine and the others, by output and order; None
-    where one is not within.
+    """Return the largest difference between the first engine and the others, by output and order.
+
+    None if any difference is out of tolerance.
     """
     largest: dict[tuple[str, int], float] = {}
     for order in range(len(QUANTITIES)):
@@ -179,7 +177,7 @@ def _agreement(
 
 
 def _off(case: Case, beat: float, record: Record) -> Iterator[_Off]:
-    """What is out of tolerance against the reference."""
+    """Yield the quantities out of tolerance against the reference."""
     for order, quantity in enumerate(QUANTITIES):
         for name, held in _held(case, beat, record, order).items():
             reference: Array | None = getattr(case.reference.get(name), quantity, None)
@@ -193,8 +191,8 @@ def _off(case: Case, beat: float, record: Record) -> Iterator[_Off]:
 def _explained(
     case: Case, beat: float, record: Record, off: Sequence[_Off]
 ) -> tuple[list[Explanation], list[str]]:
-    """Slips that explain what is out of tolerance, alike ones together, and the outputs that none
-    explains, by name.
+    """Return the slips that explain the deviations, equal ones merged, and the unexplained outputs
+    by name.
     """
     every = {order: _held(case, beat, record, order) for order in range(len(QUANTITIES))}
     units = {output.name: output.unit for output in case.outputs}

@@ -1,4 +1,4 @@
-"""An engine whose module cannot be loaded, in its place."""
+"""Substitute for an engine whose module cannot be loaded."""
 
 from __future__ import annotations
 
@@ -12,9 +12,7 @@ from ..trajectory import Trajectory
 
 @dataclass(frozen=True)
 class Unloadable:
-    """What stands in the place of an engine whose own module fails when it is imported: its pairs
-    are errors, which say why.
-    """
+    """Substitute for an engine whose own module fails on import: its pairs are errors."""
 
     name: str
     reason: str
@@ -23,20 +21,20 @@ class Unloadable:
     settings: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
     def version(self) -> str | None:
-        """Where an engine is asked first.
+        """Raise the reason. The harness calls this method first.
 
         Raises:
-            ImportError: always, with the reason.
+            ImportError: always.
         """
         raise ImportError(f"engine {self.name!r} cannot be loaded: {self.reason}")
 
     def unsupported(self, case: Case) -> str | None:
-        """Never asked."""
+        """Return None; never called."""
         return None
 
     def build(self, case: Case) -> Any:
-        """Never asked."""
+        """Return None; never called."""
 
     def solve(self, model: Any, case: Case, tol: float) -> Trajectory:
-        """Never asked."""
+        """Raise an error; never called."""
         raise NotImplementedError

@@ -1,4 +1,4 @@
-"""Verdicts: what becomes of an answer, and why, by the standards of its case."""
+"""Verdicts: the outcome of an answer and its reason, by the standards of its case."""
 
 from __future__ import annotations
 
@@ -19,11 +19,13 @@ from .record import Deviation, Deviations, Outcome
 from .standard import NATIVE, Standard, known
 
 ROUNDED = 2.0
-"""Engines measure in a unit near the mechanism's size, a power of two, which may be larger."""
+"""Factor on the residual tolerance: engines measure in a unit near the mechanism's size, a power of
+two that may be larger.
+"""
 
 
 NAMED = 3
-"""Outputs whose values a message gives; the record has all."""
+"""Number of outputs with values in a message; the record has all."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +36,7 @@ class Verdict:
         outcome: pass, fail or unjudged.
         messages: why it fails, or which part of it could not be judged.
         errors: deviations of every output.
-        seconds: that judging took.
+        seconds: time of the comparison.
     """
 
     outcome: Outcome
@@ -44,10 +46,10 @@ class Verdict:
 
 
 def judged(case: Case, answer: Answer, native: Standard, tol: float) -> Verdict:
-    """Judge an answer.
+    """Return the verdict on an answer.
 
     Args:
-        native: the native engine's answer, for all that the case's reference does not have.
+        native: the native engine's answer, for everything missing in the case's reference.
         tol: the largest residual of the samples that the engine calls solved, relative to the size.
     """
     begin = perf_counter()
@@ -64,7 +66,7 @@ def judged(case: Case, answer: Answer, native: Standard, tol: float) -> Verdict:
             f"{solved} of {samples} samples solved: {why}{_reached_elsewhere(case, answer, native)}"
         )
     faults += filter(None, (_contradiction(case, answer, native), _worst(case, errors)))
-    # an output without any value has no deviation to be out of tolerance
+    # an output without any value has no deviation and thus none out of tolerance
     faults += [
         f"{name}: {each.reason}" for name, each in errors.items() if each.lost and each.within
     ]
@@ -96,7 +98,7 @@ def _deviations(
 
 
 def _worst(case: Case, errors: Mapping[str, Deviations]) -> str:
-    """Return the deviation that is most out of tolerance, in words; empty where all are within."""
+    """Return the deviation most out of tolerance, in words; empty if all are within."""
     outside: list[tuple[float, Quantity, str, Deviation]] = [
         (off.max_abs / off.tolerance if off.tolerance else np.inf, output, quantity, off)
         for output in case.outputs
@@ -112,8 +114,8 @@ def _worst(case: Case, errors: Mapping[str, Deviations]) -> str:
 
 
 def _contradiction(case: Case, answer: Answer, native: Standard) -> str:
-    """Return what an engine has where the native engine refuses the sample, with both sides; empty
-    where they agree.
+    """Return the values at samples refused by the native engine, with both sides; empty if there
+    are none.
     """
     refused = native.refuses(case)
     if refused is None:
@@ -136,9 +138,7 @@ def _contradiction(case: Case, answer: Answer, native: Standard) -> str:
 
 
 def _reached_elsewhere(case: Case, answer: Answer, native: Standard) -> str:
-    """Return how many of the samples that an engine did not solve have a value in a standard; empty
-    where none has.
-    """
+    """Return how many of the unsolved samples have a value in a standard; empty if none has."""
     samples = len(case.sweep.values)
     unsolved = ~known(answer.outputs.values(), samples)
     for name, series in (
@@ -151,18 +151,17 @@ def _reached_elsewhere(case: Case, answer: Answer, native: Standard) -> str:
 
 
 def promised(engine: Engine, tol: float) -> float:
-    """Return the largest residual that an engine promises for its solved samples, relative to the
-    size.
+    """Return the largest residual promised for solved samples, relative to the size.
 
-    A simulation accepts what its own settings say, and is held to its outputs alone. The native
-    engine knows better how far a residual moves a pose.
+    A simulation accepts according to its own settings, and only its outputs are judged. The native
+    engine itself bounds the effect of a residual on a pose.
     """
     return tol if engine.mode == "projection" and engine.name != NATIVE else math.inf
 
 
 def excess(case: Case, residual: float, tol: float) -> str:
-    """Return by how much the residual of solved samples is above the tolerance; empty where it is
-    not.
+    """Return the excess of the solved samples' residual over the tolerance, in words; empty if
+    there is none.
 
     The tolerance is relative to the mechanism's size for lengths, and absolute for residuals
     without a unit.
@@ -178,9 +177,7 @@ def excess(case: Case, residual: float, tol: float) -> str:
 
 
 def _not_judged(case: Case, errors: Mapping[str, Deviations]) -> list[str]:
-    """Return which outputs, quantities or samples were not compared, and why; outputs with the same
-    reason together.
-    """
+    """Return the outputs, quantities or samples not compared, and why; equal reasons are merged."""
     reasons: dict[str, list[str]] = {}
     for output in case.outputs:
         each = errors[output.name]

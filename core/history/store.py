@@ -26,10 +26,9 @@ import msgspec
 
 from ..harness.provenance import missing, versions
 from ..harness.record import Record, Results, settled
-from . import faults
+from .connections import readable_connection, writable_connection
 from .faults import DamagedRunError, HistoryError, explained, told
 from .process_identity import alive, owner
-from .schema import MIGRATIONS, check, migrate, write_ahead
 
 Status: TypeAlias = Literal["running", "finished", "interrupted", "killed"]
 """The file says that a run is running until it ends; where its process is gone it was killed."""
@@ -60,7 +59,7 @@ class Store:
         self.path = path
         self.passed_over: dict[int, str] = {}  # runs that cannot be read, and why
         with self.explained("opened"):
-            self.connection = self._writable() if writable else self._readable()
+            self.connection = writable_connection(path) if writable else readable_connection(path)
 
     def __enter__(self) -> Self:
         return self
@@ -270,63 +269,6 @@ class Store:
             )
             self.connection.execute(
                 "INSERT OR REPLACE INTO attachments VALUES (?, ?, ?, ?)", (run, kind, case, digest)
-            )
-
-    def _writable(self) -> sqlite3.Connection:
-        connection = sqlite3.connect(self.path, timeout=faults.BUSY, isolation_level=None)
-        try:
-            check(connection)  # before anything is changed in a file that may not be ours
-            write_ahead(connection, faults.BUSY)
-            connection.execute("PRAGMA synchronous = FULL")  # a commit survives a power cut too
-            connection.execute("PRAGMA foreign_keys = ON")
-            migrate(connection)
-        except BaseException:
-            connection.close()
-            raise
-        return connection
-
-    def _readable(self) -> sqlite3.Connection:
-        if not self.path.is_file():
-            raise HistoryError(
-                f"history {self.path}: there is no such file; `kincheck run --history FILE`"
-                " makes one"
-            )
-        # a file in a place where nothing can be written has no journal beside it: then nobody else
-        # is writing it either
-        for how in ("mode=ro", "mode=ro&immutable=1"):
-            connection = sqlite3.connect(
-                f"{self.path.absolute().as_uri()}?{how}",
-                uri=True,
-                timeout=faults.BUSY,
-                isolation_level=None,
-            )
-            try:
-                version = check(connection)
-            except sqlite3.OperationalError:
-                connection.close()
-                if how != "mode=ro":
-                    raise
-                self._check_whole()
-                continue
-            except BaseException:
-                connection.close()
-                raise
-            if version < len(MIGRATIONS):
-                connection.close()
-                return self._writable()
-            return connection
-        raise AssertionError("the second way either connects or raises")
-
-    def _check_whole(self) -> None:
-        """What was written last may be beside the file still, and cannot be read where nothing can
-        be written.
-        """
-        beside = self.path.with_name(f"{self.path.name}-wal")
-        if beside.is_file() and beside.stat().st_size:
-            raise HistoryError(
-                f"history {self.path}: its latest records are in {beside.name} still, and the"
-                " folder cannot be written, which putting them together takes; copy both files to"
-                " a folder that can be"
             )
 
     @contextmanager

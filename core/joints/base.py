@@ -1,5 +1,4 @@
-"""What a joint is: two bodies, some geometry at the design position, and a composition of
-primitives.
+"""Base of joints: two bodies, geometry at the design position, and a composition of primitives.
 
 A new joint type is one file: a frozen dataclass with its geometry as fields (declared with
 `position`, `direction`, ...) and the method `primitives`. Declaring the class registers it: case
@@ -11,13 +10,12 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
-from dataclasses import MISSING, dataclass, field, fields
-from enum import Enum
+from dataclasses import MISSING, dataclass, fields
 from functools import partial
 from inspect import get_annotations
 from typing import Any, ClassVar, Self
 
-from ..algebra import ZERO, Scalar, Vec3, X, Y, Z, cross, root, vec, where_larger
+from ..algebra import ZERO, Vec3, vec
 from ..errors import MechanismError, Phrase
 from ..input_checks import held, plain, require_direction, require_finite, triple
 from ..primitives import (
@@ -30,62 +28,29 @@ from ..primitives import (
     Primitive,
 )
 from ..primitives import Spherical as SphericalCondition
+from .axes import require_perpendicular, triad, unit
+from .geometry_fields import Kind, direction, directions, length, position, positions
 
-
-class Kind(Enum):
-    """What a geometry field of a joint holds; tells a reader its shape and which unit applies."""
-
-    POSITION = "a point [x, y, z]"
-    DIRECTION = "a direction [x, y, z]"
-    POSITIONS = "two points [[x, y, z] on the first body, [x, y, z] on the second]"
-    DIRECTIONS = "two directions [[x, y, z] on the first body, [x, y, z] on the second]"
-    LENGTH = "a length"
-
-    @property
-    def pair(self) -> bool:
-        """Whether it is one on each body."""
-        return self is not self.single
-
-    @property
-    def single(self) -> Kind:
-        """What each of a pair is; itself, where it is no pair."""
-        return {Kind.POSITIONS: Kind.POSITION, Kind.DIRECTIONS: Kind.DIRECTION}.get(self, self)
-
-
-def _geometry(kind: Kind, **options: Any) -> Any:
-    return field(metadata={"kind": kind}, **options)
-
-
-def position(**options: Any) -> Any:
-    """A point common to both bodies, global at design [m]."""
-    return _geometry(Kind.POSITION, **options)
-
-
-def direction() -> Any:
-    """A direction common to both bodies, global at design, any length but zero [-]."""
-    return _geometry(Kind.DIRECTION)
-
-
-def positions() -> Any:
-    """A point on each body, global at design [m]."""
-    return _geometry(Kind.POSITIONS)
-
-
-def directions() -> Any:
-    """A direction on each body, global at design, any length but zero [-]."""
-    return _geometry(Kind.DIRECTIONS)
-
-
-def length(**options: Any) -> Any:
-    """A length [m]."""
-    return _geometry(Kind.LENGTH, **options)
+__all__ = [
+    "Attachment",
+    "AxialJoint",
+    "Joint",
+    "Kind",
+    "direction",
+    "directions",
+    "length",
+    "position",
+    "positions",
+    "register",
+    "require_perpendicular",
+    "triad",
+    "unit",
+]
 
 
 @dataclass(frozen=True, slots=True)
 class Attachment:
-    """A body at the design position as a joint sees it: where its origin is, and arms from
-    there.
-    """
+    """A body at the design position as a joint uses it: its origin, and arms from there."""
 
     origin: Vec3
 
@@ -95,9 +60,7 @@ class Attachment:
 
 
 def _several(annotation: Any) -> bool:
-    """Whether a field that is annotated so holds several numbers, and is no attribute of the
-    class.
-    """
+    """Return whether an annotation is of several numbers, and not of a class attribute."""
     text = str(annotation)
     return "ClassVar" not in text and any(
         each in text for each in ("tuple", "Tuple", "list", "List", "Sequence", "Vector", "Vec3")
@@ -105,12 +68,11 @@ def _several(annotation: Any) -> bool:
 
 
 def register(registry: dict[str, Any], cls: Any) -> None:
-    """Have case files know a type by its name. The same class may be declared anew: a module loaded
-    again, a cell run again.
+    """Register a type under its name for case files. The same class may be declared again, as when
+    a module is reloaded or a cell is rerun.
 
     Raises:
-        MechanismError: another class has the name; case files would mean this one instead, and
-            nobody would know.
+        MechanismError: another class has the name; case files would silently mean this one instead.
     """
     known = registry.get(cls.type, cls)
     if (known.__module__, known.__qualname__) != (cls.__module__, cls.__qualname__):
@@ -128,12 +90,12 @@ class Joint(ABC):
     Attributes:
         type: the name in case files.
         freedoms: the relative motions the joint leaves, as drivers name them.
-        symmetric: both bodies may change places; not so where geometry belongs to one of them (a
-            line, a plane, a hinge).
+        symmetric: both bodies may change places; false if geometry belongs to one of them (a line,
+            a plane, a hinge).
 
     Raises:
-        MechanismError: a number is not finite, a direction is zero, or a shape is wrong; or, where
-            a class is declared, another has its type.
+        MechanismError: a number is not finite, a direction is zero, or a shape is wrong; or, at
+            class declaration, another class has its type.
     """
 
     type: ClassVar[str]
@@ -199,7 +161,7 @@ class Joint(ABC):
         return self.i, self.j
 
     def geometry(self) -> Sequence[tuple[str, Kind, Any]]:
-        """Return name, kind and value of every geometry field that is given."""
+        """Return name, kind and value of every geometry field with a value."""
         found = [
             (each.name, each.metadata.get("kind"), getattr(self, each.name))
             for each in fields(self)
@@ -211,8 +173,8 @@ class Joint(ABC):
         ]
 
     def parts(self, body: str | None = None) -> Sequence[tuple[str, Kind, Any]]:
-        """Return the same of every single one, of a pair as "points.0" and "points.1"; only what is
-        on the body if one is named.
+        """Return the same for single values, of a pair as "points.0" and "points.1"; only those on
+        the body if one is named.
         """
         found = list[tuple[str, Kind, Any]]()
         for name, kind, value in self.geometry():
@@ -231,8 +193,8 @@ class Joint(ABC):
         return [value for _, kind, value in self.parts(body) if kind is Kind.POSITION]
 
     def mapped(self, ways: Mapping[Kind, Callable[[Any], Any]]) -> dict[str, Any]:
-        """Return its geometry fields, each point, direction or length sent through the way for its
-        kind, where there is one.
+        """Return its geometry fields, each point, direction or length passed to the function of its
+        kind, if there is one.
         """
         given = [
             (name, kind.pair, ways[kind.single], value)
@@ -254,8 +216,8 @@ class Joint(ABC):
         return self.changed(**self.mapped({Kind.POSITION: times, Kind.LENGTH: times}))
 
     def changed(self, **values: Any) -> Self:
-        """Return the joint with other fields, not checked again: as good as this one, or of numbers
-        that are known only later.
+        """Return the joint with other fields, without checks: the values are valid, or known only
+        later.
         """
         other = copy(self)
         for name, value in values.items():
@@ -264,9 +226,7 @@ class Joint(ABC):
 
     @property
     def notes(self) -> Sequence[str | Phrase]:
-        """What a reader of results should know of its geometry: where it can be meant, and yet be a
-        mistake.
-        """
+        """Remarks on its geometry for a reader of results: it may be intended, or a mistake."""
         return ()
 
     @property
@@ -277,7 +237,7 @@ class Joint(ABC):
 
     @abstractmethod
     def primitives(self, i: Attachment, j: Attachment) -> Sequence[Primitive]:
-        """Return the primitives this joint is composed of; each sees body i first."""
+        """Return the primitives of this joint; each takes body i first."""
 
 
 @dataclass(frozen=True)
@@ -293,7 +253,7 @@ class AxialJoint(Joint):
     axis: tuple[float, float, float] = direction()
 
     def measured(self, freedom: str, i: Attachment, j: Attachment) -> Primitive:
-        """Return the primitive that ties one of its coordinates, "rotation" or "translation", to a
+        """Return the primitive between one of its coordinates, "rotation" or "translation", and a
         drive.
         """
         P, h = vec(self.point), unit(self.axis)
@@ -305,7 +265,7 @@ class AxialJoint(Joint):
 
     def mixed(self, i: Attachment, j: Attachment) -> Sequence[tuple[Primitive, str]]:
         """Return the joint with its coordinates named: TraX and RotX of formulation section 4, and
-        the coordinate each takes.
+        the coordinate of each.
         """
         P, h = vec(self.point), unit(self.axis)
         slide = (
@@ -318,54 +278,16 @@ class AxialJoint(Joint):
 
     @property
     def rows(self) -> int:
-        """Number of constraint equations, of relations between its own coordinates too."""
+        """Number of constraint equations, with the relations between its own coordinates."""
         return super().rows + len(self.relations)
 
     @property
     def relations(self) -> Sequence[Mapping[str, float]]:
-        """Linear relations between its own coordinates [m, rad]: coefficients by freedom, whose
-        weighted sum stays zero.
+        """Linear relations between its own coordinates [m, rad]: coefficients by freedom of a sum
+        equal to zero.
         """
         return ()
 
 
 def _times(factor: float, value: float | Sequence[float]) -> Any:
     return tuple(factor * x for x in value) if isinstance(value, Sequence) else factor * value
-
-
-def unit(a: Sequence[Scalar]) -> Vec3:
-    """Return the direction of a, length one."""
-    v = vec(a)
-    return (1.0 / root(v @ v)) * v
-
-
-# Hardpoint tables carry three digits or more, so rounding tilts an axis by less than this; more is
-# a mistake in the table. Within it the axes keep their design angle, as the two hinges of a
-# simulator do.
-ROUNDED_RIGHT_ANGLE = 1e-2
-
-
-def require_perpendicular(joint: Joint, axes: Sequence[Sequence[float]]) -> None:
-    """Raise MechanismError unless the two axes are perpendicular up to the rounding of a table."""
-    cosine = unit(axes[0]) @ unit(axes[1])
-    if abs(cosine) > ROUNDED_RIGHT_ANGLE:
-        raise MechanismError(
-            f"{joint}: the axes are not perpendicular, the cosine of their angle is {cosine:.3g}; "
-            "expected 0 up to rounding of the table; give the two axes of the cross"
-        )
-
-
-def triad(axis: Sequence[Scalar]) -> tuple[Vec3, Vec3, Vec3]:
-    """Return f, g, h: right-handed orthonormal, h along the axis (f x g = h)."""
-    h = unit(axis)
-    # the global axis most nearly perpendicular to h gives the best conditioned f
-    nearest = X
-    for e in (Y, Z):
-        nearest = vec(
-            [
-                where_larger(nearest @ h, e @ h, new, old)
-                for new, old in zip(e, nearest, strict=True)
-            ]
-        )
-    f = unit(tuple(cross(nearest, h)))
-    return f, cross(h, f), h

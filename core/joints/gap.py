@@ -1,4 +1,4 @@
-"""How far a joint is from holding at the design position."""
+"""Residual of a joint at the design position."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from .base import Attachment, Joint
 
 
 def gap(joint: Joint) -> float:
-    """Largest residual of a joint at the design position [m]: zero, but where lengths contradict
-    points.
+    """Return the largest residual of a joint at the design position [m]; zero unless lengths
+    contradict points.
     """
     here = Attachment(ZERO)
     return max(

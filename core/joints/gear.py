@@ -9,9 +9,7 @@ from .coupler import Coupler
 
 @dataclass(frozen=True)
 class Gear(Coupler):
-    """The first joint turns by the ratio times the turn of the second; an outer gear pair has a
-    negative ratio.
-    """
+    """The first joint turns by the ratio times the second; outer gears have a negative ratio."""
 
     type = "gear"
     freedoms = ("rotation", "rotation")

@@ -12,9 +12,7 @@ from .base import Attachment, Joint, direction, position, unit
 
 @dataclass(frozen=True)
 class InPlane(Joint):
-    """The point, fixed in body j, stays in the plane through it normal to the axis, fixed in body
-    i.
-    """
+    """The point of body j stays in the plane through it normal to the axis of body i."""
 
     type = "in_plane"
     freedoms = ("translation x", "translation y", "rotation x", "rotation y", "rotation z")

@@ -12,8 +12,8 @@ from .base import Attachment, AxialJoint, triad, unit
 
 @dataclass(frozen=True)
 class Planar(AxialJoint):
-    """A plane of each body, through the point and normal to the axis, slides on the other's; it
-    turns about the axis.
+    """A plane of each body, through the point and normal to the axis, slides on the other and turns
+    about the axis.
     """
 
     type = "planar"

@@ -1,6 +1,4 @@
-"""Rack and pinion: the displacement of one joint rolls off the rotation of another. 1 row between
-two joints.
-"""
+"""Rack and pinion: one joint's displacement follows another's rotation. 1 row, two joints."""
 
 from __future__ import annotations
 
@@ -12,8 +10,8 @@ from .coupler import Coupler
 
 @dataclass(frozen=True)
 class RackPinion(Coupler):
-    """The second joint, the rack's, moves by the radius [m] times the turn of the first, the
-    pinion's; the sign sets the sense.
+    """The second joint (rack) moves by the radius [m] times the turn of the first (pinion); the
+    sign sets the sense.
     """
 
     type = "rack_pinion"

@@ -12,9 +12,7 @@ from .cylindrical import Cylindrical
 
 @dataclass(frozen=True)
 class Screw(Cylindrical):
-    """Body j moves along the axis by the lead [m] in one right-handed turn; a negative lead is a
-    left-handed thread.
-    """
+    """Body j moves by the lead [m] per right-handed turn; left-handed threads: negative."""
 
     type = "screw"
     lead: float = length()

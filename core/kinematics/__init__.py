@@ -1,19 +1,21 @@
-"""Analysis: from the description of a mechanism to its motion.
+"""Kinematics: from the description of a mechanism to its motion.
 
-The modules beside this one are the main road of one mechanism:
+The modules in this folder solve one mechanism:
 
-    solve, designs      what users call: one design, or many
-    prepare             as one program, component by component or as a sparse system, by size
-    request             what is wanted, and where it stands in a lane
-    tracing             the programs of a request, kept on disk: `programs` (Newton, outputs), `prediction`, `acceptance`
-    model               a mechanism made ready: rows selected, programs traced, lanes laid out
-    route               a model and the samples of a path
-    march, sweep        a route followed from lane to lane; and judged, with what lies beyond singular poses
-    variants            as many designs as there are lanes
-    system              the same equations as plain matrices, for what is rare
-    continuity, interpolation, thread_cache     limits, weights, and what each thread keeps
+    solve                one design over a sweep
+    design_sweep         many designs over a sweep, each with its own geometry
+    design_batch         many variants along one path, one variant in each lane
+    solver_selection     one program, component by component or a sparse system, by size
 
-The rooms hold what comes before it (`equations`, `structure`), what it turns to at singular poses
-(`singular`) and for large mechanisms (`cascade`, `sparse`), and what else is made of equations
-(`assembly`, `diagnosis`, `proofs`).
+The folders:
+
+    formulation      constraints as equations, in Cartesian or joint coordinates
+    structure        degrees of freedom, redundant rows, components, sparse factors
+    compiled         one mechanism as compiled programs: request, programs, model, samples
+    continuation     the walk along a path, step halving, singular poses, curves by arc length
+    by_components    large mechanisms, component by component
+    sparse           large mechanisms without small components, as a sparse system
+    assembly         closed poses from estimates and random starts
+    diagnosis        rank, conditioning and screws at a pose
+    verified         samples enclosed in balls by Krawczyk's test
 """

@@ -21,11 +21,13 @@ from ..mechanism.mechanism import Mechanism
 from ..mechanism.motions import Path
 from ..program import ITERATIONS, Executor
 from ..trajectory import QUANTITIES, Array
-from .compiled.compiled_model import LARGEST, SMALLEST, Model
+from .compiled.compiled_model import Model
 from .compiled.motion_start import SAME_TIME
 from .compiled.request import SIGMA, accept_by
+from .compiled.sample_rows import LARGEST, SMALLEST
 from .compiled.samples import Route
-from .continuation.walk import FINER, ROOM, march
+from .continuation.side_follower import FINER, ROOM
+from .continuation.walk import march
 from .formulation.acceptance_criteria import doubtful
 from .formulation.parameters import placed, places
 from .solver_selection import IRREDUCIBLE, prepare

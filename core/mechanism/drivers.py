@@ -1,6 +1,4 @@
-"""Drivers: what moves a mechanism. Each adds one equation  Phi(q) - c(t) = 0  per driven
-coordinate.
-"""
+"""Drivers of a mechanism. Each adds one equation  Phi(q) - c(t) = 0  per driven coordinate."""
 
 from __future__ import annotations
 
@@ -14,7 +12,7 @@ from ..joints.base import Joint, Kind
 
 @dataclass(frozen=True)
 class Driver:
-    """Base of the drivers. One that turns has its values in radians, any other in metres."""
+    """Base of the drivers. Values are in radians if it turns, else in metres."""
 
     type: ClassVar[str]
     turns: ClassVar[bool] = False

@@ -25,8 +25,7 @@ GROUND = "ground"
 """The name of the global frame; it can be used like a body and needs no declaration."""
 
 Vector: TypeAlias = tuple[float, float, float]
-# How far a joint between fixed bodies may be off [m]: no output is held to less, unless a case says
-# so.
+# # Largest gap of a joint between fixed bodies [m]: the tightest default tolerance of any output.
 HOLDS = 1e-9
 FOUR_NUMBERS = "four numbers, e0 first"
 
@@ -67,7 +66,7 @@ class Body:
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """A point of a body whose motion is wanted: position global at design [m]."""
+    """An output point of a body: position global at design [m]."""
 
     name: str
     body: str
@@ -84,13 +83,12 @@ class Mechanism:
     """A named set of bodies, joints, points and drivers.
 
     Attributes:
-        grounded: joints between two fixed bodies, as CAD exports have them. They are taken out of
-            `joints`: they hold whatever moves, and no engine has rows for them.
+        grounded: joints between two fixed bodies, as in CAD exports. They are removed from
+            `joints`: they hold in any motion, and no engine has rows for them.
 
     Raises:
-        MechanismError: a name is used twice, something refers to a name that does not exist, or a
-            joint between fixed bodies does not hold at the design position, or is driven or
-            coupled.
+        MechanismError: a name is used twice or does not exist, or a joint between fixed bodies does
+            not hold at the design position, or is driven or coupled.
     """
 
     name: str
@@ -156,7 +154,7 @@ class Mechanism:
                 driver.check(self.joint(driver.joint))
 
     def _leave_out_grounded(self) -> None:
-        """Part the joints that can move from those that cannot."""
+        """Separate the joints between fixed bodies from all others."""
         still = tuple(joint for joint in self.joints if all(map(self.is_fixed, joint.bodies)))
         object.__setattr__(self, "grounded", still)
         if not still:
@@ -193,28 +191,28 @@ class Mechanism:
                 )
 
     def is_fixed(self, name: str) -> bool:
-        """Whether the body of that name is the ground or fixed to it."""
+        """Return whether the named body is the ground or fixed to it."""
         return name == GROUND or self.body(name).fixed
 
     def body(self, name: str) -> Body:
-        """The body of that name."""
+        """Return the body of this name."""
         return self._named["bodies"][name]
 
     def joint(self, name: str) -> Joint:
-        """The joint of that name."""
+        """Return the joint of this name."""
         return self._named["joints"][name]
 
     def point(self, name: str) -> Point:
-        """The point of that name."""
+        """Return the point of this name."""
         return self._named["points"][name]
 
     def driver(self, name: str) -> Driver:
-        """The driver of that name."""
+        """Return the driver of this name."""
         return self._named["drivers"][name]
 
     def design_value(self, name: str) -> float:
-        """The value of a driver at the design position, as its values are given: the coordinate of
-        its point [m], or zero.
+        """Return the value of a driver at the design position: the coordinate of its point [m] if
+        absolute, else zero.
         """
         driver = self.driver(name)
         if not isinstance(driver, PointCoordinate) or driver.relative:
@@ -231,7 +229,7 @@ class Mechanism:
 
     @cached_property
     def _named(self) -> Mapping[str, Mapping[str, Any]]:
-        """What there is of each kind, by name."""
+        """Members by kind and name."""
         all_of = {
             "bodies": self.bodies,
             "joints": (*self.joints, *self.grounded),
@@ -242,7 +240,7 @@ class Mechanism:
 
     @property
     def moving(self) -> tuple[Body, ...]:
-        """The bodies that are not fixed, in order."""
+        """The bodies not fixed, in order."""
         return tuple(body for body in self.bodies if not body.fixed)
 
 

@@ -1,4 +1,4 @@
-"""Motions: how a driver's value goes with time. Each gives the value and its first two derivatives.
+"""Motions: a driver's value over time, with its first two derivatives.
 
 Values are measured from the design position [m or rad]; times are in seconds.
 """
@@ -21,13 +21,11 @@ from ..input_checks import finite, held
 from ..trajectory import Array
 
 ROUNDED_TIME = 1e-12
-"""A time may lie outside a motion's span by this part of its numbers: the rounding of a time, and
-nothing that anybody writes.
-"""
+"""Relative rounding by which a time may lie outside a motion's span."""
 
 
 class Measure(Enum):
-    """What a field of a motion is measured in; tells a reader which unit applies."""
+    """Quantity of a field of a motion; it sets the unit for a reader."""
 
     DRIVER = "driver units"
     DRIVER_RATE = "driver units per second"
@@ -37,7 +35,7 @@ class Measure(Enum):
 
 
 def measured(measure: Measure, **options: Any) -> Any:
-    """A field of a motion [m or rad, rad, Hz, s]."""
+    """Return a field of a motion [m or rad, rad, Hz, s]."""
     return field(metadata={"measure": measure}, **options)
 
 
@@ -54,12 +52,12 @@ class Motion(ABC):
 
     @property
     def span(self) -> tuple[float, float]:
-        """The times it is given for [s]."""
+        """First and last time of the motion [s]."""
         return -math.inf, math.inf
 
     @abstractmethod
     def at(self, t: Array) -> tuple[Array, Array, Array]:
-        """Value, velocity and acceleration at times t [s], each of t's shape."""
+        """Return value, velocity and acceleration at times t [s], each of t's shape."""
 
 
 @dataclass(frozen=True)
@@ -96,10 +94,10 @@ class Sine(Motion):
 
 @dataclass(frozen=True)
 class Table(Motion):
-    """The natural cubic spline through values at increasing times [s]: twice differentiable, so
-    that accelerations exist.
+    """Natural cubic spline through values at increasing times [s]: twice differentiable, for
+    accelerations.
 
-    Outside the table the end pieces go on.
+    Outside the table the end pieces continue.
     """
 
     type = "table"
@@ -141,8 +139,8 @@ class Table(Motion):
 
 @dataclass(frozen=True)
 class Absolute(Motion):
-    """A motion that gives a driver's absolute value, measured from the design value as all motions
-    are on the way.
+    """A motion of a driver's absolute value, converted to values from design as in all other
+    motions.
     """
 
     motion: Motion
@@ -158,8 +156,8 @@ class Absolute(Motion):
 
 
 def as_changes(motions: Mapping[str, Motion], design: Mapping[str, float]) -> dict[str, Motion]:
-    """Motions of drivers, by name, as changes from their design values, which are given where they
-    are not zero.
+    """Return motions by driver as changes from the design values; `design` lists those that are not
+    zero.
     """
     there = {
         name: motion
@@ -171,15 +169,14 @@ def as_changes(motions: Mapping[str, Motion], design: Mapping[str, float]) -> di
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """The way a mechanism is driven: the motions of its drivers over time; drivers without a motion
-    hold their design value.
+    """Motions of the drivers over time; drivers without a motion hold their design value.
 
-    Two are equal where motions and times are, to the last bit. The times do not change.
+    Two paths are equal if motions and times are, to the last bit. The times do not change.
 
     Attributes:
         motions: by driver name.
         times: of the samples, in the order wanted [s], shape (n,).
-        design: values of drivers at the design position where they are not zero; for messages.
+        design: values of drivers at the design position if not zero; for messages.
     """
 
     motions: Mapping[str, Motion]
@@ -198,8 +195,8 @@ class Path:
 
     @property
     def ours(self) -> bool:
-        """Whether all motions are of this module, of numbers that do not change: what is equal then
-        means the same.
+        """Whether all motions are of this module with immutable numbers: equal ones then mean the
+        same.
         """
         motions = (
             each.motion if isinstance(each, Absolute) else each for each in self.motions.values()
@@ -211,7 +208,7 @@ class Path:
         return all(type(each).__module__ == __name__ for each in motions)
 
     def where(self, t: float) -> str:
-        """The values of the moving drivers at time t, to read."""
+        """Return the values of the moving drivers at time t, as text."""
         values = self.drive(list(self.motions), np.array([t]))[0, :, 0]
         named = zip(self.motions, values, strict=True)
         return ", ".join(
@@ -219,8 +216,8 @@ class Path:
         )
 
     def ended(self, here: float, wanted: float, last: float | None, reason: str) -> str:
-        """Says that the motion cannot be followed to a wanted time, how far it can, and the last
-        sample reached if there is one.
+        """Return the message of a motion that cannot reach a time: its limit, and the last reached
+        sample, if any.
         """
         reached = (
             "no sample reached on this side"
@@ -233,7 +230,7 @@ class Path:
         )
 
     def drive(self, names: Sequence[str], t: Array) -> Array:
-        """Value, velocity and acceleration of the named drivers at times t, shape (3, names,
+        """Return value, velocity and acceleration of the drivers at times t, shape (3, names,
         *t.shape).
         """
         still = (np.zeros_like(t),) * 3
@@ -250,12 +247,12 @@ class Path:
         return np.array([motion.at(t)[0] for motion in self.motions.values()]).reshape(-1, len(t))
 
     def covers(self, t: float) -> bool:
-        """Return whether all motions are given for time t, up to its rounding."""
+        """Return whether all motions include time t, up to its rounding."""
         return all(_within(motion.span, t) for motion in self.motions.values())
 
     def lead_in(self, to: float) -> Path:
-        """Return the straight way of all drivers from the design, at time zero, to where they are
-        at a time, at time one.
+        """Return the straight path of all drivers from the design, at time zero, to their values at
+        a time, at time one.
         """
         values = self.values(np.array([to]))[:, 0].tolist()
         return Path(
@@ -271,8 +268,8 @@ def _within(span: tuple[float, float], t: float) -> bool:
 
 
 def outwards(times: Array, start: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """The samples after the start, those at it among them, and those before it: indices, the
-    nearest first, equal ones in order.
+    """Return indices of the samples at or after the start, and before it; nearest first, equal ones
+    in order.
     """
     nearest = np.argsort(np.abs(times - start), kind="stable")
     after = times[nearest] >= start

@@ -1,4 +1,4 @@
-"""The graph of a mechanism: a spanning tree from the ground, and the joints that are cut by it."""
+"""Graph of a mechanism: a spanning tree from the ground, and the joints it cuts."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from .mechanism import GROUND, Mechanism
 
 @dataclass(frozen=True)
 class Branch:
-    """A body of the tree: reached from its parent through a joint, or free (joint None) to move
-    relative to the ground.
+    """A body of the tree: its joint from the parent, or none if it moves freely relative to the
+    ground.
     """
 
     parent: str
@@ -24,8 +24,7 @@ class Branch:
 
 @dataclass(frozen=True)
 class SpanningTree:
-    """Branches in an order where every parent comes before its children, and the joints left over,
-    which close the loops.
+    """Branches, every parent before its children, and the joints left over, which close the loops.
 
     Fixed bodies appear only as parents, under the name "ground".
     """
@@ -35,17 +34,17 @@ class SpanningTree:
 
 
 def spanning_tree(mechanism: Mechanism) -> SpanningTree:
-    """The tree whose joints leave the fewest coordinates: driven and coupled joints first, then
-    those with the most rows (Prim).
+    """Return the tree with the fewest coordinates: driven and coupled joints first, then those with
+    the most rows (Prim).
 
-    A joint whose axis-bound freedom is driven or coupled stays in the tree, where the freedom is a
-    coordinate. Joints of fewer than three rows (a distance) tie a body too loosely to carry it; a
-    body that hangs on such joints only is free.
+    A joint with a driven or coupled freedom stays in the tree, so the freedom is a coordinate.
+    Joints of fewer than three rows (a distance) hold a body too loosely to carry it; a body with
+    such joints only is free.
     """
     named = {driver.joint for driver in mechanism.drivers if isinstance(driver, JointDriver)}
     named |= {joint for coupler in mechanism.couplers for joint in coupler.joints}
     candidates = [joint for joint in mechanism.joints if joint.rows >= 3]
-    # the least is taken first
+    # # the smallest is taken first
     ranks = [(joint.name not in named, -joint.rows, k) for k, joint in enumerate(candidates)]
     touching: dict[str, list[int]] = {}
     for k, joint in enumerate(candidates):
@@ -78,7 +77,7 @@ def spanning_tree(mechanism: Mechanism) -> SpanningTree:
 def _next(
     reaching: list[tuple[bool, int, int]], candidates: Sequence[Joint], placed: Collection[str]
 ) -> Joint | None:
-    """The first joint of the heap that leads from a placed body to another."""
+    """Return the first joint of the heap from a placed body to an unplaced one."""
     while reaching:
         joint = candidates[heappop(reaching)[-1]]
         if joint.i not in placed or joint.j not in placed:

@@ -1,7 +1,7 @@
 """Primitive constraints: one geometric condition a file, its derivation on top.
 
 Where the paper's equations are (native rows here, those as printed and corrected in paper.py, once
-more unsimplified in tests/naive.py):
+more unsimplified in tests/oracles/naive.py):
 
     (1)-(7)     A(p), virtual rotations, velocities     algebra.py, base.py
     (8)-(12)    dot10         Table 1                   dot10.py
@@ -10,8 +10,8 @@ more unsimplified in tests/naive.py):
     (22)        dot20         Table 2                   dot20.py
     (23)        dot21         Table 2                   dot21.py
     (24)        spherical                               spherical.py
-    (25)-(27)   joints                                  ../joints: spherical.py, revolute.py, translational.py
-    (28)-(32)   position, velocity, acceleration        ../analysis/programs.py
+    (25)-(27)   joints        ../joints: spherical, revolute, translational
+    (28)-(32)   position, velocity, acceleration        ../kinematics/compiled/programs.py
 
 Table 3, the operations, is counted by `kincheck bench formulation`; Tables 4 and 5, the strut, are
 cases/mcpherson_strut.toml. The tie rod's distance condition and the drivers have no numbers in the

@@ -23,7 +23,7 @@ from ..algebra import IDENTITY, UNIT, ZERO, Mat3, Quat, Scalar, Vec3, cross, rot
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """Where a body is: displacement u of its origin, rotation q since design, D = A(q) - I."""
+    """Pose of a body: displacement u of its origin, rotation q since design, D = A(q) - I."""
 
     u: Vec3
     q: Quat
@@ -31,15 +31,15 @@ class Pose:
 
     @staticmethod
     def of(u: Vec3, q: Quat) -> Pose:
-        """The pose with displacement u and rotation q."""
+        """Return the pose with displacement u and rotation q."""
         return Pose(u, q, rotation_less_identity(q))
 
     def swing(self, a: Vec3) -> Vec3:
-        """A a - a: how a body-fixed vector has changed since design."""
+        """Return A a - a: the change of a body-fixed vector since design."""
         return self.D @ a
 
     def turn(self, a: Vec3) -> Vec3:
-        """A a: a body-fixed vector now, global axes."""
+        """Return A a: a body-fixed vector now, global axes."""
         return a + self.D @ a
 
     @property
@@ -50,17 +50,17 @@ class Pose:
 
 @dataclass(frozen=True, slots=True)
 class Twist:
-    """How a body moves: velocity v of its origin and angular velocity w, global axes."""
+    """Motion of a body: velocity v of its origin and angular velocity w, global axes."""
 
     v: Vec3
     w: Vec3
 
     def of(self, arm: Vec3) -> Vec3:
-        """Velocity of the point at the end of the (turned) arm."""
+        """Return the velocity of the point at the end of the (turned) arm."""
         return self.v + cross(self.w, arm)
 
     def centripetal(self, arm: Vec3) -> Vec3:
-        """w x (w x arm): the acceleration of that point that does not come from vdot and wdot."""
+        """Return w x (w x arm): the acceleration of the point without vdot and wdot."""
         return cross(self.w, cross(self.w, arm))
 
 
@@ -77,7 +77,7 @@ class Row(NamedTuple):
     pj: Vec3
 
     def along(self, body: str, twist: Twist) -> Scalar:
-        """The part of row . velocity that belongs to one body, "i" or "j"."""
+        """Return the part of row . velocity of one body, "i" or "j"."""
         return (
             self.ri @ twist.v + self.pi @ twist.w
             if body == "i"
@@ -117,24 +117,26 @@ class Primitive(ABC):
 
     @abstractmethod
     def phi(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
-        """Residuals; zero when the condition holds. Lengths [m] or plain numbers."""
+        """Return the residuals; zero when the condition holds. Lengths [m] or plain numbers."""
 
     @abstractmethod
     def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
-        """Rows of the Jacobian."""
+        """Return the rows of the Jacobian."""
 
     @abstractmethod
     def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
-        """Right-hand sides of the acceleration equations: what rows . acceleration must be."""
+        """Return the right-hand sides of the acceleration equations: required values of rows .
+        acceleration.
+        """
 
     def nu(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
-        """Right-hand sides of the velocity equations; zero unless driven, and linear in the drive's
-        rate.
+        """Return the right-hand sides of the velocity equations: zero unless driven, linear in the
+        drive's rate.
         """
         return (0.0,) * self.n
 
     def branch(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
-        """Numbers that are positive on the intended branch of the zeros of phi; empty where no zero
-        is spurious.
+        """Return numbers that are positive on the intended branch of phi = 0; empty without
+        spurious zeros.
         """
         return ()

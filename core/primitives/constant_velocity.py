@@ -1,15 +1,18 @@
-"""Constant velocity: two shafts turn at the same rate whatever their angle (1 row).  Formulation section 2.
+"""Constant velocity: two shafts turn at the same rate at any angle (1 row).  Formulation section 2.
 
 With f_i, g_i across shaft i and f_j, g_j across shaft j, the twist between the shafts vanishes:
 
     phi   = f_i . g_j - g_i . f_j          the difference of two dot10
     rows, gamma                            the same difference of theirs, exact everywhere
 
-phi is -4 e0 e3 of the relative Euler parameters: besides the zero twist e3 = 0 it is zero where e0
-= 0, a relative turn of 180
-degrees. The branch test is  f_i . f_j + g_i . g_j = 2 (e0^2 - e3^2):  1 + cos(bend) with zero twist, positive up to where the
-shafts are folded and both zeros meet; not positive on the other. (The trace of the relative
-rotation is so up to 120 degrees only.)
+phi is -4 e0 e3 of the relative Euler parameters: besides the zero twist e3 = 0 it is zero at
+e0 = 0, a relative turn of 180 degrees. The branch test is
+
+    f_i . f_j + g_i . g_j = 2 (e0^2 - e3^2),
+
+with zero twist 1 + cos(bend): positive up to the fold of the shafts, where both zeros meet; not
+positive on the other branch. (The trace of the relative rotation is positive up to 120 degrees
+only.)
 """
 
 from __future__ import annotations

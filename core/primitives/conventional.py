@@ -6,8 +6,10 @@ simplified by the geometry. Formulation section 2, the forms quoted there after 
 A_j^T A_i:
 
     dot10   rows = [ 0 | -b^T A_ji skew(a) | 0 | -a^T A_ij skew(b) ]
-            gamma = -b^T [ A_ji W_i W_i + W_j W_j A_ji ] a + 2 w_j^T skew(b) A_ji skew(a) w_i,      W = skew(w)
-    dot20   rows = [ -(A_i a)^T | a^T skew(s_i) - d^T A_i skew(a) | (A_i a)^T | -a^T A_ij skew(s_j) ]
+            gamma = -b^T [ A_ji W_i W_i + W_j W_j A_ji ] a + 2 w_j^T skew(b) A_ji skew(a) w_i,
+            W = skew(w)
+    dot20   rows = [ -(A_i a)^T | a^T skew(s_i) - d^T A_i skew(a) | (A_i a)^T |
+                     -a^T A_ij skew(s_j) ]
             gamma = 2 w_i^T skew(a) A_i^T (v_i - v_j) + 2 s_j^T W_j A_ji W_i a
                     - s_i^T W_i W_i a - s_j^T W_j W_j A_ji a - d^T A_i W_i W_i a
 

@@ -34,7 +34,7 @@ class Distance(Primitive):
     design_length: Scalar
 
     def change(self, i: Pose, j: Pose) -> Vec3:
-        """How d has changed since design."""
+        """Return the change of d since design."""
         return (j.u - i.u) + (j.swing(self.s_j) - i.swing(self.s_i))
 
     def phi(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:

@@ -1,4 +1,6 @@
-"""Dot10: the angle between a on body i and b on body j is constant (1 row).  Paper sec. 2.2.2, eqs (8)-(12); Table 1.
+"""Dot10: the angle between a on body i and b on body j is constant (1 row).
+
+Paper sec. 2.2.2, eqs (8)-(12); Table 1.
 
 In global axes, with a = A_i a0, b = A_j b0 and n = a x b:
 

@@ -1,4 +1,6 @@
-"""Dot12: the joint frames of both bodies coincide (3 rows).  Paper sec. 2.2.4, eqs (17)-(21); Table 1.
+"""Dot12: the joint frames of both bodies coincide (3 rows).
+
+Paper sec. 2.2.4, eqs (17)-(21); Table 1.
 
 With e the vector part of the Euler parameters of the rotation from body j to body i, global axes:
 

@@ -1,11 +1,13 @@
-"""Dot20: a on body i is perpendicular to the line from P_i to P_j (1 row).  Paper sec. 2.2.5, eq. (22); Table 2.
+"""Dot20: a on body i is perpendicular to the line from P_i to P_j (1 row).
+
+Paper sec. 2.2.5, eq. (22); Table 2.
 
 In global axes, with a = A_i a0, S = A s, and d from P_i to P_j:
 
-    (22)  phi   = a . d - c - a0 . d0           expanded about design; c is the displacement when driven
+    (22)  phi   = a . d - c - a0 . d0     expanded about design; c is the driven displacement
           rows  = [ -a | a x (d + S_i) | a | S_j x a ]          exact everywhere
-          gamma = c_tt - ( (w_i x (w_i x a)) . d + 2 (w_i x a) . ddot + a . (w_j x (w_j x S_j) - w_i
-          x (w_i x S_i)) )
+          gamma = c_tt - ( (w_i x (w_i x a)) . d + 2 (w_i x a) . ddot + a .
+                  (w_j x (w_j x S_j) - w_i x (w_i x S_i)) )
 
 The printed gamma20 is garbled beyond reading (formulation section 9); this one is the second
 derivative of (22). r_j - r_i is formed from displacements before anything else, which keeps the
@@ -34,7 +36,7 @@ class Dot20(Primitive):
     drive: Drive = field(default_factory=Drive)
 
     def change(self, i: Pose, j: Pose) -> Vec3:
-        """How d has changed since design."""
+        """Return the change of d since design."""
         return (j.u - i.u) + (j.swing(self.s_j) - i.swing(self.s_i))
 
     def phi(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:

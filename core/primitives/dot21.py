@@ -1,4 +1,6 @@
-"""Dot21: P_j stays on the line through P_i along h_i, for bodies that turn alike (2 rows).  Paper sec. 2.2.6, eq. (23); Table 2.
+"""Dot21: P_j stays on the line through P_i along h_i, for bodies that turn alike (2 rows).
+
+Paper sec. 2.2.6, eq. (23); Table 2.
 
 Const-C form (formulation section 3): where Dot12 holds, body j's arm can be carried by body i, so
 body j's rotation and its arm drop out. With e = r_j - r_i = e0 + u_j - u_i between the body

@@ -9,13 +9,16 @@ Joint angle about h, on a joint whose axes are parallel, with the Euler paramete
 q_j of the relative rotation:
 
     phi   = 2 ( cos(c/2) h . vec(rho) - sin(c/2) rho_0 )  =  2 sin((theta - c)/2)
-    rows  = [ 0 | -h | 0 | h ]       nu = c_t       gamma = c_tt            exact where the axes are parallel and phi = 0
+    rows  = [ 0 | -h | 0 | h ]       nu = c_t       gamma = c_tt
+            exact where the axes are parallel and phi = 0
 
 sin(theta - c) has a second zero at c + pi, atan2 needs unwrapping and cos(theta) - cos(c) is
 singular at 0 and pi; the half angle has none of these, because Euler parameters that are followed
 continuously know the turn (any number of turns, no counter). It has one at c + 2 pi, from which the
 rows lead away; where a driver at rest makes a whole turn between two samples Newton starts exactly
-there, and the turn would be lost. The branch test is  cos((theta - c)/2) = cos(c/2) rho_0 + sin(c/2) h . vec(rho).
+there, and the turn would be lost. The branch test is
+
+    cos((theta - c)/2) = cos(c/2) rho_0 + sin(c/2) h . vec(rho).
 """
 
 from __future__ import annotations

@@ -1,11 +1,14 @@
-"""Conditions that name a joint's own motion: RotX and TraX of the mixed formulation.  Formulation section 4.
+"""Conditions that name a joint's own motion: RotX and TraX of the mixed formulation.
+
+Formulation section 4.
 
 The rotation theta about h and the displacement d along h enter as a drive, prescribed or an unknown
 of its own. In global axes, with Q the rotation of theta about h as Euler parameters [cos theta/2, h
 sin theta/2]:
 
     RotX   phi   = 2 vec( q_i Q(theta) conj(q_j) )
-           rows  = [ 0 | I | 0 | -I ]          nu = -h_i theta_t        gamma = -theta_t (w_i x h_i) - h_i theta_tt
+           rows  = [ 0 | I | 0 | -I ]          nu = -h_i theta_t
+           gamma = -theta_t (w_i x h_i) - h_i theta_tt
     TraX   phi   = d0 + (P_j - P_i) - d h_i,   P measured since design
            rows  = [ -I | skew(S_i + d h_i) | I | -skew(S_j) ]          nu = h_i d_t
            gamma = w_i x (w_i x (S_i + d h_i)) - w_j x (w_j x S_j) + 2 d_t (w_i x h_i) + h_i d_tt

@@ -27,12 +27,12 @@ from .spherical import Spherical
 
 
 def relative(i: Pose, j: Pose) -> Mat3:
-    """A_ij: from frame j to frame i."""
+    """Return A_ij: from frame j to frame i."""
     return i.A.T.times(j.A)
 
 
 def arm_rows(A: Mat3, s: Vec3) -> tuple[Vec3, Vec3, Vec3]:
-    """The rows of A skew(s)."""
+    """Return the rows of A skew(s)."""
     # row k of A, times skew(s), is a_k x s
     return cross(A.x, s), cross(A.y, s), cross(A.z, s)
 
@@ -216,7 +216,7 @@ class PaperDrivenCoordinate(DrivenCoordinate):
 
 @dataclass(frozen=True)
 class PaperDrivenAngle(DrivenAngle):
-    """Rows [ 0 | -h | 0 | h ], constant: h is the same in both body frames where the axes are
+    """Rows [ 0 | -h | 0 | h ], constant: h is the same in both body frames if the axes are
     parallel.
     """
 
@@ -260,7 +260,7 @@ def _along_gamma(a: Vec3, e0: Vec3, i: Pose, j: Pose, vi: Twist, vj: Twist) -> S
 
 
 def _of_same_fields(paper: type[Primitive]) -> Callable[[Primitive], tuple[Primitive, ...]]:
-    """The same fields in another class."""
+    """Return a function to the same fields in another class."""
 
     def twin(native: Primitive) -> tuple[Primitive, ...]:
         return (

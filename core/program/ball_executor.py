@@ -1,9 +1,9 @@
-"""Run programs in ball arithmetic: every number is a midpoint and a radius, and what comes out
-contains the true result.
+"""Execution of programs in ball arithmetic: numbers are a midpoint and a radius; each result
+contains the true value.
 
-Balls are python-flint's `arb`; `arb_series` (polynomials in time with balls as coefficients) run
-the same way, which gives the derivatives by time of whatever a program computes. One lane, no
-layout: balls do not fit into slots of doubles.
+Balls are python-flint's `arb`. `arb_series` (polynomials in time with ball coefficients) run the
+same programs and give time derivatives of all outputs. One lane without slots: balls do not fit
+into doubles.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ Ball: TypeAlias = Any
 """A `flint.arb`, or a `flint.arb_series`."""
 
 ORDER = 3
-"""Coefficients kept of a series: value, first and half the second derivative."""
+"""Coefficients of a series: value, first and half the second derivative."""
 
 
 class UndecidedError(KincheckError, ArithmeticError):
-    """Balls that are to be compared overlap."""
+    """Two compared balls overlap."""
 
 
 def flint() -> Any:
-    """The module of the ball arithmetic.
+    """Return the module of the ball arithmetic.
 
     Raises:
-        KincheckError: it is not installed.
+        KincheckError: python-flint is not installed.
     """
     try:
         return importlib.import_module("flint")
@@ -44,7 +44,7 @@ def flint() -> Any:
 
 @contextmanager
 def precision(bits: int) -> Any:
-    """Midpoints of that many bits, and series of `ORDER` coefficients, within the block."""
+    """Set the bits of midpoints, and series of `ORDER` coefficients, within the block."""
     context = flint().ctx
     before = context.prec, context.cap
     context.prec, context.cap = bits, ORDER
@@ -97,14 +97,12 @@ _OPERATIONS: Mapping[str, Callable[..., Any]] = {**_ARITHMETIC, **_OWN, **_CHOIC
 
 
 def evaluate(program: Program, inputs: Sequence[Ball]) -> dict[int, Ball]:
-    """The outputs of a program by slot, from its inputs by slot, at the precision of the block
-    around it.
+    """Return the outputs of a program by slot, from its inputs by slot, at the current `precision`.
 
-    A division by a ball that contains zero gives a ball that is not finite, as in the other
-    executors.
+    Division by a ball around zero gives a ball that is not finite, as in the other executors.
 
     Raises:
-        UndecidedError: a comparison ("larger") of balls that overlap.
+        UndecidedError: two balls compared by "larger" overlap.
     """
     arb = flint().arb
     values: list[Any] = []

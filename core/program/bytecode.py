@@ -1,9 +1,8 @@
-"""Programs as tables of whole numbers, which `llvm.interpreter` goes through: nothing has to be
-compiled before they can be run.
+"""Programs as tables of integers for `llvm.interpreter`: they run without compilation.
 
-A table is a list of stretches: the kind of an operation, how many bytes its rows take, and the
-rows: where the result goes and where the operands stand, in bytes from the lanes. Stretches are
-long: of what can be done next, all of one kind comes first.
+A table is a list of stretches. A stretch holds the kind of an operation, the bytes of its rows, and
+the rows: offsets of the result and of the operands, in bytes from the lanes. Stretches are long:
+among the ready operations, all of one kind come first.
 """
 
 from __future__ import annotations
@@ -24,11 +23,9 @@ ARITY = {
     **dict.fromkeys(("+", "-", "*", "/", "min", "max", "umax", "larger", "before", "const"), 2),
     **dict.fromkeys(("fma", "fnma", "fms", "where"), 3),
 }
-"""How many numbers a row of an operation holds beside its result. Those of "const" are the two
-halves of a number.
-"""
+"""Numbers in a row of an operation beside its result. A "const" has the two halves of its value."""
 KINDS = {op: kind for kind, op in enumerate(ARITY, 1)}
-"""The number of each; 0 ends a table."""
+"""Code of each operation; 0 ends a table."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +34,7 @@ class Bytecode:
 
     Attributes:
         words: the table.
-        cells: how many slots after those of the lanes it keeps its values in.
+        cells: number of slots, after those of the lanes, for intermediate values.
     """
 
     words: NDArray[np.uint32]
@@ -45,14 +42,14 @@ class Bytecode:
 
 
 def bytecode(program: Program, slots: int, width: int) -> Bytecode:
-    """A program as a table, for lanes of so many slots and of that width.
+    """Return a program as a table, for lanes with a number of slots and a width.
 
-    Every value has a place: the slot it goes to, where nobody reads that, or a cell, which is free
-    again after its last reader.
+    A value goes directly into its output slot if the program does not read this slot; otherwise
+    into a cell, which is free again after its last reader.
     """
     program = lowered(unrolled(program))
     nodes, vector = [*program.nodes], 8 * width
-    # an input that is put out elsewhere must survive the output that overwrites its slot
+    # # an input that goes to another slot must survive the output that overwrites its own
     inputs = {k for k in program.outputs.values() if nodes[k][0] == "input"}
     copied = {k: len(nodes) + at for at, k in enumerate(inputs)}
     nodes += [("copy", k) for k in inputs]
@@ -60,7 +57,7 @@ def bytecode(program: Program, slots: int, width: int) -> Bytecode:
     read = {int(node[1]) * vector for node in nodes if node[0] in ("input", "node")}
     goes = {k: at for at, k in outputs.items() if at not in read}
     operated = [operands(node) for node in nodes]
-    # the places of what is put out are never free
+    # # output places are never free
     uses = counts(len(nodes), *operated, outputs.values())
     place = [int(node[1]) * vector if node[0] == "input" else 0 for node in nodes]
     words, free, cells = list[int](), list[int](), slots
@@ -97,14 +94,14 @@ _NUMBER, _HALVES = struct.Struct("<d"), struct.Struct("<II")
 
 
 def _bytes(op: str, stretch: Sequence[object]) -> int:
-    """That the rows of a stretch take."""
+    """Return the bytes of the rows of a stretch."""
     return 4 * (1 + ARITY[op]) * len(stretch)
 
 
 def _stretches(
     nodes: Sequence[Node], operated: Sequence[Sequence[int]]
 ) -> Iterator[tuple[str, Sequence[int]]]:
-    """The operations, in an order in which those of one kind stand together where they can."""
+    """Yield the operations in an executable order, grouped by kind."""
     readers: list[list[int]] = [[] for _ in nodes]
     missing = [0] * len(nodes)
     ready: dict[str, list[int]] = {}
@@ -120,7 +117,7 @@ def _stretches(
     while ready:
         kind = max(ready, key=lambda op: len(ready[op]))
         stretch = ready.pop(kind)
-        for k in stretch:  # grows as it is gone through
+        for k in stretch:  # # the list grows during the loop
             for x in readers[k]:
                 missing[x] -= 1
                 if not missing[x]:

@@ -1,8 +1,8 @@
 """Derivatives of traced scalars, traced themselves: the chain rule over the operations of a tape.
 
-Zeros and ones fold as everywhere, so the program of a Jacobian holds what its entries need and
-nothing else. Constants of the tape stay operands: folded, they would be rounded to doubles, and
-balls are to prove something of the result.
+Zeros and ones fold as in all traces, so the program of a Jacobian holds only the operations of its
+entries. Constants of the tape stay operands: folding would round them to doubles, and balls have to
+prove bounds of the result.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from ..algebra import Scalar
 from .tape import Tape, Traced, cos, operands, sin
 
 Gradient: TypeAlias = dict[int, Scalar]
-"""Derivatives by the inputs that matter, by place of the input."""
+"""Derivatives by position of the input; zero derivatives are left out."""
 
 
 def _weights(op: str, y: Traced, a: Scalar, b: Scalar = 0.0) -> tuple[Scalar, ...]:
-    """Derivatives of an operation by its operands a and b, y being its value."""
+    """Return the derivatives of an operation by its operands a and b; y is its value."""
     match op:
         case "+":
             return 1.0, 1.0
@@ -44,7 +44,7 @@ def _weights(op: str, y: Traced, a: Scalar, b: Scalar = 0.0) -> tuple[Scalar, ..
 
 
 def jacobian(tape: Tape, values: Sequence[Scalar], inputs: Sequence[Traced]) -> list[Gradient]:
-    """The derivative of each value by each input; zeros are left out.
+    """Return the derivatives of each value by the inputs, without zeros.
 
     Raises:
         TypeError: a value depends on an input through an operation with a kink ("abs", "min",
@@ -65,7 +65,7 @@ def jacobian(tape: Tape, values: Sequence[Scalar], inputs: Sequence[Traced]) -> 
 
 
 def _sum(terms: Iterable[tuple[Scalar, Gradient]]) -> Gradient:
-    """The weighted sum of gradients, without what cancels."""
+    """Return the weighted sum of gradients, without terms that cancel."""
     total: Gradient = {}
     for weight, gradient in terms:
         for k, value in gradient.items():

@@ -1,5 +1,5 @@
-"""What is kept on disk between processes: machine code, tables and traced programs, by all that
-determines them.
+"""Disk cache between processes: machine code, tables and traced programs, keyed by their full
+content.
 """
 
 from __future__ import annotations
@@ -13,16 +13,16 @@ from itertools import accumulate
 from pathlib import Path
 
 DIGEST = 32
-"""Bytes of the checksum at the head of what is kept."""
+"""Bytes of the checksum at the head of an entry."""
 MOST = 2**28
-"""Bytes that are kept, a quarter of a gigabyte: some thousands of mechanisms, of whose programs
-most take some 50 kilobytes.
+"""Largest size of the cache [bytes], a quarter of a gigabyte: some thousands of mechanisms, most
+with programs of about 50 kilobytes.
 """
 
 
 def folder() -> Path | None:
-    """Where it is, below XDG_CACHE_HOME where that is set; None for a user without a home, for whom
-    nothing is kept.
+    """Return the folder of the cache, below XDG_CACHE_HOME if set; None for a user without a home,
+    who gets no cache.
     """
     given = os.environ.get("XDG_CACHE_HOME")
     try:
@@ -32,7 +32,7 @@ def folder() -> Path | None:
 
 
 def kept(content: bytes, make: Callable[[], bytes]) -> bytes:
-    """What the content meant before; or made now, and kept."""
+    """Return the cached bytes of a content; make and store them if there are none."""
     found = find(content)
     if found is None:
         found = make()
@@ -42,7 +42,7 @@ def kept(content: bytes, make: Callable[[], bytes]) -> bytes:
 
 
 def find(content: bytes) -> bytes | None:
-    """What the content meant before, or None where there is nothing that is whole."""
+    """Return the cached bytes of a content, or None without an intact entry."""
     entry = _entry(content)
     if entry is None:
         return None
@@ -55,7 +55,7 @@ def find(content: bytes) -> bytes | None:
 
 
 def known(content: bytes) -> bool:
-    """Whether there is something that the content meant before."""
+    """Return whether the cache has an entry of the content."""
     entry = _entry(content)
     return entry is not None and entry.exists()
 
@@ -66,15 +66,15 @@ def _entry(content: bytes) -> Path | None:
 
 
 def _write(entry: Path, made: bytes) -> None:
-    """Keep it; a place that cannot be written only costs the next process the time to make it."""
-    import tempfile  # slow to import, and what is kept already needs none
+    """Store an entry; without write access the next process only has to make it again."""
+    import tempfile  # # slow to import, and not needed for existing entries
 
     try:
         entry.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=entry.parent) as folder:
             whole = Path(folder) / entry.name
             whole.write_bytes(_checksum(entry, made) + made)
-            whole.replace(entry)  # whole or not at all, whoever else is writing it
+            whole.replace(entry)  # # atomic, also with concurrent writers
         _shrink(entry.parent)
     except OSError:
         return
@@ -82,8 +82,8 @@ def _write(entry: Path, made: bytes) -> None:
 
 @cache
 def _shrink(here: Path) -> None:
-    """Leave no more than `MOST`: what was not used for longest goes. Once in a process, for it
-    looks at every file.
+    """Delete the least recently used entries beyond `MOST`. Once per process, because it stats all
+    files.
     """
     entries = sorted(
         _entries(here), key=lambda each: max(each[1].st_atime, each[1].st_mtime), reverse=True
@@ -91,11 +91,11 @@ def _shrink(here: Path) -> None:
     sizes = accumulate(status.st_size for _, status in entries)
     for (path, _), size in zip(entries, sizes, strict=True):
         if size > MOST:
-            path.unlink(missing_ok=True)  # another process may be at it too
+            path.unlink(missing_ok=True)  # # another process may delete it too
 
 
 def size() -> int:
-    """Bytes that are kept."""
+    """Return the size of the cache [bytes]."""
     here = folder()
     return sum(status.st_size for _, status in _entries(here)) if here and here.exists() else 0
 
@@ -103,11 +103,13 @@ def size() -> int:
 def _entries(here: Path) -> Iterator[tuple[Path, os.stat_result]]:
     with os.scandir(here) as found:
         for each in found:
-            with suppress(FileNotFoundError):  # it has just gone
+            with suppress(FileNotFoundError):  # # another process has just deleted it
                 if each.is_file():
                     yield Path(each), each.stat()
 
 
 def _checksum(entry: Path, made: bytes) -> bytes:
-    """Of an entry under its name: what was written for another is none."""
+    """Return the checksum of an entry together with its name: entries of other contents never
+    match.
+    """
     return hashlib.sha256(entry.name.encode() + made).digest()

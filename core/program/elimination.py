@@ -1,13 +1,11 @@
-"""Gaussian elimination written into a program: the zeros and ones of the rows are used up before
-anything is computed.
+"""Gaussian elimination as traced operations, with the literal zeros and ones of the rows used up.
 
-Rows and columns fall into blocks that can be solved one after the other (block-triangular form: a
-chain of loops costs its number of loops), and no pivot ties two of them. First the pivots that cost
-nothing in safety: literal constants of size one half and more (the +-I blocks of the simplified
-rows) and entries that are alone in their row or column (there is no other choice). What is left of
-each block is a small dense core, eliminated with partial pivoting by compare-and-select, so that
-every lane pivots for itself without a branch. A fixed pivot order without this met an exact zero
-pivot within one crank turn of a four-bar.
+Rows and columns form a block-triangular matrix: blocks are solved one after the other (a chain of
+loops costs its number of loops), and no pivot connects two blocks. The first pivots are those
+without risk: literal constants of size one half or more (the +-I blocks of the simplified rows),
+and entries alone in their row or column (there is no other choice). The rest of each block is a
+small dense core (see `dense_core`). Rejected: a fixed pivot order without this; it met an exact
+zero pivot within one crank turn of a four-bar.
 """
 
 from __future__ import annotations
@@ -15,18 +13,16 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, reduce
-from operator import add, mul
+from operator import mul
 
 import numpy as np
 
 from ..algebra import Scalar, is_literal_zero
-from .tape import Traced, absolute, maximum, minimum, where_larger
+from .dense_core import Core
+from .tape import Traced, absolute, minimum, where_larger
 
 SAFE_LITERAL = 0.5
-# Larger cores are not judged by their comparison matrix.
-COMPARED = 16
-# Signs of more blocks than this are put together: as digits of a number in double precision they
-# are exact.
+# # Signs of more blocks share digits: as digits of a double they are exact up to this number.
 DIGITS = 50
 
 
@@ -39,23 +35,12 @@ class _Pivot:
     rest: tuple[tuple[int, Scalar], ...]
 
 
-@dataclass(frozen=True)
-class _CoreStep:
-    """One column of a core: exchanges (row against the pivot row, the two sizes compared) and then
-    the multipliers.
-    """
-
-    exchanges: tuple[tuple[int, Scalar, Scalar], ...]
-    multipliers: tuple[tuple[int, Scalar], ...]
-
-
 def _sign(x: Scalar) -> Scalar:
     return where_larger(x + absolute(x), 0.0, 1.0, -1.0)
 
 
 class Elimination:
-    """The factored matrix. `pivots` are the traced ones: where one is small the matrix is nearly
-    singular.
+    """A factored matrix. `pivots` are the traced ones; a small one means a nearly singular matrix.
 
     Args:
         rows: the square matrix, each row a mapping column -> entry without zeros.
@@ -64,28 +49,29 @@ class Elimination:
     def __init__(self, rows: Sequence[Mapping[int, Scalar]]) -> None:
         self.n = len(rows)
         self.pivots: list[Scalar] = []
-        self._alone: list[tuple[int, Scalar]] = []  # traced pivots of no core, and their rows
+        self._alone: list[tuple[int, Scalar]] = []  # # traced pivots outside cores, with their rows
         self._block_of_row: dict[int, int] = {}
         entries = [dict(row) for row in rows]
         self._sparse = self._eliminate_sparse(entries)
         done_rows = {pivot.row for pivot in self._sparse}
         left_rows = [i for i in range(self.n) if i not in done_rows]
-        self._cores = [_Core(entries, *block) for block in _blocks(entries, left_rows)]
+        self._cores = [Core(entries, *block) for block in _blocks(entries, left_rows)]
         for core in self._cores:
             self.pivots += core.pivots
 
     @property
     def sigma(self) -> Scalar:
-        """An estimate of the smallest singular value, at most one: the least of all blocks."""
+        """Estimate of the smallest singular value, at most one: the minimum over all blocks."""
         return reduce(minimum, self.sigmas)
 
     @cached_property
     def sigmas(self) -> Sequence[Scalar]:
-        """The same estimate of each block that is not constant, or one where all are; at most one.
+        """The same estimate of each block with traced pivots, at most one; a single one if there is
+        none.
 
-        It is the least stretch of the cores' upper triangles, and no more than any pivot. The
-        smallest pivot alone may stay where it is while the matrix becomes singular: two rows of
-        small pivots, tied by a large entry. Lower triangles hold no more than ones, and add little.
+        It is the least stretch of the cores' upper triangles, and at most any pivot. The smallest
+        pivot alone may stay constant while the matrix becomes singular: two rows of small pivots,
+        connected by a large entry. Entries of the lower triangles are at most one and add little.
         """
         found = dict[int, Scalar]()
         sizes = [(row, absolute(x)) for row, x in self._alone] + [
@@ -98,10 +84,9 @@ class Elimination:
 
     @property
     def orientation(self) -> Scalar:
-        """The signs of the blocks' determinants as digits of one number; each is right in all
-        lanes, or in none.
+        """Signs of the blocks' determinants as digits of one number, exact in all lanes.
 
-        The sign of the whole determinant would not do: two loops alike, each singular at the same
+        The sign of the whole determinant is not sufficient: two equal loops, singular at the same
         pose, change it twice.
         """
         signs = list(self._signs())
@@ -162,7 +147,7 @@ class Elimination:
         return steps
 
     def solve(self, b: Sequence[Scalar]) -> list[Scalar]:
-        """The solution x for right-hand side b; zeros of b cost nothing."""
+        """Return the solution x for right-hand side b; literal zeros of b cost nothing."""
         b, x = list(b), [0.0] * self.n
         for pivot in self._sparse:
             if not is_literal_zero(b[pivot.row]):
@@ -178,121 +163,11 @@ class Elimination:
         return x
 
 
-class _Core:
-    """A dense block of rows and columns; its other entries meet columns that are solved before
-    it.
-    """
-
-    def __init__(
-        self, entries: Sequence[Mapping[int, Scalar]], rows: Sequence[int], columns: Sequence[int]
-    ) -> None:
-        self.rows = list(rows)
-        # columns with few entries first: fewer exchanges to decide
-        self.columns = sorted(columns, key=lambda j: sum(j in entries[i] for i in rows))
-        inside = set(columns)
-        self.before = [[(j, x) for j, x in entries[i].items() if j not in inside] for i in rows]
-        self.matrix: list[list[Scalar]] = [
-            [entries[i].get(j, 0.0) for j in self.columns] for i in rows
-        ]
-        self.pivots: list[Scalar] = []
-        self.steps = [self._eliminate(k) for k in range(len(rows))]
-        self.inverses = [1.0 / self.matrix[k][k] for k in range(len(rows))]
-
-    def _eliminate(self, k: int) -> _CoreStep:
-        matrix, size = self.matrix, len(self.rows)
-        exchanges, multipliers = list[tuple[int, Scalar, Scalar]](), list[tuple[int, Scalar]]()
-        for i in range(k + 1, size):
-            x, y = matrix[i][k], matrix[k][k]
-            if is_literal_zero(x):
-                continue
-            exchanges.append((i, x, y))
-            upper, lower = matrix[k], matrix[i]
-            matrix[k] = [
-                *upper[:k],
-                *(where_larger(x, y, b, a) for a, b in zip(upper[k:], lower[k:], strict=True)),
-            ]
-            matrix[i] = [
-                *lower[:k],
-                *(where_larger(x, y, a, b) for a, b in zip(upper[k:], lower[k:], strict=True)),
-            ]
-        if is_literal_zero(matrix[k][k]):
-            raise ZeroDivisionError(
-                "the matrix is singular whatever the pose: a column of the core is empty"
-            )
-        self.pivots.append(matrix[k][k])
-        inverse = 1.0 / matrix[k][k]
-        for i in range(k + 1, size):
-            if not is_literal_zero(matrix[i][k]):
-                factor = matrix[i][k] * inverse
-                multipliers.append((i, factor))
-                matrix[i] = [
-                    *matrix[i][: k + 1],
-                    *(matrix[i][c] - factor * matrix[k][c] for c in range(k + 1, size)),
-                ]
-        return _CoreStep(tuple(exchanges), tuple(multipliers))
-
-    @property
-    def least_stretch(self) -> Scalar:
-        """One over the largest column sum of the inverse of U, or of that of its comparison matrix,
-        which is no less: it is the largest that its entries allow whatever their signs (Higham,
-        Accuracy and Stability of Numerical Algorithms, 8.3). Of a large core that may be thousands
-        of times as much.
-        """
-        reach = self._column_sums() if len(self.rows) > COMPARED else self._bounds_of_column_sums()
-        return 1.0 / reduce(maximum, reach)
-
-    def _bounds_of_column_sums(self) -> list[Scalar]:
-        reach = list[Scalar]()
-        for k, inverse in enumerate(self.inverses):
-            above = (
-                absolute(self.matrix[i][k]) * reach[i]
-                for i in range(k)
-                if not is_literal_zero(self.matrix[i][k])
-            )
-            reach.append(sum(above, 1.0) * absolute(inverse))
-        return reach
-
-    def _column_sums(self) -> Iterator[Scalar]:
-        for k, inverse in enumerate(self.inverses):
-            column: dict[int, Scalar] = {k: inverse}
-            for i in reversed(range(k)):
-                terms = (
-                    self.matrix[i][c] * x
-                    for c, x in column.items()
-                    if not is_literal_zero(self.matrix[i][c])
-                )
-                value = reduce(add, terms, 0.0) * self.inverses[i]
-                if not is_literal_zero(value):
-                    column[i] = -value
-            yield reduce(add, map(absolute, column.values()))
-
-    def solve(self, b: Sequence[Scalar], x: list[Scalar]) -> None:
-        """Put the solution of this block into x."""
-        v = [b[i] for i in self.rows]
-        for k, known in enumerate(self.before):
-            for j, entry in known:
-                v[k] = v[k] - entry * x[j]
-        for k, step in enumerate(self.steps):
-            for i, larger, other in step.exchanges:
-                v[k], v[i] = (
-                    where_larger(larger, other, v[i], v[k]),
-                    where_larger(larger, other, v[k], v[i]),
-                )
-            for i, factor in step.multipliers:
-                v[i] = v[i] - factor * v[k]
-        for k in reversed(range(len(v))):
-            for c in range(k + 1, len(v)):
-                v[k] = v[k] - self.matrix[k][c] * v[c]
-            v[k] = v[k] * self.inverses[k]
-        for j, value in zip(self.columns, v, strict=True):
-            x[j] = value
-
-
 def _blocks(
     entries: Sequence[Mapping[int, Scalar]], rows: Sequence[int]
 ) -> list[tuple[list[int], list[int]]]:
-    """Rows and columns of the blocks, in an order in which each needs only those before it."""
-    # by hand: scipy.sparse.csgraph would do, but takes longer to import than all else here together
+    """Return rows and columns of the blocks; each block needs only earlier ones."""
+    # # scipy.sparse.csgraph has this, but its import takes longer than all other imports here
     row_of = _matched({i: list(entries[i]) for i in rows})
     column_of = {i: j for j, i in row_of.items()}
     place = {i: k for k, i in enumerate(rows)}
@@ -302,7 +177,7 @@ def _blocks(
     for _ in range(len(rows).bit_length()):  # paths of twice the length
         needs = np.minimum(needs @ needs, 1.0)
     found: dict[bytes, list[int]] = {}
-    # what a block needs, needs less
+    # # a block needs more columns than each of its prerequisites
     order: list[int] = np.argsort(needs.sum(axis=1), kind="stable").tolist()
     for k in order:
         found.setdefault((needs[k] * needs[:, k]).tobytes(), []).append(rows[k])
@@ -310,7 +185,9 @@ def _blocks(
 
 
 def _matched(columns: Mapping[int, Sequence[int]]) -> dict[int, int]:
-    """The rows by column, one of its own columns for each (Kuhn's augmenting paths)."""
+    """Return the matched row of each column, from the columns of each row (Kuhn's augmenting
+    paths).
+    """
     row_of: dict[int, int] = {}
 
     def place(i: int, seen: set[int]) -> bool:
@@ -337,7 +214,7 @@ def _safe_pivot(
     columns: Mapping[int, set[int]],
     inside: Callable[[int, int], bool],
 ) -> tuple[int, int] | None:
-    """The safe pivot inside a block that fills in least (Markowitz), or None."""
+    """Return the safe pivot inside a block with the least fill-in (Markowitz), or None."""
     best: tuple[int, int, int] | None = None
     for i in sorted(rows):
         in_row = len(entries[i])

@@ -1,9 +1,9 @@
-"""Programs linked into one table (see `bytecode`): many lanes of them, and what is done in between,
-gone through in one call.
+"""Programs linked into one table (see `bytecode`): many lanes and the operations between them, in
+one interpreter call.
 
-All numbers stand in one memory of rows, a vector each. What a program reads and writes are rows of
-it, for every lane its own: nothing is gathered before and scattered after. A vector holds the same
-number of several cases.
+One memory of rows, a vector each, holds all numbers. The inputs and outputs of a program are rows
+of it, for each lane its own, so there is no gather before and no scatter after. A vector holds the
+same number of several variants or samples.
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ from .straight_line import Program
 Rows = NDArray[np.intp]
 Words = NDArray[np.uint32]
 ABREAST = 8
-"""Lanes of which each operation is done before the next: none waits for the one before it."""
+"""Lanes interleaved operation by operation, so no operation waits for the previous one."""
 MOST = 2**26
-"""Rows that words of 32 bits can name, of vectors of eight numbers."""
+"""Rows that 32-bit offsets can address, of vectors of eight numbers."""
 
 
 class Memory:
-    """Rows to be given out."""
+    """Allocator of rows."""
 
     def __init__(self) -> None:
         self.count = 0
 
     def take(self, count: int) -> slice:
-        """The next rows, as many as that. Raises MemoryError where a table could not name them."""
+        """Return the next `count` rows. Raise MemoryError if a table could not address them."""
         first, self.count = self.count, self.count + count
         if self.count > MOST:
             raise MemoryError(
@@ -41,23 +41,23 @@ class Memory:
 
 
 class Linker:
-    """Makes tables over rows of vectors of so many numbers."""
+    """Writer of tables over rows of vectors of a given width."""
 
     def __init__(self, width: int) -> None:
         self._vector = 8 * width
 
     def operations(self, op: str, *rows: Rows | int) -> Words:
-        """One operation, done for each of the rows: those of results and then of operands, one
-        after the other.
+        """Return one operation on several rows: the rows of results first, then those of each
+        operand.
         """
         every = np.broadcast_arrays(*rows)
         return self.staged(1, (op, np.zeros(len(every[0]), np.intp), every))
 
     def staged(self, stages: int, *parts: tuple[str, Rows, Sequence[Rows | int]]) -> Words:
-        """Operations in so many stages, in each first all of the first part.
+        """Return operations in stages; within a stage the parts run in order.
 
         Args:
-            parts: an operation, the stages it is done at, and rows as of `operations`.
+            parts: an operation, the stage of each row, and the rows as in `operations`.
         """
         counts = [np.bincount(stage, minlength=stages) for _, stage, _ in parts]
         takes = [
@@ -74,7 +74,7 @@ class Linker:
                 np.argsort(stage, kind="stable"),
             )
             words[start[some]], words[start[some] + 1] = KINDS[op], 4 * size * count[some]
-            # of each row how many are before it at its stage
+            # # position of each row within its stage
             before = np.arange(len(stage)) - (np.cumsum(count) - count)[stage[order]]
             at = start[stage[order]] + 2 + size * before
             words[at[:, None] + np.arange(size)] = (
@@ -83,16 +83,16 @@ class Linker:
         return words
 
     def lanes(self, program: Program, slots: Rows, memory: Memory) -> Words:
-        """A program for many lanes.
+        """Return a program for many lanes.
 
         Args:
-            slots: where the slots of each lane are, shape (slots, lanes).
-            memory: gives the rows in between.
+            slots: rows of the slots of each lane, shape (slots, lanes).
+            memory: allocates the rows of intermediate values.
         """
         count, lanes = len(slots), len(slots.T)
-        table = bytecode(program, count, 1)  # bytes of a vector of one are as good as any
+        table = bytecode(program, count, 1)  # # any width will do: offsets are scaled below
         abreast = min(ABREAST, lanes)
-        # the last group is filled up with the last lane, which gives the same once more
+        # # the last group repeats the last lane, which gives the same result again
         groups = np.minimum(np.arange(-(-lanes // abreast) * abreast), lanes - 1).reshape(
             -1, abreast
         )
@@ -109,7 +109,7 @@ class Linker:
             op, size = _OPS[int(words[at])], int(words[at + 1]) // 4
             rows = words[at + 2 : at + 2 + size].reshape(-1, 1 + ARITY[op])
             placed = np.empty((len(groups), len(rows), abreast, rows.shape[1]), np.intp)
-            # of a constant the operands are the number itself
+            # # the operands of a constant are its value
             named = 1 if op == "const" else rows.shape[1]
             placed[..., :named] = where[rows[:, :named] // 8].transpose(2, 0, 3, 1)
             placed[..., named:] = rows[:, None, named:]
@@ -120,12 +120,12 @@ class Linker:
 
 
 def numbers(rows: slice) -> Rows:
-    """Return the numbers of rows that were given out."""
+    """Return the numbers of allocated rows."""
     return np.arange(rows.start, rows.stop, dtype=np.intp)
 
 
 def joined(parts: Iterable[Words]) -> Words:
-    """One table of several, one after the other."""
+    """Return several tables as one, in order."""
     return np.concatenate([*parts, np.zeros(2, np.uint32)])
 
 
@@ -133,5 +133,5 @@ _OPS = {kind: op for op, kind in KINDS.items()}
 
 
 def _head(op: str, size: int) -> Rows:
-    """What a stretch of so many numbers begins with."""
+    """Return the head of a stretch with this many words."""
     return np.array([KINDS[op], 4 * size])

@@ -1,7 +1,8 @@
-"""Programs in the operations of a processor: a product and a sum are one, and rounded once.
+"""Programs in the operations of a processor: a product and a sum become one operation, rounded
+once.
 
-It is decided here, and not by the compiler: compiled or interpreted, a program gives the same
-numbers, to the last bit.
+This module decides the fusion, not the compiler: compiled and interpreted programs give the same
+numbers to the last bit.
 """
 
 from __future__ import annotations
@@ -14,22 +15,22 @@ from .tape import LEAVES, Node, operands
 FUSED = frozenset({"fma", "fnma", "fms"})
 """a b + c, c - a b and a b - c, of operands a, b, c."""
 SUMS = {"+": ("fma", "fma"), "-": ("fnma", "fms")}
-"""What sums and differences become where their second operand is a product, or their first."""
+"""Fused form of a sum or difference with a product as second operand, or as first."""
 SIZES = frozenset({"abs", "umax"})
-"""What is never negative. "umax" is the larger of two such numbers, or NaN if either is."""
+"""Operations with results that are never negative. "umax" is the larger of two such numbers, or NaN
+if either is.
+"""
 
 
 def lowered(program: Program) -> Program:
-    """The same program, in which a product that goes into nothing but one sum or difference is part
-    of it.
-    """
+    """Return the same program, with each product of a single sum or difference fused into it."""
     nodes = program.nodes
     operated = [operands(node) for node in nodes]
     uses = counts(len(nodes), *operated, program.outputs.values())
     taken: dict[int, int] = {}
     for k, node in enumerate(nodes):
         if node[0] in SUMS:
-            # of two products the later: the other has been there for longer
+            # # of two products the later one: the earlier has had more time to finish
             products = [x for x in operated[k] if nodes[x][0] == "*" and uses[x] == 1]
             if products:
                 taken[k] = max(products)
@@ -58,7 +59,7 @@ def lowered(program: Program) -> Program:
 
 
 def counts(size: int, *uses: Iterable[int]) -> list[int]:
-    """How often each of so many numbers occurs."""
+    """Return the number of occurrences of each number below `size`."""
     found = [0] * size
     for each in uses:
         for k in each:
@@ -67,7 +68,7 @@ def counts(size: int, *uses: Iterable[int]) -> list[int]:
 
 
 def unrolled(program: Program) -> Program:
-    """A program that is run several times, written out."""
+    """Return a repeated program written out."""
     nodes, outputs = list(program.nodes), dict(program.outputs)
     for k in range(1, program.times):
         first = len(nodes)

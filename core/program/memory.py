@@ -1,4 +1,4 @@
-"""Memory that machine code reads and writes: where it stands, and room for vectors."""
+"""Arrays for machine code: aligned allocation and addresses."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from ..trajectory import Array
 from .plan import LINE
 
 BYTES = 8
-"""Of a number."""
+"""Bytes of a number."""
 
 
 def aligned(count: int) -> Array:
-    """Room for numbers that begins with a cache line, so that no vector is in two of them."""
+    """Return an array that starts at a cache line, so no vector crosses two lines."""
     room = np.empty(count + LINE)
     start = -(address(room) // BYTES) % LINE
     return room[start : start + count]
 
 
 def address(array: NDArray[Any]) -> int:
-    """Return the address of a contiguous array; four times as quick as its own `ctypes`."""
+    """Return the address of a contiguous array; four times faster than its own `ctypes`."""
     return ctypes.addressof(ctypes.c_char.from_buffer(array.data))

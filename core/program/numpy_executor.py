@@ -1,4 +1,4 @@
-"""Run plans with numpy: no start-up cost; the oracle of the tests."""
+"""Execution of plans with numpy: no start-up cost; the oracle of the tests."""
 
 from __future__ import annotations
 
@@ -8,14 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..trajectory import Array
+from .executor_protocol import Parts, Side
 from .numpy_lanes import NumpyLanes
 from .numpy_track import NumpyTrack
-from .plan import MARGIN, Parts, Side
+from .plan import MARGIN
 from .tape import NODES
 
 
 class NumpyExecutor(NumpyLanes):
-    """The loops over the lanes of a plan; see `Executor`."""
+    """Loops over the lanes of a plan; see `Executor`."""
 
     def track(self, sides: Sequence[Side], start: Array, n: int) -> NumpyTrack:
         """See `Executor`."""
@@ -78,7 +79,7 @@ class NumpyExecutor(NumpyLanes):
             totals[:, column] = block[list(plan.kept)]
 
     def groups(self, lanes: int) -> int:
-        """See `Executor`: its programs are bound to all lanes."""
+        """See `Executor`; always one, because programs are bound to all lanes."""
         return 1
 
     def parts(self, parts: Parts) -> Callable[[int], object]:

@@ -1,4 +1,4 @@
-"""Run programs with numpy: one ufunc call per operation, over all lanes at once."""
+"""Execution of programs with numpy: one ufunc call per operation, over all lanes at once."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 
 from ..trajectory import Array
-from .plan import DONE, ITERATIONS, Plan, Table
+from .executor_protocol import Table
+from .plan import DONE, ITERATIONS, Plan
 from .straight_line import Program
 from .tape import LEAVES, operands, place_of
 
 
 def _min(a: Array, b: Array, out: Array) -> None:
-    np.minimum(a, b, out=out)  # the output of these two by keyword: numpy wants no third position
+    np.minimum(a, b, out=out)  # # by keyword: numpy rejects a third positional array
 
 
 def _max(a: Array, b: Array, out: Array) -> None:
@@ -55,7 +56,7 @@ class NumpyLanes:
     """A plan bound to a block of lanes, shape (slots, lanes).
 
     Attributes:
-        heads: lanes that have no lane before them.
+        heads: lanes without a lane before them.
     """
 
     margin = 0
@@ -100,7 +101,7 @@ class NumpyLanes:
         self.settle("predict", self.plan.alone)
 
     def settle(self, start: str, tests: Sequence[str]) -> None:
-        """Attempt all lanes: predict, iterate and test by the programs of these names."""
+        """Attempt all lanes: predict by `start`, iterate Newton, run the tests."""
         slots = self.plan.slots
         residual, iterations = (self.block[slots[name]] for name in ("residual", ITERATIONS))
         done = np.zeros(self.lanes, dtype=np.bool_)
@@ -124,8 +125,10 @@ class NumpyLanes:
         self.block[target] = self.block[source]
 
     def go_back(self, sample: Array) -> None:
-        """Have lanes stand where they are predicted from, and be ready to be; the sample there,
-        shape (sampled, 1).
+        """Restore the lanes to the state they were predicted from, ready for a new prediction.
+
+        Args:
+            sample: values of `Plan.sampled` there, shape (sampled, 1).
         """
         source, target = np.array(self.plan.carried).T
         self.block[source], self.block[list(self.plan.sampled)] = self.block[target], sample
@@ -137,7 +140,7 @@ class NumpyLanes:
         out[..., self.heads] = first[..., self.heads]
 
     def _bind(self, program: Program) -> list[Call]:
-        """Give every operation a register; a register is free again after its last reader."""
+        """Return the calls of a program; a register is free again after its last reader."""
         times, block, functions = (
             program.times,
             self.block,
@@ -176,7 +179,7 @@ class NumpyLanes:
                     free[np.bool_ if program.nodes[x][0] == "larger" else np.float64].append(
                         place[x]
                     )
-        # what stood in a slot and is put out elsewhere must survive the output that overwrites it
+        # # an input that goes to another slot must survive the output that overwrites its own
         for node in kept:
             if program.nodes[node][0] in ("input", "node"):
                 copy = np.empty(shape)

@@ -1,4 +1,4 @@
-"""Follow one motion with numpy: all its samples at once, as far as there are lanes."""
+"""One motion followed with numpy: all samples at once, as far as lanes suffice."""
 
 from __future__ import annotations
 
@@ -7,12 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..trajectory import Array
+from .executor_protocol import Side
 from .numpy_lanes import NumpyLanes
-from .plan import MARGIN, Side
+from .plan import MARGIN
 
 
 def _leading(margins: Array) -> int:
-    """How many lanes are accepted before the first that is not."""
+    """Return the number of accepted lanes before the first rejected one."""
     good = margins > 0.0
     return len(good) if good.all() else int(good.argmin())
 
@@ -32,9 +33,7 @@ class NumpyTrack:
         return self._kept
 
     def run(self) -> Sequence[int]:
-        """See `Track`. What both sides have in common is done once: a call takes longer than its
-        numbers.
-        """
+        """See `Track`. Both sides share one attempt: a numpy call takes longer than its numbers."""
         executor, counts = self._executor, [side.count for side in self._sides]
         if sum(counts) > executor.lanes:
             return [self.follow(k, 0, count, anew=True) for k, count in enumerate(counts)]
@@ -48,7 +47,7 @@ class NumpyTrack:
         executor.heads[:] = [0, *ends[:-1]]
         try:
             executor.settle("predict", plan.joined)
-        finally:  # it may be interrupted, and the executor is used again
+        finally:  # # after an interrupt the executor is used again
             executor.heads[:] = [0]
         lanes = [block[:, end - count : end] for count, end in zip(counts, ends, strict=True)]
         reached = [_leading(each[plan.slots[MARGIN]]) for each in lanes]
@@ -78,8 +77,8 @@ class NumpyTrack:
         sampled, smooth, whole = list(plan.sampled), False, False
         block[carried[1]] = (self._start if anew else self.anchors[side])[:, None]
         while at < stop:
-            # what is extrapolated begins at a multiple of the lanes: on to there as soon as a group
-            # is accepted whole
+            # # extrapolation needs groups that begin at a multiple of the lanes: a shorter group
+            # goes up to there
             count = min(lanes - at % lanes if whole and extrapolates else lanes, stop - at)
             block[sampled, :count] = samples[:, at : at + count]
             block[sampled, count:] = samples[:, stop - 1 : stop]
@@ -87,7 +86,7 @@ class NumpyTrack:
             accepted = _leading(block[plan.slots[MARGIN], :count])
             if accepted:
                 self._keep(self._sides[side], at, block[:, :accepted])
-            elif smooth:  # on from where the motion stands by its rates
+            elif smooth:  # # continue from the last accepted sample by its rates
                 executor.go_back(samples[:, at - 1 : at])
             else:
                 break

@@ -1,9 +1,9 @@
-"""The elimination of a sparse matrix in a given order, as operations on rows of memory: every entry
-is a row, a vector of numbers.
+"""Sparse LU factorisation in a fixed order, as operations on rows of memory; each entry is a row, a
+vector of numbers.
 
-No pivot is chosen, so that what is done is known before any number is: whether the order serves
-them is to be asked afterwards, of the smallest pivot and the largest multiplier. Pivots of which
-none needs another are eliminated side by side.
+No pivot is chosen at run time, so all operations are known before the numbers. A caller checks the
+order afterwards by the smallest pivot and the largest multiplier. Independent pivots are eliminated
+in the same stage.
 """
 
 from __future__ import annotations
@@ -16,19 +16,18 @@ from .linker import Linker, Rows, Words, numbers
 
 
 class FixedOrder:
-    """Which entries the factors L and U have; they take the place of the matrix, L below a diagonal
-    of ones.
+    """Structure of the factors L and U, stored in place of the matrix; L has a diagonal of ones.
 
     Args:
         rows, columns: of the entries of the matrix, in the order of elimination.
         n: rows of the matrix.
 
     Attributes:
-        count: of all entries: first those of the matrix, then those that fill in.
-        pivots: places of the diagonal of U among them.
+        count: number of entries: first those of the matrix, then the fill-in.
+        pivots: positions of the diagonal of U among the entries.
 
     Raises:
-        ValueError: a pivot is zero by structure in that order.
+        ValueError: a pivot is zero by structure in this order.
     """
 
     def __init__(self, rows: Sequence[int], columns: Sequence[int], n: int) -> None:
@@ -69,8 +68,8 @@ class FixedOrder:
             np.array(pivots),
             max(level, default=0),
         )
-        # with their pivots: entries of L and their rows, those of U and theirs, and entries and
-        # what is taken from them
+        # # each with its pivot: entries of L with their rows, entries of U with theirs, and updated
+        # entries with their two factors
         self._below, self._above = (
             np.array(each, np.intp).reshape(-1, 3).T for each in (below, above)
         )
@@ -78,18 +77,19 @@ class FixedOrder:
 
     @property
     def multipliers(self) -> Rows:
-        """Places of the entries of L among all."""
+        """Positions of the entries of L among all entries."""
         return self._below[2]
 
     def factor(
         self, link: Linker, matrix: Rows, entries: slice, inverse: slice, constants: tuple[int, int]
     ) -> list[Words]:
-        """Factor a matrix.
+        """Return the tables of a factorisation.
 
         Args:
-            matrix: rows that hold its entries.
-            entries, inverse: rows for those of the factors, and for the pivots' inverses.
-            constants: a row of zeros, and one of ones.
+            matrix: rows of the matrix entries.
+            entries, inverse: rows for the entries of the factors, and for the inverses of the
+                pivots.
+            constants: a row of zeros, and a row of ones.
         """
         at, inverses, (zero, one) = numbers(entries), numbers(inverse), constants
         (pivot, _, multiplier), (by, updated, factor, other) = self._below, self._updates
@@ -114,8 +114,8 @@ class FixedOrder:
         *,
         transposed: bool = False,
     ) -> list[Words]:
-        """Solve for what stands in the rows `right`, in the order of elimination; or with the
-        matrix transposed.
+        """Return the tables of a solve, of the matrix or its transpose, in the rows `right`, in the
+        order of elimination.
         """
         at, inverses = numbers(right), numbers(inverse)
 
@@ -124,7 +124,7 @@ class FixedOrder:
             return at[row], entries.start + entry, at[pivot], at[row]
 
         stages, back = self._last + 1, self._last - self._level
-        if transposed:  # what needs what is the other way round
+        if transposed:  # # dependencies are reversed
             (j, i, upper), (k, below, lower) = self._above, self._below
             return [
                 link.staged(

@@ -1,6 +1,4 @@
-"""Straight-line programs: the operations of a tape that some outputs need, in an order that can be
-run.
-"""
+"""Straight-line programs: the operations of a tape that the outputs need, in executable order."""
 
 from __future__ import annotations
 
@@ -19,15 +17,14 @@ FLOPS = frozenset(
 
 @dataclass(frozen=True)
 class Program:
-    """Operations in an order that can be run, and the slots that take the results.
+    """Operations in executable order, and the slots of the results.
 
     Attributes:
         nodes: the live operations only; operands are positions in this tuple.
-        outputs: slot -> position of the node it takes. All outputs are written after the last input
-            was read.
-        times: it is run so often, every input one slot further each time, and of what it puts out
-            the largest is taken; those outputs are sizes, not negative. NaN is larger than any
-            number.
+        outputs: slot -> position of its node. Outputs are written after the last input is read.
+        times: number of repetitions. Each repetition reads every input one slot further, and each
+            output is the largest of its values. These outputs are not negative; NaN counts as
+            larger than any number.
     """
 
     name: str
@@ -37,7 +34,7 @@ class Program:
 
     @property
     def operations(self) -> Counter[str]:
-        """How often each operation occurs."""
+        """Number of occurrences of each operation."""
         found = Counter(
             {
                 op: self.times * count
@@ -48,12 +45,12 @@ class Program:
 
     @cached_property
     def flops(self) -> int:
-        """Arithmetic operations of one lane: everything but reading inputs and constants."""
+        """Arithmetic operations of one lane: all but reads of inputs and constants."""
         return sum(count for op, count in self.operations.items() if op in FLOPS)
 
     @property
     def size(self) -> dict[str, int]:
-        """Operations, inputs and constants among them, and flops of one lane."""
+        """Operations of one lane (with inputs and constants), and its flops."""
         return {"operations": len(self.nodes), "flops": self.flops}
 
 
@@ -64,8 +61,8 @@ def program(
     prepared: Prepared | None = None,
     times: int = 1,
 ) -> Program:
-    """The part of the tape that the outputs (slot -> scalar) need; what is prepared is read from
-    its slot.
+    """Return the program of some outputs (slot -> scalar); prepared terms are read from their
+    slots.
     """
     wanted = {slot: tape.number(value) for slot, value in outputs.items()}
     live: dict[int, Node] = {}
@@ -84,12 +81,11 @@ def program(
 
 
 class Prepared:
-    """What depends on given slots alone (the geometry): computed once by a program of its own, and
-    kept in slots.
+    """Terms of some slots alone (the geometry), computed once by a separate program and stored.
 
     Args:
-        given: the slots it may depend on.
-        slot: a new slot for a name.
+        given: the slots the terms may depend on.
+        slot: return a new slot for a name.
     """
 
     def __init__(self, tape: Tape, given: Collection[int], slot: Callable[[str], int]) -> None:
@@ -98,9 +94,9 @@ class Prepared:
         self._kept: dict[int, int] = {}
 
     def node(self, number: int) -> Node:
-        """The node, or where it is prepared the input that reads it."""
+        """Return the node; for a prepared term, the input of its slot."""
         node = self.tape.nodes[number]
-        # a decision is no number that a slot could hold: it is made anew of what is prepared
+        # # a decision is not a number and has no slot: it is computed again from prepared terms
         if (
             not self._given
             or node[0] in LEAVES
@@ -114,11 +110,11 @@ class Prepared:
 
     @property
     def slots(self) -> list[int]:
-        """The slots it keeps things in."""
+        """The slots of the prepared terms."""
         return [*self._kept.values()]
 
     def program(self) -> Program:
-        """What computes all that programs have read so far."""
+        """Return the program of all prepared terms that programs have read so far."""
         return program(
             "prepare",
             self.tape,

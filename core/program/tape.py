@@ -1,8 +1,8 @@
-"""Traced scalars: run an equation on them and the operations it needs are written down, each once.
+"""Traced scalars: run an equation on them, and a tape records the needed operations, each once.
 
-Zeros, ones and signs fold as they are written, equal operations are shared (hash consing), and a
-program keeps only what its outputs need. What a scene does not use is therefore not in its
-programs, without anyone deciding so.
+Zeros, ones and signs fold during the trace, equal operations are shared (hash consing), and a
+program keeps only the operations its outputs need. Terms that a mechanism does not use are
+therefore absent from its programs.
 """
 
 from __future__ import annotations
@@ -14,20 +14,21 @@ from typing import TypeAlias, cast
 from ..algebra import Scalar
 
 Node: TypeAlias = tuple[str, *tuple[float, ...]]
-"""An operation and its operands: node numbers, or for "input" a slot, or for "const" a value; see
+"""An operation and its operands: node numbers; for "input" a slot, for "const" a value; see
 `LEAVES`.
 
 "+", "-", "*", "/", "neg", "sqrt", "sin", "cos", "abs", "min", "max" act on numbers ("min" and "max"
-propagate NaN); "larger" a b is true where |a| > |b|; "where" m p q is p where m is true, else q;
-"before" x a is the x of the lane before, and a in the first lane.
+propagate NaN); "larger" a b is true if |a| > |b|; "where" m p q is p if m is true, else q; "before"
+x a is x of the previous lane, and a in the first lane.
 """
 LEAVES = frozenset({"input", "const", "node"})
-"""What has no operands. "node" s k is what stands in slot s of the lane that is number k of
-`NODES`, for all lanes alike.
+"""Operations without operands. "node" s k is the value of slot s in lane k of the `NODES`, the same
+for all lanes.
 """
 NODES = 6
-"""Lanes that later ones may be extrapolated from, about as far from each other: of a group, or of
-several that follow one another where a group has fewer."""
+"""Number of lanes for extrapolation, about evenly spaced: in one group, or in several consecutive
+groups if a group has fewer lanes.
+"""
 
 
 class Tape:
@@ -38,7 +39,7 @@ class Tape:
         self._known: dict[Node, int] = {}
 
     def node(self, *node: str | float) -> Traced:
-        """The scalar of an operation, written down unless an equal one is there already."""
+        """Return the scalar of an operation; an equal operation is recorded only once."""
         key: Node = node  # type: ignore[assignment]
         number = self._known.get(key)
         if number is None:
@@ -47,20 +48,20 @@ class Tape:
         return Traced(self, number)
 
     def input(self, slot: int) -> Traced:
-        """The value that stands in a slot of the lanes when the program runs."""
+        """Return the value of a slot at run time."""
         return self.node("input", slot)
 
     def at(self, k: int, slot: int) -> Traced:
-        """The value that stands in a slot of a lane: the one that is number k of `NODES`."""
+        """Return the value of a slot in lane k of the `NODES`."""
         return self.node("node", slot, k)
 
     def number(self, a: Scalar) -> int:
-        """The node of a scalar, constants included."""
+        """Return the node number of a scalar, constants included."""
         return a.number if isinstance(a, Traced) else self.node("const", float(a)).number
 
 
 class Traced:
-    """A scalar known only when the program runs."""
+    """A scalar with a value at run time only."""
 
     __slots__ = ("number", "tape")
 
@@ -81,7 +82,7 @@ class Traced:
         return _sub(a, self)
 
     def __mul__(self, b: Scalar) -> Scalar:
-        # a vector on the right does the product itself
+        # # Vec3.__rmul__ computes the product with a vector
         return _scale("*", self, b) if isinstance(b, Traced | float | int) else NotImplemented
 
     def __rmul__(self, a: Scalar) -> Scalar:
@@ -98,17 +99,17 @@ class Traced:
         return self.tape.node("neg", self.number) if negated is None else negated
 
     def sqrt(self) -> Scalar:
-        """The square root."""
+        """Return the square root."""
         return self.tape.node("sqrt", self.number)
 
     @staticmethod
     def where_larger(a: Scalar, b: Scalar, p: Scalar, q: Scalar) -> Scalar:
-        """p where |a| > |b|, else q."""
+        """Return p if |a| > |b|, else q."""
         return where_larger(a, b, p, q)
 
     @property
     def _negated(self) -> Traced | None:
-        """The x of a scalar that is -x."""
+        """The x of a scalar -x; None for other scalars."""
         op, *operands = self.tape.nodes[self.number]
         return Traced(self.tape, int(operands[0])) if op == "neg" else None
 
@@ -118,7 +119,7 @@ def _same(a: Scalar, b: Scalar) -> bool:
 
 
 def _opposite(a: Scalar) -> Scalar | None:
-    """-a where a is written with a minus sign, else None."""
+    """Return -a if a has a minus sign, else None."""
     if isinstance(a, Traced):
         return a._negated  # pyright: ignore[reportPrivateUsage]
     return -a if a < 0.0 else None
@@ -181,38 +182,38 @@ def _unary(op: str, a: Scalar, value: Callable[[float], float]) -> Scalar:
 
 
 def sin(a: Scalar) -> Scalar:
-    """Sine of a float or traced scalar [rad]."""
+    """Return the sine of a float or traced scalar [rad]."""
     return _unary("sin", a, math.sin)
 
 
 def cos(a: Scalar) -> Scalar:
-    """Cosine of a float or traced scalar [rad]."""
+    """Return the cosine of a float or traced scalar [rad]."""
     return _unary("cos", a, math.cos)
 
 
 def absolute(a: Scalar) -> Scalar:
-    """|a|."""
+    """Return |a|."""
     return _unary("abs", a, abs)
 
 
 def _extreme(op: str, a: Scalar, b: Scalar, value: Callable[[float, float], float]) -> Scalar:
     if isinstance(a, Traced) or isinstance(b, Traced):
         return a if _same(a, b) else _operation(op, a, b)
-    return value(a, b) if b == b else b  # Python's own keep a where b is NaN
+    return value(a, b) if b == b else b  # # Python's min and max keep a if b is NaN
 
 
 def minimum(a: Scalar, b: Scalar) -> Scalar:
-    """The smaller of a and b; NaN if either is."""
+    """Return the smaller of a and b; NaN if either is."""
     return _extreme("min", a, b, min)
 
 
 def maximum(a: Scalar, b: Scalar) -> Scalar:
-    """The larger of a and b; NaN if either is."""
+    """Return the larger of a and b; NaN if either is."""
     return _extreme("max", a, b, max)
 
 
 def where_larger(a: Scalar, b: Scalar, p: Scalar, q: Scalar) -> Scalar:
-    """p where |a| > |b|, else q; every lane decides for itself."""
+    """Return p if |a| > |b|, else q; each lane decides by its own values."""
     if _same(p, q) or (not isinstance(p, Traced) and not isinstance(q, Traced) and p == q):
         return p
     tape = next((x.tape for x in (a, b) if isinstance(x, Traced)), None)
@@ -223,20 +224,20 @@ def where_larger(a: Scalar, b: Scalar, p: Scalar, q: Scalar) -> Scalar:
 
 
 def before(x: Traced, first: Traced) -> Scalar:
-    """The x of the lane before; in the first lane, `first`."""
+    """Return x of the previous lane; in the first lane, `first`."""
     return x.tape.node("before", x.number, first.number)
 
 
 def operands(node: Node) -> tuple[int, ...]:
-    """The nodes an operation reads."""
+    """Return the node numbers an operation reads."""
     return () if node[0] in LEAVES else cast("tuple[int, ...]", node[1:])
 
 
 def groups_behind(lanes: int) -> int:
-    """How many groups of so many lanes `NODES` are among."""
+    """Return the number of groups, of so many lanes each, that contain the `NODES`."""
     return -(-NODES // lanes)
 
 
 def place_of(k: int, lanes: int) -> tuple[int, int]:
-    """Number k of `NODES`: in which of those groups, the earliest first, and which of its lanes."""
+    """Return group (the earliest first) and lane of number k of the `NODES`."""
     return divmod(k * (groups_behind(lanes) * lanes - 1) // (NODES - 1), lanes)

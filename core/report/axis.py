@@ -14,10 +14,20 @@ from ..harness.record import Record
 # a figure is that many pixels wide; longer series are thinned, the worst samples always kept
 SAMPLES = 500
 
-DISPLAY = {"m": ("mm", 1e3), "rad": ("°", 180 / math.pi), "s": ("s", 1.0), "rad/m": ("°/m", 180 / math.pi)}
+DISPLAY = {
+    "m": ("mm", 1e3),
+    "rad": ("°", 180 / math.pi),
+    "s": ("s", 1.0),
+    "rad/m": ("°/m", 180 / math.pi),
+}
 """Units of results, and what they are shown in: the unit and the factor."""
 
-_DRIVER_UNITS = {"point_coordinate": "m", "joint_displacement": "m", "joint_angle": "rad", "time": "s"}
+_DRIVER_UNITS = {
+    "point_coordinate": "m",
+    "joint_displacement": "m",
+    "joint_angle": "rad",
+    "time": "s",
+}
 # Directions in files are exact, or the three digits of a table: this allows for those.
 ALONG = 1 - 1e-5
 
@@ -42,7 +52,11 @@ class Moved:
         if step >= len(self.values):
             return ""
         value = f"{self.scale * self.values[step]:+.4g}".replace("-", "\N{MINUS SIGN}")
-        return f"{self.name} {value}{self.unit}" if self.unit == "°" else f"{self.name} {value} {self.unit}".rstrip()
+        return (
+            f"{self.name} {value}{self.unit}"
+            if self.unit == "°"
+            else f"{self.name} {value} {self.unit}".rstrip()
+        )
 
 
 @dataclass(frozen=True)
@@ -64,13 +78,19 @@ class Axis(Moved):
 
     def at(self, step: int) -> str:
         """The values of all drivers at a sample, in words."""
-        return ", ".join(filter(None, (super().at(step), *(moved.at(step) for moved, _ in self.further))))
+        return ", ".join(
+            filter(None, (super().at(step), *(moved.at(step) for moved, _ in self.further)))
+        )
 
     @property
     def besides(self) -> str:
         """A sentence that names the drivers in `further`; empty where there are none."""
         named = [f"{moved.name} ({how})" if how else moved.name for moved, how in self.further]
-        return f"{'Driven' if self.unit == 's' else 'Also driven'}: {', '.join(named)}." if named else ""
+        return (
+            f"{'Driven' if self.unit == 's' else 'Also driven'}: {', '.join(named)}."
+            if named
+            else ""
+        )
 
     @property
     def label(self) -> str:
@@ -97,7 +117,10 @@ def driver_axis(facts: Mapping[str, Any], records: Sequence[Record], worst: Iter
     key = driver.get("name") or next(iter(series), "driver")
     swept = Moved.of(key, driver, series.get(key, []))
     further = [
-        (Moved.of(name, motions.get(name, {}), values), motions.get(name, {}).get("motion", {}).get("type", ""))
+        (
+            Moved.of(name, motions.get(name, {}), values),
+            motions.get(name, {}).get("motion", {}).get("type", ""),
+        )
         for name, values in series.items()
         if name != key
     ]
@@ -109,7 +132,10 @@ def driver_axis(facts: Mapping[str, Any], records: Sequence[Record], worst: Iter
     up = _upwards(driver)
     title = f"{name} [{unit}]" if unit else name
     if up and "wheel" in driver.get("point", "") and driver.get("relative", True):
-        name, title = "wheel travel", f"rebound \N{LEFTWARDS ARROW}  wheel travel [{unit}]  \N{RIGHTWARDS ARROW} jounce"
+        name, title = (
+            "wheel travel",
+            f"rebound \N{LEFTWARDS ARROW}  wheel travel [{unit}]  \N{RIGHTWARDS ARROW} jounce",
+        )
     return Axis(name, unit, swept.scale, values, title, _kept(len(values), worst), up, further)
 
 

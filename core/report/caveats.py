@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ..case.case import Truth
-from ..harness.labels import (engine_name, notes, product)
-from ..harness.record import (Outcome, Record, Results)
+from ..harness.labels import engine_name, notes, product
+from ..harness.record import Outcome, Record, Results
 from .axis import SAMPLES
 
 ANSWERED = (Outcome.PASS, Outcome.FAIL, Outcome.UNJUDGED)
@@ -26,36 +26,71 @@ def caveats(results: Results) -> list[tuple[str, str]]:
 
     say(
         "One description for all",
-        "Every engine was given the same case files. A wrong hardpoint, axis or driver in a file is wrong in all of them and "
-        "shows in no comparison.",
+        "Every engine was given the same case files. A wrong hardpoint, axis or driver in a file is"
+        " wrong in all of them and shows in no comparison.",
     )
     if names := cases(lambda record: record.truth == Truth.IN_HOUSE_ORACLE):
-        say(f"In-house oracle: {names}", "This project computed the reference. Agreement with our own oracle is not validation.")
+        say(
+            f"In-house oracle: {names}",
+            "This project computed the reference. Agreement with our own oracle is not validation.",
+        )
     if names := cases(lambda record: record.truth == Truth.CONSENSUS_ONLY):
-        say(f"Consensus only: {names}", "There is no reference. Engines that agree with the native one may be wrong together.")
+        say(
+            f"Consensus only: {names}",
+            "There is no reference. Engines that agree with the native one may be wrong together.",
+        )
     for case, note in notes(results.run):
         say(f"Note on {case}", f"{note[:1].upper()}{note[1:]}.")
     for outcome in Outcome:
         pairs = [_pair(record) for record in records if record.outcome is outcome]
         if pairs and outcome not in ANSWERED:
-            say(f"{outcome.shown.capitalize()}: {len(pairs)}", f"Nothing is said about {'; '.join(pairs)}.")
+            say(
+                f"{outcome.shown.capitalize()}: {len(pairs)}",
+                f"Nothing is said about {'; '.join(pairs)}.",
+            )
     for case, why in results.unread.items():
         say(f"Not read: {case}", f"{why}. Nothing is said about it.")
-    if pairs := [f"{product(engine, mode)} on {case}" for case, engine, mode in results.missing if case not in results.unread]:
-        say(f"Never made: {len(pairs)}", f"The run ended before them, and nothing is said about {'; '.join(pairs)}.")
+    if pairs := [
+        f"{product(engine, mode)} on {case}"
+        for case, engine, mode in results.missing
+        if case not in results.unread
+    ]:
+        say(
+            f"Never made: {len(pairs)}",
+            f"The run ended before them, and nothing is said about {'; '.join(pairs)}.",
+        )
     for record in records:
-        if record.solved is not None and record.samples is not None and record.solved < record.samples:
-            say(_pair(record), f"{record.solved} of {record.samples} samples were solved; nothing is said about the others.")
+        if (
+            record.solved is not None
+            and record.samples is not None
+            and record.solved < record.samples
+        ):
+            say(
+                _pair(record),
+                f"{record.solved} of {record.samples} samples were solved; nothing is said about"
+                " the others.",
+            )
     for reason, pairs in _uncompared(results).items():
         say(f"Not judged: {', '.join(pairs)}", reason)
     if len({record.mode for record in records if record.outcome in ANSWERED}) > 1:
-        say("Modes", "Projection and simulate are different products; their times and errors are no ranking.")
+        say(
+            "Modes",
+            "Projection and simulate are different products; their times and errors are no"
+            " ranking.",
+        )
     if len({record.loop for record in records if record.us_per_step is not None}) > 1:
-        say("Times", "The loops over the samples run in different places (see loop): a time is that of engine and loop together.")
-    if names := cases(lambda record: any(len(values) > SAMPLES for values in record.driver.values())):
+        say(
+            "Times",
+            "The loops over the samples run in different places (see loop): a time is that of"
+            " engine and loop together.",
+        )
+    if names := cases(
+        lambda record: any(len(values) > SAMPLES for values in record.driver.values())
+    ):
         say(
             f"Thinned figures: {names}",
-            f"About {SAMPLES} samples of each curve are drawn, the worst ones among them; tables and verdicts used all.",
+            f"About {SAMPLES} samples of each curve are drawn, the worst ones among them; tables"
+            " and verdicts used all.",
         )
     return said
 
@@ -69,6 +104,8 @@ def _uncompared(results: Results) -> dict[str, list[str]]:
     for record in results.records:
         if record.outcome not in ANSWERED:
             continue
-        for reason in dict.fromkeys(errors.reason for errors in record.errors.values() if errors.reason):
+        for reason in dict.fromkeys(
+            errors.reason for errors in record.errors.values() if errors.reason
+        ):
             reasons.setdefault(reason, []).append(_pair(record))
     return reasons

@@ -13,10 +13,10 @@ from dataclasses import dataclass, field
 from itertools import combinations
 from typing import Any
 
-from ..algebra import (Vec3, quat, rotation_less_identity, vec)
+from ..algebra import Vec3, quat, rotation_less_identity, vec
+from ..harness.scene_record import Scene, SceneBody, SceneJoint
 from ..joints.base import unit
 from ..mechanism.mechanism import GROUND
-from ..harness.record import (Scene, SceneBody, SceneJoint)
 from .axis import Axis
 
 MARKS = {
@@ -60,10 +60,14 @@ class Drawing:
     """
 
     bodies: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
-    nodes: list[tuple[int, float, float, float]] = field(default_factory=list[tuple[int, float, float, float]])
+    nodes: list[tuple[int, float, float, float]] = field(
+        default_factory=list[tuple[int, float, float, float]]
+    )
     links: list[tuple[int, int]] = field(default_factory=list[tuple[int, int]])
     rods: list[tuple[int, int]] = field(default_factory=list[tuple[int, int]])
-    marks: list[tuple[int, str, list[float] | None, bool]] = field(default_factory=list[tuple[int, str, list[float] | None, bool]])
+    marks: list[tuple[int, str, list[float] | None, bool]] = field(
+        default_factory=list[tuple[int, str, list[float] | None, bool]]
+    )
     labels: list[tuple[int, int, str]] = field(default_factory=list[tuple[int, int, str]])
     paths: list[int] = field(default_factory=list[int])
     steps: list[str] = field(default_factory=list[str])
@@ -79,7 +83,9 @@ def drawing(scene: Scene, axis: Axis) -> Drawing:
 
 class _Draughtsman:
     def __init__(self, scene: Scene, axis: Axis) -> None:
-        ground = SceneBody(name=GROUND, fixed=True, origin=[0.0, 0.0, 0.0], euler_parameters=[1.0, 0.0, 0.0, 0.0])
+        ground = SceneBody(
+            name=GROUND, fixed=True, origin=[0.0, 0.0, 0.0], euler_parameters=[1.0, 0.0, 0.0, 0.0]
+        )
         self.bodies = [ground, *scene.bodies]
         self.numbers = {body.name: k for k, body in enumerate(self.bodies)}
         self.drawn = Drawing()
@@ -93,13 +99,22 @@ class _Draughtsman:
         self.drawn.bodies = [self._body(k) for k in range(len(self.bodies))]
         self.drawn.steps = [f"sample {k} · {axis.at(k)}".removesuffix(" · ") for k in scene.frames]
         self.drawn.start = min(range(len(scene.frames)), key=self._from_design, default=0)
-        solved = f"Poses at {len(scene.frames)} of {len(axis.values)} samples, by the native solver. " if scene.frames else ""
-        self.drawn.caption = solved + (f"{scene.message[0].upper()}{scene.message[1:]}." if scene.message else "")
+        solved = (
+            f"Poses at {len(scene.frames)} of {len(axis.values)} samples, by the native solver. "
+            if scene.frames
+            else ""
+        )
+        self.drawn.caption = solved + (
+            f"{scene.message[0].upper()}{scene.message[1:]}." if scene.message else ""
+        )
 
     def _from_design(self, frame: int) -> float:
         """How far the bodies are from the design position [m + -], to compare frames by."""
         posed = [body for body in self.bodies if body.r]
-        return sum(math.dist(each.r[frame], each.origin) + math.dist(each.p[frame], each.euler_parameters) for each in posed)
+        return sum(
+            math.dist(each.r[frame], each.origin) + math.dist(each.p[frame], each.euler_parameters)
+            for each in posed
+        )
 
     def _node(self, body: str, position: Sequence[float]) -> int:
         """The hardpoint of a body there, a new one if there is none."""
@@ -107,7 +122,9 @@ class _Draughtsman:
         arm = vec(position) - vec(self.bodies[number].origin)
         local = _in_body(self.bodies[number], arm)
         for k, (other, *place) in enumerate(self.drawn.nodes):
-            if other == number and all(abs(a - b) < SAME for a, b in zip(place, local, strict=True)):
+            if other == number and all(
+                abs(a - b) < SAME for a, b in zip(place, local, strict=True)
+            ):
                 return k
         self.drawn.nodes.append((number, *local))
         return len(self.drawn.nodes) - 1
@@ -125,11 +142,17 @@ class _Draughtsman:
             self._mark(second, "end", None, j)
         else:
             self._label(first, first, joint.name)
-            axis = list(_in_body(self.bodies[self.numbers[i]], unit(joint.axes[0]))) if joint.axes else None
+            axis = (
+                list(_in_body(self.bodies[self.numbers[i]], unit(joint.axes[0])))
+                if joint.axes
+                else None
+            )
             self._mark(first, MARKS.get(joint.type, "other"), axis, i, j)
 
     def _mark(self, node: int, kind: str, axis: list[float] | None, *bodies: str) -> None:
-        self.drawn.marks.append((node, kind, axis, any(self.bodies[self.numbers[name]].fixed for name in bodies)))
+        self.drawn.marks.append(
+            (node, kind, axis, any(self.bodies[self.numbers[name]].fixed for name in bodies))
+        )
 
     def _label(self, a: int, b: int, text: str) -> None:
         """A label; what has the same place shares one."""

@@ -66,10 +66,15 @@ def trend_figures(history: Sequence[Past], styles: Mapping[str, Style]) -> dict[
         # a category each: a date would otherwise become a place on a calendar, and runs of one
         # night one point
         names = [plain(run) for run in runs]
-        curves = [_curve(style, names, [values.get((style.name, run)) for run in runs]) for style in drawn]
+        curves = [
+            _curve(style, names, [values.get((style.name, run)) for run in runs]) for style in drawn
+        ]
         return {
             "data": curves,
-            "layout": {"xaxis": {"type": "category", "zeroline": False, "nticks": 6, "tickangle": -30}, "hovermode": "x unified"},
+            "layout": {
+                "xaxis": {"type": "category", "zeroline": False, "nticks": 6, "tickangle": -30},
+                "hovermode": "x unified",
+            },
         }
 
     errors = figure({(each.engine, each.run): _finite(each.max_error) for each in history})
@@ -77,7 +82,11 @@ def trend_figures(history: Sequence[Past], styles: Mapping[str, Style]) -> dict[
     drawn_times = [value for trace in times["data"] for value in trace["y"] if value]
     times["layout"]["yaxis"] = ticked_axis(TIMES, drawn_times) | _decade(drawn_times)
     made = {"error": _floored(errors), "time": times}
-    return {what: each for what, each in made.items() if any(y is not None for trace in each["data"] for y in trace["y"])}
+    return {
+        what: each
+        for what, each in made.items()
+        if any(y is not None for trace in each["data"] for y in trace["y"])
+    }
 
 
 def ticked_axis(title: str, values: Sequence[float]) -> Figure:
@@ -85,7 +94,13 @@ def ticked_axis(title: str, values: Sequence[float]) -> Figure:
     at 1 alone.
     """
     span = max(values, default=1.0) / min(values, default=1.0)
-    return {"type": "log", "title": {"text": title}, "tickformat": "~g", "hoverformat": ".3~g", "dtick": "D2" if span < 1e3 else 1}
+    return {
+        "type": "log",
+        "title": {"text": title},
+        "tickformat": "~g",
+        "hoverformat": ".3~g",
+        "dtick": "D2" if span < 1e3 else 1,
+    }
 
 
 def _decade(values: Sequence[float]) -> Figure:
@@ -103,26 +118,49 @@ def precision_figure(efforts: Sequence[Effort], styles: Mapping[str, Style]) -> 
     """
     traces: list[Figure] = []
     for style in _styles((each.engine for each in efforts), styles):
-        mine = sorted((each for each in efforts if each.engine == style.name), key=lambda each: each.us_per_sample)
-        curve = _curve(style, [_finite(each.us_per_sample) for each in mine], [_finite(each.error) for each in mine])
-        told = {"text": [plain(each.setting) for each in mine], "hovertemplate": "%{text}: %{x:.3~g} µs, %{customdata:.3~g} m"}
+        mine = sorted(
+            (each for each in efforts if each.engine == style.name),
+            key=lambda each: each.us_per_sample,
+        )
+        curve = _curve(
+            style,
+            [_finite(each.us_per_sample) for each in mine],
+            [_finite(each.error) for each in mine],
+        )
+        told = {
+            "text": [plain(each.setting) for each in mine],
+            "hovertemplate": "%{text}: %{x:.3~g} µs, %{customdata:.3~g} m",
+        }
         traces.append(curve | told)
     times = [value for trace in traces for value in trace["x"] if value]
-    return _floored({"data": traces, "layout": {"xaxis": ticked_axis(TIMES, times), "hovermode": "closest"}})
+    return _floored(
+        {"data": traces, "layout": {"xaxis": ticked_axis(TIMES, times), "hovermode": "closest"}}
+    )
 
 
 def _curve(style: Style, x: Sequence[Any], y: Sequence[float | None]) -> Figure:
     line = {"width": 1.8, "color": style.colour, "dash": style.dash}
     marker = {"size": 8, "symbol": style.symbol, "color": style.colour}
-    look = {"name": plain(style.name), "uid": style.key, "meta": style.name, "line": line, "marker": marker}
+    look = {
+        "name": plain(style.name),
+        "uid": style.key,
+        "meta": style.name,
+        "line": line,
+        "marker": marker,
+    }
     return {"type": "scatter", "mode": "lines+markers", "x": x, "y": y, **look}
 
 
 def _floored(figure: Figure) -> Figure:
     """The figure with an axis for errors upwards."""
     positive = [value for trace in figure["data"] for value in trace["y"] if value]
-    side, floor = log_axis("largest position error [m]", min(positive, default=1.0), max(positive, default=1.0))
-    return {"data": figure["data"], "layout": {**figure["layout"], "yaxis": side, "meta": {"floor": floor}}}
+    side, floor = log_axis(
+        "largest position error [m]", min(positive, default=1.0), max(positive, default=1.0)
+    )
+    return {
+        "data": figure["data"],
+        "layout": {**figure["layout"], "yaxis": side, "meta": {"floor": floor}},
+    }
 
 
 def _styles(engines: Iterable[str], styles: Mapping[str, Style]) -> list[Style]:

@@ -1,8 +1,7 @@
 """Figures of the report, as Plotly JSON: outputs against the driver, and each engine's error.
 
 The page's style sheet colours the traces, so that dark mode and print need no second set of
-figures. Samples at the driver's values refer to them by the word "driver"; the page puts the values
-in.
+figures. Samples refer to the driver's values by the word "driver"; the page inserts the values.
 """
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from ..harness.labels import output_label
-from ..harness.record import (Deviation, OutputSeries)
+from ..harness.record import Deviation, OutputSeries
 from .axis import DISPLAY, Axis
 
 Figure: TypeAlias = dict[str, Any]
@@ -28,7 +27,15 @@ THIN = 1 / 2000  # a band narrower than this part of the curve's range is less t
 # Okabe and Ito: told apart by colour-blind readers
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 DASHES = ("solid", "12px,5px", "3px,3px", "12px,4px,3px,4px", "7px,7px")
-SYMBOLS = ("circle-open", "square-open", "diamond-open", "triangle-up-open", "x-thin-open", "cross-thin-open", "asterisk-open")
+SYMBOLS = (
+    "circle-open",
+    "square-open",
+    "diamond-open",
+    "triangle-up-open",
+    "x-thin-open",
+    "cross-thin-open",
+    "asterisk-open",
+)
 
 
 @dataclass(frozen=True)
@@ -45,7 +52,9 @@ class Style:
     def number(cls, index: int, name: str) -> Style:
         """The style of the index-th engine."""
         k = index % len(COLOURS)
-        return cls(f"s{k}", name, COLOURS[k], DASHES[index % len(DASHES)], SYMBOLS[index % len(SYMBOLS)])
+        return cls(
+            f"s{k}", name, COLOURS[k], DASHES[index % len(DASHES)], SYMBOLS[index % len(SYMBOLS)]
+        )
 
 
 def plain(text: str) -> str:
@@ -80,27 +89,75 @@ def output_figure(
         known = [(v, d) for v, d in zip(standard, axis.shown, strict=False) if v is not None]
         around = [v - tolerance for v, _ in known] + [v + tolerance for v, _ in reversed(known)]
         there = [d for _, d in known]
-        look: Figure = {"mode": "lines", "fill": "toself", "line": {"width": 0}, "hoverinfo": "skip", "uid": "band"}
-        traces.append(curve(around, there + there[::-1], **look, fillcolor="rgba(128,128,128,0.18)", meta="reference"))
+        look: Figure = {
+            "mode": "lines",
+            "fill": "toself",
+            "line": {"width": 0},
+            "hoverinfo": "skip",
+            "uid": "band",
+        }
+        traces.append(
+            curve(
+                around,
+                there + there[::-1],
+                **look,
+                fillcolor="rgba(128,128,128,0.18)",
+                meta="reference",
+            )
+        )
     if truth is not None:
         values = _taken(truth.position, axis.kept, scale)
         line = {"width": 6, "color": "rgba(128,128,128,0.45)"}
-        traces.append(curve(values, mode="lines", line=line, name="reference", uid="reference", meta="reference"))
+        traces.append(
+            curve(
+                values, mode="lines", line=line, name="reference", uid="reference", meta="reference"
+            )
+        )
     for index, (style, series) in enumerate(curves):
         values = _taken(series.position, axis.kept, scale)
         line = {"width": 2, "color": style.colour, "dash": style.dash}
-        traces.append(curve(values, mode="lines", line=line, name=plain(style.name), uid=style.key, meta=style.name))
+        traces.append(
+            curve(
+                values,
+                mode="lines",
+                line=line,
+                name=plain(style.name),
+                uid=style.key,
+                meta=style.name,
+            )
+        )
         stride = max(len(curves), len(values) // MARKERS)
         some = range(index * stride // len(curves), len(values), stride)
         marker = {"size": 9, "symbol": style.symbol, "color": style.colour, "line": {"width": 1.8}}
-        look = {"mode": "markers", "marker": marker, "hoverinfo": "skip", "uid": f"{style.key}-markers", "meta": style.name}
+        look = {
+            "mode": "markers",
+            "marker": marker,
+            "hoverinfo": "skip",
+            "uid": f"{style.key}-markers",
+            "meta": style.name,
+        }
         traces.append(curve([values[k] for k in some], [axis.shown[k] for k in some], **look))
-    value_axis: Figure = {"title": {"text": plain(f"{output_label(output)} [{unit}]")}, "hoverformat": ".9g", "zeroline": True}
-    moved_axis: Figure = {"title": {"text": plain(axis.title)}, "hoverformat": ".6~g", "zeroline": True} | _ticks(axis)
+    value_axis: Figure = {
+        "title": {"text": plain(f"{output_label(output)} [{unit}]")},
+        "hoverformat": ".9g",
+        "zeroline": True,
+    }
+    moved_axis: Figure = {
+        "title": {"text": plain(axis.title)},
+        "hoverformat": ".6~g",
+        "zeroline": True,
+    } | _ticks(axis)
     if axis.up < 0:
         moved_axis["autorange"] = "reversed"
-    sides = {"xaxis": value_axis, "yaxis": moved_axis} if axis.up else {"xaxis": moved_axis, "yaxis": value_axis}
-    return {"data": traces, "layout": {**sides, "hovermode": "y unified" if axis.up else "x unified"}}
+    sides = (
+        {"xaxis": value_axis, "yaxis": moved_axis}
+        if axis.up
+        else {"xaxis": moved_axis, "yaxis": value_axis}
+    )
+    return {
+        "data": traces,
+        "layout": {**sides, "hovermode": "y unified" if axis.up else "x unified"},
+    }
 
 
 def band_is_thin(standard: OutputSeries, tolerance: float) -> bool:
@@ -109,7 +166,13 @@ def band_is_thin(standard: OutputSeries, tolerance: float) -> bool:
     return not known or 2 * tolerance < THIN * (max(known) - min(known))
 
 
-def error_figure(motion: str, unit: str, axis: Axis, curves: Sequence[tuple[Style, Values, Deviation]], standard: Values) -> Figure:
+def error_figure(
+    motion: str,
+    unit: str,
+    axis: Axis,
+    curves: Sequence[tuple[Style, Values, Deviation]],
+    standard: Values,
+) -> Figure:
     """Absolute error of each engine per sample on a log axis, with the tolerance and the worst
     sample.
 
@@ -127,28 +190,65 @@ def error_figure(motion: str, unit: str, axis: Axis, curves: Sequence[tuple[Styl
         # three digits are as many as an error deserves, and keep the page small
         rounded = [None if e is None else float(f"{e:.2e}") for e in errors]
         line = {"width": 1.2, "color": style.colour, "dash": style.dash}
-        marker = {"size": 5, "symbol": style.symbol, "color": style.colour, "maxdisplayed": 3 * MARKERS}
-        look = {"name": plain(style.name), "uid": style.key, "meta": style.name, "line": line, "marker": marker}
-        traces.append({"type": "scatter", "mode": "lines+markers", "x": "driver", "y": rounded, **look})
+        marker = {
+            "size": 5,
+            "symbol": style.symbol,
+            "color": style.colour,
+            "maxdisplayed": 3 * MARKERS,
+        }
+        look = {
+            "name": plain(style.name),
+            "uid": style.key,
+            "meta": style.name,
+            "line": line,
+            "marker": marker,
+        }
+        traces.append(
+            {"type": "scatter", "mode": "lines+markers", "x": "driver", "y": rounded, **look}
+        )
     worst = max((deviation for *_, deviation in curves), key=lambda deviation: deviation.max_abs)
     if worst.worst_step < len(axis.values) and 0 < worst.max_abs < math.inf:
-        place = {"x": [axis.scale * axis.values[worst.worst_step]], "y": [worst.max_abs], "hoverinfo": "skip"}
+        place = {
+            "x": [axis.scale * axis.values[worst.worst_step]],
+            "y": [worst.max_abs],
+            "hoverinfo": "skip",
+        }
         ring = {"size": 15, "symbol": "circle-open", "color": "#7f7f7f", "line": {"width": 2}}
-        traces.append({"type": "scatter", "mode": "markers", **place, "marker": ring, "uid": "worst", "meta": "worst"})
+        traces.append(
+            {
+                "type": "scatter",
+                "mode": "markers",
+                **place,
+                "marker": ring,
+                "uid": "worst",
+                "meta": "worst",
+            }
+        )
     tolerance = worst.tolerance
     positive = [e for trace in traces for e in trace["y"] if e]
     ends = positive + ([tolerance] if tolerance else [])
     low, high = min(positive, default=(tolerance or 1e-9) * 1e-6), max(ends, default=1.0)
     side, floor = log_axis(f"{motion} error [{unit}]", low, high)
     layout: Figure = {
-        "xaxis": {"title": {"text": plain(axis.label)}, "hoverformat": ".6~g", "zeroline": False} | _ticks(axis),
+        "xaxis": (
+            {"title": {"text": plain(axis.label)}, "hoverformat": ".6~g", "zeroline": False}
+            | _ticks(axis)
+        ),
         "yaxis": side,
         "hovermode": "x unified",
         "meta": {"floor": floor},
     }
     if tolerance:
         line = {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": tolerance, "y1": tolerance}
-        below = {"type": "rect", "xref": "paper", "x0": 0, "x1": 1, "y0": floor / 10, "y1": tolerance, "layer": "below"}
+        below = {
+            "type": "rect",
+            "xref": "paper",
+            "x0": 0,
+            "x1": 1,
+            "y0": floor / 10,
+            "y1": tolerance,
+            "layer": "below",
+        }
         layout["shapes"] = [
             {**below, "line": {"width": 0}, "fillcolor": "rgba(0,158,115,0.07)"},
             {**line, "line": {"width": 1.5, "dash": "dot", "color": "#7f7f7f"}},
@@ -179,13 +279,19 @@ def log_axis(title: str, low: float, high: float) -> tuple[Figure, float]:
 
 def absolute_errors(values: Values, standard: Values) -> list[float | None]:
     """Distance from what was compared with at each sample; None where either is not known."""
-    return [None if a is None or b is None else abs(a - b) for a, b in zip(values, standard, strict=True)]
+    return [
+        None if a is None or b is None else abs(a - b)
+        for a, b in zip(values, standard, strict=True)
+    ]
 
 
 def _taken(values: Values, kept: Sequence[int], scale: float) -> list[float | None]:
     # JSON has no NaN and no infinity; both mean here that there is nothing to draw.
     taken = (values[k] if k < len(values) else None for k in kept)
-    return [float(f"{scale * v:.{DIGITS}g}") if v is not None and math.isfinite(v) else None for v in taken]
+    return [
+        float(f"{scale * v:.{DIGITS}g}") if v is not None and math.isfinite(v) else None
+        for v in taken
+    ]
 
 
 def _ticks(axis: Axis) -> Figure:

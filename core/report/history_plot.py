@@ -9,13 +9,13 @@ from typing import Any, cast
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from ..harness.labels import (known, number)
-from .figures import (Figure, Style)
-from .figure_data import trend_figures
-from .report import packed
-from .page_model import Plot
 from ..case.io.atomic_files import write
+from ..harness.labels import known, number
 from ..history.queries import History
+from .figure_data import trend_figures
+from .figures import Figure, Style
+from .page_model import Plot
+from .report import packed
 from .trends import trends
 
 _HERE = Path(__file__).parent
@@ -41,11 +41,19 @@ def page(history: History, *, title: str) -> str:
     for place, (case, each) in enumerate(sorted(by_case.items()), 1):
         plots: list[Plot] = []
         for what, figure in trend_figures(each, styles).items():
-            plots.append(Plot(f"{what}-{place}", f"{what} of each engine on {case}, by run, log axis", ""))
+            plots.append(
+                Plot(f"{what}-{place}", f"{what} of each engine on {case}, by run, log axis", "")
+            )
             figures[plots[-1].figure] = figure
-        cases.append((case, [styles[name] for name in dict.fromkeys(past.engine for past in each)], plots))
+        cases.append(
+            (case, [styles[name] for name in dict.fromkeys(past.engine for past in each)], plots)
+        )
     environment = Environment(
-        loader=FileSystemLoader(_HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        loader=FileSystemLoader(_HERE),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
     # which the macros use
     cast("dict[str, Any]", environment.filters).update(number=number, known=known)

@@ -6,8 +6,8 @@ import re
 from xml.etree import ElementTree
 
 from ..harness.compare import describe
-from ..harness.labels import (UNMADE, notes, suspects)
-from ..harness.record import (Deviations, Outcome, Record, Results)
+from ..harness.labels import UNMADE, notes, suspects
+from ..harness.record import Deviations, Outcome, Record, Results
 
 FORBIDDEN = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """What XML 1.0 cannot hold, not even escaped; a simulator's message may."""
@@ -24,23 +24,42 @@ def to_junit(results: Results) -> bytes:
     What is to be known of a case's geometry is the output of its suite.
     """
     root = ElementTree.Element("testsuites", name="kincheck")
-    for case in dict.fromkeys([*(record.case for record in results.records), *(case for case, _, _ in results.missing)]):
+    for case in dict.fromkeys(
+        [*(record.case for record in results.records), *(case for case, _, _ in results.missing)]
+    ):
         suite = ElementTree.SubElement(root, "testsuite", name=case)
         for record in results.records:
             if record.case == case:
                 for output, deviations in record.errors.items():
-                    _test(suite, record, output, deviations, suspected=results.blames_reference(record))
+                    _test(
+                        suite,
+                        record,
+                        output,
+                        deviations,
+                        suspected=results.blames_reference(record),
+                    )
         for name, engine, mode in results.missing:
             if name == case:
                 test = ElementTree.SubElement(
-                    suite, "testcase", classname=f"{case}.{engine}.{mode}", name="never made", time="0.000000"
+                    suite,
+                    "testcase",
+                    classname=f"{case}.{engine}.{mode}",
+                    name="never made",
+                    time="0.000000",
                 )
                 ElementTree.SubElement(test, "error", message=results.unread.get(case, UNMADE))
         said = [f"note: {note}" for named, note in notes(results.run) if named == case]
         said += [f"suspect: {why}" for named, why in suspects(results) if named == case]
         if said:
-            ElementTree.SubElement(suite, "system-out").text = FORBIDDEN.sub("\ufffd", "\n".join(said))
-        for count, tag in (("tests", "testcase"), ("failures", "failure"), ("errors", "error"), ("skipped", "skipped")):
+            ElementTree.SubElement(suite, "system-out").text = FORBIDDEN.sub(
+                "\ufffd", "\n".join(said)
+            )
+        for count, tag in (
+            ("tests", "testcase"),
+            ("failures", "failure"),
+            ("errors", "error"),
+            ("skipped", "skipped"),
+        ):
             suite.set(count, str(sum(1 for _ in suite.iter(tag))))
     ElementTree.indent(root)
     for element in root.iter():
@@ -49,7 +68,14 @@ def to_junit(results: Results) -> bytes:
     return ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
 
 
-def _test(suite: ElementTree.Element, record: Record, output: str, deviations: Deviations, *, suspected: bool = False) -> None:
+def _test(
+    suite: ElementTree.Element,
+    record: Record,
+    output: str,
+    deviations: Deviations,
+    *,
+    suspected: bool = False,
+) -> None:
     seconds = record.seconds.warm if record.seconds and record.seconds.warm is not None else 0.0
     test = ElementTree.SubElement(
         suite,
@@ -71,13 +97,19 @@ def _verdict(record: Record, output: str, deviations: Deviations) -> tuple[str, 
     if record.outcome is Outcome.FAIL:
         (driver, values), *_ = record.driver.items()
         unit = record.outputs[output].unit
-        off = [describe(output, quantity, each, driver, values, unit) for quantity, each in deviations.items() if not each.within]
+        off = [
+            describe(output, quantity, each, driver, values, unit)
+            for quantity, each in deviations.items()
+            if not each.within
+        ]
         if deviations.lost and not off:
             off = [f"{output}: {deviations.reason}"]
         if deviations.contradicted:
             off.append(record.message)
         # missing samples are missing from every output, and a residual is of all of them
-        of_all = record.solved != record.samples or all(each.sound for each in record.errors.values())
+        of_all = record.solved != record.samples or all(
+            each.sound for each in record.errors.values()
+        )
         off += [record.message] if of_all and not off else []
         if off:
             return "failure", "; ".join(off)

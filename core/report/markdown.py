@@ -12,7 +12,12 @@ def escaped(text: str) -> str:
     """Text that Markdown shows as it is, on one line or in a cell: no mark-up, no links, no HTML,
     nobody notified.
     """
-    plain = visible(" ".join(text.split())).replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+    plain = (
+        visible(" ".join(text.split()))
+        .replace("&", "&amp;")
+        .replace("<", "&lt;")
+        .replace(">", "&gt;")
+    )
     # an underscore inside a word, and brackets without a target, are text already
     plain = re.sub(r"([\\`*~|]|(?<!\w)_|_(?!\w)|(?<=\])\()", r"\\\1", plain)
     return re.sub(r"(?<!\w)@(?=\w)", "@\N{WORD JOINER}", plain)

@@ -9,12 +9,12 @@ from typing import TextIO
 from rich.table import Table
 from rich.text import Text
 
+from ..case.io.escape import visible
+from ..harness.labels import against, motion_unit, notes, signs, suspects, unread
+from ..harness.record import Outcome, Record, Results
 from ..trajectory import QUANTITIES
 from . import terminal
-from ..harness.labels import (against, motion_unit, notes, signs, suspects, unread)
-from .markdown import (code, escaped, row)
-from ..harness.record import (Outcome, Record, Results)
-from ..case.io.escape import visible
+from .markdown import code, escaped, row
 from .table import COLOURS, LENGTH, messages, print_messages, print_signs, worst
 
 NOT_ASKED = "–"
@@ -26,13 +26,21 @@ def print_matrix(results: Results, file: TextIO) -> None:
     """
     console = terminal.console(file)
     print_signs(results.run, console)
-    table = Table(box=None, pad_edge=False, header_style="bold", caption=Text(visible(_reading(results))), caption_justify="left")
+    table = Table(
+        box=None,
+        pad_edge=False,
+        header_style="bold",
+        caption=Text(visible(_reading(results))),
+        caption_justify="left",
+    )
     table.add_column("case", overflow="fold")
     engines, rows = _laid_out(results)
     for engine in engines:
         table.add_column(Text(visible(engine)), no_wrap=True)
     for case, records in rows.items():
-        cells = (_cell(records[engine]) if engine in records else Text(NOT_ASKED) for engine in engines)
+        cells = (
+            _cell(records[engine]) if engine in records else Text(NOT_ASKED) for engine in engines
+        )
         table.add_row(Text(visible(case)), *cells)
     console.print(table)
     print_messages(results, console)
@@ -48,7 +56,9 @@ def to_markdown(results: Results) -> str:
     lines = [line for each in signs(results.run) for line in (escaped(f"{each}."), "")]
     lines += [row(map(escaped, head)), row(["---"] * len(head))] if rows else []
     for case, records in rows.items():
-        cells = (escaped(cell(records[engine]) if engine in records else NOT_ASKED) for engine in engines)
+        cells = (
+            escaped(cell(records[engine]) if engine in records else NOT_ASKED) for engine in engines
+        )
         lines.append(row([code(case), *cells]))
     lines += ["", f"{escaped(_reading(results))}."]
     lines += [escaped(f"{said}.") for said in [unread(results.run)] if said]
@@ -67,7 +77,9 @@ def cell(record: Record) -> str:
     errors = [each for quantity in QUANTITIES if (each := worst(record, quantity)) is not None]
     if errors:
         verdict = "" if record.outcome is Outcome.PASS else f"{record.outcome.shown}: "
-        return verdict + " · ".join(f"{error.max_abs:.0e} {unit}".rstrip() for error, unit in errors)
+        return verdict + " · ".join(
+            f"{error.max_abs:.0e} {unit}".rstrip() for error, unit in errors
+        )
     if record.outcome is Outcome.UNJUDGED and record.residual_max is not None:
         return f"{record.outcome.shown}, residual {record.residual_max:.0e}"
     return record.outcome.shown
@@ -84,7 +96,12 @@ def _laid_out(results: Results) -> tuple[list[str], dict[str, dict[str, Record]]
 def _reading(results: Results) -> str:
     """How to read the cells."""
     standards = sorted(
-        {each.against for record in results.records for errors in record.errors.values() for _, each in errors.items()}
+        {
+            each.against
+            for record in results.records
+            for errors in record.errors.values()
+            for _, each in errors.items()
+        }
     )
     if not standards:
         return "No errors: nothing was compared with anything"

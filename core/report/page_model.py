@@ -6,15 +6,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ..trajectory import QUANTITIES
 from ..case.case import Truth
 from ..harness.evidence import Evidence
-from ..harness.labels import (against, engine_name, motion_unit, number, output_label)
-from ..harness.record import (Deviation, OutputSeries, Record, Results)
+from ..harness.labels import against, engine_name, motion_unit, number, output_label
+from ..harness.record import Deviation, OutputSeries, Record, Results
+from ..trajectory import QUANTITIES
 from .axis import Axis, driver_axis
 from .drawing import Drawing, drawing
+from .figure_data import Effort, Past, precision_figure, trend_figures
 from .figures import Figure, Style, Values, band_is_thin, error_figure, output_figure
-from .figure_data import (Effort, Past, precision_figure, trend_figures)
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,9 @@ class Judged:
     def ratio(self) -> float:
         """The error in tolerances."""
         d = self.deviation
-        return d.max_abs / d.tolerance if d.tolerance > 0 else float("inf") if d.max_abs > 0 else 0.0
+        return (
+            d.max_abs / d.tolerance if d.tolerance > 0 else float("inf") if d.max_abs > 0 else 0.0
+        )
 
     @property
     def unit(self) -> str:
@@ -41,7 +43,12 @@ class Judged:
 
 def judged(records: Sequence[Record]) -> list[Judged]:
     """Every deviation of the records."""
-    return [Judged(r, output, motion, d) for r in records for output, e in r.errors.items() for motion, d in e.items()]
+    return [
+        Judged(r, output, motion, d)
+        for r in records
+        for output, e in r.errors.items()
+        for motion, d in e.items()
+    ]
 
 
 def worst(deviations: Sequence[Judged]) -> Judged | None:
@@ -113,7 +120,9 @@ class Material:
     limits: Sequence[tuple[str, str]] = ()
 
 
-def case_view(given: Material, name: str, anchor: str, styles: Mapping[str, Style], figures: dict[str, Figure]) -> CaseView:
+def case_view(
+    given: Material, name: str, anchor: str, styles: Mapping[str, Style], figures: dict[str, Figure]
+) -> CaseView:
     """One case of the page; its figures are added to `figures`."""
     results = given.results
     records = [record for record in results.records if record.case == name]
@@ -122,9 +131,13 @@ def case_view(given: Material, name: str, anchor: str, styles: Mapping[str, Styl
     axis = driver_axis(facts, records, (each.deviation.worst_step for each in deviations))
     references = results.references.get(name, {})
     outputs: list[OutputView] = []
-    for index, output in enumerate(dict.fromkeys(output for record in records for output in record.outputs)):
+    for index, output in enumerate(
+        dict.fromkeys(output for record in records for output in record.outputs)
+    ):
         here = [each for each in deviations if each.output == output]
-        outputs.append(_output(output, f"{anchor}-{index}", here, records, axis, references, styles, figures))
+        outputs.append(
+            _output(output, f"{anchor}-{index}", here, records, axis, references, styles, figures)
+        )
     return CaseView(
         name=name,
         anchor=anchor,
@@ -135,7 +148,9 @@ def case_view(given: Material, name: str, anchor: str, styles: Mapping[str, Styl
         axis=axis,
         outputs=outputs,
         worst=worst(deviations),
-        account=next((r.details["dof_account"] for r in records if r.details.get("dof_account")), None),
+        account=next(
+            (r.details["dof_account"] for r in records if r.details.get("dof_account")), None
+        ),
         scene=drawing(results.scenes[name], axis) if name in results.scenes else None,
         trends=_trends(anchor, given.history.get(name, ()), styles, figures),
         precision=_precision(anchor, given.precision.get(name, ()), styles, figures),
@@ -160,7 +175,10 @@ def _output(
         values: Values | None = getattr(_standard(here, records, references), motion, None)
         if values is None:
             continue
-        found = [(styles[engine_name(j.record)], getattr(j.record.outputs[output], motion), j.deviation) for j in here]
+        found = [
+            (styles[engine_name(j.record)], getattr(j.record.outputs[output], motion), j.deviation)
+            for j in here
+        ]
         title = f"{motion} error of {label} against {axis.name}, log axis"
         errors.append(Plot(f"{key}-{motion}", title, _worst_caption(here, axis)))
         figures[f"{key}-{motion}"] = error_figure(motion, here[0].unit, axis, found, values)
@@ -168,23 +186,38 @@ def _output(
     standard = _standard(positions, records, references)
     band = (standard, positions[0].deviation.tolerance) if standard else None
     figures[key] = output_figure(output, axis, curves, truth, band)
-    said = [f"{sense[0].upper()}{sense[1:]}." for _, series in curves[:1] if (sense := series.sense)]
+    said = [
+        f"{sense[0].upper()}{sense[1:]}." for _, series in curves[:1] if (sense := series.sense)
+    ]
     said += [] if truth else ["No reference."]
     said += [_band_caption(*band, against(positions[0].deviation.against))] if band else []
-    plot = Plot(key, f"{label} against {axis.name}, all engines", " ".join([*said, axis.besides]).strip())
+    plot = Plot(
+        key, f"{label} against {axis.name}, all engines", " ".join([*said, axis.besides]).strip()
+    )
     return OutputView(output, label, plot, errors)
 
 
-def _trends(anchor: str, history: Sequence[Past], styles: Mapping[str, Style], figures: dict[str, Figure]) -> list[Plot]:
+def _trends(
+    anchor: str, history: Sequence[Past], styles: Mapping[str, Style], figures: dict[str, Figure]
+) -> list[Plot]:
     runs = len(dict.fromkeys(each.run for each in history))
     if runs < 2:  # the report's own
         return []
     made = trend_figures(history, styles)
     figures.update({f"{anchor}-trend-{what}": figure for what, figure in made.items()})
-    return [Plot(f"{anchor}-trend-{what}", f"{what} over {runs} runs, log axis", f"{runs} runs, oldest first.") for what in made]
+    return [
+        Plot(
+            f"{anchor}-trend-{what}",
+            f"{what} over {runs} runs, log axis",
+            f"{runs} runs, oldest first.",
+        )
+        for what in made
+    ]
 
 
-def _precision(anchor: str, efforts: Sequence[Effort], styles: Mapping[str, Style], figures: dict[str, Figure]) -> list[Plot]:
+def _precision(
+    anchor: str, efforts: Sequence[Effort], styles: Mapping[str, Style], figures: dict[str, Figure]
+) -> list[Plot]:
     plots: list[Plot] = []
     for mode in dict.fromkeys(each.mode for each in efforts):
         key = f"{anchor}-precision-{mode}"
@@ -203,7 +236,9 @@ def _standard(
     if not deviations:
         return None
     output, standard = deviations[0].output, deviations[0].deviation.against
-    engines = {record.engine: record.outputs[output] for record in records if output in record.outputs}
+    engines = {
+        record.engine: record.outputs[output] for record in records if output in record.outputs
+    }
     return engines.get(standard) or references.get(output)
 
 
@@ -217,4 +252,7 @@ def _worst_caption(deviations: Sequence[Judged], axis: Axis) -> str:
     largest = max(deviations, key=lambda each: each.deviation.max_abs)
     d = largest.deviation
     who = f"{engine_name(largest.record)}, sample {d.worst_step} ({axis.at(d.worst_step)})"
-    return f"Worst {number(d.max_abs)}: {who}. Tolerance {number(d.tolerance)}, against {against(d.against)}."
+    return (
+        f"Worst {number(d.max_abs)}: {who}. Tolerance {number(d.tolerance)}, against"
+        f" {against(d.against)}."
+    )

@@ -8,8 +8,8 @@ import sys
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 
-from ..harness.record import (Outcome, Record, Results)
 from ..case.io.escape import visible
+from ..harness.record import Outcome, Record, Results
 
 
 def complain(lines: Iterable[str]) -> None:
@@ -39,16 +39,26 @@ def lacking(results: Results, required: Sequence[str], named: Sequence[str] = ()
     missing.
     """
     lines = [
-        f"required engine {record.engine!r}: {record.message}" + (f"; {how_to_install(record.engine)}")
-        if record.outcome is Outcome.UNAVAILABLE
-        else f"required engine {record.engine!r}: case {record.case!r} is unsupported: {record.message}"
+        (
+            f"required engine {record.engine!r}: {record.message}"
+            + f"; {how_to_install(record.engine)}"
+            if record.outcome is Outcome.UNAVAILABLE
+            else (
+                f"required engine {record.engine!r}: case {record.case!r} is unsupported:"
+                f" {record.message}"
+            )
+        )
         for record in results.records
-        if record.engine in required and record.outcome in (Outcome.UNAVAILABLE, Outcome.UNSUPPORTED)
+        if record.engine in required
+        and record.outcome in (Outcome.UNAVAILABLE, Outcome.UNSUPPORTED)
     ]
     lines += [
-        f"engine {record.engine!r} is named and missing: {record.message}; {how_to_install(record.engine)}"
+        f"engine {record.engine!r} is named and missing: {record.message};"
+        f" {how_to_install(record.engine)}"
         for record in results.records
-        if record.engine in named and record.engine not in required and record.outcome is Outcome.UNAVAILABLE
+        if record.engine in named
+        and record.engine not in required
+        and record.outcome is Outcome.UNAVAILABLE
     ]
     return list(dict.fromkeys(lines))
 
@@ -61,13 +71,21 @@ def uncompared(results: Results) -> list[str]:
     if any(outcome.judged for outcome in counts):
         return []
     if not counts[Outcome.UNJUDGED] and any(outcome.bad for outcome in counts):
-        return ["nothing was solved: every engine that was there and able ended in an error, a timeout or a crash"]
+        return [
+            "nothing was solved: every engine that was there and able ended in an error, a timeout"
+            " or a crash"
+        ]
     # it was stopped, or its cases cannot be read, which is said already
     if not counts or results.missing:
         return []
-    found = ", ".join(f"{counts[outcome]} {outcome.shown}" for outcome in Outcome if counts[outcome])
+    found = ", ".join(
+        f"{counts[outcome]} {outcome.shown}" for outcome in Outcome if counts[outcome]
+    )
     remedy = "give the case a reference, or run another engine beside the native one"
-    return [f"nothing was compared ({found}); {remedy if counts[Outcome.UNJUDGED] else 'run other engines'}"]
+    return [
+        f"nothing was compared ({found});"
+        f" {remedy if counts[Outcome.UNJUDGED] else 'run other engines'}"
+    ]
 
 
 def how_to_install(engine: str) -> str:

@@ -9,8 +9,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from ..errors import shortened
-from ..harness.labels import (motion_unit, number, product, unread_count)
-from ..history.regression.findings import (Finding, Kind, Loose, Regressions, Step)
+from ..harness.labels import motion_unit, number, product, unread_count
+from ..history.regression.findings import Finding, Kind, Loose, Regressions, Step
 
 LONGEST = 12
 """Rows of a group that are shown; a broken engine has one for every case. The JSON has all."""
@@ -61,7 +61,11 @@ def headline(found: Regressions) -> str:
     """The report in one sentence."""
     if found.against is None:
         judged = found.pairs - len(found.unjudged)
-        failing = f"{len(found.failing)} of {judged} not right" if found.failing else f"all {judged} right"
+        failing = (
+            f"{len(found.failing)} of {judged} not right"
+            if found.failing
+            else f"all {judged} right"
+        )
         # with nothing to compare with there are no other regressions
         never = _counted(found, Kind.LOST)
         rest = [f"{len(found.unjudged)} not judged"] if found.unjudged else []
@@ -69,8 +73,15 @@ def headline(found: Regressions) -> str:
         absent = _counted(found, Kind.ABSENT)
         rest += [f"{absent} {Kind.ABSENT}"] if absent else []
         rest += [unread_count(len(found.unread))] if found.unread else []
-        return f"{found.run.name}: {', '.join([failing, *rest])}; compared with nothing: {found.reason}"
-    counts = [f"{_counted(found, kind)} {_plural(kind, found)}" for kind in Kind if found.fails(kind) and _counted(found, kind)]
+        return (
+            f"{found.run.name}: {', '.join([failing, *rest])}; compared with nothing:"
+            f" {found.reason}"
+        )
+    counts = [
+        f"{_counted(found, kind)} {_plural(kind, found)}"
+        for kind in Kind
+        if found.fails(kind) and _counted(found, kind)
+    ]
     counts += [unread_count(len(found.unread))] if found.unread else []
     said = ", ".join(counts) or "nothing regressed"
     fixed = len(pairs(found, Kind.FIXED))
@@ -88,7 +99,11 @@ def headline(found: Regressions) -> str:
 
 def versions(found: Regressions) -> list[str]:
     """The versions that changed, those of the machine and the settings aside."""
-    return [str(change) for change in found.changes if change.what not in ("host", "processor", "platform", "commit", "tol")]
+    return [
+        str(change)
+        for change in found.changes
+        if change.what not in ("host", "processor", "platform", "commit", "tol")
+    ]
 
 
 def pairs(found: Regressions, kind: Kind) -> set[tuple[str, str, str]]:
@@ -119,7 +134,9 @@ def rows(findings: Iterable[Finding]) -> list[Row]:
     alike: dict[tuple[str, str, int | None, int], list[str]] = {}
     for (case, engine, mode), each in by_pair.items():
         first = max(each, key=lambda finding: finding.ratio or 0.0)
-        alike.setdefault((product(engine, mode), first.message, first.since, len(each) - 1), []).append(case)
+        alike.setdefault(
+            (product(engine, mode), first.message, first.since, len(each) - 1), []
+        ).append(case)
     engines: dict[tuple[tuple[str, ...], str, int | None, int], list[str]] = {}
     for (engine, message, since, more), cases in alike.items():
         engines.setdefault((tuple(cases), message, since, more), []).append(engine)
@@ -134,7 +151,8 @@ def step_says(step: Step) -> str:
     elif step.quantity == "time":
         what = f"{number(1e3 * step.before)} → {number(1e3 * step.now)} ms a sweep"
     else:
-        what = f"{number(step.before)} → {number(step.now)} {motion_unit(step.unit, step.quantity)}".rstrip()
+        unit = motion_unit(step.unit, step.quantity)
+        what = f"{number(step.before)} → {number(step.now)} {unit}".rstrip()
     changed = ", ".join(map(str, step.changes)) or "no version, machine or commit changed there"
     repaired = f", repaired in run {step.repaired}" if step.repaired is not None else ""
     since = f"since run {step.first} ({step.started[:16].replace('T', ' ')}){repaired}"
@@ -151,6 +169,10 @@ def loose_says(loose: Sequence[Loose]) -> list[str]:
         least = min(each, key=lambda one: one.factor or math.inf)
         many = f"{len(each)} outputs" if len(each) > 1 else least.output
         reason = f"; its reason: {least.why}" if least.why else ""
-        factor = f"{number(least.factor)} times or more" if least.factor else "as far as you like, all errors are zero"
+        factor = (
+            f"{number(least.factor)} times or more"
+            if least.factor
+            else "as far as you like, all errors are zero"
+        )
         lines.append(f"{case}: {many}, {factor}, by {least.runs} runs{reason}")
     return lines

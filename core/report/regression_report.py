@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import msgspec
 
-from ..history.queries import (NIGHTS, NOTHING, History, read)
-from ..history.store import Store
 from ..harness.record import Outcome
-from ..history.regression.compare import (changes, compare, same_machine, unmade)
-from ..history.regression.slow_drift import crept
-from ..history.regression.findings import (Finding, Kind, Regressions, Step)
-from ..history.regression.thresholds import slowest
+from ..history.queries import NIGHTS, NOTHING, History, read
+from ..history.regression.change_points import OUTCOME, TIME, steps
+from ..history.regression.circumstance_changes import changes, same_machine
+from ..history.regression.compare import compare, unmade
+from ..history.regression.findings import Finding, Kind, Regressions, Step
 from ..history.regression.loose_tolerances import loose
 from ..history.regression.missing_pairs import missing
-from ..history.regression.solution_changes import differing
-from ..history.regression.change_points import (OUTCOME, TIME, steps)
 from ..history.regression.run_selection import Subject
+from ..history.regression.slow_drift import crept
+from ..history.regression.solution_changes import differing
+from ..history.regression.thresholds import slowest
+from ..history.store import Store
 
 RECENT = 20
 """Runs that the spread of times is taken from: what the machine is like lately."""
@@ -44,7 +45,11 @@ def regressions(
     standing = steps(around, standing=True)
     found = unmade(subject)
     if against is not None:
-        then = NOTHING if against.number is None else _alike(subject, around, before=against.number + 1)
+        then = (
+            NOTHING
+            if against.number is None
+            else _alike(subject, around, before=against.number + 1)
+        )
         found += compare(subject, against, then, limit)
         found += differing(subject, against)
         found += crept(subject, around, found)
@@ -55,8 +60,14 @@ def regressions(
         against=against.label if against else None,
         reason=reason,
         pairs=len(records),
-        failing=[(record.case, record.engine, record.mode) for record in records if record.outcome.bad],
-        unjudged=[(record.case, record.engine, record.mode) for record in records if record.outcome is Outcome.UNJUDGED],
+        failing=[
+            (record.case, record.engine, record.mode) for record in records if record.outcome.bad
+        ],
+        unjudged=[
+            (record.case, record.engine, record.mode)
+            for record in records
+            if record.outcome is Outcome.UNJUDGED
+        ],
         unread=[*subject.results.unread],
         time_limit=limit,
         missing_is_failure=missing_is_failure,
@@ -84,14 +95,25 @@ def _alike(subject: Subject, around: History, *, before: int | None) -> History:
         if (before is None or number < before) and same_machine(row.circumstances, subject.facts)
     }
     runs = dict([*runs.items()][-RECENT:])
-    pairs = {pair: [entry for entry in entries if entry.run in runs] for pair, entries in around.pairs.items()}
+    pairs = {
+        pair: [entry for entry in entries if entry.run in runs]
+        for pair, entries in around.pairs.items()
+    }
     return History(runs, pairs)
 
 
 def _since(finding: Finding, standing: list[Step]) -> Finding:
     """With the first run that has it, where a step says so."""
-    quantity = {Kind.SLOWER: TIME, Kind.FAILURE: OUTCOME, Kind.DRIFTED: finding.motion}.get(finding.kind)
-    about = (finding.case, finding.engine, finding.mode, quantity, finding.output if finding.kind is Kind.DRIFTED else None)
+    quantity = {Kind.SLOWER: TIME, Kind.FAILURE: OUTCOME, Kind.DRIFTED: finding.motion}.get(
+        finding.kind
+    )
+    about = (
+        finding.case,
+        finding.engine,
+        finding.mode,
+        quantity,
+        finding.output if finding.kind is Kind.DRIFTED else None,
+    )
     for step in standing:
         if (step.case, step.engine, step.mode, step.quantity, step.output) == about:
             return msgspec.structs.replace(finding, since=step.first)

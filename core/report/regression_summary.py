@@ -11,9 +11,9 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from ..harness.labels import product
-from .markdown import (escaped, row)
-from ..history.regression.findings import (WHY, Kind, Regressions, Step)
-from .regression_labels import (LONGEST, headline, loose_says, pairs, rows, step_says)
+from ..history.regression.findings import WHY, Kind, Regressions, Step
+from .markdown import escaped, row
+from .regression_labels import LONGEST, headline, loose_says, pairs, rows, step_says
 
 
 def to_markdown(found: Regressions) -> str:
@@ -24,16 +24,31 @@ def to_markdown(found: Regressions) -> str:
 def to_markup(found: Regressions) -> Markup:
     """The same as a part of an HTML page."""
     here = FileSystemLoader(Path(__file__).parent)
-    environment = Environment(loader=here, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment = Environment(
+        loader=here,
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
     groups = [
-        (kind, WHY[kind], len(pairs(found, kind)), rows(each for each in found.findings if each.kind is kind)) for kind in Kind
+        (
+            kind,
+            WHY[kind],
+            len(pairs(found, kind)),
+            rows(each for each in found.findings if each.kind is kind),
+        )
+        for kind in Kind
     ]
     return Markup(
         environment.get_template("regressions.html").render(
             headline=headline(found),
             found=found,
             groups=[group for group in groups if group[2]],
-            steps=[(product(step.engine, step.mode), step.case, step_says(step)) for step in found.steps],
+            steps=[
+                (product(step.engine, step.mode), step.case, step_says(step))
+                for step in found.steps
+            ],
             loose=loose_says(found.loose),
             longest=LONGEST,
         )
@@ -52,7 +67,11 @@ def _lines(found: Regressions) -> Iterator[str]:
             continue
         folded = not found.fails(kind) and kind not in (Kind.FIXED, Kind.JUDGED)
         title = f"{kind.capitalize()} ({len(pairs(found, kind))}): {WHY[kind]}"
-        yield from [f"<details><summary>{escaped(title)}</summary>", ""] if folded else [f"**{escaped(title)}**", ""]
+        yield from (
+            [f"<details><summary>{escaped(title)}</summary>", ""]
+            if folded
+            else [f"**{escaped(title)}**", ""]
+        )
         yield from ("| engine | case | what |", "| --- | --- | --- |")
         for each in group[:LONGEST]:
             yield row(map(escaped, (each.engine, each.where, each.what)))
@@ -63,11 +82,18 @@ def _lines(found: Regressions) -> Iterator[str]:
     if found.steps:
         yield from ("**Steps in the history that still stand**", "")
         yield from (f"- {escaped(_step(step))}" for step in found.steps[:LONGEST])
-        yield from [f"- and {len(found.steps) - LONGEST} more, all in the JSON"] if len(found.steps) > LONGEST else []
+        yield from (
+            [f"- and {len(found.steps) - LONGEST} more, all in the JSON"]
+            if len(found.steps) > LONGEST
+            else []
+        )
         yield ""
     if found.loose:
         lines = loose_says(found.loose)
-        yield from (f"<details><summary>Tolerances that could be tightened ({len(lines)} cases)</summary>", "")
+        yield from (
+            f"<details><summary>Tolerances that could be tightened ({len(lines)} cases)</summary>",
+            "",
+        )
         yield from (f"- {escaped(line)}" for line in lines)
         yield from ("", "</details>", "")
 

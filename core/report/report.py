@@ -17,18 +17,32 @@ from typing import Any, cast
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
+from ..harness.labels import (
+    TRUTHS,
+    against,
+    engine_name,
+    known,
+    number,
+    output_label,
+    product,
+    suspects,
+    unread_count,
+    validation,
+)
+from ..harness.record import Outcome, Record, Results
 from ..trajectory import QUANTITIES
-from ..harness.labels import (TRUTHS, against, engine_name, known, number, output_label, product, suspects, unread_count, unsound)
-from ..harness.record import (Outcome, Record, Results)
 from .caveats import ANSWERED, caveats
+from .figure_data import Effort, Past
 from .figures import Figure, Style
-from .figure_data import (Effort, Past)
-from .page_model import (CaseView, Judged, Material, case_view, judged, worst)
+from .page_model import CaseView, Judged, Material, case_view, judged, worst
 
 NOT_JUDGED = (Outcome.UNJUDGED, Outcome.UNSUPPORTED, Outcome.UNAVAILABLE)
 BROKEN = (Outcome.ERROR, Outcome.TIMEOUT, Outcome.CRASHED)
 
-WITHOUT_TRENDS = "No trends", "The history cannot be read, so that this page says nothing of earlier runs."
+WITHOUT_TRENDS = (
+    "No trends",
+    "The history cannot be read, so that this page says nothing of earlier runs.",
+)
 """Limit of a report whose history has a fault."""
 FAULTS = (
     ("is", "are", "outside tolerance"),
@@ -67,7 +81,9 @@ def write_report(
     Raises:
         OSError: the file cannot be written.
     """
-    path.write_text(render(Material(results, history or {}, precision or {}, limits), changes), encoding="utf-8")
+    path.write_text(
+        render(Material(results, history or {}, precision or {}, limits), changes), encoding="utf-8"
+    )
 
 
 def render(given: Material, changes: Markup | None = None) -> str:
@@ -76,11 +92,16 @@ def render(given: Material, changes: Markup | None = None) -> str:
     plotly: Any = importlib.import_module("plotly.offline")
     records = given.results.records
     never = {(case, product(engine, mode)) for case, engine, mode in given.results.missing}
-    names = dict.fromkeys([*(engine_name(record) for record in records), *sorted(name for _, name in never)])
+    names = dict.fromkeys(
+        [*(engine_name(record) for record in records), *sorted(name for _, name in never)]
+    )
     styles = {name: Style.number(index, name) for index, name in enumerate(names)}
     figures: dict[str, Figure] = {}
     case_names = dict.fromkeys(record.case for record in records)
-    cases = [case_view(given, name, f"case-{index}", styles, figures) for index, name in enumerate(case_names)]
+    cases = [
+        case_view(given, name, f"case-{index}", styles, figures)
+        for index, name in enumerate(case_names)
+    ]
     data = {
         "drivers": {case.anchor: case.axis.shown for case in cases},
         "figures": figures,
@@ -93,7 +114,11 @@ def render(given: Material, changes: Markup | None = None) -> str:
             headline=headline(given.results),
             changes=changes,
             worst=max(
-                ((case, case.worst) for case in cases if case.worst and case.name not in given.results.suspects),
+                (
+                    (case, case.worst)
+                    for case in cases
+                    if case.worst and case.name not in given.results.suspects
+                ),
                 key=lambda each: each[1].ratio,
                 default=None,
             ),
@@ -103,9 +128,14 @@ def render(given: Material, changes: Markup | None = None) -> str:
             problems=_grouped(
                 record
                 for record in records
-                if record.outcome in (Outcome.FAIL, *BROKEN) and not given.results.blames_reference(record)
+                if record.outcome in (Outcome.FAIL, *BROKEN)
+                and not given.results.blames_reference(record)
             ),
-            circumstances={key: value for key, value in given.results.run.items() if key not in ("cases", "missing", "unread")},
+            circumstances={
+                key: value
+                for key, value in given.results.run.items()
+                if key not in ("cases", "missing", "unread")
+            },
             unread=given.results.unread,
             settings=_settings(records),
             styles=styles,
@@ -129,10 +159,20 @@ def render(given: Material, changes: Markup | None = None) -> str:
 
 def _environment() -> Environment:
     environment = Environment(
-        loader=FileSystemLoader(_HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        loader=FileSystemLoader(_HERE),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
     cast("dict[str, Any]", environment.filters).update(
-        number=number, label=output_label, engine=engine_name, against=against, model=_model, known=known, worst=_worst_of
+        number=number,
+        label=output_label,
+        engine=engine_name,
+        against=against,
+        model=_model,
+        known=known,
+        worst=_worst_of,
     )
     return environment
 
@@ -158,7 +198,9 @@ def headline(results: Results) -> str:
     failed = [record for record in compared if record.outcome is Outcome.FAIL]
     faults = Counter(_fault(record, results.run.get("tol", 0.0)) for record in failed)
     counts = [
-        f"{n} of {len(compared)} comparisons {one if n == 1 else more} {what}" for one, more, what in FAULTS if (n := faults[what])
+        f"{n} of {len(compared)} comparisons {one if n == 1 else more} {what}"
+        for one, more, what in FAULTS
+        if (n := faults[what])
     ]
     if not compared:
         said = "Nothing was compared"
@@ -209,29 +251,28 @@ def severity(case: CaseView) -> float:
 def searched(case: CaseView) -> str:
     """The words by which the overview finds a case."""
     words = [case.name, case.source, TRUTHS[case.truth], *(output.name for output in case.outputs)]
-    words += [text for record in case.records for text in (record.engine, record.version or "", record.message)]
+    words += [
+        text
+        for record in case.records
+        for text in (record.engine, record.version or "", record.message)
+    ]
     return " ".join(words).lower()
-
-
-def validation(record: Record) -> str:
-    """What may be called validated, if anything."""
-    if not record.validated:
-        return f"{said}: not validated" if record.outcome is Outcome.PASS and (said := unsound(record)) else ""
-    standards = {deviation.against for errors in record.errors.values() for _, deviation in errors.items()}
-    whole = standards == {record.truth} and all(len(errors.items()) == len(QUANTITIES) for errors in record.errors.values())
-    return "validated" if whole else "validated, positions only"
 
 
 def _model(record: Record) -> dict[str, Any]:
     """What an engine tells of the model it made, beyond what has a table of its own."""
-    return {key: value for key, value in record.details.items() if key not in ("dof_account", "program")}
+    return {
+        key: value for key, value in record.details.items() if key not in ("dof_account", "program")
+    }
 
 
 def _grouped(records: Iterable[Record]) -> list[tuple[Outcome, str, str, list[str]]]:
     """Outcome, engine and message, with the cases they were the same for."""
     groups: dict[tuple[Outcome, str, str], list[str]] = {}
     for record in records:
-        groups.setdefault((record.outcome, engine_name(record), record.message), []).append(record.case)
+        groups.setdefault((record.outcome, engine_name(record), record.message), []).append(
+            record.case
+        )
     return [(*key, cases) for key, cases in groups.items()]
 
 
@@ -239,7 +280,9 @@ def _settings(records: Sequence[Record]) -> list[tuple[str, dict[str, Any], list
     """Each engine's distinct settings, with the cases they were the same for."""
     groups: dict[str, tuple[str, dict[str, Any], list[str]]] = {}
     for record in records:
-        group = groups.setdefault(f"{engine_name(record)} {record.settings}", (engine_name(record), record.settings, []))
+        group = groups.setdefault(
+            f"{engine_name(record)} {record.settings}", (engine_name(record), record.settings, [])
+        )
         group[2].append(record.case)
     return list(groups.values())
 

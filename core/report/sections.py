@@ -17,14 +17,14 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from rich.table import Table
 from rich.text import Text
 
+from ..case.io.atomic_files import to_standard_output, write_all
 from ..errors import KincheckError
-from . import terminal
-from ..harness.labels import (known, number)
+from ..harness.labels import known, number
 from ..harness.record import to_json
-from .figures import (Figure, Style)
-from .report import packed
+from . import terminal
+from .figures import Figure, Style
 from .page_model import Plot
-from ..case.io.atomic_files import (to_standard_output, write_all)
+from .report import packed
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,10 @@ def deliver(report: Report, results: msgspec.Struct, *, out: Path | None, json: 
     """
     contents = [(Path(json), to_json(results))] if json not in (None, "-") else []
     if out is not None:
-        contents += [(out / f"{report.name}.json", to_json(results)), (out / f"{report.name}.html", page(report).encode())]
+        contents += [
+            (out / f"{report.name}.json", to_json(results)),
+            (out / f"{report.name}.html", page(report).encode()),
+        ]
     problems = write_all(contents)  # before anything is printed: who reads it may have gone
     print_report(report, sys.stderr if json == "-" else sys.stdout)
     if json == "-":
@@ -111,15 +114,27 @@ def page(report: Report) -> str:
     """The report as one HTML file, in the look of a run's."""
     here = Path(__file__).parent
     environment = Environment(
-        loader=FileSystemLoader(here), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        loader=FileSystemLoader(here),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
     # which the macros use
     cast("dict[str, Any]", environment.filters).update(number=number, known=known)
-    figures = {diagram.plot.figure: diagram.figure for section in report.sections for diagram in section.diagrams}
+    figures = {
+        diagram.plot.figure: diagram.figure
+        for section in report.sections
+        for diagram in section.diagrams
+    }
     shown: dict[str, str] = {}
     if figures:
         plotly: Any = importlib.import_module("plotly.offline")
-        data = json.dumps({"drivers": {}, "figures": figures, "scenes": {}}, allow_nan=False, separators=(",", ":"))
+        data = json.dumps(
+            {"drivers": {}, "figures": figures, "scenes": {}},
+            allow_nan=False,
+            separators=(",", ":"),
+        )
         shown = {
             "data": packed(data),
             "plotlyjs": packed(plotly.get_plotlyjs()),

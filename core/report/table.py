@@ -10,13 +10,18 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from ..case.io.escape import visible
+from ..harness.labels import against, motion_unit, notes, signs, suspects, unread, unsound
+from ..harness.record import Deviation, Outcome, Record, Results
 from ..trajectory import QUANTITIES
 from . import terminal
-from ..harness.labels import (against, motion_unit, notes, signs, suspects, unread, unsound)
-from ..harness.record import (Deviation, Outcome, Record, Results)
-from ..case.io.escape import visible
 
-COLOURS = {Outcome.PASS: "green", Outcome.UNJUDGED: "yellow", Outcome.UNSUPPORTED: "yellow", Outcome.UNAVAILABLE: "yellow"}
+COLOURS = {
+    Outcome.PASS: "green",
+    Outcome.UNJUDGED: "yellow",
+    Outcome.UNSUPPORTED: "yellow",
+    Outcome.UNAVAILABLE: "yellow",
+}
 LENGTH = "m"
 
 
@@ -61,9 +66,17 @@ def print_messages(results: Results, console: Console) -> None:
     for case, why in suspects(results):
         console.print(Text(visible(f"suspect: {case}: {why}"), style="bold"), soft_wrap=True)
     for (engine, outcome, message), cases in messages(results).items():
-        console.print(Text(visible(f"{outcome.shown}: {', '.join(cases)} · {engine}: {message}", also="\n\t")), soft_wrap=True)
+        console.print(
+            Text(
+                visible(f"{outcome.shown}: {', '.join(cases)} · {engine}: {message}", also="\n\t")
+            ),
+            soft_wrap=True,
+        )
     counts = Counter(record.outcome for record in results.records)
-    console.print(", ".join(f"{count} {outcome.shown}" for outcome in Outcome if (count := counts[outcome])) or "nothing was run")
+    console.print(
+        ", ".join(f"{count} {outcome.shown}" for outcome in Outcome if (count := counts[outcome]))
+        or "nothing was run"
+    )
     if said := unread(results.run):
         console.print(Text(visible(said), style="bold red"), soft_wrap=True)
 
@@ -81,7 +94,9 @@ def _error(record: Record, quantity: str) -> Text:
     if found is None:
         return Text("–")
     error, unit = found
-    return Text(visible(f"{error.max_abs:.1e} {unit}".rstrip()), style="" if error.within else "bold red")
+    return Text(
+        visible(f"{error.max_abs:.1e} {unit}".rstrip()), style="" if error.within else "bold red"
+    )
 
 
 def worst(record: Record, quantity: str) -> tuple[Deviation, str] | None:
@@ -94,8 +109,14 @@ def worst(record: Record, quantity: str) -> tuple[Deviation, str] | None:
     found: list[tuple[Deviation, str]] = []
     for output, errors in record.errors.items():
         unit = record.outputs[output].unit if output in record.outputs else LENGTH
-        found += [(each, "" if unit == LENGTH else f"[{unit}]") for name, each in errors.items() if name == quantity]
-    return max(found, key=lambda each: (not each[0].within, not each[1], each[0].max_abs), default=None)
+        found += [
+            (each, "" if unit == LENGTH else f"[{unit}]")
+            for name, each in errors.items()
+            if name == quantity
+        ]
+    return max(
+        found, key=lambda each: (not each[0].within, not each[1], each[0].max_abs), default=None
+    )
 
 
 def messages(results: Results) -> dict[tuple[str, Outcome, str], list[str]]:

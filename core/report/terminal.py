@@ -14,8 +14,8 @@ import msgspec
 from rich.console import Console
 from rich.table import Table
 
+from ..case.io.atomic_files import to_standard_output, write
 from ..harness.record import to_json
-from ..case.io.atomic_files import (to_standard_output, write)
 
 # Columns for a log or a pipe, which have no width of their own: the table's lines are not to be
 # broken there.
@@ -43,7 +43,13 @@ def console(file: TextIO) -> Console:
     """Where to print text as it is: names may have square brackets or colons, which rich takes for
     colours and pictures.
     """
-    return _Console(file=file, width=None if file.isatty() else LOG_WIDTH, highlight=False, markup=False, emoji=False)
+    return _Console(
+        file=file,
+        width=None if file.isatty() else LOG_WIDTH,
+        highlight=False,
+        markup=False,
+        emoji=False,
+    )
 
 
 def page(json: str | None) -> Console:
@@ -53,10 +59,22 @@ def page(json: str | None) -> Console:
 
 def columns(*heads: str, title: str | None = None) -> Table:
     """A table without lines; columns whose heads begin with ">" stand right."""
-    table = Table(box=None, pad_edge=False, header_style="bold", title=title, title_justify="left", title_style="bold")
+    table = Table(
+        box=None,
+        pad_edge=False,
+        header_style="bold",
+        title=title,
+        title_justify="left",
+        title_style="bold",
+    )
     for head in heads:
         right = head.startswith(">")
-        table.add_column(head.removeprefix(">"), justify="right" if right else "left", overflow="fold", no_wrap=right)
+        table.add_column(
+            head.removeprefix(">"),
+            justify="right" if right else "left",
+            overflow="fold",
+            no_wrap=right,
+        )
     return table
 
 

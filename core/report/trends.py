@@ -5,9 +5,9 @@ the runs.
 from __future__ import annotations
 
 from ..harness.labels import product
-from .figure_data import Past
-from ..history.queries import (Entry, History, unit_of)
+from ..history.queries import Entry, History, unit_of
 from ..history.store import RunRow
+from .figure_data import Past
 
 
 def trends(history: History) -> dict[str, list[Past]]:
@@ -18,7 +18,9 @@ def trends(history: History) -> dict[str, list[Past]]:
         name = product(engine, mode)
         for entry in entries:
             row = history.runs[entry.run]
-            found.setdefault(case, []).append(Past(run_name(row), name, largest_length(entry, case, row), entry.us_per_step))
+            found.setdefault(case, []).append(
+                Past(run_name(row), name, largest_length(entry, case, row), entry.us_per_step)
+            )
     names = {run_name(row): place[row.id] for row in history.runs.values()}
     return {case: sorted(each, key=lambda past: names[past.run]) for case, each in found.items()}
 

@@ -1,5 +1,5 @@
-"""The assemblies of a case at a value of its sweep, and consistent starts in any of them for the
-simulators.
+"""Assemblies of a case at a value of its sweep, and consistent starts in any of
+them for simulators.
 """
 
 from __future__ import annotations
@@ -24,9 +24,7 @@ INTENDED = 1e-9
 
 
 class Found(msgspec.Struct, frozen=True):
-    """One assembly in a results file; see `analysis.assembly.assemblies.Assembly`. bodies: r [m]
-    and p by name.
-    """
+    """An assembly in a results file; see `assembly_modes.Assembly`. bodies: r [m] and p by name."""
 
     number: int
     intended: bool
@@ -40,8 +38,8 @@ class Found(msgspec.Struct, frozen=True):
 
 
 class Report(msgspec.Struct, frozen=True):
-    """The assemblies of a case as a file. drivers: their values [m or rad]; ranked_by: what
-    distances are from.
+    """Assemblies of a case as a file. drivers: values [m or rad]; ranked_by: origin
+    of the distances.
     """
 
     schema: str
@@ -57,12 +55,12 @@ class Report(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True, eq=False)
 class Survey:
-    """The assemblies of a case, and which of them is intended.
+    """The assemblies of a case, with the intended one.
 
     Attributes:
-        drivers: their values at which it is assembled, as the sweep has them [m or rad].
-        way: of the bodies from the design to the intended assembly; None where there is none, with
-            the reason.
+        drivers: their values at the assemblies, as in the sweep [m or rad].
+        way: motion of the bodies from the design to the intended assembly; None where
+            there is none.
         reason: why the drive does not lead from the design to these values.
     """
 
@@ -75,7 +73,7 @@ class Survey:
 
     @property
     def ranked_by(self) -> str:
-        """What the distances are from."""
+        """The origin of the distances."""
         return (
             "the intended assembly, where the motion leads from the design"
             if self.way
@@ -83,11 +81,11 @@ class Survey:
         )
 
     def intended(self, one: Assembly) -> bool:
-        """Whether it is the assembly to which the drive leads from the design."""
+        """Return whether the drive leads from the design to this assembly."""
         return self.way is not None and one.distance <= INTENDED
 
     def report(self) -> Report:
-        """All of it as a file has it."""
+        """Return the survey as a file's content."""
         found = [
             Found(
                 number,
@@ -107,7 +105,7 @@ class Survey:
 
 
 def survey(case: Case, at: float | None = None, *, samples: int, seed: int) -> Survey:
-    """Look for all assemblies of a case at a value of its sweep; by default the value at design.
+    """Find assemblies of a case at a value of its sweep; by default the value at design.
 
     Raises:
         SolveError: drivers and degrees of freedom do not match, the design does not close, or the
@@ -144,7 +142,7 @@ def survey(case: Case, at: float | None = None, *, samples: int, seed: int) -> S
 
 
 def written(found: Survey, write: Writer, number: int) -> Mapping[str, str]:
-    """The case's mechanism in a writer's format, starting in one of its assemblies.
+    """Return the case's mechanism in a writer's format, starting in one of its assemblies.
 
     Raises:
         KincheckError: there is no such assembly, or the format cannot express something.
@@ -164,8 +162,7 @@ def written(found: Survey, write: Writer, number: int) -> Mapping[str, str]:
         for each in case.mechanism.joints
         if isinstance(each, AxialJoint) and each.relations
     ]
-    # their coordinates count whole turns, which poses do not tell, and no motion leads there from
-    # the design
+    # their coordinates count whole turns; poses do not show these, and no motion leads there
     if related:
         raise KincheckError(
             f"case {case.name!r}: assembly {number} cannot be exported:"
@@ -176,10 +173,9 @@ def written(found: Survey, write: Writer, number: int) -> Mapping[str, str]:
 
 
 def _straight(case: Case, chosen: Assembly) -> dict[str, BodyMotion]:
-    """A way from the design to an assembly on which each body turns about one axis; the loops are
-    open in between.
+    """Return a motion from the design to an assembly, each body turning about one axis, loops open.
 
-    Writers take from it how far joints have turned, and for that only its end has to close.
+    Writers read the joints' turns from it, so only its end has to close.
     """
     steps = math.ceil(math.pi / LARGEST_TURN)
     part = np.linspace(0.0, 1.0, steps + 1)[:, None]

@@ -1,16 +1,15 @@
-"""Proving a case: every output at every sample, to as many digits as are asked for, and how far the
-native engine is from it.
+"""Proof of a case: every output at every sample to a number of digits, and the
+native engine's errors.
 
-The native solution of each sample is proved to lie near exactly one solution of the case's
-equations (`analysis.proofs.enclosure`). That is a statement about the equations that kincheck has
-made of the description: as a truth it is an in_house_oracle.
+Each native solution is proved to lie near exactly one solution of the case's
+equations (`kinematics.verified.krawczyk`). The equations are kincheck's own, so the
+reference is an in_house_oracle.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
@@ -18,7 +17,6 @@ import numpy as np
 from ..algebra import Vec3
 from ..case.case import Case, Quantity
 from ..case.io.reference_file import ProvedSeries, Reference, Sample
-from ..harness.compare import output_series
 from ..jet import Jet
 from ..kinematics.verified.exact import Exact, Reading, as_decimal, as_double
 from ..kinematics.verified.krawczyk import Enclosure, UnprovedError
@@ -26,16 +24,17 @@ from ..kinematics.verified.verified_sweep import Drives, Proofs, prove
 from ..program.ball_executor import Ball, flint, precision
 from ..trajectory import Array
 from ..version import VERSION
+from .native_error import Column, NativeError, native_errors, upper
 
 NUMBERS: Mapping[str, Reading] = {"double": as_double, "decimal": as_decimal}
-"""How the numbers of a case are understood: as the doubles that engines are given, or as the
-decimals that print them.
+"""Readings of a case's numbers: as the engines' doubles, or as the decimals of
+their shortest print.
 """
 
-# Bits beyond the digits asked for: Newton's iteration ends 40 above the precision, the rest is for
-# poses that are nearly singular.
+# Bits beyond the digits: Newton's iteration ends 40 above the precision; nearly singular poses take
+# the rest.
 GUARD_BITS = 100
-# Digits printed beyond those asked for, so that printing does not use up the bound.
+# Extra digits printed, so that printing does not use up the bound.
 SPARE_DIGITS = 2
 
 NOTE = (
@@ -47,34 +46,14 @@ NOTE = (
     " outputs and the pi in the lead of a screw are their doubles."
 )
 
-Column = Sequence[Ball | None]
-"""A quantity at the samples; None where it is not known."""
-
-
-@dataclass(frozen=True)
-class NativeError:
-    """How far the native engine is from a proved output: position, velocity and acceleration, the
-    largest over the samples.
-
-    Attributes:
-        largest: [SI]; None where there is no such derivative.
-        ulps: the same in units in the last place of the largest value that any output of that unit
-            takes: an output may itself be zero throughout, by symmetry.
-    """
-
-    output: str
-    unit: str
-    largest: Sequence[float | None]
-    ulps: Sequence[float | None]
-
 
 def prove_case(
     case: Case, *, digits: int, numbers: str, tol: float
 ) -> tuple[Reference, list[NativeError]]:
-    """Prove the samples of a case, and measure the native engine by them.
+    """Prove the samples of a case, and measure the native engine's errors.
 
     Args:
-        digits: outputs are given to 10^-digits, absolutely [SI].
+        digits: outputs are enclosed to 10^-digits, absolutely [SI].
         numbers: a key of `NUMBERS`.
         tol: of the native solution.
 
@@ -110,7 +89,7 @@ def prove_case(
             )
             for output in case.outputs
         }
-        errors = _native_errors(case, found, values)
+        errors = native_errors(case, found, values)
     made = Reference(
         case=case.name,
         kincheck=VERSION,
@@ -129,8 +108,8 @@ def prove_case(
 
 
 def _drives(case: Case, numbers: str) -> Drives:
-    """What the moving drivers do at the samples; the swept one exactly, others by the doubles that
-    their motions give.
+    """Return the moving drivers' values at the samples: exact for the swept one,
+    doubles for others.
     """
     path, sweep, reading = case.sweep.path, case.sweep, NUMBERS[numbers]
     table = path.drive([*path.motions], path.times)
@@ -149,7 +128,7 @@ def _drives(case: Case, numbers: str) -> Drives:
 
 
 def _grid(values: Array, numbers: str) -> list[Fraction]:
-    """The samples of the sweep; decimals of a grid that is even but for rounding are made even."""
+    """Return the sweep's samples; decimals of a grid that is even up to rounding are made even."""
     each, last = list(map(NUMBERS[numbers], values.tolist())), len(values) - 1
     if numbers == "double" or last < 1:
         return each
@@ -159,9 +138,7 @@ def _grid(values: Array, numbers: str) -> list[Fraction]:
 
 
 def _values(case: Case, output: Quantity, found: Proofs, numbers: str) -> Sequence[Column]:
-    """Position, velocity and acceleration of an output at the samples: its own formula, over jets
-    of balls.
-    """
+    """Return an output's position, velocity and acceleration at the samples, as balls."""
     reading, still = NUMBERS[numbers], Exact.of(Fraction(0))
     proved = [k for k, each in enumerate(found.samples) if isinstance(each, Enclosure)]
     at: dict[str, Vec3] = {}
@@ -206,7 +183,7 @@ def _sample(
     digits: int,
     others: Sequence[str] | None,
 ) -> Sample:
-    """The proof, unless what it says of an output is not as sharp as was asked for."""
+    """Return the proof, unless an output's enclosure is too wide."""
     if isinstance(found, UnprovedError):
         return Sample(proved=False, reason=str(found))
     balls = {
@@ -230,7 +207,7 @@ def _sample(
         alone=found.alone,
         contraction=found.contraction,
         branch=min((float(each.lower()) for each in found.branch), default=None),
-        redundant=max((_upper(each) for each in found.left_out), default=None),
+        redundant=max((upper(each) for each in found.left_out), default=None),
         contradicted=sum(not each.contains(0) for each in found.left_out),
         left_out=None if others is None else list(others),
     )
@@ -251,7 +228,7 @@ def _series(
         ]
         texts = [None if ball is None else _printed(ball, digits) for ball in known]
         bounds = [
-            _upper(ball - flint().arb(text))
+            upper(ball - flint().arb(text))
             for ball, text in zip(known, texts, strict=True)
             if ball is not None
         ]
@@ -272,43 +249,6 @@ def _series(
 
 
 def _printed(ball: Ball, digits: int) -> str:
-    """A decimal that is off by less than 10^-digits."""
+    """Return a decimal with an error below 10^-digits."""
     whole = max(0, math.ceil(math.log10(1.0 + abs(float(ball.mid())))))
     return ball.mid().str(digits + SPARE_DIGITS + whole, radius=False)
-
-
-def _native_errors(
-    case: Case, found: Proofs, values: Mapping[str, Sequence[Column]]
-) -> list[NativeError]:
-    outputs = [output for output in case.outputs if output.name in values]
-    sizes: dict[tuple[str, int], float] = {}
-    for output in outputs:
-        for order, column in enumerate(values[output.name]):
-            known = [
-                sizes.get((output.unit, order), 0.0),
-                *(_upper(ball) for ball in column if ball is not None),
-            ]
-            sizes[output.unit, order] = max(known)
-    errors: list[NativeError] = []
-    for output in outputs:
-        native = output_series(case, output, found.native)
-        largest: list[float | None] = []
-        ulps: list[float | None] = []
-        for order, given in enumerate((native.position, native.velocity, native.acceleration)):
-            numbers: list[float] = [] if given is None else given.tolist()
-            pairs = zip(numbers, values[output.name][order], strict=given is not None)
-            off = [
-                _upper(flint().arb(x) - ball)
-                for x, ball in pairs
-                if ball is not None and math.isfinite(x)
-            ]
-            size = sizes[output.unit, order]
-            largest.append(max(off, default=None))
-            ulps.append(max(off) / float(np.spacing(size)) if off and size > 0.0 else None)
-        errors.append(NativeError(output.name, output.unit, largest, ulps))
-    return errors
-
-
-def _upper(ball: Ball) -> float:
-    """A float not below |ball|."""
-    return float(np.nextafter(float(ball.abs_upper()), np.inf))

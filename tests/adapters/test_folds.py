@@ -13,8 +13,9 @@ from kincheck.core.kinematics.formulation.acceptance_criteria import (
 )
 from kincheck.core.studies.stress.families import Family
 from kincheck.core.studies.stress.families.base import as_case
+from kincheck.core.studies.stress.families.folds import Folds
 from kincheck.core.studies.stress.families.planar import any_plane, slider_crank
-from kincheck.core.studies.stress.run import stress
+from kincheck.core.studies.stress.run import specimen, stress
 from kincheck.core.studies.stress.truth.first_fold import turning
 from kincheck.core.studies.stress.truth.reference_motion import Reach, followed
 from kincheck.core.studies.stress.verdicts import Verdict
@@ -109,3 +110,10 @@ def test_a_step_is_compared_with_itself_and_not_with_its_rates():
     assert continued(np.array([0.49]), np.array([24.0]), np.array([25.5]), dt)
     assert not continued(np.array([0.51]), np.array([25.5]), np.array([25.5]), dt)  # too long
     assert continued(np.zeros(1), np.zeros(1), np.zeros(1), dt)
+
+
+@pytest.mark.parametrize(("seed", "number", "passed"), [(101, 364, 0), (109, 192, 2)])
+def test_a_singular_pose_that_the_motion_passes_is_no_fold(seed, number, passed):
+    """Rates stay finite there, and `trace` goes on through a branch point or without an event."""
+    truth = specimen(Folds(), seed, number, 4).truth
+    assert truth.reach[passed] == Reach.UNKNOWN

@@ -252,7 +252,9 @@ def simulated(tmp_path, *options):
 
 
 def test_the_command_line_keeps_modes_apart(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(adapters, "ENGINES", {"native": "Native", "mujoco": "MuJoCo"})
+    monkeypatch.setattr(
+        adapters, "ENGINES", {name: adapters.ENGINES[name] for name in ("native", "mujoco")}
+    )
     assert simulated(tmp_path, "--mode", "simulate", "--engine", "mujoco") == (
         1,
         [("mujoco", "simulate")],

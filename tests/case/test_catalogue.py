@@ -8,7 +8,7 @@ from kincheck.core.case.io import schema
 from kincheck.core.case.io.catalogue import catalogue, rows_of
 from kincheck.core.case.io.driving import DRIVERS
 from kincheck.core.case.io.schema import driver_keys, joint_keys, motion_keys
-from kincheck.core.case.variation import variation_file
+from kincheck.core.case.variation import variation_schema
 from kincheck.core.cli import main
 from kincheck.core.errors import MechanismError
 from kincheck.core.joints import Coupler, Joint, Spherical
@@ -120,7 +120,7 @@ def test_every_key_of_a_file_is_in_the_reference_that_is_printed(capsys):
     said = capsys.readouterr().out
     structures = [
         each
-        for room in (schema, variation_file)
+        for room in (schema, variation_schema)
         for each in vars(room).values()
         if isinstance(each, type)
     ]

@@ -276,7 +276,15 @@ def test_units_of_chrono_are_known():
 
 def test_the_command_line_reads_hardpoints(tmp_path, capsys):
     file = edited(tmp_path, TABLE)
-    options = ["--engine", "native", "mujoco", "--template", WISHBONE, "--axes", "rearward,right,up"]
+    options = [
+        "--engine",
+        "native",
+        "mujoco",
+        "--template",
+        WISHBONE,
+        "--axes",
+        "rearward,right,up",
+    ]
     assert main(["run", str(file), *options]) == 2
     assert "--units mm" in capsys.readouterr().err
     assert main(["run", str(file), *options, "--units", "mm"]) == 0

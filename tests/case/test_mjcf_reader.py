@@ -143,7 +143,7 @@ def test_orientations(tmp_path, orientation, sequence, angle):
           <site name="s" pos="0.1 0 0" {orientation}/></body>
         </frame>
       </body>
-    </worldbody></mujoco>"""
+    </worldbody></mujoco>"""  # noqa: E501
     agree(model(tmp_path, text))
 
 
@@ -170,7 +170,7 @@ def test_classes_of_joints_and_bodies_without_joints(tmp_path):
           </body>
         </body>
       </worldbody>
-    </mujoco>"""
+    </mujoco>"""  # noqa: E501
     tree = agree(model(tmp_path, text))
     assert [joint.type for joint in tree.joints.values()] == [
         "hinge",
@@ -206,7 +206,7 @@ def linkage(equality, more=""):
         <fixed name="one"><joint joint="lever" coef="3"/></fixed>
         <fixed name="both"><joint joint="reach" coef="3"/><joint joint="out" coef="0.5"/></fixed></tendon>
       <equality>{equality}</equality>{more}
-    </mujoco>"""
+    </mujoco>"""  # noqa: E501
 
 
 EVERYTHING = ("crank", "pivot", "reach", "lever", "out", "cross_1", "cross_2")
@@ -248,7 +248,7 @@ def test_equalities(tmp_path, kind):
 
 
 BLOCK = """<body name="block" pos="0.4 0 0.4" quat="1 0 1 0"><joint name="x" type="slide" axis="0 0 1"/>
-    <joint name="z" type="slide" axis="1 0 0"/><site name="hub" pos="0 0 0.1" euler="0 0 50"/></body><body name="lever\""""
+    <joint name="z" type="slide" axis="1 0 0"/><site name="hub" pos="0 0 0.1" euler="0 0 50"/></body><body name="lever\""""  # noqa: E501
 
 
 @pytest.mark.parametrize("kind", ["connect", "weld"])
@@ -303,7 +303,7 @@ ROD = """
           <body name="rod" pos="0.2 0 0"><joint name="ball" type="ball"/></body></body>
         <body name="slider" pos="1 0 0"><joint name="slider" type="slide" axis="1 0.1 0"/></body>
       </body>
-    </worldbody><equality><connect body1="rod" body2="slider" anchor="0.8 0.1 -0.4"/></equality></mujoco>"""
+    </worldbody><equality><connect body1="rod" body2="slider" anchor="0.8 0.1 -0.4"/></equality></mujoco>"""  # noqa: E501
 
 
 def test_a_rod_on_a_ball_and_a_connect_does_not_spin(tmp_path):

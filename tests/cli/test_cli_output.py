@@ -126,7 +126,7 @@ def test_a_length_that_contradicts_the_points_is_told_wherever_results_are(
 
 
 @pytest.mark.parametrize("length", ["1.1", "1.0"])
-def test_a_length_that_contradicts_the_points_is_told_where_a_case_is_explained_or_its_design_varied(
+def test_a_length_that_contradicts_the_points_is_told_by_explain_and_where_the_design_varies(
     tmp_path, capsys, length
 ):
     file, vary, out = tmp_path / "rod.toml", tmp_path / "vary.toml", tmp_path / "out"

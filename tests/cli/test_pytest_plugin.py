@@ -85,7 +85,7 @@ def solved(case, engine):
     return Record(**known, engine=engine.name, outcome=Outcome(outcome), message=f"{engine.name} cannot")
 
 plugin._solved = solved
-"""
+"""  # noqa: E501
 
 
 def test_what_becomes_of_each_outcome(repository):

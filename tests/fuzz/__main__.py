@@ -6,7 +6,7 @@ build/fuzz/NAME.crashes:
     python -m tests.fuzz casefile build/fuzz/casefile.crashes/*         run them again
     python -m tests.fuzz casefile --keep build/fuzz/casefile.crashes/*  keep them as tests, once the defect is understood
     python -m tests.fuzz casefile --keep                                keep a minimal set of all inputs as tests
-"""
+"""  # noqa: E501
 
 import argparse
 import importlib

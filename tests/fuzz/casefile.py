@@ -21,7 +21,7 @@ KEYS = """schema name source truth units length angle bodies origin euler_parame
 ratio lead body position drivers direction relative joint motion rate amplitude frequency phase times values sweep driver start stop
 steps outputs component atol rtol why suspension convention side forward up wheel_center center_plane kingpin wheel_radius axle
 wheelbase cg_height brakes drive per_travel reference file columns rows ground time closed_form x y z mm deg left iso8855 sae_j670
-front outboard inboard"""
+front outboard inboard"""  # noqa: E501
 TYPES = [*Joint.registry, *Coupler.registry, *DRIVERS, *Motion.registry, *SuspensionOutput.registry]
 WORDS = (*KEYS.split(), *TYPES)
 

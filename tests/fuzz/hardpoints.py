@@ -20,7 +20,7 @@ ROLES = [
     for name in (role.name, *role.also)
 ]
 KEYS = """name x y z mm cm inch [HARDPOINT] [UNITS] {hardpoint_name symmetry x_value y_value z_value} left/right single right LENGTH
-= Type Template Suspension Spindle COM Location // /* */ $ # units: axes: rearward,right,up"""
+= Type Template Suspension Spindle COM Location // /* */ $ # units: axes: rearward,right,up"""  # noqa: E501
 WORDS = (
     *KEYS.split(),
     *ROLES,

@@ -64,7 +64,7 @@ FOUR_BAR = b"""<mujoco model="drive crank:0:0.5:5 hold "><worldbody>
 <body name="a"><joint name="crank" axis="0 1 0"/>
 <body name="b" pos="0 0 2"><joint name="B" axis="0 1 0"/><site name="C" pos="4 0 0"/></body></body>
 <body name="c" pos="4 0 0"><joint name="D" axis="0 1 0"/><site name="c" pos="0 0 2"/></body></worldbody>
-<equality><connect site1="C" site2="c"/></equality></mujoco>"""
+<equality><connect site1="C" site2="c"/></equality></mujoco>"""  # noqa: E501
 SLIDERS = b"""<mujoco model="drive s:0:0.1:3 hold b free "><compiler angle="radian" eulerseq="zyx"/>
 <default><joint axis="1 0 0"/><default class="q"><joint type="slide"/></default></default><worldbody>
 <frame pos="0 0 1" euler="0 0.1 0"><body name="a" childclass="q" quat="1 0 0 0.5">
@@ -72,12 +72,12 @@ SLIDERS = b"""<mujoco model="drive s:0:0.1:3 hold b free "><compiler angle="radi
 <body name="c"><joint name="u" class="q"/></body><body name="d"><joint name="b" type="ball"/><geom size="1"/></body>
 <body name="free" pos="1 1 1"><freejoint/></body></worldbody>
 <tendon><fixed name="f"><joint joint="s" coef="2"/><joint joint="u" coef="-1"/></fixed></tendon>
-<equality><joint joint1="t" joint2="s" polycoef="0 3"/><tendon tendon1="f"/></equality></mujoco>"""
+<equality><joint joint1="t" joint2="s" polycoef="0 3"/><tendon tendon1="f"/></equality></mujoco>"""  # noqa: E501
 ROD = b"""<mujoco model="drive in:0:0.5:5 hold "><worldbody><body name="a"><joint name="in" axis="0 0 1"/></body>
 <body name="b" pos="2 1 3"><joint name="out" axis="1 0 0"/>
 <body name="rod" pos="0 3.9 -0.8"><joint name="r" type="ball"/></body></body></worldbody>
 <equality><connect body1="rod" body2="a" anchor="-3 -4.9 -2.2"/>
-<weld body1="a" body2="world" active="false"/></equality></mujoco>"""
+<weld body1="a" body2="world" active="false"/></equality></mujoco>"""  # noqa: E501
 
 
 def one(data: bytes) -> None:

@@ -222,9 +222,11 @@ def test_missing_samples_do_not_hide_a_deviation():
 
 def test_nothing_solved_is_a_failure_without_numbers():
     nan = np.full((SAMPLES, 3), np.nan)
-    answer = lambda case: solution(
-        case, solved=np.zeros(SAMPLES, dtype=bool), position=nan, velocity=None, acceleration=None
-    )
+
+    def answer(case):
+        solved = np.zeros(SAMPLES, dtype=bool)
+        return solution(case, solved=solved, position=nan, velocity=None, acceleration=None)
+
     record = record_of(Fake(answer=answer))
     assert (
         record.message

@@ -103,7 +103,7 @@ def test_a_history_that_cannot_be_used_costs_no_result(path, tmp_path, capsys, m
 
 DAMAGE = {
     "circumstances": (
-        """UPDATE runs SET circumstances = replace(circumstances, '"kincheck":', '"kincheck"!') WHERE id = 2"""
+        """UPDATE runs SET circumstances = replace(circumstances, '"kincheck":', '"kincheck"!') WHERE id = 2"""  # noqa: E501
     ),
     "plan": "UPDATE runs SET plan = replace(plan, '[', '(') WHERE id = 2",
     "a byte of a run": "UPDATE runs SET command = cast(x'61ff62' as text) WHERE id = 2",

@@ -204,7 +204,7 @@ with Store(Path(sys.argv[1])) as store:
         store.add_record(number, record)
     store.finish(number)
     print(number, store.records(number) == records)
-"""
+"""  # noqa: E501
 
 
 def test_runs_at_once_do_not_disturb_each_other(path):

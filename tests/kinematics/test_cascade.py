@@ -9,7 +9,8 @@ import pytest
 from kincheck import cases
 from kincheck.core import Body, Gear, JointAngle, Mechanism, Point, Revolute, SolveError, solve
 from kincheck.core.case.io.case_file import load_case
-from kincheck.core.kinematics.by_components.block_solver import WORST, Cascade
+from kincheck.core.kinematics.by_components.block_solver import Cascade
+from kincheck.core.kinematics.by_components.component_lanes import WORST
 from kincheck.core.kinematics.by_components.sweep import LANES, CascadeSweep
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.motion_start import start_of

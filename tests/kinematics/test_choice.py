@@ -16,8 +16,9 @@ from kincheck.core.kinematics.compiled.samples import Route
 from kincheck.core.kinematics.continuation import row_exchange, segments, singular_samples, sweep
 from kincheck.core.kinematics.continuation.row_exchange import Choice, chosen
 from kincheck.core.kinematics.continuation.segments import Followed
+from kincheck.core.kinematics.continuation.side_follower import Marcher
 from kincheck.core.kinematics.continuation.sweep import follow
-from kincheck.core.kinematics.continuation.walk import Marcher, march
+from kincheck.core.kinematics.continuation.walk import march
 from kincheck.core.kinematics.diagnosis.conditioning import conditioning
 from kincheck.core.kinematics.solve import solve
 from kincheck.core.mechanism.motions import Path, Ramp, Sine

@@ -151,7 +151,8 @@ def revolute_loop(pin, meet, rest):
     )
 
 
-NEARLY_KITES = {  # and nearly parallelograms: pin, end of the rod, rest of the rocker, last turn, samples
+# and nearly parallelograms: pin, end of the rod, rest of the rocker, last turn, samples
+NEARLY_KITES = {
     "kite": (
         (0.4260866094025061, 0.09610141632702796),
         (0.05330114251731225, 0.32373794595045846),

@@ -148,10 +148,14 @@ def written(mechanism, drivers):
     ("loops", "drivers", "left_out", "status", "said"),
     [
         (LOOPS, {"turn": "pivot0"}, "", 2, "nothing was compared (1 not judged)"),
-        (LOOPS, {"turn": "pivot0", "second": "pivot9"}, "", 2, "1 degree of freedom (174 coordinates - rank 173) but 2 drivers"),
-        (LOOPS, {"turn": "pivot0"}, f"cross{LOOPS - 1}", 2, f"what can still move is most of all 'coupler{LOOPS - 1}', 'cr"),
-        (2, {"turn": "pivot0", "second": "pivot1"}, "", 2, "1 degree of freedom (30 coordinates - rank 29) but 2 drivers"),
-        (2, {"turn": "pivot0"}, "cross1", 2, "but 1 driver; 'crank2' can turn, 'coupler1' can turn; add a driver"),
+        (LOOPS, {"turn": "pivot0", "second": "pivot9"}, "", 2,
+         "1 degree of freedom (174 coordinates - rank 173) but 2 drivers"),
+        (LOOPS, {"turn": "pivot0"}, f"cross{LOOPS - 1}", 2,
+         f"what can still move is most of all 'coupler{LOOPS - 1}', 'cr"),
+        (2, {"turn": "pivot0", "second": "pivot1"}, "", 2,
+         "1 degree of freedom (30 coordinates - rank 29) but 2 drivers"),
+        (2, {"turn": "pivot0"}, "cross1", 2,
+         "but 1 driver; 'crank2' can turn, 'coupler1' can turn; add a driver"),
     ],
 )  # fmt: skip
 def test_exit_status_is_the_same_for_small_and_large(

@@ -13,7 +13,7 @@ from kincheck.core.kinematics.by_components import block_solver
 from kincheck.core.kinematics.by_components import sweep as cascade_sweep
 from kincheck.core.kinematics.compiled import compiled_model, samples
 from kincheck.core.kinematics.compiled.thread_cache import ThreadCache
-from kincheck.core.kinematics.continuation import walk
+from kincheck.core.kinematics.continuation import side_follower, walk
 from kincheck.core.kinematics.solver_selection import prepare
 from kincheck.core.kinematics.sparse import sparse_model as sparse
 from kincheck.core.mechanism.motions import Absolute, Motion, Path, Ramp, Sine, Table
@@ -160,9 +160,9 @@ def test_joints_of_a_users_own_are_made_anew(made):
 @pytest.fixture
 def bound(monkeypatch):
     """What was bound to lanes, a route each."""
-    routes, bind = [], walk.Marcher.__init__
+    routes, bind = [], side_follower.Marcher.__init__
     monkeypatch.setattr(
-        walk.Marcher,
+        side_follower.Marcher,
         "__init__",
         lambda self, *given: (routes.append(given[0]), bind(self, *given))[1],
     )

@@ -17,8 +17,9 @@ from kincheck.core.kinematics.structure.redundancy import independent_rows
 from kincheck.core.primitives.base import Pose
 from kincheck.core.program import Elimination
 from kincheck.core.studies.stress.families import planar
+from kincheck.core.studies.stress.families.dimensions import crank_rocker
 from kincheck.core.studies.stress.families.pairs import beside
-from kincheck.core.studies.stress.families.planar import any_plane, crank_rocker
+from kincheck.core.studies.stress.families.planar import any_plane
 
 
 def test_independent_rows_of_a_known_matrix():

@@ -23,7 +23,7 @@ from kincheck.core.kinematics.continuation.walk import march
 from kincheck.core.kinematics.formulation.acceptance_criteria import doubtful
 from kincheck.core.kinematics.solve import solve
 from kincheck.core.program import Elimination, Tape, program
-from kincheck.core.program.elimination import COMPARED
+from kincheck.core.program.dense_core import COMPARED
 from mpmath import mp, mpf
 
 from ..support.mechanisms import CRANK, mcpherson, slider_crank, slider_crank_motion
@@ -302,7 +302,7 @@ def test_of_a_large_core_sigma_is_no_less_than_by_its_comparison_matrix(monkeypa
     """And not by a little: of 24 random rows it would be a hundredth."""
     matrices = np.random.default_rng(5).normal(size=(50, 24, 24))
     exact, _ = estimated(matrices)
-    monkeypatch.setattr("kincheck.core.program.elimination.COMPARED", 24)
+    monkeypatch.setattr("kincheck.core.program.dense_core.COMPARED", 24)
     compared, _ = estimated(matrices)
     assert (compared <= exact * (1.0 + 1e-12)).all()
     assert np.median(exact / compared) > 10.0

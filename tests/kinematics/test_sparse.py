@@ -30,7 +30,8 @@ from kincheck.core.kinematics.continuation.sweep import follow
 from kincheck.core.kinematics.formulation.constraints import frames
 from kincheck.core.kinematics.solver_selection import IRREDUCIBLE
 from kincheck.core.kinematics.sparse.determinant_signs import Blocks
-from kincheck.core.kinematics.sparse.sparse_model import FailedError, SparseModel
+from kincheck.core.kinematics.sparse.sparse_equations import FailedError
+from kincheck.core.kinematics.sparse.sparse_model import SparseModel
 from kincheck.core.kinematics.sparse.sweep import solve_sparse
 from kincheck.core.kinematics.structure.components import components
 from kincheck.core.kinematics.structure.sparse_lu import Factors

@@ -48,7 +48,7 @@ define double @scaled(double %x) {
   %product = fmul double %x, 0x400921FB54442D18
   ret double %product
 }
-"""
+"""  # noqa: E501
 """A table to jump by, a call, a constant that is loaded."""
 
 

@@ -218,10 +218,10 @@ def test_joints_of_the_users_own_are_traced_every_time(tmp_path, monkeypatch):
     hinge = next(joint for joint in known.joints if isinstance(joint, Revolute))
 
     class Mine(Revolute):
-        type = "mine"
+        type = "mine_traced"
 
     monkeypatch.setattr(
-        Revolute, "registry", {k: v for k, v in Revolute.registry.items() if k != "mine"}
+        Revolute, "registry", {k: v for k, v in Revolute.registry.items() if k != "mine_traced"}
     )
     mine = Mine(**{each.name: getattr(hinge, each.name) for each in fields(hinge)})
     mechanism = replace(known, joints=[mine if joint is hinge else joint for joint in known.joints])

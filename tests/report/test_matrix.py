@@ -11,7 +11,7 @@ import pytest
 from kincheck.core.cli import main as cli
 from kincheck.core.joints import Coupler, Joint
 
-from ..support.fakes import (Fake, crank, off, raising)
+from ..support.fakes import Fake, crank, off, raising
 
 README = Path(__file__).parents[2] / "README.md"
 BUILT_IN = [
@@ -54,7 +54,9 @@ ENGINES = (
 def test_cells_say_how_far_off_or_why_not(run):
     status, _, markdown = run(engines=ENGINES, cases=[crank(reference=False)])
     assert status == 1
-    head, _, row = ([cell.strip() for cell in line.split("|")[1:-1]] for line in markdown.splitlines()[:3])
+    head, _, row = (
+        [cell.strip() for cell in line.split("|")[1:-1]] for line in markdown.splitlines()[:3]
+    )
     assert head == ["", *(f"{each.name} {each.installed or ''}".strip() for each in ENGINES)]
     assert row == [
         "`crank`",
@@ -66,7 +68,9 @@ def test_cells_say_how_far_off_or_why_not(run):
         "unavailable",
     ]
     assert "against native: position [m]" in markdown
-    assert r"Unsupported: crank in unable: joint 'pivot' (revolute) has no \| counterpart." in markdown
+    assert (
+        r"Unsupported: crank in unable: joint 'pivot' (revolute) has no \| counterpart." in markdown
+    )
     assert "no [axis] there" in markdown
 
 
@@ -101,7 +105,9 @@ def test_markdown_is_refused_before_the_run_where_it_cannot_be_written(capsys):
 
 def test_every_joint_type_is_in_the_readme():
     """`kincheck run --joints --markdown FILE` makes the table anew."""
-    found = re.search(r"<!-- joints:begin -->(.*)<!-- joints:end -->", README.read_text("utf-8"), re.DOTALL)
+    found = re.search(
+        r"<!-- joints:begin -->(.*)<!-- joints:end -->", README.read_text("utf-8"), re.DOTALL
+    )
     if found is None:
         pytest.skip("the README has no table of joints")
     rows = re.findall(r"^\| `(\w+)` \|(.*)$", found[1], re.MULTILINE)

@@ -16,16 +16,16 @@ from typing import Any
 import msgspec
 import pytest
 from kincheck.core import solve
-from kincheck.core.studies.bench.ring import ring
 from kincheck.core.harness.labels import number
 from kincheck.core.harness.record import Deviation, Deviations, Outcome, Results
 from kincheck.core.report.axis import SAMPLES
-from kincheck.core.report.figures import SYMBOLS
 from kincheck.core.report.figure_data import Past
-from kincheck.core.report.report import (headline, write_report)
+from kincheck.core.report.figures import SYMBOLS
+from kincheck.core.report.report import headline, write_report
+from kincheck.core.studies.bench.ring import ring
 
-from ..support.made_up import (CRANK, GRID, distances, judged, record, results, series)
 from ..kinematics.test_chain import chain
+from ..support.made_up import CRANK, GRID, distances, judged, record, results, series
 
 HOSTILE = "<script>alert('x')</script><a href='https://example.org'>&amp;</a>"
 
@@ -70,7 +70,11 @@ def report(run: Results, folder: Path) -> Page:
 
 
 def traces(page: Page, figure: str, name: str, mode: str) -> list[Any]:
-    return [trace for trace in page.data["figures"][figure]["data"] if trace["meta"] == name and trace["mode"] == mode]
+    return [
+        trace
+        for trace in page.data["figures"][figure]["data"]
+        if trace["meta"] == name and trace["mode"] == mode
+    ]
 
 
 @pytest.mark.parametrize("mechanism", [chain(12), ring(24)], ids=["components", "sparse"])
@@ -78,7 +82,13 @@ def test_large_mechanisms_have_their_programs_and_their_freedoms_on_the_page(mec
     """What the native engine really tells of them."""
     details = solve(mechanism, "turn", [0.0], points=()).details
     assert ("components" in details) != ("factor_entries" in details)
-    page = report(Results(run={}, records=[record("large", "consensus_only", "native", 0.0, [0.0], details=details)]), tmp_path)
+    page = report(
+        Results(
+            run={},
+            records=[record("large", "consensus_only", "native", 0.0, [0.0], details=details)],
+        ),
+        tmp_path,
+    )
     for name, size in details["program"].items():
         assert name in page.text
         assert str(size["flops"]) in page.text
@@ -95,7 +105,9 @@ def test_figures_hold_the_outputs_in_millimetres_with_the_travel_upwards(tmp_pat
         expected = [1000 * v for v in each.outputs["half_track_change"].position if v is not None]
         assert curve["x"] == pytest.approx(expected, rel=1e-9)  # ten digits are kept
     [reference] = traces(page, "case-0-0", "reference", "lines")
-    assert reference["x"] == pytest.approx([1000 * v for v in series(GRID).position if v is not None], rel=1e-9)
+    assert reference["x"] == pytest.approx(
+        [1000 * v for v in series(GRID).position if v is not None], rel=1e-9
+    )
     layout = page.data["figures"]["case-0-0"]["layout"]
     assert layout["xaxis"]["title"]["text"] == "half-track change [mm]"
     assert "wheel travel [mm]" in layout["yaxis"]["title"]["text"]
@@ -105,7 +117,9 @@ def test_an_angle_lies_on_the_horizontal_axis_in_degrees(tmp_path: Path) -> None
     page = report(results(driver=CRANK | {"name": "stroke"}), tmp_path)
     [curve] = traces(page, "case-0-0", "one", "lines")
     assert curve["x"] == "driver"
-    assert page.data["drivers"]["case-0"] == pytest.approx([math.degrees(d) for d in GRID], rel=1e-15)
+    assert page.data["drivers"]["case-0"] == pytest.approx(
+        [math.degrees(d) for d in GRID], rel=1e-15
+    )
 
 
 @pytest.mark.parametrize("motion", ["position", "velocity"])
@@ -115,7 +129,9 @@ def test_error_figures_hold_the_distances_from_the_reference(tmp_path: Path, mot
     for each in run.records[:2]:
         [curve] = traces(page, f"case-0-0-{motion}", each.engine, "lines+markers")
         deviation: Deviation = getattr(each.errors["half_track_change"], motion)
-        expected = distances(getattr(each.outputs["half_track_change"], motion), getattr(series(GRID), motion))
+        expected = distances(
+            getattr(each.outputs["half_track_change"], motion), getattr(series(GRID), motion)
+        )
         assert curve["y"] == pytest.approx(expected, rel=5e-3)  # three digits are kept
         assert curve["y"][deviation.worst_step] == pytest.approx(deviation.max_abs, rel=5e-3)
         assert max(curve["y"]) == pytest.approx(deviation.max_abs, rel=5e-3)
@@ -125,13 +141,25 @@ def test_error_figures_hold_the_distances_from_the_reference(tmp_path: Path, mot
     assert "case-0-0-acceleration" not in page.data["figures"]
 
 
-def test_a_case_without_reference_is_drawn_against_the_engine_it_was_compared_with(tmp_path: Path) -> None:
+def test_a_case_without_reference_is_drawn_against_the_engine_it_was_compared_with(
+    tmp_path: Path,
+) -> None:
     run = results("consensus_only")
     native, one, _ = run.records
-    nothing = Deviations(position=None, velocity=None, acceleration=None, reason="the case has no reference")
-    native = msgspec.structs.replace(native, errors=dict.fromkeys(native.errors, nothing), outcome=Outcome.UNJUDGED)
-    output = {name: judged(one.outputs[name], native.outputs[name], 1e-9, "native") for name in one.outputs}
-    page = report(Results(run=run.run, records=[native, msgspec.structs.replace(one, errors=output)]), tmp_path)
+    nothing = Deviations(
+        position=None, velocity=None, acceleration=None, reason="the case has no reference"
+    )
+    native = msgspec.structs.replace(
+        native, errors=dict.fromkeys(native.errors, nothing), outcome=Outcome.UNJUDGED
+    )
+    output = {
+        name: judged(one.outputs[name], native.outputs[name], 1e-9, "native")
+        for name in one.outputs
+    }
+    page = report(
+        Results(run=run.run, records=[native, msgspec.structs.replace(one, errors=output)]),
+        tmp_path,
+    )
     assert traces(page, "case-0-0", "reference", "lines") == []
     assert traces(page, "case-0-0-position", "native", "lines+markers") == []
     [curve] = traces(page, "case-0-0-position", "one", "lines+markers")
@@ -146,7 +174,11 @@ def test_samples_that_are_missing_are_not_called_out_of_tolerance(tmp_path: Path
     run = results()
     fine = {
         name: msgspec.structs.replace(
-            each, **{motion: msgspec.structs.replace(found, within=True) for motion, found in each.items()}
+            each,
+            **{
+                motion: msgspec.structs.replace(found, within=True)
+                for motion, found in each.items()
+            },
         )
         for name, each in run.records[1].errors.items()
     }
@@ -164,8 +196,14 @@ def test_page_names_the_worst_engine_sample_and_outcomes_first(tmp_path: Path) -
     head = words[: words.index("Overview")]
     assert "1 of 2 comparisons is outside tolerance" in head
     travel = f"{1000 * GRID[worst.worst_step]:+.4g}".replace("-", "−")
-    assert "Worst: engine one on case strut, output half-track change (position), at wheel travel" in head
-    assert f"at wheel travel {travel} mm (sample {worst.worst_step} of 0…20): {number(worst.max_abs / 1e-9)} × tolerance" in head
+    assert (
+        "Worst: engine one on case strut, output half-track change (position), at wheel travel"
+        in head
+    )
+    assert (
+        f"at wheel travel {travel} mm (sample {worst.worst_step} of 0…20):"
+        f" {number(worst.max_abs / 1e-9)} × tolerance" in head
+    )
     assert f"Error {number(worst.max_abs)} m, tolerance 1e-9, against in-house oracle" in head
     assert "✗ fail one on strut: half_track_change: too far off" in head
     assert "○ unavailable two on strut: two is not installed" in words
@@ -192,9 +230,12 @@ def test_the_worst_case_leads(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("truth", "said"), [("closed_form", 1), ("third_party_data", 1), ("in_house_oracle", 0), ("consensus_only", 0)]
+    ("truth", "said"),
+    [("closed_form", 1), ("third_party_data", 1), ("in_house_oracle", 0), ("consensus_only", 0)],
 )
-def test_validated_is_said_of_a_pass_against_foreign_truth_only(tmp_path: Path, truth: str, said: int) -> None:
+def test_validated_is_said_of_a_pass_against_foreign_truth_only(
+    tmp_path: Path, truth: str, said: int
+) -> None:
     page = report(results(truth), tmp_path)
     assert len(re.findall("validated", page.text)) == said
     assert ("our own oracle is not validation" in page.text) == (truth == "in_house_oracle")
@@ -206,26 +247,55 @@ def test_validated_names_what_was_not_judged_against_the_truth(tmp_path: Path) -
 
 def test_text_from_files_is_escaped(tmp_path: Path) -> None:
     run = results(case=HOSTILE)
-    strange = msgspec.structs.replace(run.records[1], engine=HOSTILE, message=HOSTILE, settings={HOSTILE: HOSTILE}, version=HOSTILE)
+    strange = msgspec.structs.replace(
+        run.records[1],
+        engine=HOSTILE,
+        message=HOSTILE,
+        settings={HOSTILE: HOSTILE},
+        version=HOSTILE,
+    )
     named = msgspec.structs.replace(strange, outputs={HOSTILE: series(GRID)}, errors={})
     page = report(
-        Results(run={**run.run, HOSTILE: HOSTILE}, records=[run.records[0], strange, named], references=run.references), tmp_path
+        Results(
+            run={**run.run, HOSTILE: HOSTILE},
+            records=[run.records[0], strange, named],
+            references=run.references,
+        ),
+        tmp_path,
     )
     assert page.names == ["report-data", "plotly", "script 2", "script 3"]
     assert not any("alert" in page.scripts[name] for name in page.names)
-    assert not [attrs for tag, attrs in page.tags if tag == "a" and not (attrs["href"] or "").startswith("#")]
+    assert not [
+        attrs
+        for tag, attrs in page.tags
+        if tag == "a" and not (attrs["href"] or "").startswith("#")
+    ]
     assert page.text.count("<script>alert('x')</script>") > 5
-    shown = [trace.get("name", "") for figure in page.data["figures"].values() for trace in figure["data"]]
-    shown += [figure["layout"][axis]["title"]["text"] for figure in page.data["figures"].values() for axis in ("xaxis", "yaxis")]
+    shown = [
+        trace.get("name", "")
+        for figure in page.data["figures"].values()
+        for trace in figure["data"]
+    ]
+    shown += [
+        figure["layout"][axis]["title"]["text"]
+        for figure in page.data["figures"].values()
+        for axis in ("xaxis", "yaxis")
+    ]
     assert not any("<" in text for text in shown)
     assert any("&lt;script&gt;" in text for text in shown)
 
 
 def test_nothing_is_fetched(tmp_path: Path) -> None:
     page = report(results(), tmp_path)
-    assert not [tag for tag, _ in page.tags if tag in ("link", "img", "iframe", "object", "embed", "base")]
+    assert not [
+        tag for tag, _ in page.tags if tag in ("link", "img", "iframe", "object", "embed", "base")
+    ]
     assert not [attrs for tag, attrs in page.tags if tag == "script" and "src" in attrs]
-    policy = [attrs["content"] for tag, attrs in page.tags if attrs.get("http-equiv") == "Content-Security-Policy"]
+    policy = [
+        attrs["content"]
+        for tag, attrs in page.tags
+        if attrs.get("http-equiv") == "Content-Security-Policy"
+    ]
     assert policy
     assert str(policy[0]).startswith("default-src 'none'")
     assert "http" not in str(policy[0])
@@ -234,16 +304,23 @@ def test_nothing_is_fetched(tmp_path: Path) -> None:
 def test_what_was_not_computed_leaves_a_gap_and_no_number(tmp_path: Path) -> None:
     run = results()
     whole = run.records[1]
-    holed = [None if k == 4 else math.nan if k == 5 else v for k, v in enumerate(series(GRID, 3e-9).position)]
+    holed = [
+        None if k == 4 else math.nan if k == 5 else v
+        for k, v in enumerate(series(GRID, 3e-9).position)
+    ]
     output = msgspec.structs.replace(whole.outputs["half_track_change"], position=holed)
-    broken = msgspec.structs.replace(whole, outputs={"half_track_change": output}, solved=19, us_per_step=None, rank=None)
+    broken = msgspec.structs.replace(
+        whole, outputs={"half_track_change": output}, solved=19, us_per_step=None, rank=None
+    )
     page = report(Results(run=run.run, records=[broken], references=run.references), tmp_path)
     [curve] = traces(page, "case-0-0", "one", "lines")
     assert [k for k, value in enumerate(curve["x"]) if value is None] == [4, 5]
     [errors] = traces(page, "case-0-0-position", "one", "lines+markers")
     assert [k for k, value in enumerate(errors["y"]) if value is None] == [4, 5]
     assert "19 of 21 samples were solved" in page.text
-    assert "µs/sample" not in page.text[page.text.index("Overview") : page.text.index("Engines")].replace("time per", "")
+    assert "µs/sample" not in page.text[
+        page.text.index("Overview") : page.text.index("Engines")
+    ].replace("time per", "")
 
 
 def test_zero_errors_stay_zero_and_the_floor_is_below_all_others(tmp_path: Path) -> None:
@@ -258,11 +335,25 @@ def test_long_series_are_thinned_and_said_to_be(tmp_path: Path) -> None:
     driver = [1e-4 * k for k in range(3 * SAMPLES)]
     spike = 1234
     found = series(driver)
-    position = [v + (1e-7 if k == spike else 0.0) for k, v in enumerate(found.position) if v is not None]
+    position = [
+        v + (1e-7 if k == spike else 0.0) for k, v in enumerate(found.position) if v is not None
+    ]
     output = msgspec.structs.replace(found, position=position)
     errors = {"half_track_change": judged(output, series(driver), 1e-9, "closed_form")}
-    long = record("strut", "closed_form", "one", 0, driver, outputs={"half_track_change": output}, errors=errors)
-    run = Results(run=results().run, records=[long], references={"strut": {"half_track_change": series(driver)}})
+    long = record(
+        "strut",
+        "closed_form",
+        "one",
+        0,
+        driver,
+        outputs={"half_track_change": output},
+        errors=errors,
+    )
+    run = Results(
+        run=results().run,
+        records=[long],
+        references={"strut": {"half_track_change": series(driver)}},
+    )
     page = report(run, tmp_path)
     [curve] = traces(page, "case-0-0", "one", "lines")
     assert SAMPLES <= len(curve["x"]) <= SAMPLES + 2
@@ -284,17 +375,34 @@ def test_every_symbol_has_a_swatch_of_its_own(tmp_path: Path) -> None:
     """What the legend shows is what is drawn: symbols without one would all be told by the same
     cross.
     """
-    records = [record("strut", "closed_form", f"engine {k}", 1e-12, GRID) for k in range(len(SYMBOLS))]
+    records = [
+        record("strut", "closed_form", f"engine {k}", 1e-12, GRID) for k in range(len(SYMBOLS))
+    ]
     write_report(Results(run={}, records=records), tmp_path / "report.html")
-    legend = (tmp_path / "report.html").read_text("utf-8").split("Curves shown")[1].split("</div>")[0]
+    legend = (
+        (tmp_path / "report.html").read_text("utf-8").split("Curves shown")[1].split("</div>")[0]
+    )
     shapes = [each.partition("/>")[2] for each in re.findall(r"<svg(.*?)</svg>", legend, re.DOTALL)]
     assert len(shapes) == len(set(shapes)) == len(SYMBOLS)
 
 
 def test_what_could_not_be_read_comes_first_and_how_it_was_made_last(tmp_path: Path) -> None:
-    run = {**results().run, "unread": {"gone.toml": "gone.toml: schema: found 'x'"}, "processor": "an abacus"}
+    run = {
+        **results().run,
+        "unread": {"gone.toml": "gone.toml: schema: found 'x'"},
+        "processor": "an abacus",
+    }
     text = report(msgspec.structs.replace(results(), run=run), tmp_path).text
-    places = [text.index(words) for words in ("not read", "gone.toml: schema", "Overview", "Largest deviations", "an abacus")]
+    places = [
+        text.index(words)
+        for words in (
+            "not read",
+            "gone.toml: schema",
+            "Overview",
+            "Largest deviations",
+            "an abacus",
+        )
+    ]
     assert places == sorted(places)
 
 

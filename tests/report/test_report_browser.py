@@ -17,15 +17,30 @@ import msgspec
 import pytest
 from kincheck import cases
 from kincheck.core.harness.record import Outcome, Results
-from kincheck.core.report.figure_data import (Effort, Past)
-from kincheck.core.report.report import write_report
 from kincheck.core.harness.scene import FRAMES, scene
+from kincheck.core.report.figure_data import Effort, Past
+from kincheck.core.report.report import write_report
 
-from ..support.made_up import (GRID, record, results)
+from ..support.made_up import GRID, record, results
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-FLAGS = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking"]
-FLAGS += ["--disable-component-update", "--disable-sync", "--enable-logging=stderr", "--v=0", "--window-size=1200,4000"]
+CHROMIUM = (
+    shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+)
+FLAGS = [
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+]
+FLAGS += [
+    "--disable-component-update",
+    "--disable-sync",
+    "--enable-logging=stderr",
+    "--v=0",
+    "--window-size=1200,4000",
+]
 HOSTILE = "</script><script>alert(1)</script><img src=x onerror=alert(2)>"
 
 # Waits for the page to be drawn, does what a test asks, and leaves what it returns in the document.
@@ -41,7 +56,7 @@ addEventListener("load", async () => {
   try { told = await (async () => { %s })(); } catch (error) { told = { error: String(error) }; }
   document.body.dataset.told = JSON.stringify(told);
 });
-</script></body>"""
+</script></body>"""  # noqa: E501
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
 
@@ -56,8 +71,16 @@ def visit(tmp_path: Path) -> Any:
         path = tmp_path / "report.html"
         write_report(run, path, **further)
         path.write_text(path.read_text("utf-8").replace("</body>", ACT % act), "utf-8")
-        command = [str(CHROMIUM), *FLAGS, "--virtual-time-budget=20000", f"--user-data-dir={tmp_path / 'profile'}", "--dump-dom"]
-        done = subprocess.run([*command, path.as_uri()], capture_output=True, text=True, timeout=120, check=True)
+        command = [
+            str(CHROMIUM),
+            *FLAGS,
+            "--virtual-time-budget=20000",
+            f"--user-data-dir={tmp_path / 'profile'}",
+            "--dump-dom",
+        ]
+        done = subprocess.run(
+            [*command, path.as_uri()], capture_output=True, text=True, timeout=120, check=True
+        )
         assert [line for line in done.stderr.splitlines() if "CONSOLE" in line] == []
         found = re.search(r'data-told="([^"]*)"', done.stdout)
         assert found, "the page did not become ready"
@@ -73,14 +96,22 @@ def strut(**changes: Any) -> Results:
 
 
 def several() -> Results:
-    rows = [("good", "one", 1e-12), ("good", "two", 1e-11), ("bad", "one", 5e-9), ("bad", "two", 1e-12), ("fine", "one", 1e-13)]
+    rows = [
+        ("good", "one", 1e-12),
+        ("good", "two", 1e-11),
+        ("bad", "one", 5e-9),
+        ("bad", "two", 1e-12),
+        ("fine", "one", 1e-13),
+    ]
     records = [record(case, "closed_form", engine, error, GRID) for case, engine, error in rows]
     crashed = {"outcome": Outcome.CRASHED, "message": "signal 11", "outputs": {}, "errors": {}}
     records.append(record("fine", "closed_form", "two", 0.0, GRID, **crashed))
     return Results(run={"cases": {"good": {"source": "a yellow book"}}}, records=records)
 
 
-def test_the_overview_is_filtered_by_outcome_engine_and_words_and_worked_by_keyboard(visit: Any) -> None:
+def test_the_overview_is_filtered_by_outcome_engine_and_words_and_worked_by_keyboard(
+    visit: Any,
+) -> None:
     told = visit(
         several(),
         """
@@ -104,12 +135,17 @@ def test_the_overview_is_filtered_by_outcome_engine_and_words_and_worked_by_keyb
         const reached = all(".filters button, .filters input").every((each) => each.tabIndex === 0);
         const named = all("button").every((each) => each.textContent.trim() || each.ariaLabel);
         return { states, none, keys: { focus, slash, reached, named } };
-        """,
+        """,  # noqa: E501
     )
     everything, failed, of_two, two, yellow, crashed, sorted_ = told["states"]
     every = ["good", "bad", "fine"]
     assert everything == {"rows": every, "columns": ["one", "two"], "sections": every, "said": ""}
-    assert failed == {"rows": ["bad"], "columns": ["one", "two"], "sections": ["bad"], "said": "1 of 3 cases"}
+    assert failed == {
+        "rows": ["bad"],
+        "columns": ["one", "two"],
+        "sections": ["bad"],
+        "said": "1 of 3 cases",
+    }
     assert of_two == {"rows": [], "columns": ["two"], "sections": [], "said": "0 of 3 cases"}
     assert told["none"]
     assert two == {"rows": every, "columns": ["two"], "sections": every, "said": ""}
@@ -125,13 +161,17 @@ def test_plots_hold_the_numbers_of_the_results(visit: Any) -> None:
         """
         return all(".plot[data-drawn]").map((plot) => [plot.dataset.figure, plot.data.map(({ meta, mode, x, y, uid }) =>
           ({ meta, mode, uid, x: [...x], y: [...y] }))]);
-        """,
+        """,  # noqa: E501
     )
     drawn = dict(told)
     # others wait; no history, no efforts
     assert list(drawn) == ["case-0-0", "case-0-1", "case-0-0-position", "case-0-0-velocity"]
     for each in run.records[:2]:
-        [curve] = [trace for trace in drawn["case-0-0"] if (trace["meta"], trace["mode"]) == (each.engine, "lines")]
+        [curve] = [
+            trace
+            for trace in drawn["case-0-0"]
+            if (trace["meta"], trace["mode"]) == (each.engine, "lines")
+        ]
         assert curve["y"] == pytest.approx([1000 * d for d in GRID], abs=1e-12)
         position = each.outputs["half_track_change"].position
         assert curve["x"] == pytest.approx([1000 * v for v in position if v is not None], rel=1e-9)
@@ -154,7 +194,7 @@ def test_curves_are_switched_and_the_other_errors_chosen(visit: Any) -> None:
         const off = one("[data-figure=case-0-0]").data.filter((trace) => trace.visible === false).map((trace) => trace.meta);
         return { off, pressed: one("button[data-series=one]").ariaPressed, visible: visible(),
           later: one("[data-figure=case-0-1-position]").data.filter((trace) => trace.visible === false).length };
-        """,
+        """,  # noqa: E501
     )
     assert told["off"] == ["one", "one"]  # the line and its markers
     assert told["pressed"] == "false"
@@ -179,7 +219,7 @@ def test_the_mechanism_is_drawn_turned_and_moved(visit: Any) -> None:
         press(" ", canvas); note("played"); const still = +slider.value; await pause(500);
         one("[data-layer=names]").click(); note("no names");
         return { looks, playing, stopped: still === +slider.value, last: +slider.max };
-        """,
+        """,  # noqa: E501
     )
     looks = {what: (frame, said) for what, frame, said, _ in told["looks"]}
     assert told["last"] == FRAMES - 1
@@ -201,15 +241,22 @@ def test_without_poses_the_design_is_drawn_and_nothing_moves(visit: Any) -> None
         press(" ", canvas);
         const controls = all("[data-act=play], input[type=range]").length;
         return { said: one("output").textContent, controls, drawn: seen.some(Boolean), note: one(".scene .note").textContent };
-        """,
+        """,  # noqa: E501
     )
     assert (told["said"], told["controls"], told["drawn"]) == ("design position", 0, True)
     assert "no answer in this run: this is the design position" in told["note"]
 
 
 def test_earlier_runs_and_work_precision_are_drawn_where_there_are_any(visit: Any) -> None:
-    past = [Past(run, "one", error, 10.0) for run, error in (("2026-11-01", 1e-12), ("2026-11-02", 0.0), ("2026-11-03", None))]
-    efforts = [Effort("one", "tol 1e-6", 1e-7, 20.0), Effort("gone", "default", 1e-9, 5.0), Effort("one", "tol 1e-3", 1e-4, 9.0)]
+    past = [
+        Past(run, "one", error, 10.0)
+        for run, error in (("2026-11-01", 1e-12), ("2026-11-02", 0.0), ("2026-11-03", None))
+    ]
+    efforts = [
+        Effort("one", "tol 1e-6", 1e-7, 20.0),
+        Effort("gone", "default", 1e-9, 5.0),
+        Effort("one", "tol 1e-3", 1e-4, 9.0),
+    ]
     read = """
         const traces = (plot) => plot.data.map(({ meta, x, y }) => [meta, [...x], [...y]]);
         return all(".plot[data-drawn]").map((plot) => [plot.dataset.figure, traces(plot)]);
@@ -218,7 +265,9 @@ def test_earlier_runs_and_work_precision_are_drawn_where_there_are_any(visit: An
     [curve, zeros, _] = drawn["case-0-trend-error"]
     assert curve == ["one", ["2026-11-01", "2026-11-02", "2026-11-03"], [1e-12, None, None]]
     assert zeros[1] == ["2026-11-02"]
-    assert drawn["case-0-trend-time"] == [["one", ["2026-11-01", "2026-11-02", "2026-11-03"], [10, 10, 10]]]
+    assert drawn["case-0-trend-time"] == [
+        ["one", ["2026-11-01", "2026-11-02", "2026-11-03"], [10, 10, 10]]
+    ]
     curves = {meta: (x, y) for meta, x, y in drawn["case-0-precision-projection"]}
     assert curves["one"] == ([9, 20], [1e-4, 1e-7])
     assert "gone" in curves
@@ -226,9 +275,14 @@ def test_earlier_runs_and_work_precision_are_drawn_where_there_are_any(visit: An
 
 def test_hostile_text_is_text(visit: Any) -> None:
     shown = scene(cases.load("mcpherson_strut"))
-    joints = [msgspec.structs.replace(shown.joints[0], name=HOSTILE, type=HOSTILE), *shown.joints[1:]]
+    joints = [
+        msgspec.structs.replace(shown.joints[0], name=HOSTILE, type=HOSTILE),
+        *shown.joints[1:],
+    ]
     run = results(case=HOSTILE)
-    strange = msgspec.structs.replace(run.records[1], engine=HOSTILE, message=HOSTILE, version=HOSTILE)
+    strange = msgspec.structs.replace(
+        run.records[1], engine=HOSTILE, message=HOSTILE, version=HOSTILE
+    )
     run = msgspec.structs.replace(
         run,
         records=[run.records[0], strange],
@@ -243,7 +297,7 @@ def test_hostile_text_is_text(visit: Any) -> None:
         return { raw, images: all("img").length, scripts: all("script").length, title: one("section.case h2").textContent,
           drawn: all(".plot[data-drawn]").length, links: all(".plot a").length,
           shown: all("section.case")[0].textContent.split("alert(1)").length };
-        """,
+        """,  # noqa: E501
         history={HOSTILE: [past, replace(past, run=f"{HOSTILE} again")]},
         precision={HOSTILE: [effort]},
     )

@@ -13,18 +13,23 @@ import numpy as np
 import pytest
 from kincheck import cases
 from kincheck.core import Body, Distance, JointAngle, Mechanism, Point, Revolute, solve
-from kincheck.core.case.case import (MARKER, Case, Sweep, Truth)
-from kincheck.core.harness.record import Outcome, Results, Scene, SceneBody, from_json, to_json
-from kincheck.core.report.axis import (Axis, driver_axis)
-from kincheck.core.report.drawing import (Drawing, drawing)
+from kincheck.core.case.case import MARKER, Case, Sweep, Truth
+from kincheck.core.harness.record import Outcome, Results, from_json, to_json
 from kincheck.core.harness.scene import FRAMES, LARGEST, POSES, scene, with_scenes
+from kincheck.core.harness.scene_record import Scene, SceneBody
+from kincheck.core.report.axis import Axis, driver_axis
+from kincheck.core.report.drawing import Drawing, drawing
 
-from ..support.made_up import (GRID, STROKE, record, series)
-from ..oracles.naive import A
 from ..kinematics.test_chain import chain
+from ..oracles.naive import A
+from ..support.made_up import GRID, STROKE, record, series
 
 STRUT = cases.load("mcpherson_strut")
-AXIS = driver_axis({"driver": STROKE}, [record("strut", "closed_form", "one", 0.0, STRUT.sweep.values.tolist())], [])
+AXIS = driver_axis(
+    {"driver": STROKE},
+    [record("strut", "closed_form", "one", 0.0, STRUT.sweep.values.tolist())],
+    [],
+)
 
 
 def place(drawn: Drawing, node: int, frame: int) -> Any:
@@ -40,7 +45,9 @@ def test_hardpoints_are_drawn_where_the_native_engine_has_them():
     drawn = drawing(shown, AXIS)
     assert len(shown.frames) == FRAMES
     assert (shown.frames[0], shown.frames[-1]) == (0, 160)
-    motion = solve(STRUT.mechanism, "stroke", STRUT.sweep.values[shown.frames]).points["wheel_center"]
+    motion = solve(STRUT.mechanism, "stroke", STRUT.sweep.values[shown.frames]).points[
+        "wheel_center"
+    ]
     [path] = drawn.paths
     for frame in (0, 17, 60):
         # rounded to a millionth
@@ -52,11 +59,20 @@ def test_hardpoints_are_drawn_where_the_native_engine_has_them():
 def test_both_sides_of_a_joint_stay_together_and_rods_keep_their_length():
     drawn = drawing(scene(STRUT), AXIS)
     [rod] = drawn.rods
-    lengths = [math.dist(place(drawn, rod[0], frame), place(drawn, rod[1], frame)) for frame in range(FRAMES)]
-    assert lengths == pytest.approx([math.dist((1.115, 0.665, 0.118), (1.14, 0.355, 0.1455))] * FRAMES, abs=5e-6)
+    lengths = [
+        math.dist(place(drawn, rod[0], frame), place(drawn, rod[1], frame))
+        for frame in range(FRAMES)
+    ]
+    assert lengths == pytest.approx(
+        [math.dist((1.115, 0.665, 0.118), (1.14, 0.355, 0.1455))] * FRAMES, abs=5e-6
+    )
     names = [body["name"] for body in drawn.bodies]
     ball = np.array([0.9676, 0.66, -0.01])
-    sides = [k for k, (b, *_) in enumerate(drawn.nodes) if np.allclose(place(drawn, k, 30), ball, atol=1e-5)]
+    sides = [
+        k
+        for k, (b, *_) in enumerate(drawn.nodes)
+        if np.allclose(place(drawn, k, 30), ball, atol=1e-5)
+    ]
     assert sorted(names[drawn.nodes[k][0]] for k in sides) == ["knuckle", "lca"]
     for frame in (0, 60):
         assert math.dist(place(drawn, sides[0], frame), place(drawn, sides[1], frame)) < 5e-6
@@ -66,11 +82,29 @@ def test_a_body_is_its_hardpoints_joined_and_fixed_bodies_are_not():
     drawn = drawing(scene(STRUT), AXIS)
     names = [body["name"] for body in drawn.bodies]
     linked = [names[drawn.nodes[a][0]] for a, _ in drawn.links]
-    assert {name: linked.count(name) for name in set(linked)} == {"lca": 1, "knuckle": 6, "strut": 1}
+    assert {name: linked.count(name) for name in set(linked)} == {
+        "lca": 1,
+        "knuckle": 6,
+        "strut": 1,
+    }
     assert all(drawn.nodes[a][0] == drawn.nodes[b][0] for a, b in drawn.links)
-    assert {text for *_, text in drawn.labels} == {"lca_pivot", "ball", "strut_slide", "strut_top", "tie_rod", "wheel_center"}
+    assert {text for *_, text in drawn.labels} == {
+        "lca_pivot",
+        "ball",
+        "strut_slide",
+        "strut_top",
+        "tie_rod",
+        "wheel_center",
+    }
     kinds = [(kind, on_fixed) for _, kind, _, on_fixed in drawn.marks]
-    assert sorted(kinds) == [("ball", False), ("ball", True), ("end", False), ("end", True), ("hinge", True), ("slide", False)]
+    assert sorted(kinds) == [
+        ("ball", False),
+        ("ball", True),
+        ("end", False),
+        ("end", True),
+        ("hinge", True),
+        ("slide", False),
+    ]
 
 
 def star(count: int) -> Scene:
@@ -78,10 +112,17 @@ def star(count: int) -> Scene:
     turned = [math.cos(0.4), 0.0, 0.0, math.sin(0.4)]
     body = SceneBody(name="plate", fixed=False, origin=[5.0, 0.0, 0.0], euler_parameters=turned)
     points = [
-        {"name": f"P{k}", "body": "plate", "position": [5.0 + math.cos(k), math.sin(k), 0.1 * k], "output": False}
+        {
+            "name": f"P{k}",
+            "body": "plate",
+            "position": [5.0 + math.cos(k), math.sin(k), 0.1 * k],
+            "output": False,
+        }
         for k in range(count)
     ]
-    return msgspec.convert({"bodies": [msgspec.to_builtins(body)], "joints": [], "points": points}, Scene)
+    return msgspec.convert(
+        {"bodies": [msgspec.to_builtins(body)], "joints": [], "points": points}, Scene
+    )
 
 
 def test_points_that_only_show_how_a_body_turns_are_no_hardpoints():
@@ -94,7 +135,9 @@ def test_points_that_only_show_how_a_body_turns_are_no_hardpoints():
 
 
 @pytest.mark.parametrize(("count", "nodes", "links"), [(1, 2, 1), (2, 2, 1), (4, 4, 6), (7, 8, 7)])
-def test_few_hardpoints_are_joined_each_with_each_and_many_with_a_hub(count: int, nodes: int, links: int):
+def test_few_hardpoints_are_joined_each_with_each_and_many_with_a_hub(
+    count: int, nodes: int, links: int
+):
     drawn = drawing(star(count), AXIS)
     assert (len(drawn.nodes), len(drawn.links)) == (nodes, links)
     assert place(drawn, 0, 0) == pytest.approx([6.0, 0.0, 0.0], abs=1e-12)
@@ -110,13 +153,20 @@ def test_axes_are_drawn_amid_the_hardpoints_of_a_body_whose_origin_is_far():
         drawing(star(4), AXIS),
         drawing(
             msgspec.structs.replace(
-                star(4), bodies=[SceneBody(name="plate", fixed=False, origin=[0, 0, 0], euler_parameters=[1, 0, 0, 0])]
+                star(4),
+                bodies=[
+                    SceneBody(
+                        name="plate", fixed=False, origin=[0, 0, 0], euler_parameters=[1, 0, 0, 0]
+                    )
+                ],
             ),
             AXIS,
         ),
     )
     assert near.bodies[1]["frame"] == [0.0, 0.0, 0.0]
-    assert far.bodies[1]["frame"] == pytest.approx(np.mean([node[1:] for node in far.nodes], axis=0))
+    assert far.bodies[1]["frame"] == pytest.approx(
+        np.mean([node[1:] for node in far.nodes], axis=0)
+    )
 
 
 def dead_centre() -> Case:
@@ -132,7 +182,9 @@ def dead_centre() -> Case:
         [Point("pin", "crank", (1, 0, 0))],
         [JointAngle("turn", "a")],
     )
-    return Case("short", "", Truth.CONSENSUS_ONLY, mechanism, Sweep("turn", np.linspace(0.0, 3.1, 301)), ())
+    return Case(
+        "short", "", Truth.CONSENSUS_ONLY, mechanism, Sweep("turn", np.linspace(0.0, 3.1, 301)), ()
+    )
 
 
 def test_samples_that_were_not_reached_have_no_frame_and_the_reason_is_said():
@@ -163,8 +215,12 @@ def test_what_cannot_be_solved_is_drawn_at_the_design_and_says_why():
         ("mujoco", Outcome.PASS, 161, False),
     ],
 )
-def test_poses_are_solved_for_only_where_the_native_engine_answered(engine: str, outcome: Outcome, solved: int | None, posed: bool):
-    made = record("mcpherson_strut", "closed_form", engine, 0.0, GRID, outcome=outcome, solved=solved)
+def test_poses_are_solved_for_only_where_the_native_engine_answered(
+    engine: str, outcome: Outcome, solved: int | None, posed: bool
+):
+    made = record(
+        "mcpherson_strut", "closed_form", engine, 0.0, GRID, outcome=outcome, solved=solved
+    )
     results = with_scenes(Results(run={}, records=[made]), [STRUT])
     assert bool(results.scenes["mcpherson_strut"].frames) == posed
     assert ("this is the design position" in results.scenes["mcpherson_strut"].message) != posed
@@ -193,8 +249,12 @@ UP: Any = {"name": "lift", "type": "point_coordinate", "point": "wheel_center", 
         ({"name": "lift", "type": "joint_angle"}, 0, "lift"),
     ],
 )
-def test_travel_is_upwards_where_a_point_is_driven_along_z(driver: dict[str, Any], up: int, name: str):
-    made = record("strut", "closed_form", "one", 0.0, GRID, driver={"lift": GRID}, outputs={"x": series(GRID)})
+def test_travel_is_upwards_where_a_point_is_driven_along_z(
+    driver: dict[str, Any], up: int, name: str
+):
+    made = record(
+        "strut", "closed_form", "one", 0.0, GRID, driver={"lift": GRID}, outputs={"x": series(GRID)}
+    )
     axis: Axis = driver_axis({"driver": driver}, [made], [])
     assert (axis.up, axis.name) == (up, name)
 
@@ -202,7 +262,9 @@ def test_travel_is_upwards_where_a_point_is_driven_along_z(driver: dict[str, Any
 def test_large_mechanisms_have_fewer_frames_and_the_largest_no_scene():
     def case(loops: int) -> Case:
         made = chain(loops)
-        return Case(made.name, "", Truth.CONSENSUS_ONLY, made, Sweep("turn", np.linspace(0.0, 0.1, 101)), ())
+        return Case(
+            made.name, "", Truth.CONSENSUS_ONLY, made, Sweep("turn", np.linspace(0.0, 0.1, 101)), ()
+        )
 
     assert len(scene(case(30)).frames) == POSES // 61
     # one crank more than loops

@@ -13,7 +13,15 @@ def test_outputs_are_labelled_in_words() -> None:
 
 @pytest.mark.parametrize(
     ("value", "text"),
-    [(None, "–"), (0.0, "0"), (1.25e-16, "1.25e-16"), (1e-9, "1e-9"), (12.345, "12.3"), (1543.2, "1543"), (2e7, "2e7")],
+    [
+        (None, "–"),
+        (0.0, "0"),
+        (1.25e-16, "1.25e-16"),
+        (1e-9, "1e-9"),
+        (12.345, "12.3"),
+        (1543.2, "1543"),
+        (2e7, "2e7"),
+    ],
 )
 def test_numbers_are_short_and_a_dash_is_no_zero(value: float | None, text: str) -> None:
     assert number(value) == text

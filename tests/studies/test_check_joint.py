@@ -314,16 +314,24 @@ REFUSED = (
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("def f(:\n    pass\n", "SyntaxError: invalid syntax ({file}, line 1: def f(:); correct it"),
-        ("\nx = 1\n  y = 2\n", "IndentationError: unexpected indent ({file}, line 3: y = 2); correct it"),
-        (RAISING, "ZeroDivisionError: division by zero ({file}, line 2: return 1 / 0, called from {file}, line 4: f()); "),
-        ("import nowhere_to_be_found\n", "No module named 'nowhere_to_be_found' ({file}, line 1: import nowhere_to_be_found); "),
+        ("def f(:\n    pass\n",
+         "SyntaxError: invalid syntax ({file}, line 1: def f(:); correct it"),
+        ("\nx = 1\n  y = 2\n",
+         "IndentationError: unexpected indent ({file}, line 3: y = 2); correct it"),
+        (RAISING, "ZeroDivisionError: division by zero ({file}, line 2: return 1 / 0, called"
+                  " from {file}, line 4: f()); "),
+        ("import nowhere_to_be_found\n",
+         "No module named 'nowhere_to_be_found' ({file}, line 1: import nowhere_to_be_found); "),
         ("import brok\n", "No module named 'brok' ({file}, line 1: import brok); correct it"),
-        ("import broken_too\n", "was never closed ({too}, line 2: x = (, called from {file}, line 1: import broken_too); "),
-        (ENDLESS, "{file}, line 2: f(), called from {file}, line 2: f(), called from {file}, line 4: f()); "),
-        (REFUSED, "joins 'a' with itself; a joint needs two different bodies ({file}, line 2: ball = Spherical("),
+        ("import broken_too\n", "was never closed ({too}, line 2: x = (, called from {file},"
+                                " line 1: import broken_too); "),
+        (ENDLESS, "{file}, line 2: f(), called from {file}, line 2: f(), called from {file},"
+                  " line 4: f()); "),
+        (REFUSED, "joins 'a' with itself; a joint needs two different bodies ({file}, line 2:"
+                  " ball = Spherical("),
     ],
-    ids=["syntax", "indent", "raises", "needs", "needs a name that begins its own", "imports", "recursion", "refused"],
+    ids=["syntax", "indent", "raises", "needs", "needs a name that begins its own", "imports",
+         "recursion", "refused"],
 )  # fmt: skip
 def test_a_module_that_fails_is_one_message_with_its_place(
     tmp_path, monkeypatch, capsys, text, said

@@ -8,9 +8,9 @@ from kincheck.core import Distance, Point, Revolute
 from kincheck.core.case.io.case_writer import case_text
 from kincheck.core.case.models.files import load
 from kincheck.core.cli.main import main
+from kincheck.core.harness.program_account import explain
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.results_file import read_results
-from kincheck.core.studies.explain import explain
 
 
 def totals(lines):

@@ -14,7 +14,8 @@ from kincheck.core.harness.execution import Answer, Failure, Pair
 from kincheck.core.harness.record import Outcome
 from kincheck.core.studies.stress.families import Family, Specimen
 from kincheck.core.studies.stress.families.base import as_case
-from kincheck.core.studies.stress.families.planar import any_plane, crank_rocker, four_bar
+from kincheck.core.studies.stress.families.dimensions import crank_rocker
+from kincheck.core.studies.stress.families.planar import any_plane, four_bar
 from kincheck.core.studies.stress.reproducers import judge as judge_file
 from kincheck.core.studies.stress.run import specimen, stress
 from kincheck.core.studies.stress.shrink import fewer_samples, reduced, rounded

@@ -216,7 +216,9 @@ def test_text_of_files_is_no_markup():
         cells=[Cell(family=evil, specimens=1, samples=counts, elsewhere=0, bad=1, **cell)],
         findings=[
             Finding(
-                family=evil, engine=evil, mode="projection", verdict="silently wrong", specimen=evil, number=0, sample=0,
+                family=evil, engine=evil, mode="projection", verdict="silently wrong",
+                specimen=evil, number=0,
+                sample=0,
                 value=0.0, message=evil, tol=1e-12, worst=[2.0, None, None],
             )
         ],

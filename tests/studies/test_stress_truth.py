@@ -14,10 +14,10 @@ from kincheck.core.errors import KincheckError
 from kincheck.core.joints import Spherical
 from kincheck.core.studies.stress.families.base import as_case
 from kincheck.core.studies.stress.families.degenerate import WRONG
+from kincheck.core.studies.stress.families.dimensions import crank_rocker
 from kincheck.core.studies.stress.families.pairs import beside, beside_motion
 from kincheck.core.studies.stress.families.planar import (
     any_plane,
-    crank_rocker,
     flats,
     four_bar,
     four_bar_motion,

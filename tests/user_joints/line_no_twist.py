@@ -10,7 +10,9 @@ from kincheck.core.joints.base import direction, position, triad
 
 @dataclass(frozen=True)
 class LineNoTwist(Joint):
-    """A point of body j slides along a line of body i; body j bends from it, and does not turn about it."""
+    """A point of body j slides along a line of body i; body j bends from it, and does not turn
+    about it.
+    """
 
     type = "line_no_twist"
     freedoms = ("slide", "bend x", "bend y")

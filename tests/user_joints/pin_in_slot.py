@@ -10,7 +10,9 @@ from kincheck.core.joints.base import directions, position, require_perpendicula
 
 @dataclass(frozen=True)
 class PinInSlot(Joint):
-    """Body i has a slot along the first axis; a pin of body j, about the second, slides and turns in it."""
+    """Body i has a slot along the first axis; a pin of body j, about the second, slides and turns
+    in it.
+    """
 
     type = "pin_in_slot"
     freedoms = ("slide", "turn")

@@ -11,7 +11,9 @@ from kincheck.core.primitives import Primitive, Row
 
 @dataclass(frozen=True)
 class Parabola(Primitive):
-    """phi = y - x^2 / (2 R), with x along a and y along b from the apex; a, b and the apex fixed in body i."""
+    """phi = y - x^2 / (2 R), with x along a and y along b from the apex; a, b and the apex fixed
+    in body i.
+    """
 
     n = 1
     a: Vec3
@@ -43,7 +45,9 @@ class Parabola(Primitive):
 
 @dataclass(frozen=True)
 class PointOnParabola(Joint):
-    """The point, fixed in body j, stays on a parabola of body i through it: along the first axis, curved to the second."""
+    """The point, fixed in body j, stays on a parabola of body i through it: along the first axis,
+    curved to the second.
+    """
 
     type = "point_on_parabola"
     freedoms = ("slide", "rotation x", "rotation y", "rotation z")

@@ -11,7 +11,9 @@ from kincheck.core.joints.base import direction, position, triad
 
 @dataclass(frozen=True)
 class Rzeppa(Joint):
-    """Both shafts meet in the point and turn at the same rate about their axes, in line at design."""
+    """Both shafts meet in the point and turn at the same rate about their axes, in line at
+    design.
+    """
 
     type = "rzeppa"
     freedoms = ("bend x", "bend y")
@@ -23,7 +25,9 @@ class Rzeppa(Joint):
         return p.Spherical(i.arm(P), j.arm(P)), p.ConstantVelocity(f, g, f, g)
 
     def equivalent(self):
-        """A Clemens coupling: two links, hinged to a shaft each and to each other by a ball, mirror images across the joint."""
+        """A Clemens coupling: two links, hinged to a shaft each and to each other by a ball,
+        mirror images across the joint.
+        """
         P, (f, g, h) = np.array(self.point), (np.array([*a]) for a in triad(self.axis))
         links, reach = (f"{self.name}_link_{k}" for k in (1, 2)), 0.1
         first, second = links

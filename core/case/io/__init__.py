@@ -1,1 +1,1 @@
-"""Reading: case files and reference tables to cases, every mistake to one clear message."""
+"""Readers and writers of case files and reference tables; an input error gives one message."""

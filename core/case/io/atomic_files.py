@@ -1,6 +1,4 @@
-"""Files written whole or not at all; what cannot be written is told, before the work where that can
-be seen.
-"""
+"""Files written whole or not at all. Write errors are reported, if possible before the work."""
 
 from __future__ import annotations
 
@@ -19,11 +17,11 @@ Named: TypeAlias = tuple[str, Path | str | None]
 """An option and the file that it names, "-" for standard output; None where it was not given."""
 
 Content: TypeAlias = bytes | Callable[[Path], object]
-"""What a file is to have, or what writes it to the path that it is given."""
+"""Content of a file, or a function that writes it to a given path."""
 
 
 def written(path: Path, content: Content) -> list[str]:
-    """Write a file; or why it cannot be."""
+    """Write a file; return the reason if it fails."""
     try:
         _put(path, content)
     except OSError as error:
@@ -35,7 +33,7 @@ def written(path: Path, content: Content) -> list[str]:
 
 
 def write_all(contents: Iterable[tuple[Path, Content]]) -> list[str]:
-    """Write files; why some could not be."""
+    """Write files; return the reasons of failures."""
     return [problem for path, content in contents for problem in written(path, content)]
 
 
@@ -82,10 +80,10 @@ def _whole(path: Path) -> Generator[Path]:
 
 
 def unwritable(files: Iterable[Named], history: Path | None = None) -> list[str]:
-    """What cannot be written of the files that options name, or would be written over by the next.
+    """Return the files of options that cannot be written, or would overwrite one another.
 
     Args:
-        history: kept in a file of its own, which is none of these.
+        history: file of the history, which is none of these.
     """
     found = list[str]()
     seen = {} if history is None else {history.resolve(): "--history"}
@@ -131,9 +129,7 @@ def _is_standard_output(path: Path) -> bool:
 
 
 def to_standard_output(encoded: bytes) -> None:
-    """Write a JSON document to standard output: in UTF-8, as it has to be, whatever the encoding of
-    texts is there.
-    """
+    """Write a JSON document to standard output in UTF-8, whatever the encoding of texts there."""
     sys.stdout.flush()
     binary: BinaryIO | None = getattr(sys.stdout, "buffer", None)
     if binary is None:  # a caller has put something in its place that takes texts alone

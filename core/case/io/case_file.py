@@ -14,9 +14,10 @@ from ...mechanism.mechanism import Body, Mechanism, Point, Vector
 from ..case import PER_TRAVEL, Case, Output, Quantity, Truth, size
 from ..units import ANGLES, LENGTHS, Unit
 from .coordinates import AXES, with_all_coordinates
-from .document import as_table, class_of, explained, fault, join, parse, read_text, shown, typed
+from .document import explained, fault, join, parse, read_text, shown
 from .driving import read_drivers, read_sweep
-from .reference import Convert, ReferenceKeys, is_derivative, read_origin, read_reference
+from .reference import Convert, is_derivative, read_origin, read_reference
+from .reference_samples import ReferenceKeys
 from .schema import (
     COORDINATE,
     SCHEMA,
@@ -30,24 +31,24 @@ from .schema import (
     own_fields,
 )
 from .tolerance import tolerance
+from .typed_tables import as_table, class_of, typed
 
 if TYPE_CHECKING:
     from .suspension import SuspensionTable
 
 LARGEST_FILE = 4_000_000
-# Twice as many bodies as the largest mechanism that was measured, and joints and points beside
-# them.
+# Twice the bodies of the largest measured mechanism; the same limit for joints and points.
 MOST_PARTS = 60_000
 _PARTS = ("bodies", "joints", "points", "drivers", "outputs")
 
 
 def load_case(path: str | Path) -> Case:
-    """The case in a file, in SI units. Without a [reference] it is consensus_only, whatever it
-    claims.
+    """Read a case from a file, in SI units. Without a [reference] it is consensus_only, whatever
+    its truth.
 
     Raises:
-        CaseError: the file, or its reference, cannot be read or does not make sense; the message
-            names file, key and remedy.
+        CaseError: the file or its reference is unreadable or inconsistent; the message names file,
+            key and remedy.
     """
     file = Path(path)
     tables = parse(
@@ -103,8 +104,8 @@ def load_case(path: str | Path) -> Case:
 
 
 def _scaled(kind: Kind | None, value: Any, length: Convert) -> Any:
-    """A field of a joint in SI; directions and plain numbers have no unit, and what may be left out
-    is None then.
+    """Return a field of a joint in SI. Directions and plain numbers have no unit; an omitted field
+    is None.
     """
     if value is None:
         return None
@@ -171,7 +172,7 @@ def _unit(direction: Vector) -> Vector:
 def _with_outputs(
     file: Path, keys: CaseKeys, case: Case, length: Unit, units: Mapping[str, Convert]
 ) -> Case:
-    """The case with its outputs, and with the points that they need beyond those of the file."""
+    """Return the case with its outputs, and with the points they need beyond those of the file."""
     mechanism = case.mechanism
     if not keys.points:
         raise fault(
@@ -201,7 +202,7 @@ def _outputs(
     case: Case,
     units: Mapping[str, Convert],
 ) -> tuple[Quantity, ...]:
-    """Those that the file names."""
+    """Return the outputs named in the file."""
     return tuple(
         _output(file, name, value, keys, table, case, units) for name, value in keys.outputs.items()
     )

@@ -27,15 +27,15 @@ PLAIN: Mapping[str, Any] = {
 
 
 def case_text(case: Case, comments: Sequence[str] = ()) -> str:
-    """The text of a case file that is read as the same case, its reference excepted; samples to the
-    last place.
+    """Return the text of a case file that reads as the same case without its reference; samples
+    agree to the last place.
 
     Args:
-        comments: lines to put on top.
+        comments: lines at the top.
 
     Raises:
-        CaseError: the case has what no case file can say: samples that are no even grid, or an
-            output of a suspension.
+        CaseError: no case file can express the case: samples on no even grid, or an output of a
+            suspension.
     """
     lines = [f"# {line}" for line in comments]
     lines += _keys({"schema": SCHEMA, "name": case.name, "source": case.source})
@@ -95,7 +95,7 @@ def _output(case: Case, output: Any) -> Iterator[tuple[str, Any]]:
 
 
 def _own(item: Any) -> Mapping[str, Any]:
-    """The fields that a file gives; what may be left out and is, is not written."""
+    """Return the fields that a file gives, without omitted optional ones."""
     described: Any = type(item)  # pyright: ignore[reportUnknownVariableType]
     return {
         f.name: value for f in own_fields(described) if (value := getattr(item, f.name)) is not None

@@ -1,6 +1,4 @@
-"""The types that a case file can name, read off the registries: their keys, and what joints take
-and leave.
-"""
+"""Catalogue of the types in case files: their keys, and the rows and freedoms of joints."""
 
 from __future__ import annotations
 
@@ -62,9 +60,7 @@ def catalogue() -> Iterator[str]:
 
 
 def output_catalogue() -> Iterator[str]:
-    """Lines to print: the types of outputs, with their unit, their keys, what they need of
-    [suspension], and their signs.
-    """
+    """Yield lines of the output types: unit, keys, needs from [suspension], and signs."""
     yield "outputs: (type) = coordinate, point, component or direction, (relative); or a type, and"
     rows: list[tuple[str, ...]] = []
     for name, cls in sorted(SuspensionOutput.registry.items()):
@@ -92,9 +88,7 @@ def rows_of(cls: type[Joint]) -> int | None:
 
 
 def _counts(cls: type[Joint]) -> tuple[str, str]:
-    """How many rows a joint takes, and how many freedoms it leaves and which, where they have
-    names.
-    """
+    """Return the rows a joint takes, and the number and names of the freedoms it leaves."""
     rows = rows_of(cls)
     count, left = ("?", "?") if rows is None else (str(rows), str(6 - rows))
     names = f": {', '.join(cls.freedoms)}" if cls.freedoms else ""
@@ -102,7 +96,7 @@ def _counts(cls: type[Joint]) -> tuple[str, str]:
 
 
 def _keys(cls: type[Joint] | type[Coupler] | type[Driver] | type[Motion]) -> str:
-    """The keys of a type; in brackets those that may be left out, and after a motion's the unit."""
+    """Return the keys of a type; optional ones in brackets, those of a motion with the unit."""
     names: list[str] = []
     for each in own_fields(cls):
         measure = each.metadata.get("measure")

@@ -1,4 +1,4 @@
-"""Coordinates of points as outputs: what is compared where nothing else is asked for."""
+"""Coordinates of points as outputs, compared by default."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ AXES: Mapping[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (
 
 
 def with_all_coordinates(case: Case, points: Iterable[str] | None = None) -> Case:
-    """The case with x, y and z of its points, or of those named, as outputs POINT.x and so on;
-    tolerances are the default ones.
+    """Return the case with outputs POINT.x, .y and .z of all or the named points, with default
+    tolerances.
     """
     given, names = (
         default(size(case)),

@@ -1,8 +1,7 @@
-"""Tables from a file somebody wrote: TOML or JSON in, plain checked data out, and one clear
-CaseError for whatever is wrong.
+"""Documents: TOML or JSON text to plain checked data, with one clear CaseError for each fault.
 
-Nothing is evaluated or imported from a file. Every message says: file, key, what was found, what
-was expected, what to do.
+Nothing is evaluated or imported from a file. Every message states file, key, found, expected and
+remedy.
 """
 
 from __future__ import annotations
@@ -14,31 +13,27 @@ import re
 import reprlib
 import tomllib
 from collections import Counter
-from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, TypeAlias, TypeVar, cast, get_args, get_origin
+from typing import Any, TypeAlias, cast
 
-import msgspec
-
-from ...errors import LONGEST_NAME, CaseError, MechanismError, remedy, similar
+from ...errors import LONGEST_NAME, CaseError, MechanismError
 from ..units import METRE, Unit
 from .escape import visible
 
-# Numbers are squared and multiplied on the way: within these bounds that neither overflows nor
+# Numbers are squared and multiplied later; within these bounds this neither overflows nor
 # underflows.
 LARGEST, SMALLEST = 1e100, 1e-100
-# Tables of a case are three deep, rows of numbers two more; what nests beyond that only hides in a
+# Tables of a case are three levels deep, rows of numbers two more. Deeper nesting only obscures a
 # message.
 DEEPEST = 16
 # Texts say where numbers come from; what is longer hides the rest of a message.
 LONGEST_TEXT = 10_000
 LONGEST_MESSAGE = 3_000
-# Python's bound for decimal integers, which keeps their conversion from taking hours, is 4300
-# digits.
+# Python limits decimal integers to 4300 digits, because longer ones could take hours to convert.
 _TOO_MANY_DIGITS = "Exceeds the limit"
-# tomllib takes the square of a dotted key's length, in time and in memory: gigabytes for one of a
+# Time and memory of tomllib grow with the square of a dotted key's length: gigabytes for a key of a
 # hundred kilobytes.
 _TOML_TEXT = re.compile(
     r'"""(?:[^"\\]|\\.|"(?!""))*+"*+|\'\'\'(?:[^\']|\'(?!\'\'))*+\'*+|"(?:[^"\\\n]|\\.)*+"?|\'[^\'\n]*+\'?|#[^\n]*+',
@@ -50,13 +45,10 @@ _short = reprlib.Repr()
 _short.maxstring = _short.maxother = 60
 _short.maxlevel = 3
 
-_Struct = TypeVar("_Struct", bound=msgspec.Struct)
-_Class = TypeVar("_Class", bound=type)
-
 
 def fault(file: Path, key: str, problem: str) -> CaseError:
-    """The error to raise: 'FILE: KEY: PROBLEM', or 'FILE: PROBLEM' where no key is to blame; of a
-    long one both ends.
+    """Return the error 'FILE: KEY: PROBLEM', or 'FILE: PROBLEM' without a key; a long one keeps
+    both ends.
     """
     whole = visible(": ".join(filter(None, (str(file), key, problem))))
     half = LONGEST_MESSAGE // 2
@@ -69,12 +61,12 @@ def fault(file: Path, key: str, problem: str) -> CaseError:
 def explained(
     file: Path, key: str = "", length: Unit = METRE, given: object = None
 ) -> Generator[None]:
-    """What a description refuses becomes an error of the file, at the key that it names, or else at
-    the one given.
+    """Turn a MechanismError into an error of the file, at the key it names, or else at the given
+    one.
 
     Args:
-        length: the file's unit; the message has lengths in it, and as the file has them.
-        given: the table of the file whose numbers the message may be about.
+        length: the file's unit; lengths in the message are given in it, as in the file.
+        given: table of the file with the numbers that the message may quote.
     """
     try:
         yield
@@ -86,7 +78,7 @@ def explained(
 
 
 def _numbers(value: object) -> Iterator[float]:
-    """All numbers in a value of a file."""
+    """Yield all numbers in a value of a file."""
     waiting: list[Any] = [value]
     while waiting:
         each = waiting.pop()
@@ -101,22 +93,22 @@ def _numbers(value: object) -> Iterator[float]:
 
 
 def shown(value: object) -> str:
-    """A found value in a message, abridged."""
+    """Return a found value for a message, abridged."""
     return _short.repr(value)
 
 
 def join(key: str, name: str) -> str:
-    """The path of a key inside a table."""
+    """Return the path of a key inside a table."""
     name = name if name.isprintable() and name else repr(name)
     return f"{key}.{name}" if key else name
 
 
 def decimal(text: str) -> float:
-    """The number that a text is, as every language reads it.
+    """Return the number of a text, in notation common to all languages.
 
     Raises:
-        ValueError: it is none, or of digits that only Python takes: 1_0 is ten there, and a slip of
-            the pen anywhere else.
+        ValueError: not a number, or digits that only Python takes: 1_0 is ten there, and a typing
+            error anywhere else.
     """
     if "_" in text or not text.isascii():
         raise ValueError(text)
@@ -124,7 +116,7 @@ def decimal(text: str) -> float:
 
 
 def read_text(file: Path, limit: int, why_limit: str) -> str:
-    """The text of a file of at most `limit` bytes.
+    """Return the text of a file of at most `limit` bytes.
 
     Raises:
         CaseError: not there, not a regular file, not readable, too large, or not UTF-8.
@@ -147,17 +139,16 @@ def read_text(file: Path, limit: int, why_limit: str) -> str:
 
 
 def sha256(file: Path) -> str:
-    """The digest of a file that has been read, as `sha256sum` prints it."""
+    """Return the digest of a file, as `sha256sum` prints it."""
     return hashlib.sha256(file.read_bytes()).hexdigest()
 
 
 def parse(file: Path, text: str) -> dict[str, Any]:
-    """The tables of a TOML or JSON text: JSON if the file is called so, or if it is called neither
-    and starts with a brace.
+    """Return the tables of a TOML or JSON text. It is JSON if the suffix says so, or if the suffix
+    is neither and the text starts with a brace.
 
     Raises:
-        CaseError: the syntax is wrong, a key is given twice, or a number or text cannot be worked
-            with.
+        CaseError: the syntax is wrong, a key is given twice, or a number or text is unusable.
     """
     suffix = file.suffix.lower()
     is_json = suffix == ".json" or (suffix != ".toml" and text.lstrip().startswith("{"))
@@ -191,9 +182,7 @@ def parse(file: Path, text: str) -> dict[str, Any]:
 
 
 def _blank(found: re.Match[str]) -> str:
-    """A quoted key in place of a text, and nothing of a comment; its lines stay, and what is after
-    it keeps its place.
-    """
+    """Return underscores for a text and blanks for a comment; lines and columns are kept."""
     part = found.group()
     return re.sub(r"[^\n]", " " if part.startswith("#") else "_", part)
 
@@ -210,8 +199,8 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 _Path: TypeAlias = "tuple[_Path, str | int] | None"
-"""The way to a value: that to what holds it, and its name or index there. Written out only where
-something is wrong.
+"""Path to a value: that of its container, and its name or index there; written out only for an
+error.
 """
 
 
@@ -227,7 +216,9 @@ def _written(path: _Path) -> str:
 
 
 def _check_values(file: Path, tables: Mapping[str, Any]) -> None:
-    """Numbers must be usable, and text printable: it ends up in terminals and reports."""
+    """Refuse unusable numbers, deep nesting and unprintable text, which would reach terminals and
+    reports.
+    """
     # a stack: nesting may be deeper than Python recurses
     waiting: list[tuple[_Path, Any, int]] = [(None, tables, 0)]
     while waiting:
@@ -274,101 +265,7 @@ def _check_values(file: Path, tables: Mapping[str, Any]) -> None:
 
 
 def usable(number: float) -> bool:
-    """Whether a number is finite, and zero or of a size that can be squared."""
+    """Return whether a number is finite, and zero or of a size that can be squared."""
     return number == 0 or (
         abs(number) <= LARGEST and abs(number) >= SMALLEST and math.isfinite(number)
     )
-
-
-def as_table(file: Path, key: str, value: object) -> dict[str, Any]:
-    """A value that has to be a table.
-
-    Raises:
-        CaseError: it is something else.
-    """
-    if not isinstance(value, dict):
-        raise fault(
-            file, key, f"found {shown(value)}, expected a table; write [{key}] and its keys below"
-        )
-    return cast("dict[str, Any]", value)
-
-
-def class_of(file: Path, key: str, what: str, value: object, known: Mapping[str, _Class]) -> _Class:
-    """The class that the key `type` of a table names.
-
-    Raises:
-        CaseError: not a table, or no such type.
-    """
-    table = as_table(file, key, value)
-    if "type" not in table:
-        raise fault(
-            file,
-            join(key, "type"),
-            f"missing, expected a {what} type; add it, one of {', '.join(known)}",
-        )
-    name = table["type"]
-    if not isinstance(name, str) or name not in known:
-        raise fault(
-            file,
-            join(key, "type"),
-            f"found {shown(name)}, expected a {what} type; {remedy(str(name), known)}",
-        )
-    return known[name]
-
-
-def typed(file: Path, key: str, value: object, struct: type[_Struct]) -> _Struct:
-    """A table as the struct that says which keys it has; the fields' `msgspec.Meta` descriptions
-    serve as expectations.
-
-    Raises:
-        CaseError: not a table, an unknown key, a missing key, or a value of another type or shape
-            than described.
-    """
-    table = as_table(file, key, value)
-    fields = _fields(struct)
-    for name in table:
-        if name not in fields:
-            raise fault(
-                file,
-                join(key, name),
-                f"unknown key, expected one of {', '.join(fields)}; {_key_remedy(name, fields)}",
-            )
-    for name, field in fields.items():
-        if field.required and name not in table:
-            raise fault(
-                file,
-                join(key, name),
-                f"missing, expected {description(field.type)}; add the key {name!r}",
-            )
-    for name, found in table.items():
-        try:
-            msgspec.convert(found, fields[name].type)
-        except msgspec.ValidationError:
-            expected = description(fields[name].type)
-            raise fault(
-                file,
-                join(key, name),
-                f"found {shown(found)}, expected {expected}; correct the value",
-            ) from None
-    return msgspec.convert(table, struct)
-
-
-@cache
-def _fields(struct: type[msgspec.Struct]) -> Mapping[str, msgspec.structs.FieldInfo]:
-    """By key; looked up once, not for each of ten thousand bodies."""
-    return {field.encode_name: field for field in msgspec.structs.fields(struct)}
-
-
-def _key_remedy(name: str, known: Iterable[str]) -> str:
-    close = similar(name, known)
-    return f"did you mean {close!r}?" if close else "remove it"
-
-
-def description(annotation: Any) -> str:
-    """What `typing.Annotated[type, msgspec.Meta(description=...)]` says of a value."""
-    for part in get_args(annotation):
-        if isinstance(part, msgspec.Meta) and part.description:
-            return part.description
-        if get_origin(part) is Annotated:  # of Annotated[...] | None
-            return description(part)
-    raise TypeError(f"{annotation} has no description")

@@ -1,4 +1,4 @@
-"""What moves the mechanism of a case file: drivers, their motions, and the sweep."""
+"""Motion of the mechanism of a case file: drivers, their motions, and the sweep."""
 
 from __future__ import annotations
 
@@ -16,9 +16,10 @@ from ...mechanism.motions import ROUNDED_TIME, Absolute, Measure, Motion
 from ...trajectory import Array
 from ..case import TIME, Sweep
 from ..units import SECOND, Unit, plain
-from .document import class_of, explained, fault, join, shown, typed
+from .document import explained, fault, join, shown
 from .reference import Convert
 from .schema import CaseKeys, SweepKeys, driver_keys, motion_keys, own_fields
+from .typed_tables import class_of, typed
 
 DRIVERS: Mapping[str, type[Driver]] = {
     cls.type: cls for cls in (PointCoordinate, JointAngle, JointDisplacement)
@@ -26,9 +27,7 @@ DRIVERS: Mapping[str, type[Driver]] = {
 
 
 def read_drivers(file: Path, tables: Mapping[str, Any]) -> list[Driver]:
-    """The drivers of [drivers]; their motions are read by `read_sweep`, because what they mean
-    depends on it.
-    """
+    """Read the drivers of [drivers]; `read_sweep` reads their motions, which depend on it."""
     if not tables:
         raise fault(
             file, "drivers", "found no driver, expected at least one that moves; add [drivers.NAME]"
@@ -68,7 +67,7 @@ def _driver(file: Path, key: str, name: str, value: object) -> Driver:
 def read_sweep(
     file: Path, keys: CaseKeys, mechanism: Mechanism, length: Unit, angle: Unit
 ) -> tuple[Sweep, Unit]:
-    """The sweep with the motions of all other drivers, and what makes SI of what is swept."""
+    """Read the sweep, with the motions of all other drivers, and the unit of the swept values."""
     sweep = typed(file, "sweep", keys.sweep, SweepKeys)
     moved = {
         name: value["motion"]
@@ -173,7 +172,7 @@ def _scaled(value: float | tuple[float, ...], convert: Convert) -> float | tuple
 
 
 def _check_motion(file: Path, key: str, motion: Motion, times: Array) -> None:
-    """A motion must say where its driver is at every sample."""
+    """Refuse a motion that does not define its driver's value at every sample."""
     (first, last), low, high = motion.span, float(times.min()), float(times.max())
     slack = ROUNDED_TIME * max(abs(low), abs(high))
     if low < first - slack or high > last + slack:
@@ -191,5 +190,5 @@ def _check_motion(file: Path, key: str, motion: Motion, times: Array) -> None:
 
 
 def _unit(driver: Driver, length: Unit, angle: Unit) -> Unit:
-    """The unit of a driver's values in the file."""
+    """Return the unit of a driver's values in the file."""
     return angle if driver.turns else length

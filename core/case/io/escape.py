@@ -6,14 +6,14 @@ from __future__ import annotations
 
 
 def visible(text: str, also: str = "") -> str:
-    r"""The text with all that does not print as an escape: \x1b, \u202e, \udcff; spaces and all
-    letters stay as they are.
+    r"""Return the text with all unprintable characters as escapes: \x1b, \u202e, \udcff; spaces and
+    letters are kept.
 
-    A terminal obeys escape sequences, direction marks turn the order of what is read, and lone
+    A terminal obeys escape sequences, direction marks change the order of reading, and lone
     surrogates cannot be written.
 
     Args:
-        also: characters that may stay though they do not print.
+        also: unprintable characters to keep.
     """
     if text.isprintable():
         return text
@@ -26,7 +26,7 @@ def visible(text: str, also: str = "") -> str:
 
 
 def file_name(text: str) -> str:
-    """A name of a file that stays in its folder, from a text that may be anything, also a path."""
+    """Return a file name in its own folder from any text, even a path."""
     return "".join(letter if letter.isalnum() or letter in "-_. ()'" else "_" for letter in text)
 
 

@@ -1,6 +1,4 @@
-"""What writes a mechanism for a simulator, and the way from the design position to where it shall
-start.
-"""
+"""Interface of model writers, and the path from the design position to the start of a model."""
 
 from __future__ import annotations
 

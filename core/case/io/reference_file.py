@@ -1,6 +1,4 @@
-"""The file of a proved reference, schema kincheck-reference/1, and its use as the truth of a
-case.
-"""
+"""Files of proved references, schema kincheck-reference/1, and their use as the truth of a case."""
 
 from __future__ import annotations
 
@@ -47,17 +45,17 @@ class ProvedSeries(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Sample(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """The proof of a sample, or the reason why there is none.
+    """Proof of a sample, or the reason why there is none.
 
     Attributes:
-        alone: radius of the box around the native pose that holds exactly one solution [lengths:
-            units of the mechanism's size].
-        contraction: of Krawczyk's operator in that box, below one.
-        branch: a lower bound of all branch tests; none where the equations have no spurious zero.
-        redundant: an upper bound of the rows that are left out, at the solution; none without any.
-        contradicted: left-out rows that are proved not to be zero: the geometry, as rounded, closes
-            only without them.
-        left_out: those rows, where they are others than `Reference.redundant`.
+        alone: radius of the box around the native pose with exactly one solution [lengths: units of
+            the mechanism's size].
+        contraction: of Krawczyk's operator in this box, below one.
+        branch: lower bound of all branch tests; none if the equations have no spurious zero.
+        redundant: upper bound of the omitted rows at the solution; none without any.
+        contradicted: number of omitted rows proved nonzero: the rounded geometry closes only
+            without them.
+        left_out: omitted rows, if they differ from `Reference.redundant`.
     """
 
     proved: bool
@@ -100,15 +98,15 @@ class Reference(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def proved(self) -> int:
-        """How many samples are."""
+        """Number of proved samples."""
         return sum(sample.proved for sample in self.samples)
 
 
 def read(file: Path) -> Reference:
-    """The reference in a file.
+    """Read the reference in a file.
 
     Raises:
-        CaseError: it cannot be read or is none.
+        CaseError: the file is unreadable, or no proved reference.
     """
     text = read_text(file, LARGEST_FILE, "give a file that kincheck reference wrote")
     try:
@@ -124,15 +122,15 @@ def read(file: Path) -> Reference:
 def series(
     file: Path, found: Reference, values: Array, outputs: Sequence[Quantity]
 ) -> dict[str, Series]:
-    """The doubles nearest to the proved numbers, by output; NaN at samples that are not proved.
+    """Return the doubles nearest to the proved numbers, by output; NaN at unproved samples.
 
     Args:
-        file: that the reference was read from, for messages.
-        values: the grid of the sweep [m, rad or s], shape (n,).
-        outputs: those of the case.
+        file: file of the reference, for messages.
+        values: grid of the sweep [m, rad or s], shape (n,).
+        outputs: outputs of the case.
 
     Raises:
-        CaseError: the grid or the outputs, or their signs, are not those of the case.
+        CaseError: the grid, the outputs or their signs differ from those of the case.
     """
     grid = np.array(next(iter(found.driver.values())) if found.driver else [])
     if grid.shape != values.shape or not np.allclose(

@@ -1,77 +1,93 @@
-"""The keys of a case file, schema kincheck-case/1: which there are, what each holds, and what it is
-when left out.
+"""The keys of a case file, schema kincheck-case/1: their values and defaults.
 
-The keys of a joint's geometry, of a driver and of a motion are read off the fields of its class: a
-new type needs nothing here.
+The keys of a joint's geometry, of a driver and of a motion are the fields of its class: a new type
+needs nothing here.
 
 Reference. A case file is TOML, or JSON with the same keys. Points and directions are global, at the
 design position, as in a table of hardpoints; directions have any length but zero. Numbers are in SI
-units and radians unless [units] says otherwise; results always are. Keys in brackets may be left
-out. `kincheck list --joints` prints all types there are, with their keys.
+units and radians unless [units] states others; results always are in SI. Keys in brackets may be
+left out. `kincheck list --joints` prints all types with their keys.
 
     schema = "kincheck-case/1"
-    name, source         what it is called, and where the numbers come from
-    (truth)              with a reference only, where that comes from: closed_form, third_party_data or in_house_oracle
+    name, source         name of the case, and source of its numbers
+    (truth)              kind of the reference, with a reference only: closed_form,
+                         third_party_data or in_house_oracle
 
-    [units]              (length) "m" or "mm", (angle) "rad" or "deg"; seconds and hertz have no other unit
-    [bodies.NAME]        (origin) = [0, 0, 0], (euler_parameters) = [1, 0, 0, 0], e0..e3, body to global; (fixed) = false
-                         the body "ground" is there without being declared
-    [joints.NAME]        type, bodies = [first, second], and what the type asks for: point, axis, lengths, ...
-                         a type of your own: --joint-type MODULE:CLASS on the command line has it
-                         known type, joints = [first, second], where it couples two other joints:
-                         gear (ratio), rack_pinion (radius) a joint's rotation and displacement are
-                         those of its second body relative to its first, about and along its axis by
-                         the right-hand rule, zero at design
-    [points.NAME]        body, position: a point that is compared, or driven
+    [units]              (length) "m" or "mm", (angle) "rad" or "deg"; time is in s and Hz
+    [bodies.NAME]        (origin) = [0, 0, 0], (euler_parameters) = [1, 0, 0, 0], e0..e3, body to
+                         global; (fixed) = false
+                         the body "ground" exists without a declaration
+    [joints.NAME]        type, bodies = [first, second], and the keys of the type: point, axis,
+                         lengths, ...
+                         own types: declare them by --joint-type MODULE:CLASS
+                         type, joints = [first, second], for a coupler of two other joints: gear
+                         (ratio), rack_pinion (radius)
+                         a joint's rotation and displacement are those of its second body relative
+                         to its first, about and along its axis by the right-hand rule, zero at
+                         design
+    [points.NAME]        body, position: a point to compare or to drive
     [drivers.NAME]       type = "point_coordinate": point, direction, (relative) = true
-                         type = "joint_angle" or "joint_displacement": joint, (relative) = true; of
-                         joints that have a rotation or a translation: revolute, cylindrical, screw,
-                         planar (its turn), translational values are measured from the design
-                         position; relative = false: absolute, which for joints is the same
-    [drivers.NAME.motion]   how it goes with time; without, it holds its design value unless it is swept
-                         type = "ramp": rate, per second type = "sine": amplitude, frequency [Hz],
-                         (phase) = 0: amplitude sin(2 pi frequency t + phase) type = "table": times
-                         [s], values: the natural cubic spline through them, which must cover the
-                         sweep
-    [sweep]              (driver), start, stop, steps: samples with both ends, 1 where they are the same; (rate) = 1, in driver
-                         units per second driver: its samples from start to stop; it moves at the
-                         rate, whose sign says which way, and has its design value at time zero no
-                         driver, or "time": start and stop are times [s], there is no rate, and the
-                         motions move everything both are followed from the design position, both
-                         ways: from time zero, or from a sample, where the values are those of the
-                         design to six digits; where none are, all drivers go straight from the
-                         design to their values at time zero if the sweep has it, else at the first
-                         sample, and the result says so
+                         type = "joint_angle" or "joint_displacement": joint, (relative) = true;
+                         for joints with a rotation or a translation: revolute, cylindrical,
+                         screw, planar (its turn), translational
+                         values are relative to the design position; relative = false: absolute,
+                         which is the same for joints
+    [drivers.NAME.motion]   motion over time; without it, the driver holds its design value unless
+                         it is swept
+                         type = "ramp": rate, per second
+                         type = "sine": amplitude, frequency [Hz], (phase) = 0:
+                         amplitude sin(2 pi frequency t + phase)
+                         type = "table": times [s], values: the natural cubic spline through them,
+                         which must cover the sweep
+    [sweep]              (driver), start, stop, steps: samples with both ends, 1 if they are equal;
+                         (rate) = 1, in driver units per second
+                         driver: its samples from start to stop; it moves at the rate, whose sign
+                         gives the direction, and has its design value at time zero
+                         no driver, or "time": start and stop are times [s], there is no rate, and
+                         the motions move everything
+                         both are followed from the design position, in both directions: from time
+                         zero, or from a sample with the values of the design to six digits;
+                         without either, all drivers go straight from the design to their values at
+                         time zero if the sweep has it, else at the first sample, and the result
+                         says so
     [outputs.NAME]       (type) = "coordinate": point, component = "x", "y" or "z", or direction
                          type = "toe", "camber", ...: of the wheel in [suspension]; `kincheck list
-                         --outputs` prints them with their keys, signs, and what they need there;
-                         each comes with its derivative by wheel travel, NAME.per_travel (relative)
-                         = false: measured from the design; not for quotients of velocities, such as
-                         motion_ratio (atol), in the output's unit, (rtol), of the range of the true
-                         values: with either, (why), the reason no outputs: x, y and z of every
-                         point
-    [suspension]         what suspension outputs need to know of the vehicle
-                         convention = "iso8855" or "sae_j670" (z down), side = "left" or "right":
-                         whose signs, and which wheel forward, up: directions of the vehicle in the
-                         file's axes, at right angles (wheel_center) = "wheel_center", the name of a
-                         point; (center_plane) = [0, 0, 0], a point in the middle (static_toe) = 0,
-                         toe-in, and (static_camber) = 0, top outboard: angles of the wheel at
-                         design (kingpin) = ["lower", "upper"], names of points; (wheel_radius),
-                         loaded, to the contact centre (axle) = "front" or "rear"; (wheelbase),
-                         (cg_height), above the road (brakes) = "outboard", (drive) = "inboard":
-                         what holds the torque, wheel carrier or vehicle body (brake_share),
-                         (drive_share): parts of the vehicle's force at this axle, 0 to 1
-                         (per_travel) = true: derivatives by travel, the upward way of the wheel
+                         --outputs` prints them with their keys, signs and needs; each has its
+                         derivative by wheel travel, NAME.per_travel
+                         (relative) = false: measured from the design; not for quotients of
+                         velocities, such as motion_ratio
+                         (atol), in the output's unit, (rtol), of the range of the true values:
+                         with either, (why), the reason
+                         no outputs: x, y and z of every point
+    [suspension]         vehicle data of suspension outputs
+                         convention = "iso8855" or "sae_j670" (z down), of the signs;
+                         side = "left" or "right", of the wheel
+                         forward, up: perpendicular directions of the vehicle in the file's axes
+                         (wheel_center) = "wheel_center", the name of a point;
+                         (center_plane) = [0, 0, 0], a point in the middle
+                         (static_toe) = 0, toe-in, and (static_camber) = 0, top outboard: angles of
+                         the wheel at design
+                         (kingpin) = ["lower", "upper"], names of points; (wheel_radius), loaded,
+                         to the contact centre
+                         (axle) = "front" or "rear"; (wheelbase), (cg_height), above the road
+                         (brakes) = "outboard", (drive) = "inboard": support of the torque, wheel
+                         carrier or vehicle body
+                         (brake_share), (drive_share): parts of the vehicle's force at this axle,
+                         0 to 1
+                         (per_travel) = true: derivatives by travel, upward motion of the wheel
                          centre
-    [reference]          true values: file, the name of a CSV file beside the case file, or rows, with (columns)
+    [reference]          true values: file, the name of a CSV file beside the case file, or rows,
+                         with (columns)
                          beside is in its folder or below, links followed: a case file from
-                         elsewhere has nothing else opened first column: what is swept, on its grid;
-                         others: OUTPUT, OUTPUT.velocity, OUTPUT.acceleration a CSV file of
-                         suspension outputs names their convention in a comment: # signs: iso8855
-                         (citation), where the true values come from: author, title, page or
-                         address; without, agreement with them is not called validated, whatever
-                         truth says (digest) = "sha256:...", of the file, as sha256sum prints it: a
-                         file of another content is refused
+                         elsewhere opens no other file
+                         first column: swept values, on the grid; others: OUTPUT, OUTPUT.velocity,
+                         OUTPUT.acceleration
+                         a CSV file of suspension outputs names their convention in a comment:
+                         # signs: iso8855
+                         (citation), source of the true values: author, title, page or address;
+                         without it, agreement is not called validated, whatever the truth
+                         (digest) = "sha256:...", of the file, as sha256sum prints it: a file of
+                         other content is refused
 """
 
 from __future__ import annotations
@@ -204,7 +220,7 @@ _INHERITED = {each.name for base in (Joint, Coupler, Driver, Motion) for each in
 
 @cache
 def joint_keys(cls: type[Joint] | type[Coupler]) -> type[msgspec.Struct]:
-    """The keys of a joint of that class: type, the bodies or joints it joins, and its geometry."""
+    """Return the keys of a joint class: type, the bodies or joints it joins, and its geometry."""
     keys: _Keys = [
         ("type", Text),
         ("joints", Joints) if issubclass(cls, Coupler) else ("bodies", Bodies),
@@ -222,23 +238,23 @@ def joint_keys(cls: type[Joint] | type[Coupler]) -> type[msgspec.Struct]:
 
 @cache
 def driver_keys(cls: type[Driver]) -> type[msgspec.Struct]:
-    """The keys of a driver of that class: type, its fields, and its motion."""
+    """Return the keys of a driver class: type, its fields, and its motion."""
     return _keys_of_fields(cls, ("motion", Table | None, None))
 
 
 @cache
 def motion_keys(cls: type[Motion]) -> type[msgspec.Struct]:
-    """The keys of a motion of that class: type and its fields."""
+    """Return the keys of a motion class: type and its fields."""
     return _keys_of_fields(cls)
 
 
 def own_fields(cls: type[Joint] | type[Coupler] | type[Driver] | type[Motion]) -> list[Field[Any]]:
-    """The fields of a class beyond those of its kind: what a case file gives."""
+    """Return the fields of a class beyond those of its kind, which case files give."""
     return [each for each in fields(cls) if each.name not in _INHERITED]
 
 
 def kind_of(each: Field[Any]) -> Kind | None:
-    """What a field of a joint holds; None for a plain number."""
+    """Return the kind of a joint's field; None for a plain number."""
     return each.metadata.get("kind")
 
 

@@ -1,5 +1,5 @@
-"""Suspension outputs of a case file: the [suspension] table, and [outputs.NAME] with a type, onto
-`harness.suspension`.
+"""Suspension outputs of a case file: the [suspension] table and typed [outputs.NAME], read to
+`case.suspension`.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ from ..suspension import (
     own_keys,
 )
 from ..units import Unit
-from .document import fault, join, shown, typed
+from .document import fault, join, shown
 from .reference import Convert
 from .schema import Flag, Number, Numbers3, Text, ToleranceKeys
 from .tolerance import tolerance
+from .typed_tables import typed
 
-# Axes written to nine digits are at right angles to about 1e-9; a slip in a sign or a digit is far
-# more.
+# Axes written to nine digits are perpendicular to about 1e-9; a wrong sign or digit gives far more.
 SQUARE = 1e-8
 
 
@@ -83,9 +83,7 @@ _NOT_OF_VEHICLE = ("center_plane", "per_travel")
 
 @cache
 def output_keys(cls: type[SuspensionOutput]) -> type[msgspec.Struct]:
-    """The keys of a suspension output of that class: type, its fields, and a tolerance with its
-    reason.
-    """
+    """Return the keys of a suspension output class: type, fields, tolerance and its reason."""
     hints = get_type_hints(cls)
     keys: list[Any] = [("type", Text)]
     for each in own_keys(cls):
@@ -99,9 +97,7 @@ def output_keys(cls: type[SuspensionOutput]) -> type[msgspec.Struct]:
 
 
 def _shape_of(hint: Any) -> Any:
-    """The annotation of an output's own field: one of a few words, the names of two points, or true
-    and false.
-    """
+    """Return the annotation of an output's own field: some words, two point names, or a flag."""
     if isinstance(hint, type) and issubclass(hint, StrEnum):
         return Annotated[hint, _one_of(hint)]
     return {tuple[str, str]: Points, bool: Flag}[hint]
@@ -118,11 +114,10 @@ class SuspensionTable:
 def read_suspension(
     file: Path, value: object, mechanism: Mechanism, length: Unit, angle: Convert
 ) -> SuspensionTable:
-    """The table in SI.
+    """Read the table, in SI.
 
     Raises:
-        CaseError: axes that are none, points that are not there, or a wheel that is not where its
-            side says.
+        CaseError: invalid axes, unknown points, or a wheel on the wrong side.
     """
     keys = typed(file, "suspension", value, SuspensionKeys)
     forward, up = (_direction(file, name, getattr(keys, name)) for name in ("forward", "up"))
@@ -172,7 +167,7 @@ def _check_point(file: Path, key: str, name: str, mechanism: Mechanism) -> None:
 
 
 def _check_side(file: Path, vehicle: Vehicle, mechanism: Mechanism, length: Unit) -> None:
-    """What most often goes wrong: hardpoints of one side or of mirrored axes under the name of the
+    """Refuse the most common mistake: hardpoints of one side or of mirrored axes, declared as the
     other side.
     """
     point = mechanism.point(vehicle.wheel_center)
@@ -215,15 +210,15 @@ def read_output(
     case: Case,
     units: Mapping[str, Convert],
 ) -> SuspensionOutput:
-    """An output of that type.
+    """Read an output of the given class.
 
     Args:
-        case: as read so far.
-        units: from the file's units to SI, by the unit there.
+        case: the case as read so far.
+        units: conversions from the file's units, by SI unit.
 
     Raises:
-        CaseError: unknown key, something missing that the type needs, or a type that this wheel
-            does not have.
+        CaseError: an unknown key, a missing input of the type, or a type that this wheel does not
+            have.
     """
     if table is None:
         raise fault(
@@ -267,11 +262,11 @@ def read_output(
 
 
 def with_slopes(outputs: Sequence[Quantity], size: float) -> tuple[Quantity, ...]:
-    """The outputs, each suspension output followed by its derivative by travel.
+    """Return the outputs, each suspension output followed by its derivative by travel.
 
     Args:
-        size: of the mechanism [m]: moving its pose by d changes a slope by about d / size of what d
-            changes the output by.
+        size: size of the mechanism [m]. A pose error changes a slope by about 1 / size times its
+            change of the output.
     """
     both: list[Quantity] = []
     for output in outputs:
@@ -282,7 +277,7 @@ def with_slopes(outputs: Sequence[Quantity], size: float) -> tuple[Quantity, ...
 
 
 def with_markers(mechanism: Mechanism, outputs: Sequence[Quantity]) -> Mechanism:
-    """The mechanism with the points on wheel carriers that the outputs need to see them turn."""
+    """Return the mechanism with the points on wheel carriers by which outputs measure rotation."""
     read = {name for output in outputs for name in output.points}
     added: dict[str, Point] = {}
     for output in outputs:

@@ -1,4 +1,4 @@
-"""Tolerances of outputs in a case file, and those they get without one."""
+"""Tolerances of outputs in a case file, and their defaults."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from .schema import ToleranceKeys
 # Hardpoints are measured to about a micrometre; double precision rounds coordinates of metre-sized
 # mechanisms at 1e-16 m.
 DEFAULT_ATOL = 1e-9
-# Near a dead centre outputs go thousands of times as fast as their driver, by whose pace `atol` is
-# passed on, and so do errors: a loop of a revolute, a cylindrical joint and a pin in a slot, 1,855
-# m/s^2 at a pace of 0.5 /s, proved: the engines are within 3e-10 m/s^2, which 1e-9 m at that pace
-# does not allow.
+# Near a dead centre outputs and their errors change thousands of times as fast as the driver, whose
+# pace scales `atol`. Example: a loop of a revolute, a cylindrical joint and a pin in a slot has
+# 1,855 m/s^2 at a pace of 0.5 /s. Engines are proved to be within 3e-10 m/s^2, which 1e-9 m at that
+# pace does not allow.
 DEFAULT_RTOL = 1e-9
 _OF_RANGE = "; and of values whose range is larger, as much of the range"
-# Of mechanisms below a millimetre: a nanometre is as large as some of them.
+# For mechanisms below a millimetre: some are as small as a nanometre.
 PART_OF_SIZE = 1e-6
 DEFAULT_WHY = (
     "the default of 1e-9 m, or a millionth of the size of mechanisms below a millimetre: a"
@@ -37,13 +37,11 @@ _DEFAULTS: Mapping[str, str] = {
         f" millions of times the round-off of a ratio near one in double precision{_OF_RANGE}"
     ),
 }
-"""The reason for the default by the unit of the output."""
+"""Reason for the default, by the unit of the output."""
 
 
 def default(size: float, unit: str = "m") -> tuple[float, float, str]:
-    """atol [unit], rtol [-] and the reason for them, where a mechanism of that size [m] is told
-    none.
-    """
+    """Return the default atol [unit], rtol [-] and their reason for a mechanism of a size [m]."""
     return (
         min(DEFAULT_ATOL, PART_OF_SIZE * size) if unit == "m" else DEFAULT_ATOL,
         DEFAULT_RTOL,
@@ -54,11 +52,11 @@ def default(size: float, unit: str = "m") -> tuple[float, float, str]:
 def tolerance(
     file: Path, key: str, keys: ToleranceKeys, convert: Convert, size: float, unit: str = "m"
 ) -> tuple[float, float, str]:
-    """atol [unit], rtol [-] and the reason for them.
+    """Return atol [unit], rtol [-] and their reason.
 
     Args:
-        convert: from the file's unit of the output to SI.
-        size: of the mechanism [m].
+        convert: conversion from the file's unit of the output to SI.
+        size: size of the mechanism [m].
 
     Raises:
         CaseError: a tolerance without a reason, or a reason without a tolerance.

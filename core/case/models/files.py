@@ -1,4 +1,4 @@
-"""Which reader a file is for: by the end of its name, and by what it begins with."""
+"""Choice of the reader of a file, by its suffix and content."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ TABLES = (".csv", ".tsv")
 ADAMS_FILES = (".sub", ".tpl", ".asy", ".hpt")
 MODELS = (".xml", ".mjcf")
 SUFFIXES = (*CASE_FILES, *TABLES, *ADAMS_FILES, *MODELS)
-"""Ends of names that are files, whether they are there or not."""
+"""Suffixes of names that are files, whether they exist or not."""
 
 CASE, CHRONO, ADAMS, TABLE, MODEL = (
     "case file",
@@ -32,11 +32,11 @@ _OPTIONS = {
 
 
 def load(file: Path, supplied: Supplied = NOTHING) -> Case:
-    """The case in a file of any kind that can be read.
+    """Read a case from a file of any supported kind.
 
     Raises:
-        CaseError: the file cannot be read, does not make sense, or does not say enough; or an
-            option is not for such files.
+        CaseError: the file is unreadable, inconsistent or incomplete, or an option is not for such
+            files.
     """
     kind = kind_of(file, supplied)
     for option in supplied.given:
@@ -72,11 +72,10 @@ def load(file: Path, supplied: Supplied = NOTHING) -> Case:
 
 
 def kind_of(file: Path, supplied: Supplied = NOTHING) -> str:
-    """What kind of file it is; a file of no known kind is a case file, whose reader says what that
-    needs.
+    """Return the kind of a file; an unknown kind is a case file, whose reader states its needs.
 
     Raises:
-        CaseError: a file that has to be looked into for it cannot be read.
+        CaseError: a file whose content decides cannot be read.
     """
     suffix = file.suffix.lower()
     if suffix == ".toml":

@@ -1,5 +1,5 @@
-"""Suspensions: outputs as kinematics engineers know them, each with its derivative by wheel travel
-and its sign in words.
+"""Suspension outputs in the terms of kinematics engineers, each with its derivative by wheel travel
+and the meaning of its sign.
 """
 
 from . import instant_axis as instant_axis

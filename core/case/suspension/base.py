@@ -1,9 +1,8 @@
-"""What an output of a suspension is: a formula over the vectors of a corner, and what it tells of
-its unit and sign.
+"""Base classes of suspension outputs: a formula over the vectors of a corner, with unit and sign.
 
 A new output type is a frozen dataclass with `type`, `measure`, `positive`, `needs`, `reads` and a
-formula, below one of the three kinds here. Declaring the class registers it: case files can name it
-at once, and `kincheck list --outputs` prints it.
+formula, derived from one of the three kinds here. The class declaration registers it: case files
+can name it at once, and `kincheck list --outputs` prints it.
 """
 
 from __future__ import annotations
@@ -22,22 +21,21 @@ from ..case import PER_TRAVEL
 from .corner import Corner
 from .vehicle import Vehicle
 
-# Samples at which the wheel travels slower than this part of the fastest point are left out: there
-# a quotient by the speed of travel has lost three digits of the rates it is made of, and more the
-# slower it gets.
+# Samples with a wheel speed below this fraction of the fastest point's speed are left out: a
+# quotient by the travel speed has lost three digits of its rates there, and more at lower speeds.
 STILL = 1e-3
 
 
 @dataclass(frozen=True)
 class SuspensionOutput(ABC):
-    """A quantity of one wheel over its travel; judged, reported and compared like any other output.
+    """A quantity of one wheel over its travel, judged, reported and compared like any other output.
 
     Attributes:
-        type: the name in case files.
-        measure: its unit: m, rad, or 1 for a ratio.
-        positive: what a positive value means, for all wheels and conventions.
-        needs: attributes of the vehicle that may be left out in general, but not here.
-        reads: attributes of the vehicle that name the points it reads.
+        type: name in case files.
+        measure: unit: m, rad, or 1 for a ratio.
+        positive: meaning of a positive value, for all wheels and conventions.
+        needs: vehicle attributes that are optional in general, but required here.
+        reads: vehicle attributes with the names of the points it reads.
         atol, rtol: an error is accepted up to atol [unit] + rtol * range of the reference.
     """
 
@@ -61,11 +59,11 @@ class SuspensionOutput(ABC):
 
     @abstractmethod
     def value(self, corner: Corner) -> Jet:
-        """The formula."""
+        """Return the value of the formula over the samples."""
 
     @abstractmethod
     def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
-        """The output over the samples; see `Quantity.of`."""
+        """Return the output over the samples; see `Quantity.of`."""
 
     @property
     def points(self) -> tuple[str, ...]:
@@ -78,7 +76,7 @@ class SuspensionOutput(ABC):
 
     @property
     def unit(self) -> str:
-        """That of its type."""
+        """Unit of the type."""
         return self.measure
 
     @property
@@ -88,80 +86,78 @@ class SuspensionOutput(ABC):
 
     @property
     def sense(self) -> str:
-        """What a positive value means for this wheel, in words."""
+        """Meaning of a positive value for this wheel, in words."""
         return f"positive: {self.positive}"
 
     @property
     def problem(self) -> str:
-        """Why there is no such output of this wheel: what was found, expected, and what to do;
-        empty where there is.
-        """
+        """Reason why this wheel has no such output: found, expected, remedy. Otherwise empty."""
         return ""
 
     @property
     def signs(self) -> str:
-        """The convention in words."""
+        """Convention of signs and axes, in words."""
         return self.vehicle.signs
 
     @property
     def facts(self) -> Mapping[str, Any]:
-        """What a reader of results needs to know of it."""
+        """Properties for readers of results."""
         own = {each: value for each, value in asdict(self).items() if each != "vehicle"}
         return {"type": self.type, "unit": self.unit, "sense": self.sense, **own}
 
 
 @dataclass(frozen=True)
 class Change(SuspensionOutput):
-    """A coordinate, measured from the design position."""
+    """A coordinate relative to the design position."""
 
     def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
-        """The coordinate less that at design."""
+        """Return the coordinate minus its value at design."""
         return self.value(Corner(self.vehicle, at)) - self.value(Corner(self.vehicle, design))
 
 
 @dataclass(frozen=True)
 class Attitude(SuspensionOutput):
-    """An angle or an offset that is known at every position.
+    """An angle or an offset, known at every position.
 
     Attributes:
-        relative: measured from the design position.
+        relative: whether it is measured from the design position.
     """
 
     relative: bool = False
 
     def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
-        """The angle or offset, less that at design if it is relative."""
+        """Return the angle or offset, minus its value at design if relative."""
         value = self.value(Corner(self.vehicle, at))
         return value - self.value(Corner(self.vehicle, design)) if self.relative else value
 
 
 @dataclass(frozen=True)
 class Rate(SuspensionOutput):
-    """A quotient of velocities: known where the wheel travels, and with one derivative less.
+    """A quotient of velocities, known only while the wheel travels, with one derivative less.
 
-    It is a property of the position only while nothing but the travel moves the wheel.
+    It is a property of the position only if the travel alone moves the wheel.
     """
 
     @property
     def orders(self) -> int:
-        """Value and rate; they take velocities and accelerations."""
+        """Value and rate; they need velocities and accelerations."""
         return 2
 
     def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
-        """The quotient, NaN where the wheel stands still."""
+        """Return the quotient, NaN while the wheel is at rest."""
         corner = Corner(self.vehicle, at)
         return where_moving(self.value(corner), corner, at)
 
 
 @dataclass(frozen=True)
 class PerTravel:
-    """The derivative of an output by wheel travel: upward displacement of the wheel centre against
-    the vehicle's body, jounce.
+    """The derivative of an output by wheel travel (jounce): the upward displacement of the wheel
+    centre relative to the vehicle's body.
 
-    It is the slope along the sweep, q' / s': with further drivers that move, their share is in it.
+    It is the slope along the sweep, q' / s', and includes the share of other moving drivers.
 
     Attributes:
-        atol: of the output, over the size of the mechanism [unit / m].
+        atol: tolerance of the output over the size of the mechanism [unit / m].
     """
 
     of_output: SuspensionOutput
@@ -169,7 +165,7 @@ class PerTravel:
 
     @property
     def name(self) -> str:
-        """That of the output, with an ending."""
+        """Name of the output with the suffix `PER_TRAVEL`."""
         return f"{self.of_output.name}{PER_TRAVEL}"
 
     @property
@@ -179,42 +175,42 @@ class PerTravel:
 
     @property
     def orders(self) -> int:
-        """One less than the output has."""
+        """One less than those of the output."""
         return self.of_output.orders - 1
 
     @property
     def unit(self) -> str:
-        """That of the output by metres."""
+        """Unit of the output per metre."""
         return f"{self.of_output.unit}/m"
 
     @property
     def rtol(self) -> float:
-        """As of the output."""
+        """Relative tolerance of the output."""
         return self.of_output.rtol
 
     @property
     def why(self) -> str:
-        """The reason for the tolerance."""
+        """Reason for the tolerance."""
         return f"that of {self.of_output.name} over the size of the mechanism; {self.of_output.why}"
 
     @property
     def sense(self) -> str:
-        """What a positive value means, in words."""
+        """Meaning of a positive value, in words."""
         return f"{self.of_output.sense}, per metre of jounce travel"
 
     @property
     def vehicle(self) -> Vehicle:
-        """That of the output."""
+        """Vehicle of the output."""
         return self.of_output.vehicle
 
     @property
     def signs(self) -> str:
-        """The convention in words."""
+        """Convention of signs and axes, in words."""
         return self.of_output.signs
 
     @property
     def facts(self) -> Mapping[str, Any]:
-        """What a reader of results needs to know of it."""
+        """Properties for readers of results."""
         known: Sequence[str] = ("name", "unit", "sense", "atol", "rtol", "why")
         return {
             "type": "per_travel",
@@ -223,21 +219,21 @@ class PerTravel:
         }
 
     def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
-        """The slope, NaN where the wheel stands still."""
+        """Return the slope, NaN while the wheel is at rest."""
         corner = Corner(self.vehicle, at)
         return where_moving(self.of_output.of(at, design).dot / corner.center.z.dot, corner, at)
 
 
 def where_moving(quotient: Jet, corner: Corner, at: Mapping[str, Vec3]) -> Jet:
-    """The quotient by the speed of travel, NaN where that is as good as zero beside the fastest of
-    the points.
+    """Return a quotient by the travel speed, NaN at samples with a negligible travel speed relative
+    to the fastest point.
     """
     travel = np.abs(corner.center.z.v)
     speeds = [
         np.sqrt(sum(component.v * component.v for component in point)) for point in at.values()
     ]
-    # over points and samples, not over lanes: variants of a design may be side by side, and are not
-    # to be judged by one another
+    # The maximum is over points and samples, not over lanes: lanes may hold variants of a design,
+    # which must not be judged by one another.
     fastest = np.max(np.nan_to_num(np.array(speeds)), axis=(0, 1), initial=0.0)
     still = ~(travel > STILL * fastest)
 
@@ -248,6 +244,6 @@ def where_moving(quotient: Jet, corner: Corner, at: Mapping[str, Vec3]) -> Jet:
 
 
 def own_keys(cls: type[SuspensionOutput]) -> list[Any]:
-    """The fields of a type beyond those all have: what a case file gives."""
+    """Return the fields of an output type beyond the common ones, which case files give."""
     inherited = {each.name for each in fields(SuspensionOutput)}
     return [each for each in fields(cls) if each.name not in inherited]

@@ -1,10 +1,10 @@
-"""A corner of the vehicle in motion: the vectors of which its outputs are made.
+"""A corner of the vehicle in motion: the vectors from which its outputs are computed.
 
-Everything is in corner axes: x forward, y outboard, z up, the origin in the vehicle's centre plane.
-A right wheel is the mirror image of a left one, and in corner axes both have the same coordinates:
-one formula serves both, and left and right cannot be told apart but by the outputs that mean to.
-For a right wheel these axes are left-handed: a cross product in them has the other sign, so it may
-only be used where that cancels.
+All vectors are in corner axes: x forward, y outboard, z up, with the origin in the vehicle's centre
+plane. A right wheel is the mirror image of a left one, and both have the same coordinates in corner
+axes. One formula serves both sides, and only outputs defined by side distinguish them. For a right
+wheel these axes are left-handed: a cross product changes its sign and may only be used if the sign
+cancels.
 
 All angles come from vectors: toe and camber of a turned wheel are no Euler angles of its carrier.
 """
@@ -19,10 +19,10 @@ from .vehicle import Vehicle
 
 
 class Corner:
-    """The wheel, its carrier and its steering axis as jets over the samples, corner axes [m].
+    """The wheel, its carrier and its steering axis as jets over the samples, in corner axes [m].
 
     Args:
-        at: global positions by name; of those, only what an output asks for needs to be there.
+        at: global positions by name; only the points used by the output are required.
     """
 
     def __init__(self, vehicle: Vehicle, at: Mapping[str, Vec3]) -> None:
@@ -31,14 +31,14 @@ class Corner:
         self._axes = vec(vehicle.forward), vehicle.outboard, vec(vehicle.up)
 
     def point(self, name: str) -> Vec3:
-        """A point [m]."""
+        """Return the position of a point [m]."""
         arm = self._at[name] - vec(self.vehicle.middle)
         x, y, z = (axis @ arm for axis in self._axes)
         return Vec3(x, y, z)
 
     @property
     def center(self) -> Vec3:
-        """The wheel centre [m]."""
+        """Wheel centre [m]."""
         return self.point(self.vehicle.wheel_center)
 
     @property
@@ -48,30 +48,28 @@ class Corner:
 
     @property
     def heading(self) -> Vec3:
-        """Unit vector along the intersection of the wheel plane with the road, forward [-]; z is
-        zero.
-        """
+        """Unit vector along the intersection of wheel plane and road, forward [-]; z is zero."""
         s = self.spin
         level = sqrt(s.x * s.x + s.y * s.y)
         return Vec3(s.y / level, -s.x / level, 0.0)
 
     @property
     def aside(self) -> Vec3:
-        """Unit vector in the road plane at right angles to the heading, outboard [-]; z is zero."""
+        """Unit vector in the road plane, perpendicular to the heading, outboard [-]; z is zero."""
         h = self.heading
         return Vec3(-h.y, h.x, 0.0)
 
     @property
     def rise(self) -> Vec3:
-        """Unit vector in the wheel plane that goes up the steepest way [-]."""
+        """Unit vector of steepest ascent in the wheel plane [-]."""
         s = self.spin
         level = sqrt(s.x * s.x + s.y * s.y)
         return Vec3(-s.x * s.z / level, -s.y * s.z / level, level)
 
     @property
     def contact(self) -> Vec3:
-        """The contact centre [m]: the lowest point of a disc with the wheel's radius. The road is
-        level with it.
+        """Contact centre [m]: the lowest point of a disc with the wheel's radius. The road is at
+        its height.
         """
         radius = self.vehicle.wheel_radius
         assert radius is not None
@@ -79,12 +77,12 @@ class Corner:
 
     @property
     def contact_velocity(self) -> Vec3:
-        """Velocity of the wheel carrier's point that is at the contact centre, the wheel locked to
-        its carrier [m/s].
+        """Velocity of the wheel carrier's point at the contact centre, with the wheel locked to the
+        carrier [m/s].
 
-        Its arm from the wheel centre is -R (top.w top + third.w third) in directions fixed to the
-        carrier, at right angles to the axis of rotation; only these turn. The third direction, a
-        cross product, is there twice, so its sense cancels.
+        Its arm from the wheel centre is -R (top.w top + third.w third), in two directions fixed to
+        the carrier and perpendicular to the axis of rotation; only these turn. The third direction,
+        a cross product, appears twice, so its sign cancels.
         """
         radius, w, s = self.vehicle.wheel_radius, self.rise, self.spin
         assert radius is not None
@@ -96,23 +94,21 @@ class Corner:
 
     @property
     def kingpin(self) -> tuple[Vec3, Vec3]:
-        """The lower point of the steering axis [m], and the way from there to the upper one [m]."""
+        """Lower point of the steering axis [m], and the vector from it to the upper point [m]."""
         assert self.vehicle.kingpin is not None
         lower, upper = (self.point(name) for name in self.vehicle.kingpin)
         return lower, upper - lower
 
     @property
     def kingpin_offset(self) -> Vec3:
-        """The vector from the contact centre to where the steering axis meets the road [m]; z is
-        zero.
-        """
+        """Vector from the contact centre to the steering axis in the road plane [m]; z is zero."""
         lower, axis = self.kingpin
         contact = self.contact
         return lower + ((contact.z - lower.z) / axis.z) * axis - contact
 
 
 def velocity(a: Vec3) -> Vec3:
-    """The derivative of a vector of jets by time."""
+    """Return the time derivative of a vector of jets."""
     return each(a, lambda jet: jet.dot)
 
 
@@ -122,5 +118,5 @@ def _unit(a: Vec3) -> Vec3:
 
 
 def distance(a: Vec3, b: Vec3) -> Jet:
-    """Between two points [m]."""
+    """Return the distance between two points [m]."""
     return sqrt((a - b) @ (a - b))

@@ -1,10 +1,10 @@
-"""Outputs of the way the wheel is going: roll centre, motion ratio, anti-dive, anti-squat and
-anti-lift.
+"""Outputs of the instantaneous motion of the wheel: roll centre, motion ratio, anti-dive,
+anti-squat and anti-lift.
 
 They are quotients of velocities. In a view along an axis of the vehicle, the instant centre of the
-wheel carrier lies on the normal to the velocity of any of its points; the line from the contact
-centre to it is all that roll centre and anti-effects need. Definitions: W. F. and D. L. Milliken,
-Race Car Vehicle Dynamics, chapter 17.
+wheel carrier lies on the normal to the velocity of each of its points. Roll centre and anti-effects
+need only the line from the contact centre to the instant centre. Definitions: W. F. and D. L.
+Milliken, Race Car Vehicle Dynamics, chapter 17.
 """
 
 from __future__ import annotations
@@ -22,12 +22,11 @@ _CARRIER = ("wheel_center", "spin_marker", "top_marker")
 
 @dataclass(frozen=True)
 class RollCenterHeight(Rate):
-    """Height above the road of the kinematic roll centre of an axle whose wheels travel in
-    parallel.
+    """Height of the kinematic roll centre above the road, for parallel travel of an axle's wheels.
 
-    The line from the contact centre to the instant centre of the front view, cut with the vehicle's
-    centre plane: with the contact's velocity (v_y, v_z) it is normal to that and rises by v_y / v_z
-    over a metre inboard.
+    It is the intersection of the vehicle's centre plane with the line from the contact centre to
+    the instant centre of the front view. This line is normal to the contact's velocity (v_y, v_z)
+    and rises by v_y / v_z per metre inboard.
     """
 
     type = "roll_center_height"
@@ -37,14 +36,14 @@ class RollCenterHeight(Rate):
     positive = "above the road"
 
     def value(self, corner: Corner) -> Jet:
-        """Height [m]."""
+        """Return the height [m]."""
         v = corner.contact_velocity
         return corner.contact.y * (v.y / v.z)
 
 
 @dataclass(frozen=True)
 class MotionRatio(Rate):
-    """Compression of a spring or damper between two points, over wheel travel.
+    """Compression of a spring or damper between two points, per wheel travel.
 
     Attributes:
         between: names of its ends.
@@ -59,24 +58,23 @@ class MotionRatio(Rate):
 
     @property
     def points(self) -> tuple[str, ...]:
-        """The wheel centre and the ends."""
+        """Wheel centre and both ends."""
         return (*super().points, *self.between)
 
     def value(self, corner: Corner) -> Jet:
-        """Motion ratio [-]."""
+        """Return the motion ratio [-]."""
         a, b = (corner.point(name) for name in self.between)
         return -distance(a, b).dot / corner.center.z.dot
 
 
 @dataclass(frozen=True)
 class _Anti(Rate):
-    """The part of a load transfer that the suspension links take, so that the springs need not: 1
-    is all of it.
+    """Part of a load transfer taken by the suspension links instead of the springs: 1 is all of it.
 
-    share * tan * wheelbase / cg_height, tan being the slope of the side view's line from the wheel
-    to the instant centre, rising towards the middle of the vehicle. It starts at the contact centre
-    where the wheel carrier holds the torque, and at the wheel centre where the vehicle's body does,
-    through a shaft.
+    It is share * tan * wheelbase / cg_height. tan is the slope of the side view's line from the
+    wheel to the instant centre, positive if it rises towards the middle of the vehicle. The line
+    starts at the contact centre if the wheel carrier holds the torque, and at the wheel centre if
+    the vehicle's body does, through a shaft.
     """
 
     measure = "1"
@@ -87,7 +85,7 @@ class _Anti(Rate):
 
     @property
     def problem(self) -> str:
-        """Each is of one axle."""
+        """Reason why the axle of this wheel has no such output; empty if it has one."""
         if self.vehicle.axle is self.axle:
             return ""
         return (
@@ -96,7 +94,7 @@ class _Anti(Rate):
         )
 
     def value(self, corner: Corner) -> Jet:
-        """Part of the load transfer [-]."""
+        """Return the part of the load transfer [-]."""
         car = self.vehicle
         share, reaction = (
             (car.brake_share, car.brakes) if self.braking else (car.drive_share, car.drive)
@@ -111,7 +109,7 @@ class _Anti(Rate):
 
 @dataclass(frozen=True)
 class AntiDive(_Anti):
-    """Of the front axle, in braking."""
+    """Anti-dive of the front axle in braking."""
 
     type = "anti_dive"
     positive = "less dive in braking, none at 1"
@@ -120,7 +118,7 @@ class AntiDive(_Anti):
 
 @dataclass(frozen=True)
 class AntiLift(_Anti):
-    """Of the rear axle, in braking."""
+    """Anti-lift of the rear axle in braking."""
 
     type = "anti_lift"
     positive = "less lift in braking, none at 1"
@@ -129,7 +127,7 @@ class AntiLift(_Anti):
 
 @dataclass(frozen=True)
 class AntiSquat(_Anti):
-    """Of the driven rear axle, in acceleration."""
+    """Anti-squat of the driven rear axle in acceleration."""
 
     type = "anti_squat"
     needs = (*_Anti.needs[:-1], "drive_share")

@@ -1,5 +1,5 @@
-"""Outputs of the steering axis, a line through two points: the physical one, not the axis about
-which the wheel turns at once.
+"""Outputs of the steering axis, the physical line through two points, not the instantaneous axis of
+rotation of the wheel.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class Caster(_Inclination):
     positive = "top rearward"
 
     def value(self, corner: Corner) -> Jet:
-        """Caster angle [rad]."""
+        """Return the caster angle [rad]."""
         _, axis = corner.kingpin
         return arctan2(-axis.x, axis.z)
 
@@ -41,15 +41,15 @@ class KingpinInclination(_Inclination):
     positive = "top inboard"
 
     def value(self, corner: Corner) -> Jet:
-        """Kingpin inclination [rad]."""
+        """Return the kingpin inclination [rad]."""
         _, axis = corner.kingpin
         return arctan2(-axis.y, axis.z)
 
 
 @dataclass(frozen=True)
 class _GroundOffset(Attitude):
-    """A component of the way between the contact centre and where the steering axis meets the
-    road.
+    """A component of the vector between the contact centre and the intersection of steering axis
+    and road.
     """
 
     measure = "m"
@@ -59,10 +59,10 @@ class _GroundOffset(Attitude):
 
 @dataclass(frozen=True)
 class ScrubRadius(_GroundOffset):
-    """Steering axis offset at ground: from where the axis meets the road to the contact centre,
-    across the wheel's heading.
+    """Steering axis offset at ground, across the wheel's heading: from the intersection of steering
+    axis and road to the contact centre.
 
-    As in ISO 8855 and Adams/Car it is measured along the tyre's axes, which turn with the wheel,
+    As in ISO 8855 and Adams/Car, it is measured along the tyre's axes, which turn with the wheel,
     not along the vehicle's.
     """
 
@@ -70,19 +70,19 @@ class ScrubRadius(_GroundOffset):
     positive = "the axis meeting the road inboard of the contact centre"
 
     def value(self, corner: Corner) -> Jet:
-        """Scrub radius [m]."""
+        """Return the scrub radius [m]."""
         return -(corner.aside @ corner.kingpin_offset)
 
 
 @dataclass(frozen=True)
 class MechanicalTrail(_GroundOffset):
-    """Castor offset at ground (ISO 8855, 7.2.3): from the contact centre to where the axis meets
-    the road, along the heading.
+    """Castor offset at ground (ISO 8855, 7.2.3), along the heading: from the contact centre to the
+    intersection of steering axis and road.
     """
 
     type = "mechanical_trail"
     positive = "the axis meeting the road ahead of the contact centre"
 
     def value(self, corner: Corner) -> Jet:
-        """Mechanical trail [m]."""
+        """Return the mechanical trail [m]."""
         return corner.heading @ corner.kingpin_offset

@@ -1,6 +1,4 @@
-"""What the outputs of a suspension need to know of the vehicle beside the motion of points: axes,
-signs, wheel and axle.
-"""
+"""Vehicle data of suspension outputs beside the motion of points: axes, signs, wheel and axle."""
 
 from __future__ import annotations
 
@@ -12,13 +10,13 @@ from ...algebra import Vec3, cross, vec
 from ...mechanism.mechanism import Vector
 from ..case import MARKER
 
-# Metres between the wheel centre and the points that show how the wheel carrier turns: a rim's
-# radius, so that directions keep all digits of positions.
+# Distance from the wheel centre to the markers on the wheel carrier [m]: a rim's radius, so
+# directions keep all digits of positions.
 MARKER_DISTANCE = 0.25
 
 
 class Convention(StrEnum):
-    """Whose axes and signs the outputs have. SAE J670 also allows z up; here its name means its
+    """Standard of the axes and signs of outputs. SAE J670 also allows z up; here its name means the
     historical z down.
     """
 
@@ -27,7 +25,7 @@ class Convention(StrEnum):
 
     @property
     def words(self) -> str:
-        """The standard and its axes."""
+        """Standard and its axes, in words."""
         return (
             "ISO 8855 (x forward, y left, z up)"
             if self is Convention.ISO_8855
@@ -36,35 +34,33 @@ class Convention(StrEnum):
 
     @property
     def up(self) -> int:
-        """What makes a component along z of one that is upwards; and one along y of one that is to
-        the left.
+        """Factor from an upward component to one along z, and from a leftward component to one
+        along y.
         """
         return 1 if self is Convention.ISO_8855 else -1
 
 
 class Side(StrEnum):
-    """Where the wheel is, seen by the driver."""
+    """Side of the wheel, seen by the driver."""
 
     LEFT = "left"
     RIGHT = "right"
 
     @property
     def left(self) -> int:
-        """What makes a component to the left of one that is outboard."""
+        """Factor from an outboard component to one to the left."""
         return 1 if self is Side.LEFT else -1
 
 
 class Axle(StrEnum):
-    """Which axle the wheel is on."""
+    """Axle of the wheel."""
 
     FRONT = "front"
     REAR = "rear"
 
 
 class Reaction(StrEnum):
-    """Where the torque of brakes or drive is held: on the wheel carrier, or on the vehicle's
-    body.
-    """
+    """Support of the torque of brakes or drive: the wheel carrier, or the vehicle's body."""
 
     OUTBOARD = "outboard"
     INBOARD = "inboard"
@@ -72,17 +68,17 @@ class Reaction(StrEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class Vehicle:
-    """One wheel's corner of a vehicle; SI, global axes at design. What is None is not known and not
-    needed.
+    """One wheel's corner of a vehicle, in SI units and global axes at design. None is unknown and
+    not needed.
 
     Attributes:
-        forward, up: unit vectors fixed to the vehicle's body, at right angles [-].
+        forward, up: perpendicular unit vectors fixed to the vehicle's body [-].
         wheel_center: name of the point.
-        static_toe, static_camber: at design [rad]; see `wheel` for what the angles are.
+        static_toe, static_camber: angles at design [rad], as defined in `wheel`.
         middle: a point of the vehicle's centre plane [m].
         wheel_radius: loaded, from the wheel centre to the contact centre in the wheel plane [m].
         kingpin: names of the lower and the upper point of the steering axis.
-        cg_height: above the road [m].
+        cg_height: height of the centre of gravity above the road [m].
         brake_share, drive_share: parts of the vehicle's braking and driving force at this axle [-].
     """
 
@@ -106,32 +102,28 @@ class Vehicle:
 
     @property
     def outboard(self) -> Vec3:
-        """Unit vector to the left or to the right, away from the centre plane, global."""
+        """Global unit vector to the left or to the right, away from the centre plane."""
         return self.side.left * cross(vec(self.up), vec(self.forward))
 
     @property
     def spin(self) -> Vec3:
-        """Unit vector along the wheel's axis of rotation at design, outboard, global."""
+        """Global unit vector along the wheel's axis of rotation at design, outboard."""
         toe, camber = self.static_toe, self.static_camber
         level = math.sin(toe) * vec(self.forward) + math.cos(toe) * self.outboard
         return math.cos(camber) * level + -math.sin(camber) * vec(self.up)
 
     @property
     def spin_marker(self) -> str:
-        """Name of the point on the wheel carrier that is outboard of the wheel centre on the axis
-        of rotation.
-        """
+        """Name of the carrier's point on the axis of rotation, outboard of the wheel centre."""
         return f"{MARKER}{self.wheel_center}.spin"
 
     @property
     def top_marker(self) -> str:
-        """Name of the point on the wheel carrier that is beside the wheel centre in the wheel
-        plane, upwards at design.
-        """
+        """Name of the carrier's point beside the wheel centre in the wheel plane, up at design."""
         return f"{MARKER}{self.wheel_center}.top"
 
     def marker_positions(self, center: Vector) -> dict[str, Vector]:
-        """Where the two markers are at design, by name [m]."""
+        """Return the positions of both markers at design, by name [m]."""
         s, u = self.spin, vec(self.up)
         top = u - (u @ s) * s
         top = (1.0 / math.sqrt(top @ top)) * top
@@ -142,9 +134,7 @@ class Vehicle:
 
     @property
     def signs(self) -> str:
-        """The convention, the wheel and the axes in words: what heads every table of these
-        outputs.
-        """
+        """Convention, wheel and axes in words, for the head of each table of these outputs."""
         where = f"{self.axle} {self.side}" if self.axle else str(self.side)
         forward, up = (", ".join(f"{x:g}" for x in axis) for axis in (self.forward, self.up))
         return (

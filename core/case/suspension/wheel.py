@@ -1,6 +1,4 @@
-"""Outputs of the wheel: toe, camber, steer angle, and how the wheel centre or the contact centre
-shifts.
-"""
+"""Outputs of the wheel: toe, camber, steer angle, and displacements of its centre and contact."""
 
 from __future__ import annotations
 
@@ -15,7 +13,7 @@ from .vehicle import Axle, Convention
 
 
 class Place(StrEnum):
-    """Where a shift of the wheel is measured."""
+    """Point at which a displacement of the wheel is measured."""
 
     WHEEL_CENTER = "wheel_center"
     CONTACT = "contact"
@@ -33,7 +31,7 @@ class AxisName(StrEnum):
 class Toe(Attitude):
     """Angle in the road plane between the vehicle's x axis and the wheel plane (ISO 8855, 7.1.6).
 
-    In corner axes the axis of rotation s of a wheel that toes in points forward: tan = s_x / s_y.
+    In corner axes the axis of rotation s of a toed-in wheel points forward: tan = s_x / s_y.
     """
 
     type = "toe"
@@ -42,15 +40,15 @@ class Toe(Attitude):
     positive = "toe-in"
 
     def value(self, corner: Corner) -> Jet:
-        """Toe-in [rad]."""
+        """Return the toe-in [rad]."""
         s = corner.spin
         return arctan2(s.x, s.y)
 
 
 @dataclass(frozen=True)
 class SteerAngle(Attitude):
-    """The same angle about the z axis of the convention by the right-hand rule: one sign for both
-    wheels.
+    """The angle of `Toe`, about the z axis of the convention by the right-hand rule: one sign for
+    both wheels.
     """
 
     type = "steer_angle"
@@ -60,7 +58,7 @@ class SteerAngle(Attitude):
 
     @property
     def sense(self) -> str:
-        """Left about an axis that points up, right about one that points down."""
+        """Left if the z axis points up, right if it points down."""
         return (
             "positive: to the left"
             if self.vehicle.convention is Convention.ISO_8855
@@ -68,14 +66,14 @@ class SteerAngle(Attitude):
         )
 
     def value(self, corner: Corner) -> Jet:
-        """Steer angle [rad]."""
+        """Return the steer angle [rad]."""
         s, side = corner.spin, self.vehicle.side.left * self.vehicle.convention.up
         return -side * arctan2(s.x, s.y)
 
 
 @dataclass(frozen=True)
 class Camber(Attitude):
-    """Angle between the vehicle's z axis and the wheel plane, whatever the toe: sin = -s_z."""
+    """Angle between the vehicle's z axis and the wheel plane, independent of toe: sin = -s_z."""
 
     type = "camber"
     measure = "rad"
@@ -83,7 +81,7 @@ class Camber(Attitude):
     positive = "top outboard"
 
     def value(self, corner: Corner) -> Jet:
-        """Camber [rad]; by the tangent, for a sine near one has lost half its digits."""
+        """Return the camber [rad], by its tangent: a sine near one has lost half its digits."""
         s = corner.spin
         return arctan2(-s.z, sqrt(s.x * s.x + s.y * s.y))
 
@@ -96,12 +94,12 @@ class _Shift(Change):
 
     @property
     def points(self) -> tuple[str, ...]:
-        """The wheel centre, and for the contact centre the axis of rotation too."""
+        """Wheel centre; for the contact centre also the axis of rotation."""
         return super().points if self.at is Place.CONTACT else (self.vehicle.wheel_center,)
 
     @property
     def problem(self) -> str:
-        """The contact centre is known from the wheel's radius only."""
+        """Reason why there is no contact centre: it needs the wheel's radius. Otherwise empty."""
         if self.at is Place.WHEEL_CENTER or self.vehicle.wheel_radius is not None:
             return ""
         return (
@@ -115,8 +113,8 @@ class _Shift(Change):
 
 @dataclass(frozen=True)
 class HalfTrackChange(_Shift):
-    """Lateral shift of the contact centre, or of the wheel centre: half of an axle's track change
-    in parallel travel.
+    """Lateral displacement of contact centre or wheel centre: half of an axle's track change in
+    parallel travel.
     """
 
     type = "half_track_change"
@@ -124,14 +122,14 @@ class HalfTrackChange(_Shift):
     positive = "outboard, a wider track"
 
     def value(self, corner: Corner) -> Jet:
-        """Half track [m]."""
+        """Return the half track [m]."""
         return self._position(corner).y
 
 
 @dataclass(frozen=True)
 class WheelbaseChange(_Shift):
-    """Longitudinal shift of the contact centre, or of the wheel centre: forward lengthens at the
-    front, rearward at the rear.
+    """Longitudinal displacement of contact centre or wheel centre. Forward lengthens the wheelbase
+    at the front, rearward at the rear.
     """
 
     type = "wheelbase_change"
@@ -141,21 +139,21 @@ class WheelbaseChange(_Shift):
 
     @property
     def sense(self) -> str:
-        """The wheel base gets longer."""
+        """Direction of a longer wheelbase."""
         return (
             f"positive: {'forward' if self.vehicle.axle is Axle.FRONT else 'rearward'}, a longer"
             " wheel base"
         )
 
     def value(self, corner: Corner) -> Jet:
-        """Coordinate along the wheel base [m]."""
+        """Return the coordinate along the wheelbase [m]."""
         x: Jet = self._position(corner).x
         return x if self.vehicle.axle is Axle.FRONT else -x
 
 
 @dataclass(frozen=True)
 class WheelDisplacement(Change):
-    """Shift of the wheel centre against the vehicle's body along an axis of the convention."""
+    """Displacement of the wheel centre relative to the body, along an axis of the convention."""
 
     type = "wheel_displacement"
     measure = "m"
@@ -166,7 +164,7 @@ class WheelDisplacement(Change):
 
     @property
     def sense(self) -> str:
-        """Where the axis points."""
+        """Direction of the axis."""
         iso = self.vehicle.convention is Convention.ISO_8855
         ways = {
             AxisName.X: "forward",
@@ -176,7 +174,7 @@ class WheelDisplacement(Change):
         return f"positive: {ways[self.component]}"
 
     def value(self, corner: Corner) -> Jet:
-        """Coordinate [m]."""
+        """Return the coordinate [m]."""
         x, y, z = corner.center
         up = self.vehicle.convention.up
         shifts: dict[AxisName, Jet] = {

@@ -1,3 +1,1 @@
-"""Variations of a design: places of its geometry, laws of their variation, and the file that
-declares them.
-"""
+"""Variations of a design: places of its geometry, laws of their variation, and the file format."""

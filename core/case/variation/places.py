@@ -1,6 +1,4 @@
-"""The places of a mechanism's geometry as somebody names them: found by name, and with all that is
-at the same point.
-"""
+"""Places of a mechanism's geometry: search by name, and groups of coincident positions."""
 
 from __future__ import annotations
 
@@ -13,21 +11,20 @@ from ...kinematics.formulation.parameters import kinds, places
 from ...mechanism.mechanism import Mechanism
 from ..case import MARKER
 
-# Positions closer than this are one hardpoint [m]: tables are measured to about a micrometre at
-# best.
+# Positions closer than this are one hardpoint [m]: tables are measured to a micrometre at best.
 SAME = 1e-6
 
 
 class PlaceError(ValueError):
-    """A name is that of no place, or of several; the message says what to write."""
+    """Error for a name of no place, or of several; the message states the remedy."""
 
 
 class Geometry:
     """The places of a mechanism.
 
     Attributes:
-        values: of every place [m or -], the markers' among them.
-        kinds: what each is.
+        values: value of each place [m or -], markers included.
+        kinds: kind of each place.
     """
 
     def __init__(self, mechanism: Mechanism) -> None:
@@ -36,14 +33,14 @@ class Geometry:
 
     @property
     def named(self) -> list[str]:
-        """The places that a user knows: all but those of markers."""
+        """Places known to the user: all except those of markers."""
         return [place for place in self.values if not place.startswith(f"points.{MARKER}")]
 
     def find(self, name: str) -> str:
-        """The place of that name, or the one position of the joint or point of that name.
+        """Return the place of a name, or the only position of the joint or point of that name.
 
         Raises:
-            PlaceError: there is none, or more than one.
+            PlaceError: no place matches, or several do.
         """
         if name in self.named:
             return name
@@ -64,7 +61,7 @@ class Geometry:
         return found[0]
 
     def together(self, place: str) -> tuple[str, ...]:
-        """The place, and if it is a position, every other that is there at design."""
+        """Return the place and, if a position, every other position at this point at design."""
         if self.kinds[place] is not Kind.POSITION:
             return (place,)
         here = self.values[place]
@@ -75,7 +72,7 @@ class Geometry:
         )
 
     def with_markers(self, moved: Iterable[str]) -> tuple[str, ...]:
-        """Places, and those of the markers that stand beside points among them."""
+        """Return places, and those of the markers beside points among them."""
         found = [*moved]
         for place in self.values:
             if place.startswith(f"points.{MARKER}"):

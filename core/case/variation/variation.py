@@ -1,9 +1,9 @@
-"""How a design is varied: independent coordinates, what each moves, and the numbers of every
-variant by its index.
+"""Variation of a design: independent coordinates, their effect on the geometry, and the offsets of
+each variant by index.
 
-A variant is known by seed and index alone: `DRAWN` of them are drawn by a generator of their own,
-whose seed sequence is the study's spawned by their place, so that any machine can make any
-variants, and one can be made again by itself.
+Seed and index define a variant. Each block of `DRAWN` variants has its own generator, seeded by the
+study's seed sequence spawned by the number of the block. So any machine can compute any variants,
+and a single variant can be reproduced.
 """
 
 from __future__ import annotations
@@ -20,11 +20,12 @@ from numpy.typing import NDArray
 from ...trajectory import Array
 
 DRAWN = 256
-"""Variants that are drawn together; part of what a seed means, and no setting for that reason."""
+"""Number of variants drawn together. It is part of the meaning of a seed, and therefore no setting.
+"""
 
 
 class Mode(StrEnum):
-    """Which variants there are."""
+    """Choice of the variants."""
 
     MONTE_CARLO = "monte_carlo"
     GRID = "grid"
@@ -32,7 +33,7 @@ class Mode(StrEnum):
 
 
 class Law(StrEnum):
-    """How a coordinate is distributed."""
+    """Distribution of a coordinate."""
 
     NORMAL = "normal"
     UNIFORM = "uniform"
@@ -40,7 +41,7 @@ class Law(StrEnum):
 
 
 class Stream(IntEnum):
-    """What random numbers are drawn for; each has generators of its own."""
+    """Purpose of random numbers; each purpose has its own generators."""
 
     GEOMETRY = 0
     SUBSET = 1
@@ -52,12 +53,12 @@ class Coordinate:
     direction, a length.
 
     Attributes:
-        hardpoint: name in the file.
-        axis: x, y or z; empty of a length.
-        unit: m, or rad of a direction's components.
-        law: of the offsets from the nominal value.
-        scale: standard deviation, half width, or the largest offset [unit].
-        values: the offsets of a grid or of one at a time [unit]; empty where it is drawn.
+        hardpoint: its name in the file.
+        axis: x, y or z; empty for a length.
+        unit: m, or rad for components of a direction.
+        law: distribution of the offsets from the nominal value.
+        scale: standard deviation, half width, or largest offset [unit].
+        values: offsets in a grid or one at a time [unit]; empty if drawn.
     """
 
     hardpoint: str
@@ -69,20 +70,19 @@ class Coordinate:
 
     @property
     def name(self) -> str:
-        """What results call it by."""
+        """Name in results."""
         return f"{self.hardpoint}.{self.axis}" if self.axis else self.hardpoint
 
 
 @dataclass(frozen=True, eq=False)
 class Variation:
-    """The coordinates that vary, and how the places of the geometry follow them: nominal + moves @
-    offsets.
+    """The coordinates that vary, and their linear effect on geometry: nominal + moves @ offsets.
 
     Attributes:
-        places: names of the varied places (see `analysis.equations.geometry.places`), with how many
-            numbers each has.
+        places: names of the varied places (see `kinematics.formulation.parameters.places`), with
+            the count of numbers of each.
         nominal: numbers of the varied places at the nominal design [m or -], shape (numbers,).
-        moves: shape (numbers, coordinates).
+        moves: changes of these numbers per unit offset, shape (numbers, coordinates).
     """
 
     mode: Mode
@@ -93,22 +93,23 @@ class Variation:
 
     @property
     def count(self) -> int | None:
-        """How many variants there are; None where as many as are asked for."""
+        """Number of variants; None for a Monte Carlo study, which has any number."""
         sizes = [len(each.values) for each in self.coordinates]
         if self.mode is Mode.MONTE_CARLO:
             return None
         if self.mode is Mode.ONE_AT_A_TIME:
             return 1 + sum(sizes)
         count = 1
-        for size in sizes:  # in whole numbers without end: a grid outgrows 64 bits soon
+        for size in sizes:  # unbounded integers: a grid soon outgrows 64 bits
             count *= size
         return count
 
     def geometry(self, offsets: Array) -> Array:
-        """Numbers of the varied places, shape (numbers, V), from offsets, shape (coordinates, V).
+        """Return numbers of the varied places, shape (numbers, V), from offsets, shape
+        (coordinates, V).
 
-        Term by term: a matrix product may round differently with the number of columns and with the
-        machine.
+        The sum is computed term by term: the rounding of a matrix product may depend on the number
+        of columns and on the machine.
         """
         found = np.repeat(self.nominal[:, None], offsets.shape[1], axis=1)
         for number, coordinate in np.argwhere(self.moves).tolist():
@@ -116,22 +117,20 @@ class Variation:
         return found
 
     def values(self, offsets: Array) -> dict[str, tuple[float, ...]]:
-        """The value of every varied place of one variant, from its offsets, shape
-        (coordinates,).
-        """
+        """Return the value of each varied place of one variant; offsets of shape (coordinates,)."""
         numbers = iter(self.geometry(offsets[:, None])[:, 0].tolist())
         return {
             place: tuple(next(numbers) for _ in range(size)) for place, size in self.places.items()
         }
 
     def offsets(self, seed: int, first: int, count: int) -> Array:
-        """Offsets of variants from the nominal design [units], shape (coordinates, count)."""
+        """Return offsets of variants from the nominal design [units], (coordinates, count)."""
         if self.mode is Mode.MONTE_CARLO:
             return self._drawn(seed, first, count)
         return self._listed(first + np.arange(count))
 
     def of_variant(self, seed: int, index: int) -> Array:
-        """Offsets of one variant [units], shape (coordinates,)."""
+        """Return offsets of one variant [units], shape (coordinates,)."""
         return self.offsets(seed, index, 1)[:, 0]
 
     def _drawn(self, seed: int, first: int, count: int) -> Array:
@@ -143,11 +142,11 @@ class Variation:
         return found[:, skipped : skipped + count]
 
     def _draw(self, random: np.random.Generator) -> Array:
-        """A whole draw, however much of it is wanted: what a variant is must not depend on how many
-        there are.
+        """Draw a whole block, even if only part of it is needed: a variant must not depend on the
+        number of variants.
         """
         rows = list[Array]()
-        # those of one law by one call, without Python's lock
+        # one call for all coordinates of one law, without Python's lock
         for law, some in groupby(self.coordinates, lambda each: each.law):
             scale = np.array([each.scale for each in some])[:, None]
             shape = len(scale), DRAWN
@@ -163,7 +162,7 @@ class Variation:
 
     def _listed(self, indices: NDArray[np.int64]) -> Array:
         found = np.zeros((len(self.coordinates), len(indices)))
-        if self.mode is Mode.GRID:  # the last coordinate goes fastest
+        if self.mode is Mode.GRID:  # the last coordinate varies fastest
             for row in reversed(range(len(self.coordinates))):
                 values = np.array(self.coordinates[row].values)
                 indices, digit = np.divmod(indices, len(values))
@@ -176,7 +175,7 @@ class Variation:
 
     @cached_property
     def _steps(self) -> tuple[NDArray[np.int64], Array]:
-        """Coordinate and offset of every variant of one at a time but the first."""
+        """Coordinate and offset of each one-at-a-time variant except the first."""
         pairs = [(row, value) for row, each in enumerate(self.coordinates) for value in each.values]
         return np.array([row for row, _ in pairs], dtype=np.int64), np.array(
             [value for _, value in pairs]
@@ -184,7 +183,7 @@ class Variation:
 
 
 def generator(seed: int, place: int, stream: Stream) -> np.random.Generator:
-    """Philox, seeded by a child of the study's seed sequence: the place-th draw of a stream."""
+    """Return the Philox generator of a draw of a stream, seeded by a child of the study's seed."""
     return np.random.Generator(
         np.random.Philox(np.random.SeedSequence(seed, spawn_key=(place, int(stream))))
     )

@@ -1,30 +1,4 @@
-"""What varies, from a file: schema kincheck-vary/1, TOML or JSON, onto a `Variation` of a case.
-
-Reference. Keys in brackets may be left out.
-
-    schema = "kincheck-vary/1"
-    mode                 "monte_carlo": drawn, as many as --samples says
-                         "grid": every combination of all values "one_at_a_time": the nominal
-                         design, then each coordinate by itself at each of its values
-    [units]              length = "m" or "mm", needed where a position or length varies: no unit is safe to guess
-                         (angle) = "rad" or "deg", of directions
-    [hardpoints.NAME]    at: a position, direction or length of the case: "joints.tie_rod.points.0", "joints.hinge.axis",
-                         "joints.rod.length", "points.wheel_center.position"; or the name of a joint
-                         or point that has one position only: "ball". Every place of the case that
-                         is there at design moves along, so that a ball and the rod that ends in it
-                         stay together; markers that show how a wheel turns go with its centre.
-                         (only) = ["joints.ball.point", ...]: just these of them sigma, or
-                         half_width, or values: a number for all three coordinates or three numbers;
-                         0 does not vary monte_carlo: sigma (normal) or half_width (uniform) grid:
-                         values = [-1, 0, 1], offsets for each coordinate, or three such lists; or
-                         half_width and steps, so many values from -half_width to half_width
-                         one_at_a_time: values, or half_width (both ends; with steps, as in a grid),
-                         or sigma (both sides) offsets are along the case's axes; those of a
-                         direction, taken at length one, are angles
-    [lines.NAME]         axis = "joints.strut_slide.axis", through = ["strut_foot", "strut_top"]: a direction that goes on through
-                         two positions as they vary; named like `at`. Other directions stay as they
-                         are.
-"""
+"""Reader of variation files, schema kincheck-vary/1: TOML or JSON to a `Variation` of a case."""
 
 from __future__ import annotations
 
@@ -32,85 +6,22 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
 
-import msgspec
 import numpy as np
-from msgspec import Meta
 
 from ...joints import Kind
 from ...mechanism.drivers import PointCoordinate
 from ...trajectory import Array
 from ..case import Case
-from ..io.document import fault, join, parse, read_text, shown, typed
+from ..io.document import fault, join, parse, read_text, shown
+from ..io.typed_tables import typed
 from .places import Geometry, PlaceError
 from .variation import Coordinate, Law, Mode, Variation
+from .variation_schema import SCHEMA, HardpointKeys, LineKeys, VaryKeys, VaryUnits
 
-SCHEMA = "kincheck-vary/1"
 LARGEST_FILE = 1_000_000
-MOST_STEPS = 10_000
-# Directions in case files are written to five digits or so: a line that is off by more is another
-# one.
+# Case files give directions to about five digits; a line with a larger error is another one.
 ALONG = 1e-4
-
-Text = Annotated[str, Meta(min_length=1, description="a text that is not empty")]
-Size = Annotated[float, Meta(ge=0.0)]
-# a list, not a tuple: converting to a number or a tuple of constrained numbers, msgspec 0.22
-# crashes
-Sizes = Annotated[
-    Size | Annotated[list[Size], Meta(min_length=3, max_length=3)],
-    Meta(description="a number that is not negative, or three [x, y, z]"),
-]
-Offsets = Annotated[
-    list[float | list[float]],
-    Meta(description="a list of offsets, or three such [[x, ...], [y, ...], [z, ...]]"),
-]
-Steps = Annotated[
-    int, Meta(ge=2, le=MOST_STEPS, description=f"a whole number of values, 2 to {MOST_STEPS}")
-]
-
-
-class VaryKeys(msgspec.Struct, forbid_unknown_fields=True):
-    """The tables of the file."""
-
-    schema: Annotated[str, Meta(description=f'"{SCHEMA}"')]
-    mode: Annotated[Mode, Meta(description=f"one of {', '.join(Mode)}")]
-    hardpoints: Annotated[
-        dict[str, Any], Meta(min_length=1, description="a table of at least one hardpoint")
-    ]
-    units: Annotated[dict[str, Any], Meta(description="a table")] = {}
-    lines: Annotated[dict[str, Any], Meta(description="a table")] = {}
-
-
-class VaryUnits(msgspec.Struct, forbid_unknown_fields=True):
-    """[units] of the offsets."""
-
-    length: Annotated[Literal["m", "mm"], Meta(description='"m" or "mm"')] | None = None
-    angle: Annotated[Literal["rad", "deg"], Meta(description='"rad" or "deg"')] = "rad"
-
-
-class HardpointKeys(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
-    """[hardpoints.NAME]."""
-
-    at: Text
-    only: (
-        Annotated[tuple[Text, ...], Meta(min_length=1, description="a list of places of the case")]
-        | None
-    ) = None
-    sigma: Sizes | None = None
-    half_width: Sizes | None = None
-    values: Offsets | None = None
-    steps: Steps | None = None
-
-
-class LineKeys(msgspec.Struct, forbid_unknown_fields=True):
-    """[lines.NAME]."""
-
-    axis: Text
-    through: Annotated[
-        tuple[Text, Text], Meta(description='two names ["first position", "second position"]')
-    ]
-
 
 _TAKES: Mapping[Mode, tuple[frozenset[str], ...]] = {
     Mode.MONTE_CARLO: (frozenset({"sigma"}), frozenset({"half_width"})),
@@ -122,10 +33,10 @@ _TAKES: Mapping[Mode, tuple[frozenset[str], ...]] = {
 
 
 def read_variation(path: str | Path, case: Case) -> Variation:
-    """What the file varies of a case, in SI units.
+    """Read the variation of a case from a file, in SI units.
 
     Raises:
-        CaseError: the file cannot be read, does not make sense, or does not fit the case; it names
+        CaseError: the file is unreadable, inconsistent, or does not fit the case; the message names
             file, key and remedy.
     """
     file = Path(path)
@@ -142,9 +53,7 @@ def read_variation(path: str | Path, case: Case) -> Variation:
 
 @dataclass(frozen=True, eq=False)
 class _Block:
-    """The coordinates of one hardpoint: the places that take over their offsets, and what of
-    them.
-    """
+    """Coordinates of one hardpoint, and the places that follow its offsets, a factor each."""
 
     places: Mapping[str, float]
     coordinates: list[tuple[int, Coordinate]]
@@ -270,7 +179,7 @@ class _Reader:
     def _listed(
         self, row: int, name: str, axis: str, unit: str, values: tuple[float, ...]
     ) -> list[tuple[int, Coordinate]]:
-        """The coordinate with its values; one at a time, the nominal design is there already."""
+        """Return the coordinate with its values; one at a time without zero, the nominal design."""
         if self.keys.mode is Mode.ONE_AT_A_TIME:
             values = tuple(value for value in values if value)
         if not any(values):
@@ -278,7 +187,7 @@ class _Reader:
         return [(row, Coordinate(name, axis, unit, Law.VALUES, max(map(abs, values)), values))]
 
     def _lists(self, key: str, given: list[float | list[float]], count: int) -> list[list[float]]:
-        """The offsets of each coordinate: the same for all of them, or a list each."""
+        """Return the offsets of each coordinate: the same for all, or a list each."""
         flat: list[float] = [each for each in given if not isinstance(each, list)]
         lists = [each for each in given if isinstance(each, list)]
         found: list[list[float]] = [flat] * count if len(flat) == len(given) else lists
@@ -294,7 +203,7 @@ class _Reader:
         return found
 
     def _unit(self, key: str, kind: Kind) -> tuple[str, float]:
-        """The SI unit of the offsets, and what the file's are in it."""
+        """Return the SI unit of the offsets, and the size of the file's unit in it."""
         if kind is Kind.DIRECTION:
             return "rad", math.radians(1.0) if self.units.angle == "deg" else 1.0
         if self.units.length is None:
@@ -306,9 +215,7 @@ class _Reader:
         return "m", 1e-3 if self.units.length == "mm" else 1.0
 
     def _line(self, key: str, table: object, moves: dict[str, Array]) -> None:
-        """Let a direction follow the two positions it goes through; it stays as long as it is where
-        only one end of it varies.
-        """
+        """Let a direction follow the two positions on its line; unvaried ends are fixed."""
         keys = typed(self.file, key, table, LineKeys)
         axis = self._found(join(key, "axis"), keys.axis)
         ends = [self._found(join(key, "through"), each) for each in keys.through]
@@ -344,8 +251,8 @@ class _Reader:
             moves[axis] = math.copysign(float(np.linalg.norm(direction)) / long, cosine) * follows
 
     def _check_drivers(self, moves: Mapping[str, Array]) -> None:
-        """Drivers are measured from each variant's own design, which an absolute value of a point
-        that varies would not be.
+        """Refuse a driver by the absolute position of a varied point: drivers start at each
+        variant's design.
         """
         for name in self.case.sweep.path.motions:
             driver = self.case.mechanism.driver(name)

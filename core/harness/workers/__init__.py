@@ -1,1 +1,1 @@
-"""Worker processes: pairs solved where a crash, a hang or a flood costs nothing but the pair."""
+"""Worker processes: pairs solved in isolation. A crash, a hang or a flood costs only the pair."""

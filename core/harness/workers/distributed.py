@@ -1,5 +1,5 @@
-"""Pairs solved on a dask.distributed cluster: a task each, and on its machine a worker process, so
-that limits hold there too.
+"""Pairs solved on a dask.distributed cluster: one task per pair, each in a worker process on its
+machine, so that limits hold there too.
 """
 
 from __future__ import annotations
@@ -21,24 +21,25 @@ from ..resource_limits import Limits
 from .messages import pack
 from .worker import Seat
 
-# For a port to answer [s], and as long again for a scheduler behind it: each takes milliseconds,
-# unless packets are lost, which are sent again after 1 s and after 3 s.
+# Longest time for a port to answer [s], and again for the scheduler behind it. Each takes
+# milliseconds unless packets are lost; those are sent again after 1 s and after 3 s.
 ANSWER = 5.0
-# For a scheduler that has answered to do so again, if it is lost on the way [s].
+# Longest time for a scheduler that has answered to do so again, if a packet is lost [s].
 CONNECT = 20.0
 
 
 class ClusterError(KincheckError):
-    """There is no cluster to solve on, or it has gone."""
+    """There is no cluster to solve on, or it was lost."""
 
 
 def on_cluster(address: str, limits: Limits) -> Solver:
-    """The solver on the workers of a scheduler. A pair whose worker is lost is solved by another;
-    its result comes once.
+    """Return the solver on the workers of a scheduler.
+
+    If a worker is lost, another one solves its pair; each result comes once.
 
     Raises:
-        ClusterError: dask.distributed is not installed, the scheduler does not answer, or it has
-            gone meanwhile.
+        ClusterError: dask.distributed is not installed, the scheduler does not answer, or it was
+            lost meanwhile.
     """
 
     def solve(pairs: Sequence[Pair]) -> Attempts:
@@ -50,14 +51,14 @@ def on_cluster(address: str, limits: Limits) -> Solver:
 
 
 def connected(distributed: Any, address: str) -> Any:
-    """A client of the scheduler, to be used in a `with`.
+    """Return a client of the scheduler, to be used in a `with`.
 
     Raises:
-        ClusterError: the address cannot be one, or no scheduler answers there.
+        ClusterError: the address is invalid, or no scheduler answers there.
     """
     try:
-        # asked before there is a client, for one that finds no scheduler waits for its own end in
-        # vain; and in a thread, for that of a notebook has a loop already
+        # before the client, since a client without a scheduler never ends; in a thread, since a
+        # notebook's thread already has an event loop
         with ThreadPoolExecutor(1) as aside:
             aside.submit(
                 asyncio.run, asyncio.wait_for(_asked(distributed, address), 2.0 * ANSWER)
@@ -77,7 +78,7 @@ def connected(distributed: Any, address: str) -> Any:
 
 async def _asked(distributed: Any, address: str) -> None:
     place = urlsplit(address if "://" in address else f"//{address}")
-    # a port out of range raises ValueError when it is asked for
+    # a port out of range raises ValueError on access
     if not place.hostname or place.port == 0:
         raise ValueError("no host and port")
     comm = await distributed.comm.connect(
@@ -89,13 +90,13 @@ async def _asked(distributed: Any, address: str) -> None:
 def _gathered(
     distributed: Any, client: Any, address: str, pairs: Sequence[Pair], limits: Limits
 ) -> Attempts:
-    # of tasks: the scheduler takes equal names for one and the same task
+    # for tasks: the scheduler treats equal names as one task
     name = f"kincheck-{uuid4().hex}"
     tasks = dict[Any, int]()
     for index, pair in enumerate(pairs):
         try:
             packed = pack(pair)
-        except Exception as error:  # of the engine's own ways of being pickled
+        except Exception as error:  # from the engine's own pickling
             yield (
                 index,
                 Attempt(
@@ -124,7 +125,8 @@ def _gathered(
                 f"scheduler {address}: has gone ({said(error)}); run again with --resume when it is"
                 " back"
             ) from error
-        except Exception as error:  # raised on the cluster around the worker process: no process can be started, for one
+        # from the cluster, around the worker process, e.g. no process can be started
+        except Exception as error:
             found = Attempt(
                 None, Failure(Outcome.ERROR, f"the cluster's worker cannot solve: {said(error)}")
             )
@@ -133,7 +135,7 @@ def _gathered(
 
 
 def loaded() -> Any:
-    """The package distributed.
+    """Return the package distributed.
 
     Raises:
         ClusterError: it is not installed.
@@ -153,9 +155,7 @@ _lock = Lock()
 
 
 def solve_there(packed: bytes, engine: str, limits: Limits, version: str) -> Attempt:
-    """Solve a packed pair in a process beside this one, a cluster's worker, which keeps it for the
-    engine's next pair.
-    """
+    """Solve a packed pair in a process beside this cluster worker, kept for later pairs."""
     if version != VERSION:
         message = (
             f"kincheck {VERSION} on the cluster's worker, expected {version} as in the run; install"

@@ -1,4 +1,4 @@
-"""What parent and worker send each other: pickled objects, each after its length."""
+"""Messages between parent and worker: pickled objects, each after its length."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from typing import Any, BinaryIO
 
 LENGTH = struct.Struct("<Q")
 
-# Longer than any answer (a million samples of a thousand outputs are 24 GB, and no case): what
-# looks so is not a length, but something that was written into the channel by mistake.
+# Longest message [bytes]; no answer reaches it (a million samples of a thousand outputs are 24 GB,
+# and no case). A larger length is foreign data, written into the channel by mistake.
 LONGEST = 1 << 34
 
 
 def pack(message: Any) -> bytes:
-    """A message as bytes."""
+    """Return a message as bytes."""
     return pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL)
 
 
@@ -26,10 +26,10 @@ def write(stream: BinaryIO, packed: bytes) -> None:
 
 
 def read(stream: BinaryIO) -> bytes:
-    """The next message, packed.
+    """Return the next message, packed.
 
     Raises:
-        EOFError: the other side has gone, or what it sent is no message.
+        EOFError: the other side has ended, or sent no valid message.
     """
     head = stream.read(LENGTH.size)
     if len(head) < LENGTH.size or (length := LENGTH.unpack(head)[0]) > LONGEST:

@@ -15,9 +15,7 @@ from .worker import Seat
 
 
 def in_workers(jobs: int, limits: Limits) -> Solver:
-    """The solver with so many worker processes at a time, each for one engine until there are no
-    more pairs of it.
-    """
+    """Return the solver with `jobs` worker processes, each kept for one engine at a time."""
 
     def solve(pairs: Sequence[Pair]) -> Attempts:
         waiting = _Waiting(pairs)
@@ -42,7 +40,7 @@ def in_workers(jobs: int, limits: Limits) -> Solver:
 
 
 class _Waiting:
-    """The pairs that nobody has taken yet, by engine."""
+    """The pairs not yet taken, by engine."""
 
     def __init__(self, pairs: Sequence[Pair]) -> None:
         self.lock = Lock()
@@ -52,9 +50,7 @@ class _Waiting:
             self.queues.setdefault(f"{pair.engine.name} {pair.engine.mode}", deque()).append(index)
 
     def take(self, engine: str | None) -> tuple[str, int] | None:
-        """The next pair of that engine; if there is none, of the one that the fewest have turned
-        to, the first come first.
-        """
+        """Return the next pair of the engine; if it has none, of the one with the fewest takers."""
         with self.lock:
             if engine is None or not self.queues.get(engine):
                 left = [name for name, queue in self.queues.items() if queue]
@@ -65,7 +61,7 @@ class _Waiting:
             return engine, self.queues[engine].popleft()
 
     def clear(self) -> None:
-        """Leave nothing to take."""
+        """Remove all pairs."""
         with self.lock:
             self.queues.clear()
 
@@ -94,21 +90,21 @@ class _Slot(Thread):
                 self.through.put((index, solve_packed(self.pairs[index], self.seat)))
         except (
             BaseException
-        ) as error:  # a defect of ours: the run must hear of it, for nobody looks at a thread's end
+        ) as error:  # a defect of kincheck: the run must see it, since a thread's exception is lost
             self.through.put(error)
         finally:
             self.seat.close()
 
     def stop(self) -> None:
-        """Be through soon, with whatever is being solved."""
+        """Stop soon, whatever is being solved."""
         self.seat.stop()
 
 
 def solve_packed(pair: Pair, seat: Seat) -> Attempt:
-    """Solve a pair at a seat; what cannot be sent there fails."""
+    """Solve a pair at a seat. A pair that cannot be pickled fails."""
     try:
         packed = pack(pair)
-    except Exception as error:  # of the engine's own ways of being pickled
+    except Exception as error:  # from the engine's own pickling
         message = (
             f"cannot be sent to a worker process: {said(error)}; define it in a module, or solve in"
             " this process (--jobs 0)"

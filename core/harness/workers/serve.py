@@ -1,8 +1,8 @@
-"""A worker process from inside: it reads pairs from its standard input and answers on its standard
-output until that ends.
+"""A worker process, inside view: it reads pairs from its standard input and answers on its standard
+output until the input ends.
 
-What engines print, from Python or from C, goes to standard error, which the parent reads to its end
-at all times.
+Output printed by engines, from Python or from C, goes to standard error, which the parent always
+reads to its end.
 """
 
 from __future__ import annotations
@@ -26,8 +26,12 @@ READY = b"ready"
 
 @dataclass(frozen=True)
 class Setup:
-    """The first message to a worker: its parent, where that finds modules, and how much memory a
-    pair may take [GB].
+    """The first message to a worker.
+
+    Attributes:
+        parent: process number of the parent.
+        path: the parent's search path for modules.
+        memory: largest memory of a pair [GB].
     """
 
     parent: int
@@ -36,13 +40,11 @@ class Setup:
 
 
 def serve() -> None:
-    """Answer pairs until there is no parent any more. Ends the process, without the simulators' own
-    ways of going down.
-    """
+    """Answer pairs until the parent has ended, then end without the engines' exit handlers."""
     requests, answers = _channel()
-    # a parent in the background has it ignored; engines shall not differ
+    # a parent in the background ignores it; engines must behave alike in both
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    faulthandler.enable()  # a crash then tells the line of Python it came from
+    faulthandler.enable()  # a crash then prints its line of Python
     setup: Setup = pickle.loads(read(requests))
     sys.path[:] = setup.path
     _end_with(setup.parent)
@@ -59,7 +61,7 @@ def serve() -> None:
 
 
 def _channel() -> tuple[BinaryIO, BinaryIO]:
-    """The pipes to the parent, out of the engines' way."""
+    """Return the pipes to the parent, out of the engines' reach."""
     requests, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     nothing = os.open(os.devnull, os.O_RDONLY)
     os.dup2(nothing, 0)
@@ -70,9 +72,10 @@ def _channel() -> tuple[BinaryIO, BinaryIO]:
 
 def _solve(packed: bytes, answers: BinaryIO) -> Attempt:
     try:
-        pair = pickle.loads(packed)  # imports the engine's module, which may do anything
+        pair = pickle.loads(packed)  # imports the engine's module, which may run any code
         return attempt(pair, tell=lambda facts: write(answers, pack(facts)))
-    except BaseException as error:  # KeyboardInterrupt too: the terminal's goes to the parent, so this one is the engine's
+    # KeyboardInterrupt too: the terminal's goes to the parent, so this one is the engine's
+    except BaseException as error:
         return Attempt(None, Failure(Outcome.ERROR, said(error)))
 
 
@@ -94,15 +97,15 @@ def _flush() -> None:
         except Exception:  # an engine has closed or replaced it: there is nothing to flush
             continue
     if os.name == "posix":
-        ctypes.CDLL(None).fflush(None)  # C keeps what it prints until it has a bufferful
+        ctypes.CDLL(None).fflush(None)  # C prints only full buffers
 
 
 def _end_with(parent: int) -> None:
-    """Be killed with the parent, even in the middle of a pair that will never end. Elsewhere than
-    on Linux, only between pairs.
+    """End this process with the parent, even during a pair that never ends; except on Linux, only
+    between pairs.
     """
     if sys.platform == "linux":
         library: Any = ctypes.CDLL(None)
         library.prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
-        if os.getppid() != parent:  # it was gone before
+        if os.getppid() != parent:  # the parent had already ended
             os._exit(0)

@@ -1,5 +1,5 @@
-"""A worker process from outside, and the seat that always has one: warm while all goes well,
-another after a failure.
+"""A worker process, outside view, and the seat that always has one: warm in normal operation, a new
+one after a failure.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ from .serve import READY, Setup
 
 COMMAND = "from kincheck.core.harness.workers.serve import serve; serve()"
 
-# Bytes of output kept: the stack of a crash and the lines before it. The rest is read, so that
-# nobody waits, and dropped.
+# Bytes of output kept: the stack of a crash and the lines before it. The rest is read, so that no
+# writer blocks, and dropped.
 TAIL = 8192
 
-# For a process that is as good as gone, and its output, to go [s].
+# Longest time for an ended process and its output to close [s].
 GOING = 5.0
 
 
 class _Tail(Thread):
-    """Reads a stream to its end, and keeps the last of it."""
+    """Reads a stream to its end, and keeps the last part of it."""
 
     def __init__(self, stream: IO[bytes]) -> None:
         super().__init__(daemon=True)
@@ -47,12 +47,12 @@ class _Tail(Thread):
 
     @property
     def text(self) -> str:
-        """What was kept; addresses, which are others every time, are left out."""
+        """The kept text, without addresses, which differ every time."""
         return re.sub(r"0x[0-9a-f]{6,}", "0x...", self.kept.decode("utf-8", "replace")).strip()
 
 
 class Worker:
-    """A process that solves one pair at a time. It dies with the thread that made it."""
+    """A process that solves one pair at a time. It dies with the thread that started it."""
 
     def __init__(self, limits: Limits) -> None:
         self.limits = limits
@@ -63,10 +63,12 @@ class Worker:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
-            # threads that wait for each other, and for those of other workers, would be the
-            # simulators' times
+            # otherwise times would include threads that wait for each other and for other workers'
+            # threads
             env={**dict.fromkeys(THREADS, "1"), **os.environ},
-            start_new_session=True,  # the terminal's interrupt is for the parent; and its children can be killed with it
+            # the terminal's interrupt is for the parent; the group allows its children to be killed
+            # too
+            start_new_session=True,
         )
         self._in, self._out = (
             cast(BinaryIO, self.process.stdin),
@@ -76,7 +78,7 @@ class Worker:
         self._tail.start()
 
     def solve(self, packed: bytes) -> Attempt:
-        """Solve a packed pair. After a failure that is harmful the process is gone or should go."""
+        """Solve a packed pair. After a harmful failure the process has ended or must be closed."""
         facts: Facts | None = None
         try:
             if self.fresh:
@@ -88,19 +90,19 @@ class Worker:
                 write(self._in, packed)
                 while not isinstance(message := pickle.loads(read(self._out)), Attempt):
                     facts = message
-        except Exception:  # its end of the pipe is closed, or what came is no message
+        except Exception:  # its end of the pipe is closed, or the bytes are no message
             return Attempt(facts, self._post_mortem())
         self.fresh = False
         return replace(message, facts=message.facts or facts)
 
     def close(self) -> str:
-        """Kill the process and what it has started, and give the last that they printed."""
+        """Kill the process and its children, and return the end of their output."""
         self.kill()
         self.process.wait()
-        # longer only where a process that has left the group keeps the pipe open
+        # longer only if a process outside the group keeps the pipe open
         self._tail.join(GOING)
         for stream in (self._in, self._out):
-            with suppress(OSError):  # what is left unsent has nobody to go to
+            with suppress(OSError):  # unsent data has no receiver
                 stream.close()
         return self._tail.text
 
@@ -127,7 +129,7 @@ class Worker:
             timer.cancel()
 
     def _post_mortem(self) -> Failure:
-        # still there although it will not answer: close() ends it
+        # still running without an answer: close() ends it
         with suppress(subprocess.TimeoutExpired):
             self.process.wait(GOING)
         status = self.process.returncode
@@ -145,11 +147,9 @@ class Worker:
 
 
 class Seat:
-    """A place for a worker of one engine. A failure in a worker that was used before is tried once
-    more in a new one.
+    """A slot for a worker of one engine. A failure in a used worker is repeated once in a new one.
 
-    So no pair pays for what another has left behind, and which pairs came before does not show in
-    the outcome.
+    So no pair suffers from an earlier one, and outcomes do not depend on the pairs before.
     """
 
     def __init__(self, limits: Limits) -> None:
@@ -185,14 +185,14 @@ class Seat:
             return self._worker
 
     def close(self) -> str:
-        """Have no worker, and give the last that it printed."""
+        """Remove the worker, and return the end of its output."""
         with self._lock:
             worker, self._worker = self._worker, None
         return worker.close() if worker else ""
 
     def stop(self) -> None:
-        """Have no worker any more, from another thread: what is being solved fails, and the thread
-        that solves it tidies up.
+        """Stop the worker from another thread: the present pair fails, and the solving thread
+        cleans up.
         """
         with self._lock:
             self._stopped = True
@@ -208,9 +208,7 @@ def _name(number: int) -> str:
 
 
 def _last(printed: str) -> str:
-    """The last that was said before the end, and the line of Python where that was, if faulthandler
-    has told.
-    """
+    """Return the last line printed before the end, and faulthandler's line of Python, if any."""
     before, _, stack = printed.partition("Fatal Python error:")
     lines = [line.strip() for line in before.splitlines() if line.strip()]
     at = re.search(r"^ *File (.+)$", stack, re.MULTILINE)

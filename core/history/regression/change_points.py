@@ -16,7 +16,7 @@ from ...harness.record import Deviation, Outcome
 from ...trajectory import QUANTITIES
 from ..queries import IDLE, Entry, History, Pair, calibration, unit_of
 from ..store import RunRow
-from .compare import changes
+from .circumstance_changes import changes
 from .findings import Change, Step
 from .segmentation import change_points
 from .thresholds import DRIFT, DRIFT_FLOOR, TIME_FLOOR

@@ -4,7 +4,6 @@ became slower.
 
 from __future__ import annotations
 
-import statistics
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -12,12 +11,13 @@ from ...case.io.tolerance import DEFAULT_ATOL
 from ...harness.labels import UNMADE, motion_unit, number
 from ...harness.record import Outcome, OutputSeries, Record
 from ...trajectory import QUANTITIES
-from ..queries import Entry, History, Pair, calibration, own_seconds
-from .findings import Change, Finding, Kind
+from ..queries import History, Pair
+from .circumstance_changes import same_machine
+from .findings import Finding, Kind, finding_of
 from .run_selection import Subject
-from .thresholds import DRIFT, ENOUGH, SAME_SAMPLE, TIME_FLOOR, UNJUDGED, drifted
+from .slower_solves import slower, usual_times
+from .thresholds import DRIFT, SAME_SAMPLE, UNJUDGED, drifted
 
-CIRCUMSTANCES = ("kincheck", "python", "numpy", "tol", "host", "processor", "platform")
 PHASES = ("build", "first", "warm", "compare")
 
 References = Mapping[str, Mapping[str, OutputSeries]]
@@ -48,9 +48,9 @@ def compare(now: Subject, before: Subject, history: History, slowest: float) -> 
         findings += _errors(record, old)
         findings += _references(record, now.results.references, before.results.references)
         entries = history.pairs.get(pair, ())
-        findings += _slower(
+        findings += slower(
             record,
-            _usual(before, old, entries, history, same_machine(now.facts, before.facts)),
+            usual_times(before, old, entries, history, same_machine(now.facts, before.facts)),
             now.facts,
             slowest,
         )
@@ -77,39 +77,6 @@ def unmade(now: Subject) -> list[Finding]:
 def by_pair(records: Sequence[Record]) -> dict[Pair, Record]:
     """The records by case, engine and mode."""
     return {(record.case, record.engine, record.mode): record for record in records}
-
-
-def changes(now: Mapping[str, Any], before: Mapping[str, Any]) -> list[Change]:
-    """Versions, machine and settings of two runs that differ: engines first, then ours and what it
-    stands on.
-    """
-    old: dict[str, Any] = before.get("engines") or {}
-    new: dict[str, Any] = now.get("engines") or {}
-    # an engine that only one of the runs has was not asked for in the other
-    pairs: list[tuple[str, Any, Any]] = [
-        (name, old[name], new[name]) for name in new if name in old
-    ]
-    pairs += [(name, before.get(name), now.get(name)) for name in CIRCUMSTANCES]
-    pairs.append(("commit", _git(before, "commit"), _git(now, "commit")))
-    pairs.append(("uncommitted edits", _edits(before), _edits(now)))
-    return [Change(what=what, before=a, now=b) for what, a, b in pairs if a != b]
-
-
-def _git(facts: Mapping[str, Any], what: str) -> Any:
-    git: Mapping[str, Any] = facts.get("git") or {}
-    return git.get(what)
-
-
-def _edits(facts: Mapping[str, Any]) -> str | None:
-    """What tells edits apart: a digest, or where none was kept that there are some."""
-    return _git(facts, "edits") or ("some" if _git(facts, "changed") else None)
-
-
-def same_machine(now: Mapping[str, Any], before: Mapping[str, Any]) -> bool:
-    """Whether times can be compared by the clock too: on equal processors. Hosted runners have
-    another name every night.
-    """
-    return now.get("processor") == before.get("processor")
 
 
 def _outcomes(now: Record, before: Record) -> Iterator[Finding]:
@@ -285,65 +252,5 @@ def _references(record: Record, now: References, before: References) -> Iterator
                 break
 
 
-def _usual(
-    before: Subject, record: Record, entries: Sequence[Entry], history: History, same: bool
-) -> tuple[float | None, float | None]:
-    """Seconds that a warm solve took, and the same in calibration loops of its run; None where they
-    are not to be compared.
-
-    The median of the latest runs up to the one compared with, and of that one alone where there are
-    few: the noise of one run would be in every comparison with it.
-    """
-    latest = [entry for entry in entries if entry.seconds][-ENOUGH:]
-    if len(latest) < ENOUGH:
-        seconds = (
-            own_seconds(record.seconds.warm, record.seconds.waited) if record.seconds else None
-        )
-        loop = calibration(before.facts)
-        return seconds if same else None, seconds / loop if seconds is not None and loop else None
-    times = [(entry.seconds or 0.0, calibration(history.runs[entry.run])) for entry in latest]
-    loops = [seconds / loop for seconds, loop in times if loop]
-    return statistics.median(seconds for seconds, _ in times) if same else None, (
-        statistics.median(loops) if loops else None
-    )
-
-
-def _slower(
-    now: Record, usual: tuple[float | None, float | None], facts: Mapping[str, Any], limit: float
-) -> Iterator[Finding]:
-    """Slower by the clock and by the calibration loop, where both can be compared: either alone may
-    be the machine's doing.
-    """
-    seconds = own_seconds(now.seconds.warm, now.seconds.waited) if now.seconds else None
-    if seconds is None:
-        return
-    by_clock, by_loop = usual
-    loop = calibration(facts)
-    expected = [by_clock] if by_clock else []
-    expected += [by_loop * loop] if by_loop and loop else []
-    if not expected:
-        return
-    should = max(expected)
-    if seconds > limit * should and seconds - should > TIME_FLOOR:
-        ratio = seconds / should
-        spread = f"×{number(ratio)}; by the spread from run to run, ×{number(limit)} may be chance"
-        told = f"{number(1e3 * should)} → {number(1e3 * seconds)} ms a sweep ({spread})"
-        yield finding_of(
-            Kind.SLOWER, now, told, before=should, now=seconds, ratio=ratio, limit=limit
-        )
-
-
 def _said(record: Record) -> str:
     return f"{record.outcome.shown}: {record.message}" if record.message else record.outcome.shown
-
-
-def finding_of(kind: Kind, record: Record, message: str, **about: Any) -> Finding:
-    """Return a finding about the pair of a record."""
-    return Finding(
-        kind=kind,
-        case=record.case,
-        engine=record.engine,
-        mode=record.mode,
-        message=message,
-        **about,
-    )

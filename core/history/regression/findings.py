@@ -8,6 +8,8 @@ from typing import Any, Literal
 
 import msgspec
 
+from ...harness.record import Record
+
 
 class Kind(StrEnum):
     """What a finding says."""
@@ -237,3 +239,15 @@ class Regressions(msgspec.Struct, frozen=True, kw_only=True):
         whether anything is bad.
         """
         return bool(self.regressions) or (self.against is None and bool(self.failing))
+
+
+def finding_of(kind: Kind, record: Record, message: str, **about: Any) -> Finding:
+    """Return a finding about the pair of a record."""
+    return Finding(
+        kind=kind,
+        case=record.case,
+        engine=record.engine,
+        mode=record.mode,
+        message=message,
+        **about,
+    )

@@ -9,8 +9,8 @@ from collections.abc import Iterator
 from ...harness.labels import number
 from ...harness.record import Record
 from ...trajectory import QUANTITIES
-from .compare import by_pair, finding_of, same_samples, values_of
-from .findings import Finding, Kind
+from .compare import by_pair, same_samples, values_of
+from .findings import Finding, Kind, finding_of
 from .run_selection import Subject
 from .thresholds import RESIDUAL, RESIDUAL_FLOOR
 

@@ -12,7 +12,7 @@ from ...trajectory import Array
 from ..compiled.request import accept_by
 from ..continuation.singular_crossing import COVERED, EIGHT, NODES, PLACES, SIX
 from ..continuation.step_halving import longest
-from .block_solver import Lanes
+from .component_lanes import Lanes
 
 # Nothing is interpolated here: it is enough to see that there is one curve, and other assemblies
 # are farther off.

@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +19,8 @@ from ..compiled.motion_start import Start, by_ways, start_of
 from ..compiled.request import SIGMA, accept_by
 from ..continuation.singularity import CONTINUED, listed
 from ..continuation.step_halving import MOST_PARTS, TOO_MANY, part_of_step
-from ..structure.degrees_of_freedom import counted
-from .block_solver import WORST, Cascade, Lanes
+from .block_solver import Cascade
+from .component_lanes import WORST, Lanes
 from .singular_crossing import cross
 
 # Samples at once: all are predicted from one pose, and the farther they are from it the more
@@ -135,34 +134,6 @@ class CascadeSweep:
             (side, self._lanes.sampled(times[side], self.path))
             for side in outwards(times, self.start.time)
         ]
-
-    @cached_property
-    def _details(self) -> dict[str, Any]:
-        """What the record of every solution says of the cascade."""
-        cascade, unknowns, rows, redundant, sizes = (
-            self.cascade,
-            0,
-            0,
-            list[str](),
-            dict[str, dict[str, int]](),
-        )
-        for kind in cascade.kinds:
-            account, like = kind.model.selection.account, cascade.parts[kind.members[0]].bodies[0]
-            unknowns += account.moving_coordinates * len(kind.members)
-            rows += account.rows * len(kind.members)
-            for part in (cascade.parts[k] for k in kind.members):
-                # as they are called in a section
-                joints = {f"j{k}": joint.name for k, joint in enumerate(part.joints)}
-                named = (name.partition(":") for name in account.redundant_rows)
-                redundant += [f"{joints[owner]}{colon}{row}" for owner, colon, row in named]
-            which = f"components like that of {like} ({len(kind.members)})"
-            sizes |= {f"{name}, {which}": size for name, size in kind.model.sizes.items()}
-        return {
-            **counted(cascade.mechanism, unknowns, rows, redundant).details,
-            "components": len(cascade.parts),
-            "largest_component": cascade.largest,
-            "program": sizes,
-        }
 
     @cached_property
     def _departure(self) -> tuple[list[Array], str, Sequence[str]]:
@@ -311,7 +282,7 @@ class CascadeSweep:
             residual=largest_found(tests["closure"][solved]) * unit,
             message="; ".join(messages),
             details={
-                **self._details,
+                **self.cascade.details,
                 "redundant_residual": largest_found(tests["leftover"][solved]) * unit,
                 "smallest_singular_value": min(-largest_found(-tests[SIGMA][solved]), 1.0),
             }

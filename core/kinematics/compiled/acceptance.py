@@ -1,7 +1,9 @@
-"""Which lanes are accepted: the programs of the tests of a solution.
+"""Acceptance of lanes: the programs of the tests of a solution.
 
-gaps      states, predicted and before       -> gap, moved, reach   the largest of their components
-alone, joined   all that is tested, and the tolerance   -> margin    positive where a lane may be accepted
+gaps            states, predicted and before -> gap, moved, reach
+                the largest of their components
+alone, joined   all test quantities, and the tolerance -> margin
+                positive if a lane may be accepted
 """
 
 from __future__ import annotations

@@ -13,27 +13,26 @@ from numpy.typing import NDArray
 
 from ...errors import SolveError
 from ...mechanism.mechanism import Mechanism
-from ...program import ITERATIONS, MARGIN, Executor, NumpyExecutor, Plan, Program
+from ...program import Executor, NumpyExecutor, Plan, Program
 from ...program.llvm.compiler import available
 from ...program.llvm.executor import LlvmExecutor
 from ...program.llvm.jit import LlvmCode, make_loops_ready
-from ...trajectory import QUANTITIES, Array
+from ...trajectory import Array
 from ..formulation.driver_inputs import drive_numbers
 from ..structure.components import Section
 from . import acceptance, predictor
 from .program_cache import Tracing, ours, traced
-from .request import (
-    EARLIER,
-    FROM,
-    LARGEST_SIGMA,
-    ORIENTATION,
-    PREDICTED,
-    RATE,
-    RATE_T,
-    SIGMA,
-    TIME,
-    Request,
-    remembered,
+from .request import EARLIER, FROM, TIME, Request
+from .sample_rows import (
+    LARGEST,
+    LARGEST_OF_PARTS,
+    SMALLEST,
+    SMALLEST_OF_PARTS,
+    kept_motions,
+    kept_tests,
+    row_ranges,
+    rows_of_bodies,
+    rows_of_points,
 )
 from .thread_cache import ThreadCache
 
@@ -48,16 +47,6 @@ CLOSED = 1e-12
 # distance is taken up by them.
 ASSEMBLING = 50
 NONE_VARIED = np.empty((0, 1))
-TESTS = ("closure", "leftover", "branch", SIGMA, ORIENTATION, LARGEST_SIGMA, ITERATIONS, MARGIN)
-"""Scalars that are kept of every sample, after the motions."""
-TESTS_OF_VARIANTS = ("closure", SIGMA, ITERATIONS)
-"""Those kept of variants: where there is a solution, how sure, and what it took. Few, because
-variants are many.
-"""
-LARGEST, SMALLEST = ("closure", "leftover"), (SIGMA,)
-"""Tests of which the worst is found over all samples."""
-LARGEST_OF_PARTS, SMALLEST_OF_PARTS = (*LARGEST, ITERATIONS), (*SMALLEST, MARGIN)
-"""Those of a sample, over all its parts."""
 
 
 def compile_model(mechanism: Mechanism, request: Request, section: Section | None = None) -> Model:
@@ -121,9 +110,10 @@ class Model:
             slot for name in self.request.drivers for slot in self.vectors[f"drive {name}"]
         ]
         self._tangent = "outputs" if self.request.order == 2 else "tangent"
-        kept = [slot for name in self._wanted() for slot in self.vectors[name]]
-        self.rows = self._rows()
-        self.kept = len(kept) + len(self._tests)
+        motions, tests = kept_motions(request, self.state), kept_tests(request, self.blocks)
+        kept = [slot for name in motions for slot in self.vectors[name]]
+        self.rows = row_ranges({name: len(self.vectors[name]) for name in motions}, tests)
+        self.kept = len(kept) + len(tests)
         self.plan = Plan(
             self.programs,
             self.slots,
@@ -141,7 +131,7 @@ class Model:
             past=self.vectors.get(predictor.PAST, (0,))[0],
             carried=tracing.carried,
             continued=tracing.continued,
-            kept=[*kept, *(self.slots[name] for name in self._tests)],
+            kept=[*kept, *(self.slots[name] for name in tests)],
             largest=[self.slots[name] for name in (LARGEST_OF_PARTS if request.state else LARGEST)],
             smallest=[
                 self.slots[name] for name in (SMALLEST_OF_PARTS if request.state else SMALLEST)
@@ -156,62 +146,15 @@ class Model:
         self.bound = ThreadCache()
         self.design = np.full(len(self.slots), np.nan) if request.rows else self._solve_design()
 
-    def _wanted(self) -> list[str]:
-        """Names of the vectors asked for, those of one motion side by side."""
-        order = self.request.order + 1
-        found = (
-            [*self.state, *(PREDICTED + name for name in self.state), RATE, RATE_T]
-            if self.request.state
-            else []
-        )
-        found += [f"{label} {name}" for name in self.request.points for label in QUANTITIES[:order]]
-        labels = (("r",), ("p",), ("rdot", "omega"), ("rddot", "omega_t"))[: order + 1]
-        return found + [
-            f"{label} {name}" for name in self.request.bodies for group in labels for label in group
-        ]
-
-    @property
-    def _tests(self) -> Sequence[str]:
-        # a part of a large mechanism: whose fault it is, and what the next sample is accepted by
-        if self.request.state:
-            return ("closure", *remembered(self.blocks))
-        return TESTS_OF_VARIANTS if self.request.varied else TESTS
-
-    def _rows(self) -> dict[str, slice]:
-        rows: dict[str, slice] = {}
-        row = 0
-        for name in self._wanted():
-            rows[name] = slice(row, row := row + len(self.vectors[name]))
-        for name in self._tests:
-            rows[name] = slice(row, row := row + 1)
-        return rows
-
     @cached_property
     def of_points(self) -> Mapping[str, list[slice | None]]:
-        """By point: rows of its position, velocity and acceleration; None where one is not
-        wanted.
-        """
-        return {
-            name: [self.rows.get(f"{label} {name}") for label in QUANTITIES]
-            for name in self.request.points
-        }
+        """By point: rows of its position, velocity and acceleration; None for an absent one."""
+        return rows_of_points(self.request, self.rows)
 
     @cached_property
     def of_bodies(self) -> Mapping[str, list[slice | None]]:
-        """By body: rows of its r, p, v and a, None where not wanted; rates of place and of rotation
-        stand side by side.
-        """
-        pairs = (("r", "r"), ("p", "p"), ("rdot", "omega"), ("rddot", "omega_t"))
-
-        def rows(first: str, last: str) -> slice | None:
-            return (
-                slice(self.rows[first].start, self.rows[last].stop) if first in self.rows else None
-            )
-
-        return {
-            name: [rows(f"{first} {name}", f"{last} {name}") for first, last in pairs]
-            for name in self.request.bodies
-        }
+        """By body: rows of its r, p, v and a, None for an absent one."""
+        return rows_of_bodies(self.request, self.rows)
 
     @property
     def orders(self) -> int:

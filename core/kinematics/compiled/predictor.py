@@ -1,10 +1,12 @@
-"""Programs that predict lanes from those before them on a motion, and what is carried for that (see
-`programs`).
+"""Programs that predict lanes from earlier ones on a motion, and the slots carried for them.
 
-predict   from state, v, a and time; time    -> state        Taylor step of second order
-extrapolate   states of the groups of lanes before, weights   -> state       through `NODES` of them, without v and a; and what is
-                                                                carried of the last of them
-extend    states of the samples before, weights   -> state        likewise, for lanes that are motions of their own
+They share the layout of `programs`:
+
+    predict       state, v, a and time; time -> state: Taylor step of second order
+    extrapolate   states of earlier groups of lanes, weights -> state through `NODES` of them,
+                  without v and a, and the carried slots of the last of them
+    extend        states of earlier samples, weights -> state likewise, for lanes that are
+                  motions of their own
 """
 
 from __future__ import annotations

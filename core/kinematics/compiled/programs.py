@@ -1,13 +1,15 @@
-"""The programs of a sweep, traced from the equations: they share one layout of slots.
+"""The programs of a sweep, traced from the equations, with one layout of slots.
 
-    newton    state, drives                      -> state, residual, sigma, orientation   one Newton-Raphson iteration; what is
-                                                    said of residual and rows is that before it
-    outputs   state, drives' rates               -> v, a, wanted motions, closure, leftover, branch   one factorisation at the
-                                                    converged pose, solved for nu and gamma
-    tangent   state, drives' rates               -> v, a         where a march begins, if not all of it is put out
+    newton    state, drives -> state, residual, sigma, orientation
+              one Newton-Raphson iteration; residual, sigma and orientation are those before it
+    outputs   state, drives' rates -> v, a, wanted motions, closure, leftover, branch
+              one factorisation at the converged pose, solved for nu and gamma
+    tangent   state, drives' rates -> v, a
+              at the start of a march, if `outputs` does not compute all of it
 
-Those that follow a motion are in `prediction` and `acceptance`. Each is traced for what is asked:
-no acceleration, no gamma; no velocity, no factorisation after the last iteration.
+`predictor` and `acceptance` hold the programs that follow a motion. Each program is traced for the
+requested order: without accelerations no gamma, without velocities no factorisation after the last
+iteration.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Follow the curve of poses by its length, not by a driver: beyond lock-ups, where the driver turns
 back, and over bifurcations.
 
-Pseudo-arclength continuation. The unknowns are the pose q and the path's time t; a step of length h
-along the tangent (dq, dt),
-|dq| = 1 [units of the mechanism's size, rad], is corrected across the tangent by Newton's iteration on
+Pseudo-arclength continuation. The unknowns are the pose q and the path's time t. A step of length
+h along the tangent (dq, dt), |dq| = 1 [units of the mechanism's size, rad], is corrected across the
+tangent by Newton's iteration on
 
     phi(q, t) = 0,   dq . (q - q_predicted) = 0        Jacobian  B = [ J  -nu ; dq^T  0 ]
 

@@ -15,8 +15,9 @@ from ..compiled.request import FROM, LARGEST_SIGMA, SIGMA, TIME
 from ..compiled.samples import Route
 from ..formulation.acceptance_criteria import LOW, doubtful, in_question
 from .row_exchange import BETTER, NEAR, Choice
+from .side_follower import End, March
 from .singular_crossing import bridge, onward
-from .walk import End, March, arrived, led, march
+from .walk import arrived, led, march
 
 # Each takes some milliseconds to be passed. A motion that has so many is one of thousands of turns.
 MOST = 1000

@@ -17,9 +17,10 @@ import numpy as np
 
 from ...mechanism.motions import Path
 from ...trajectory import QUANTITIES, Array
-from ..compiled.compiled_model import TESTS, Model
+from ..compiled.compiled_model import Model
 from ..compiled.dense_equations import system_of
 from ..compiled.request import FROM, ORIENTATION, RATE, SIGMA, TIME
+from ..compiled.sample_rows import TESTS
 from ..compiled.samples import Route
 from ..formulation.acceptance_criteria import AMPLIFIED, EPSILON, WORSE
 from .singularity import solve_closely

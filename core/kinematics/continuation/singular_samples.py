@@ -11,80 +11,35 @@ refused.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...mechanism.motions import Path
 from ...trajectory import Array
-from ..compiled.compiled_model import TESTS, Model
+from ..compiled.compiled_model import Model
 from ..compiled.dense_equations import System, system_of
-from ..compiled.request import FROM, SIGMA, TIME
+from ..compiled.request import SIGMA
+from ..compiled.sample_rows import TESTS
 from ..compiled.samples import Route
 from ..formulation.acceptance_criteria import AMPLIFIED, WORSE
 from .row_exchange import BETTER
-from .segments import Followed, Passage
+from .segments import Followed
+from .side_follower import March
 from .singular_crossing import bridge
+from .singular_findings import Findings, add_end, add_passages
 from .singularity import (
     CONTINUED,
     REGULAR,
-    Singularity,
     examine,
     listed,
     smallest_singular_values,
     solve_closely,
 )
-from .trace import limit_ahead
-from .walk import End, March
 
-# Of one march: the others are counted.
-NAMED = 8
 # A fine sweep has some tens of samples beside a singular pose that cannot be told from it.
 BRIDGED = 64
 # Unknowns up to which a dense decomposition is worth its time, a second.
 LARGEST = 1000
-# A passage is found this near to the sample that it is at, by the time or one.
-BESIDE = 1e-6
-
-
-@dataclass
-class Findings:
-    """What there is to say of a march.
-
-    Attributes:
-        notes: of samples that are right, but at or beyond singular poses.
-        messages: why samples are missing.
-        poses: the singular poses, for the record.
-        retried: samples that were solved again.
-        sigma: smallest singular value among those.
-        renewed: how often rows were chosen anew.
-        uncertain: samples that are refused because their pose or rates are uncertain; the motion
-            does not end there.
-    """
-
-    notes: list[str] = field(default_factory=list[str])
-    messages: list[str] = field(default_factory=list[str])
-    poses: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
-    retried: int = 0
-    sigma: float = np.inf
-    renewed: int = 0
-    uncertain: list[int] = field(default_factory=list[int])
-
-    @property
-    def details(self) -> dict[str, Any]:
-        """The findings as a record has them; empty where nothing was found."""
-        found: dict[str, Any] = {}
-        if self.retried:
-            found |= {"retried_samples": self.retried, "smallest_singular_value": self.sigma}
-        if self.renewed:
-            found["rows_chosen_anew"] = self.renewed
-        if self.poses:
-            found["singular_poses"] = self.poses
-        if self.uncertain:
-            found["uncertain_samples"] = sorted(self.uncertain)
-        return found | ({"notes": self.notes} if self.notes else {})
 
 
 def scrutinise(route: Route, found: March, tol: float) -> Findings:
@@ -97,9 +52,9 @@ def scrutinise(route: Route, found: March, tol: float) -> Findings:
     scrutiny.followed.go_on()
     scrutiny.samples()
     scrutiny.stuck()
-    scrutiny.passages()
+    add_passages(scrutiny.findings, scrutiny.followed)
     for end in scrutiny.followed.ends:
-        scrutiny.end(end)
+        add_end(scrutiny.findings, end, tol)
     scrutiny.findings.renewed = scrutiny.followed.renewed
     scrutiny.findings.uncertain = [k for k in scrutiny.findings.uncertain if not found.solved[k]]
     return scrutiny.findings
@@ -262,7 +217,7 @@ class _Scrutiny:
         singularity = examine(
             system, system.state(near[:, None]), self.route.sampled(np.array([time]))
         )
-        self._say("passed", time, singularity, k)
+        self.findings.add_pose("passed", self.route.path, time, singularity, k)
         what = "" if singularity.regular else "a singular pose at "
         self.findings.notes.append(
             f"passes {what}{self._where(time)}: {singularity.words}; {CONTINUED}, interpolated"
@@ -278,7 +233,7 @@ class _Scrutiny:
         found = [examine(system, state[:, [at]], sample[:, [at]]) for at in range(len(indices))]
         for k, each in zip(indices.tolist(), found, strict=True):
             if each.sigma < REGULAR:
-                self._say("refused", float(self.times[k]), each, k)
+                self.findings.add_pose("refused", self.route.path, float(self.times[k]), each, k)
         worst = int(error.max(axis=0).argmax())
         singularity = found[worst]
         uncertain = f"the pose uncertain by {error[0, worst]:.2g} of the mechanism's size"
@@ -302,96 +257,5 @@ class _Scrutiny:
             )
         self.findings.messages.append(f"refused at {places}: {why}")
 
-    # Passages
-
-    def passages(self) -> None:
-        """Say what was passed between samples."""
-        said = [pose["time"] for pose in self.findings.poses if pose["outcome"] == "passed"]
-        others = [
-            each
-            for each in self.followed.passages
-            if not any(abs(each.time - t) <= BESIDE * (1.0 + abs(t)) for t in said)
-        ]
-        for each in others[:NAMED]:
-            self._crossed(each)
-        if len(others) > NAMED:
-            self.findings.notes.append(
-                f"crosses {len(others) - NAMED} more singular poses, between samples"
-            )
-
-    def _crossed(self, passage: Passage) -> None:
-        path, time, where = passage.route.path, passage.time, passage.route.path.where
-        system = system_of(passage.route.model)
-        singularity = examine(
-            system, system.state(passage.lane[:, None]), passage.route.sampled(np.array([time]))
-        )
-        if singularity.regular:  # the motion knows nothing of the choice of rows
-            return
-        self._say("crossed", time, singularity, path=path)
-        if path.motions is self.route.path.motions:
-            places = np.append(self.times, self.route.start)
-            low, high = (
-                where(float(side))
-                for side in (places[places <= time].max(), places[places >= time].min())
-            )
-            beside = f"between {low} and {high}, "
-        else:
-            beside = f"on the way to {self.route.begin.name}, "
-        self.findings.notes.append(
-            f"crosses a singular pose {beside}near {where(time)}: {singularity.words}; {CONTINUED}"
-        )
-
-    # Ends
-
-    def end(self, end: End) -> None:
-        """Say what stopped a side: a limit point ahead of its last pose, or what that pose is
-        nearest to.
-        """
-        if end.divided:
-            self.findings.messages.append(end.message)
-            return
-        model, path = end.route.model, end.route.path
-        system, time = system_of(model), float(end.lane[model.slots[FROM + TIME]])
-        state = system.state(end.lane[:, None])
-        ahead = limit_ahead(system, path, state, time, 1 if end.wanted > time else -1, self.tol)
-        if ahead is None:
-            singularity = examine(system, state, end.route.sampled(np.array([time])))
-            regular = f"the pose is regular there, smallest singular value {singularity.sigma:.3g}"
-            self.findings.messages.append(
-                f"{end.message}; there, {singularity.words}"
-                if singularity.sigma < REGULAR
-                else f"{end.message}; {regular}"
-            )
-            return
-        self._say("limit", ahead.value, ahead.singularity, path=path)
-        self.findings.messages.append(
-            f"{end.message}; the limit of travel is {path.where(ahead.value)}:"
-            f" {ahead.singularity.words}; kincheck trace goes on beyond"
-        )
-
     def _where(self, time: float) -> str:
         return self.route.path.where(time)
-
-    def _say(
-        self,
-        outcome: str,
-        time: float,
-        singularity: Singularity,
-        sample: int | None = None,
-        path: Path | None = None,
-    ) -> None:
-        path = path or self.route.path
-        values = path.drive(list(path.motions), np.array([time]))[0, :, 0]
-        driver = {
-            name: path.design.get(name, 0.0) + float(x)
-            for name, x in zip(path.motions, values, strict=True)
-        }
-        self.findings.poses.append(
-            {
-                "outcome": outcome,
-                "time": time,
-                "driver": driver,
-                "sample": sample,
-                **singularity.facts,
-            }
-        )

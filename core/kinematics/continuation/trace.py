@@ -1,6 +1,4 @@
-"""Trace a mechanism along the length of its motion, with the driver's value as an outcome: through
-limit points and beyond.
-"""
+"""Trace a motion along its own length, through limit points; the driver's value is a result."""
 
 from __future__ import annotations
 
@@ -47,8 +45,8 @@ class Event:
 
     @property
     def kind(self) -> str:
-        """A limit point is where the driver locks up and turns back; at a branch point the motion
-        may go on in several ways.
+        """ "limit point" where the driver locks up and turns back; "branch point" where the motion
+        may branch.
         """
         return "limit point" if self.singularity.lock_up else "branch point"
 
@@ -110,23 +108,22 @@ def trace(
     tol: float = 1e-12,
     style: str = "native",
 ) -> Curve:
-    """Trace the motion from the design position, whatever the driver does on the way; further
-    drivers hold their design value.
+    """Trace the motion from the design position; further drivers hold their design value.
 
     Args:
-        mechanism: what to trace.
+        mechanism: to trace.
         driver: whose value is given along the curve.
-        length: to trace [units of the mechanism's size, rad]; it ends before where it is back at
-            the design position.
+        length: to trace [units of the mechanism's size, rad]; a closed curve ends before it, at
+            design.
         direction: 1 to start with the driver's value growing, -1 with it falling.
-        points: names of the points whose positions are wanted; all of them unless given.
-        longest: step.
+        points: names of the points whose positions are wanted; all unless given.
+        longest: longest step.
         tol: largest accepted constraint residual, relative to the mechanism's size.
         style: how the rows are written, as for `solve`.
 
     Raises:
         SolveError: drivers and degrees of freedom do not match, the mechanism does not close at the
-            design position, or an argument makes no sense.
+            design position, or an argument is invalid.
     """
     if driver not in (drivers := [each.name for each in mechanism.drivers]):
         require_driven(mechanism)
@@ -180,9 +177,7 @@ def trace(
 def limit_ahead(
     system: System, path: Path, state: Array, time: float, direction: int, tol: float
 ) -> Event | None:
-    """The limit point that a pose of a path is close to, going on in a direction of time; None
-    where there is none nearby.
-    """
+    """Return the limit point close ahead of a pose in a direction of time, or None."""
     walk = ArclengthWalk(system, path, tol)
     try:
         spot = walk.begin(state, time, direction)
@@ -222,9 +217,7 @@ def _walked(walk: ArclengthWalk, first: Spot, length: float, longest: float) -> 
 
 
 def _turns_back(before: Spot, after: Spot) -> bool:
-    """Whether the driver's value is stationary between two spots; at a spot itself, before it or
-    after it, and not twice.
-    """
+    """Return whether the driver's value is stationary between two spots; a spot counts once."""
     return (before.dt < 0.0) != (after.dt < 0.0)
 
 
@@ -236,9 +229,7 @@ def _note_limit(walk: ArclengthWalk, trail: _Trail) -> None:
 
 
 def _note_branches(walk: ArclengthWalk, trail: _Trail) -> None:
-    """Add the branch points: sigma is least at a spot, or the determinant changes its sign beside
-    it.
-    """
+    """Add branch points: sigma is least at a spot, or the determinant changes sign beside it."""
     spots = _with_neighbours(walk, trail)
     for one, two, three in zip(spots, spots[1:], spots[2:], strict=False):
         if two.sigma < min(one.sigma, three.sigma) or (

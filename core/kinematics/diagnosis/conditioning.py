@@ -14,50 +14,26 @@ then says how much that geometry would contradict itself.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
-from ...algebra import Vec3, vec
-from ...joints import Kind
-from ...mechanism.mechanism import Mechanism, Point
+from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path
-from ...primitives.base import GROUND_POSE, Drive, Twist
+from ...primitives.base import Drive
 from ...trajectory import Array, Trajectory
 from ..compiled.compiled_model import compile_model
 from ..compiled.request import Request
 from ..continuation.row_exchange import chosen
 from ..continuation.sweep import sweep
-from ..formulation.body_kinematics import position_of
 from ..formulation.cartesian import Cartesian
 from ..formulation.constraints import Frames
 from ..formulation.driver_inputs import standing_drives
-from ..formulation.formulation import Configuration
-from ..formulation.parameters import kinds, placed, places
+from ..formulation.parameters import placed
 from ..formulation.state_vectors import displaced, jacobian, state_of
-from .dual_numbers import Slope, derivatives
 from .instantaneous_screws import Screw, screws
-
-
-@dataclass(frozen=True, eq=False)
-class Gradient:
-    """Derivatives of a point's position [m] at a sample, by components x, y, z.
-
-    Attributes:
-        position: where it is, and where it is at design, global [m], shape (3,).
-        by_residuals: by the residuals of the solved rows [m or rad], shape (3, rows).
-        by_geometry: by the numbers of the places, shape (3, numbers).
-        design_by_geometry: of where it is at design, shape (3, numbers).
-    """
-
-    position: Array
-    design: Array
-    by_residuals: Array
-    by_geometry: Array
-    design_by_geometry: Array
+from .position_gradients import Dependence, Geometry, Gradient
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +113,7 @@ def conditioning(
         int(k) for k in np.linspace(0, len(path.times) - 1, min(samples, len(path.times))).round()
     }
     at |= {int(np.abs(path.times).argmin()), *(reached[[0, -1]].tolist() if len(reached) else [])}
-    geometry = _Geometry(mechanism, varied)
+    geometry = Geometry(mechanism, varied)
     elsewhere = placed(mechanism, geometry.slopes)
     looked, matrices = list[PoseConditioning](), list[Array]()
     seen = sorted(at & set(reached.tolist()))
@@ -168,7 +144,7 @@ def conditioning(
         )
         by_geometry = np.array([geometry.derivatives_of(x) for x in phi])
         shift = -inverse @ by_geometry[kept]
-        dependence = _Dependence(formulation, configuration, frame, metres, shift)
+        dependence = Dependence(formulation, configuration, frame, metres, shift)
         looked.append(
             PoseConditioning(
                 float(values[k]),
@@ -231,85 +207,3 @@ def _is_length(formulation: Cartesian, rows: Array) -> Array:
 
 def _floats(state: Mapping[str, Sequence[float]]) -> dict[str, tuple[float, ...]]:
     return {name: tuple(map(float, vector)) for name, vector in state.items()}
-
-
-class _Geometry:
-    """The places that are varied.
-
-    Attributes:
-        slopes: their values by place, each number with its derivatives by all of them.
-        numbers: as `Conditioning.numbers`.
-    """
-
-    def __init__(self, mechanism: Mechanism, varied: Sequence[str]) -> None:
-        every, holds = places(mechanism), kinds(mechanism)
-        values = {place: every[place] for place in varied}
-        # a derivative by the components of a direction becomes one by its angle
-        lengths = {
-            place: math.hypot(*value)
-            for place, value in values.items()
-            if holds[place] is Kind.DIRECTION
-        }
-        self.numbers = [
-            (place, k, lengths.get(place, 1.0))
-            for place, value in values.items()
-            for k in range(len(value))
-        ]
-        rows = iter(np.eye(len(self.numbers)))
-        self.slopes = {
-            place: tuple(Slope(x, next(rows)) for x in value) for place, value in values.items()
-        }
-
-    def derivatives_of(self, x: Any) -> Array:
-        """Return the derivatives of a number by all numbers of the places, shape (numbers,); zero
-        where it depends on none.
-        """
-        return np.broadcast_to(derivatives(x), (len(self.numbers),))
-
-
-@dataclass(frozen=True, eq=False)
-class _Dependence:
-    """What the unknowns at a sample owe to residuals and to geometry.
-
-    Attributes:
-        by_residuals: derivatives of the unknowns by the residuals of the solved rows [m or rad],
-            shape (unknowns, rows).
-        by_geometry: derivatives of the unknowns by the numbers of the places, shape (unknowns,
-            numbers).
-    """
-
-    formulation: Cartesian
-    at: Configuration
-    frame: Frames
-    by_residuals: Array
-    by_geometry: Array
-
-    def gradient(self, point: Point, geometry: _Geometry) -> Gradient:
-        """How the position of a point depends on both."""
-        pose, arm = (
-            self.at.poses.get(point.body, GROUND_POSE),
-            self.frame.arm(point.body, point.position),
-        )
-        turned = pose.turn(arm)
-        by_unknowns = np.zeros((3, self.formulation.unknowns))
-        if point.body in self.formulation.columns:
-            first = self.formulation.columns[point.body]
-            for k in range(6):
-                rates = [float(k == column) for column in range(6)]
-                by_unknowns[:, first + k] = [*Twist(vec(rates[:3]), vec(rates[3:])).of(turned)]
-        by_unknowns *= self.frame.unit
-        moved: Vec3 = vec(geometry.slopes.get(f"points.{point.name}.position", point.position))
-        # the body carries its point along: A times the change of where it is at design
-        design = np.array([geometry.derivatives_of(x) for x in moved])
-        along = np.array([geometry.derivatives_of(x) for x in pose.turn(moved)])
-        here, there = (
-            np.array([*position_of(point.position, arm, self.frame.unit, pose)]),
-            np.array(point.position),
-        )
-        return Gradient(
-            here,
-            there,
-            by_unknowns @ self.by_residuals,
-            by_unknowns @ self.by_geometry + along,
-            design,
-        )

@@ -1,9 +1,8 @@
-"""Which rows say what others say, which contradict each other and by how much, and what is left
-free: by name, at the design.
+"""Redundant rows, contradictions and free motions at the design, by name.
 
-The rows are those of the native formulation, joints first, then drivers; lengths are in mechanism
+The rows are those of the native formulation, joints first, then drivers. Lengths are in mechanism
 sizes, so that rows of lengths and of angles compare. Contradictions are found by exact rows:
-simplified ones have another fixed point where the residual is not zero (formulation section 3).
+simplified rows have another fixed point where the residual is not zero (formulation section 3).
 """
 
 from __future__ import annotations
@@ -66,9 +65,7 @@ class Dependency:
 
 @dataclass(frozen=True)
 class ComponentCount:
-    """Bodies that joints, couplers or drivers tie together, with their share of the count; drivers
-    are not among the rows.
-    """
+    """Connected bodies with their share of the count; drivers are not among the rows."""
 
     bodies: tuple[str, ...]
     unknowns: int
@@ -84,9 +81,7 @@ class ComponentCount:
 
 @dataclass(frozen=True)
 class Violation:
-    """A row that cannot be met, and by how much: residual [m or rad], or its rate by the
-    driver's.
-    """
+    """A row that cannot be met: residual [m or rad], or its rate by the driver's."""
 
     row: NamedRow
     amount: float
@@ -94,16 +89,14 @@ class Violation:
 
 @dataclass(frozen=True)
 class Blocked:
-    """A driver that cannot move what it drives: the least by which other rows would have to give
-    way, per unit of the driver.
-    """
+    """A driver that cannot move, and the least violation of other rows per unit of the driver."""
 
     driver: str
     rows: tuple[Violation, ...]
 
 
 class Ranks:
-    """The rows of a mechanism at the design position, and what can be said of their rank."""
+    """The rows of a mechanism at the design position, and their rank."""
 
     def __init__(self, mechanism: Mechanism) -> None:
         self.mechanism, self.frame = mechanism, frames(mechanism)
@@ -170,9 +163,7 @@ class Ranks:
 
     @cached_property
     def nearly(self) -> list[tuple[float, list[NamedRow]]]:
-        """Combinations of joint rows that are nearly redundant: their size, which is a singular
-        value, and the rows in them.
-        """
+        """Nearly redundant combinations of joint rows: singular value, and the rows in them."""
         u, values = np.linalg.svd(self.matrix[: self.joint_rows], full_matrices=False)[:2]
         scale = values.max(initial=0.0)
         found: list[tuple[float, list[NamedRow]]] = []
@@ -264,8 +255,8 @@ class Ranks:
 
     @cached_property
     def contradictions(self) -> list[Violation]:
-        """The rows that do not hold in the pose nearest to an assembly, with the drivers at design;
-        empty where it closes.
+        """Rows violated in the pose nearest to an assembly, drivers at design; empty where it
+        closes.
         """
         exact = Cartesian.of(self.mechanism, self.frame, style=Style.CONVENTIONAL)
         state = exact.design
@@ -288,9 +279,7 @@ class Ranks:
 
 
 def _largest_first(amounts: Array) -> list[int]:
-    """Indices by size; of equals, to all but round-off, in their own order: the same on every
-    processor.
-    """
+    """Return indices by size; equals (to round-off) keep their order on every processor."""
     sizes = np.abs(amounts)
     scale = float(sizes.max(initial=0.0)) or 1.0
     return np.argsort(-np.round(sizes / scale, DIGITS), kind="stable").tolist()

@@ -1,3 +1,1 @@
-"""What is solved: a mechanism's constraints as equations over any scalar, in Cartesian or in joint
-coordinates.
-"""
+"""A mechanism's constraints as equations over any scalar, in Cartesian or joint coordinates."""

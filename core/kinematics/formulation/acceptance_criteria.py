@@ -1,6 +1,4 @@
-"""May a pose be believed: does it come from the same motion as its neighbour, and are its residuals
-all there is to know?
-"""
+"""Acceptance criteria of a pose: same motion as its neighbour, residuals that bound its error."""
 
 from __future__ import annotations
 
@@ -10,79 +8,80 @@ from numpy.typing import NDArray
 from ...trajectory import Array
 
 # Along one motion the trapezoidal rule predicts the change between neighbours; on a sinusoid
-# sampled every 70 degrees it is off by 13 %. A step that is off by more than a quarter is divided
-# and tried again, so a coarse grid costs steps, not samples.
+# sampled every 70 degrees its error is 13 %. A step with an error above a quarter is halved and
+# solved again, so a coarse grid costs steps, not samples.
 LARGEST_DEVIATION = 0.25
-# Newton corrects a predicted pose by what its prediction lacks, of third order: on a sinusoid by a
-# tenth of the way in steps of 45 degrees. At a quarter a loop of four bodies was found beyond the
-# limit of its travel, in another assembly.
+# Newton's correction of a predicted pose is of third order: on a sinusoid a tenth of the step at
+# steps of 45 degrees. With a limit of a quarter, a loop of four bodies converged beyond its limit
+# of travel, in another assembly.
 LARGEST_CORRECTION = 0.1
-# Changes below this part of the mechanism's size are not another assembly: where a motion is
-# followed poses are known no better (FOLLOWED).
+# Changes below this fraction of the mechanism's size are not another assembly: a followed pose is
+# not known more accurately (FOLLOWED).
 NEGLIGIBLE = 1e-8
-# A step from one pose to the next that is longer than this, in Euler parameters (half of it: one
-# radian), joint angles [rad] or parts of the mechanism's size, says nothing of what is between: a
-# whole turn ends where it began, on whatever assembly.
+# A longer step, in Euler parameters (half of it: one radian), joint angles [rad] or fractions of
+# the mechanism's size, does not determine the motion between its ends: a whole turn ends at its
+# start, on any assembly.
 LONGEST_STEP = 0.5
-# Where all stands still at two samples the state says nothing of a driver that made whole turns
-# between them, and its row does not know two of them from none: a driver turns by no more than this
-# in a step, or it is divided [rad].
+# If the whole mechanism rests at two samples, its state does not show whole turns of a driver
+# between them, and the driver's row cannot tell two turns from none. A driver that turns by more in
+# one step [rad] has its step divided.
 LONGEST_TURN = 2.0
-# Nor does a step over which sigma changes by more than this factor, or a determinant its sign:
-# beside a singular pose rates change as fast. Steps towards it get shorter and shorter, and nothing
-# there is stepped over. Where rows are exchanged the estimate of sigma jumps, over the case library
-# by up to 3.6 times.
+# Nor is the motion determined over a step in which sigma changes by more than this factor or a
+# determinant changes its sign: near a singular pose rates change as fast. Steps towards one shrink,
+# and none crosses it. An exchange of rows makes the estimate of sigma jump, by up to 3.6 times over
+# the case library.
 LARGEST_RATIO = 16.0
-# Nor one in which sigma could have been zero: it is taken to change, by what the pose does [Euler
-# parameters, parts of the mechanism's size], by no more than the first times what it did or does,
-# which is forgotten by the second from step to step, and never by more than the third: the angle
-# between two bodies changes by up to four times what the Euler parameters of each do. It is asked
-# of every block of the rows, for a small loop's sigma hides that of a large one beside it (8 of
-# 2,500 sweeps). The sign of a determinant says nothing of a gap behind which the motion seems to go
-# on; and where there are more rows than are solved it changes by their choice too, and not where
-# both are within a step. Of 600 coarse sweeps of kites with redundant rows that are off by less
-# than 1e-4, 79 were found on their other assembly without this, four where all was forgotten at
-# once, none of 4,600 so. The third alone gives thousands of parts to a screw so fine that sigma is
-# 0.002 everywhere. (Comparing the frames of all rows of two poses, as one sign of a determinant,
-# leaves 0.5 %: there both may turn over within a step too.)
+# Nor over a step in which sigma could have been zero. The assumed slope of sigma by the change of
+# the pose [Euler parameters, fractions of the mechanism's size] is at most the first factor times
+# the observed slope. The observed slope decays by the second factor a step, and the assumed one
+# never exceeds the third: the angle between two bodies changes by up to four times the change of
+# their Euler parameters. The test runs on each block of the rows, because the sigma of a small loop
+# hides that of a large one beside it (8 of 2,500 sweeps). The sign of a determinant does not show a
+# gap behind which the motion seems to continue; with redundant rows it also changes with the choice
+# of rows, and two changes within a step cancel. Of 600 coarse sweeps of kites with redundant rows
+# off by less than 1e-4, 79 ended on the other assembly without this test, 4 with a slope that
+# decays at once, and none of 4,600 with these values. The third factor alone divides the steps of a
+# screw so fine that sigma is 0.002 everywhere into thousands of parts. (A comparison of the frames
+# of all rows of two poses, as one sign of a determinant, leaves 0.5 %: both may turn over within a
+# step.)
 STEEPER, FALLS, STEEPEST = 4.0, 0.5, 4.0
-# The same question where whole Jacobians are at hand, as a simulator gives them: over a step J may
-# change by this part of itself. At one, J may be singular on the straight way between both. A half
-# leaves as much again for what J does beside that way.
+# The same criterion for whole Jacobians, as a simulator returns them: over a step J may change by
+# this fraction of itself. At one, J may be singular on the straight line between both. A half
+# leaves the same margin for the deviation of J from that line.
 LARGEST_CHANGE = 0.5
-# Residuals are accepted up to a tolerance, and amplified by the mechanism up to this: with the
-# 1e-12 of `kincheck run` to the 1e-9 m that outputs are held to.
+# Residuals are accepted up to a tolerance, and the mechanism may amplify them by this factor: the
+# 1e-12 of `kincheck run` becomes the 1e-9 m required of outputs.
 AMPLIFIED = 1e3
-# The estimate of sigma (`Elimination.sigma`) is 0.16 to 4 times as much over the case library: a
-# bound by sigma is worse than by the estimate by up to this. Where there are only pivots (sparse
-# systems), which are 1.3 to 17 times as much, by more.
+# The estimate of sigma (`Elimination.sigma`) is 0.16 to 4 times sigma over the case library: a
+# bound by sigma exceeds a bound by the estimate by up to the first factor. Sparse systems have
+# pivots only, 1.3 to 17 times sigma, hence the second factor.
 WORSE, WORSE_BY_PIVOTS = 10.0, 30.0
-# Where there are more rows than are solved, others are looked for where a step fails and sigma is
-# below this part of the largest that it has had; if none are better, where it is this part of that.
+# With redundant rows, others are tried if a step fails and sigma is below this fraction of its
+# largest value so far; if none are better, again at this fraction of the present value.
 LOW = 0.1
-# So much less is allowed of errors that other rows may not have.
+# Factor on the errors allowed where another choice of rows might avoid them.
 SHARPER = 1e-2
 EPSILON = float(np.finfo(np.float64).eps)
-# Residuals up to this are of a row's own rounding: some tens of products and sums of size one.
+# A row's own rounding leaves residuals up to this: some tens of products and sums of size one.
 ROUNDING = 64.0 * EPSILON
-# A motion is followed towards a singular pose as long as rounding leaves its rates uncertain by
-# less than the first part, estimated from sigma: nearer it seems to turn any way, also into another
-# motion that crosses it there. Away from one it is followed only where they are surer than the
-# second: what turns there may have been turned by rounding. The other motion is about sigma away,
-# so that rounding moves a pose by a ten-thousandth of the way there, by a six-hundredth where the
-# estimate is four times too large. Of pivots, which may be too large by much more, a parallelogram
-# was found on its other motion.
+# Towards a singular pose a motion is followed while rounding leaves its rates uncertain by less
+# than the first fraction, estimated from sigma: nearer, the motion has no clear direction and may
+# continue on another motion that crosses there. Away from a singular pose the second fraction is
+# required, because rounding may already have turned the motion. The other motion is about sigma
+# away, so rounding moves a pose by a ten-thousandth of that distance, or by a six-hundredth if the
+# estimate is four times too large. Pivots may be too large by much more: with them a parallelogram
+# ended on its other motion, hence the third fraction.
 FOLLOWED, TURNED, TURNED_BY_PIVOTS = 1e-2, 1e-3, 1e-5
 
 
 def doubtful(
     sigma: float | Array, closure: float | Array, tol: float, order: int = 1
 ) -> bool | NDArray[np.bool_]:
-    """Which samples need scrutiny: their residuals and estimates of sigma allow errors too large.
+    """Return whether residuals and estimates of sigma allow too large an error at each sample.
 
-    The error of rates is that of the pose over sigma once more. Where sigma itself is known the
-    same margin is kept: without it accelerations two thousandths of a radian from a singular pose
-    were off by 1e-8, solved closely by 1e-10.
+    The error of rates is that of the pose over sigma once more. A known sigma gets the same margin:
+    without it accelerations two thousandths of a radian from a singular pose had errors of 1e-8; a
+    close solution has 1e-10.
 
     Args:
         order: 2 for accelerations, whose error is that of rates over sigma once more.
@@ -94,13 +93,13 @@ def doubtful(
 def in_question(
     sigma: float | Array, closure: float | Array, tol: float, largest: float | None
 ) -> bool | NDArray[np.bool_]:
-    """Which samples are doubtful, or may be better by other rows than those that are solved.
+    """Return whether each sample is doubtful, or may be more accurate with other rows.
 
-    What the mechanism itself makes of rounding cannot be helped, a choice of rows can: from them
-    more is asked.
+    Amplification of rounding by the mechanism itself is unavoidable, but a poor choice of rows is
+    not: redundant rows have to meet a sharper limit.
 
     Args:
-        largest: estimate of sigma along the motion, if there are more rows than are solved.
+        largest: largest estimate of sigma along the motion; None without redundant rows.
     """
     found = doubtful(sigma, closure, tol)
     if largest is None:
@@ -111,8 +110,7 @@ def in_question(
 def continuous(
     change: Array, velocity: Array, velocity_before: Array, dt: float | Array, size: float
 ) -> NDArray[np.bool_]:
-    """Whether the change between neighbouring samples is what their velocities make it (Hermite's
-    condition).
+    """Return whether changes between neighbouring samples agree with their velocities (Hermite).
 
     Args:
         change: coordinates now less coordinates before [m], shape (..., k).
@@ -121,7 +119,7 @@ def continuous(
         size: characteristic length of the mechanism [m].
 
     Returns:
-        One truth value per pair; false where anything is not finite.
+        One truth value for each step; false where anything is not finite.
     """
     step = np.abs(np.asarray(dt))
     half = 0.5 * np.asarray(dt)[..., None]
@@ -131,9 +129,9 @@ def continuous(
 
 
 def continued(change: Array, velocity: Array, velocity_before: Array, dt: float | Array) -> bool:
-    """Return whether a step of all coordinates is short, and as their velocities predict it.
+    """Return whether a step of all coordinates is short and agrees with their velocities.
 
-    Beside a fold the rates are so large that they allow any deviation. So the deviation is compared
+    Near a fold the rates are so large that they allow any deviation, so the deviation is compared
     with the step itself.
 
     Args:
@@ -147,15 +145,15 @@ def continued(change: Array, velocity: Array, velocity_before: Array, dt: float 
 
 
 def regular_between(ratio: Array) -> bool:
-    """Return whether a Jacobian stays regular on the way between two poses (see LARGEST_CHANGE).
+    """Return whether a Jacobian stays regular between two poses (see LARGEST_CHANGE).
 
-    Let C = J_before^-1 J - I. The Jacobian is regular on the straight way from J_before to J where
-    some norm of C is below one. The norm used is the smallest of all those that differ only by the
-    units of the unknowns: the largest eigenvalue of |C| (Perron and Frobenius). So the units do not
-    matter, nor the weights of the rows, and each block of the rows is judged by itself.
+    Let C = J_before^-1 J - I. The Jacobian is regular on the straight line from J_before to J if
+    some norm of C is below one. The smallest norm over all units of the unknowns is the largest
+    eigenvalue of |C| (Perron and Frobenius). With this norm neither the units nor the weights of
+    the rows matter, and each block of the rows is judged by itself.
 
     Args:
-        ratio: J_before^-1 J, or the least-squares solution where there are redundant rows.
+        ratio: J_before^-1 J, or the least-squares solution with redundant rows.
     """
     change = np.abs(ratio - np.eye(len(ratio)))
     if not change.max() < 1.0 / EPSILON:  # singular where it begins, or not finite

@@ -1,4 +1,4 @@
-"""What a body carries, its points and its own frame: how they move, over any scalar."""
+"""Motion of the points and the frame carried by a body, over any scalar."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from .formulation import Acceleration
 
 
 def position_of(position: Sequence[Scalar], arm: Vec3, metres: Scalar, pose: Pose) -> Vec3:
-    """Where a point is [m]: its displacement is formed first, and added once.
+    """Return the position of a point [m]; its displacement is formed first and added once.
 
     Args:
         position: at design [m].
         arm: from the body's internal origin at design, in the unit of the frames.
-        metres: that unit.
+        metres: length of that unit [m].
     """
     return vec(position) + metres * (pose.u + pose.swing(arm))
 
@@ -28,7 +28,7 @@ def motion_of_point(
     twist: Twist,
     acceleration: Acceleration,
 ) -> tuple[Vec3, Vec3, Vec3]:
-    """Position [m], velocity and acceleration of a point; see `position_of`."""
+    """Return position [m], velocity and acceleration of a point; see `position_of`."""
     turned = pose.turn(arm)
     return (
         position_of(position, arm, metres, pose),
@@ -40,8 +40,10 @@ def motion_of_point(
 def motion_of_frame(
     design: Quat, pose: Pose, twist: Twist, acceleration: Acceleration
 ) -> tuple[Quat, Vec3, Vec3]:
-    """p, omega' and omega'dot of a body's own frame, the paper's variables, from its Euler
-    parameters at design.
+    """Return the paper's variables p, omega' and omega'dot of a body's own frame.
+
+    Args:
+        design: Euler parameters of the frame at design.
     """
     p = pose.q * design
     to_body = rotation_less_identity(p).T

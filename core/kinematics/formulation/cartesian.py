@@ -1,8 +1,7 @@
 """The Cartesian formulation: six unknowns (dr, dpi) of every moving body, and all joints as rows.
 
-A joint's own coordinate, its turn or displacement, is a further unknown where it is named: coupled
-to another, or by the style. dpi is in global axes, or in body axes where the row style is; the
-poses are the same.
+A joint's rotation or translation is a further unknown if it is named: by a coupling or by the
+style. dpi is in global axes, or in body axes if the row style is; the poses are the same.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ COLUMNS = 6
 
 @dataclass(frozen=True, slots=True)
 class Given:
-    """How a body moves that is solved for elsewhere."""
+    """The prescribed motion of a body that is solved elsewhere."""
 
     pose: Pose = GROUND_POSE
     twist: Twist = GROUND_TWIST
@@ -38,8 +37,8 @@ class Cartesian:
     """The constraints over the named moving bodies; implements `Formulation`.
 
     Attributes:
-        named: coordinates that have a column whether or not a primitive is driven by them.
-        given: moving bodies that have no columns.
+        named: coordinates with a column even if no primitive is driven by them.
+        given: prescribed moving bodies, without columns.
     """
 
     constraints: Sequence[Constraint | Relation]
@@ -55,8 +54,9 @@ class Cartesian:
         drives: Mapping[str, Drive] | None = None,
         style: Style = Style.NATIVE,
     ) -> Cartesian:
-        """All constraints of a mechanism over its moving bodies; drivers that are not named hold
-        their design value.
+        """Return all constraints of a mechanism over its moving bodies.
+
+        Drivers without a drive hold their design value.
         """
         return cls(constraints(mechanism, frame, drives or {}, style), frame.moving)
 
@@ -67,7 +67,7 @@ class Cartesian:
 
     @cached_property
     def coordinates(self) -> Mapping[str, int]:
-        """Column of every named coordinate; they come after the bodies."""
+        """Column of every named coordinate, after those of the bodies."""
         driven = (
             c.coordinate for c in self.constraints if isinstance(c, Constraint) and c.coordinate
         )
@@ -106,8 +106,9 @@ class Cartesian:
 
     @property
     def _from_ground(self) -> Mapping[str, int]:
-        """Joints and drivers between every body and the ground, or what is given; bodies that none
-        leads to are missing.
+        """Joints and drivers between every body and the ground or a prescribed body.
+
+        Unconnected bodies are missing.
         """
         pairs = [(c.i, c.j) for c in self.constraints if isinstance(c, Constraint)]
         far = {name: 0 for pair in pairs for name in pair if name not in self.columns}
@@ -167,7 +168,7 @@ class Cartesian:
                 continue
             pair, bound = _pair(c, at), self._bound(c, at, rate=1.0)
             rows = [self._sparse(row, c) for row in bound.rows(*pair)]
-            # nu is linear in the drive's rate: what it is at rate one is minus the coordinate's
+            # nu is linear in the drive's rate: its value at rate one is minus the coordinate's
             # column
             if c.coordinate:
                 for row, value in zip(rows, bound.nu(*pair), strict=True):
@@ -211,7 +212,7 @@ class Cartesian:
         at: Configuration,
         carried: Mapping[str, Twist],
     ) -> list[Scalar]:
-        """Right-hand sides less what given bodies contribute to the left."""
+        """Subtract the contribution of prescribed bodies from right-hand sides."""
         found: list[Scalar] = [*values]
         for body, place in ((c.i, "i"), (c.j, "j")):
             if body in carried:
@@ -222,8 +223,9 @@ class Cartesian:
         return found
 
     def _bound(self, c: Constraint, at: Configuration, rate: Scalar = 0.0) -> Primitive:
-        """The primitive, driven by its coordinate where it has one; the coordinate's acceleration
-        is an unknown's, not here.
+        """Return the primitive, driven by its coordinate if it has one.
+
+        The coordinate's acceleration is an unknown and stays zero here.
         """
         if not c.coordinate:
             return c.primitive
@@ -248,7 +250,7 @@ class Cartesian:
         }
 
     def _own(self, v: Sequence[Scalar]) -> dict[str, Twist]:
-        """The unknowns by body, in the axes of the rows."""
+        """Return the unknowns by body, in the axes of the rows."""
         return {
             name: Twist(vec(v[k : k + 3]), vec(v[k + 3 : k + COLUMNS]))
             for name, k in self.columns.items()
@@ -268,7 +270,7 @@ class Cartesian:
 
 
 def _named(c: Constraint | Relation) -> tuple[str, str]:
-    """Joint or driver, and primitive."""
+    """Return the names of the joint or driver, and of the primitive."""
     return c.owner, "Relation" if isinstance(c, Relation) else type(c.primitive).__name__
 
 

@@ -1,9 +1,8 @@
-"""The equations of a mechanism: its joints and drivers as primitives between bodies, over any
-scalar.
+"""The constraints of a mechanism: joints and drivers as primitives between bodies, over any scalar.
 
-Lengths are measured in a power of two of metres near the mechanism's size, which is exact and makes
-rows of lengths and of angles alike in size. Every moving body gets an internal origin at one of its
-joints, so that the arm of that joint is a literal zero.
+The unit of length is a power of two of metres near the mechanism's size: conversion is exact, and
+rows of lengths and of angles are of similar size. The internal origin of a moving body is at one of
+its joints, so that the arm of this joint is a literal zero.
 """
 
 from __future__ import annotations
@@ -28,11 +27,11 @@ from ...primitives.base import Drive
 
 @dataclass(frozen=True)
 class Constraint:
-    """A primitive between two bodies, and the joint or driver it belongs to.
+    """A primitive between two bodies, and its joint or driver.
 
     Attributes:
         coordinate: the unknown that drives the primitive, as JOINT.rotation or JOINT.translation;
-            empty where none does.
+            empty without one.
     """
 
     owner: str
@@ -44,9 +43,7 @@ class Constraint:
 
 @dataclass(frozen=True)
 class Relation:
-    """A linear row between coordinates: the weighted sum is the drive's value (zero unless
-    driven).
-    """
+    """A linear row: the weighted sum of coordinates is the drive's value (zero unless driven)."""
 
     owner: str
     weights: Mapping[str, float]
@@ -55,24 +52,21 @@ class Relation:
 
 @dataclass(frozen=True)
 class Frames:
-    """How the mechanism is measured: the length unit [m], the internal origin of every body
-    [units], and which bodies move.
-    """
+    """The length unit [m], the internal origin of every body [units], and the moving bodies."""
 
     unit: float
     origins: Mapping[str, Vec3]
     moving: tuple[str, ...]
 
     def arm(self, body: str, position: Sequence[float]) -> Vec3:
-        """Return the vector from the internal origin of the body to a point, global at design
-        [units].
-        """
+        """Return the vector from a body's internal origin to a point, at design [units]."""
         return (1.0 / self.unit) * vec(position) - self.origins[body]
 
 
 def frames(mechanism: Mechanism, length_unit: float | None = None) -> Frames:
-    """The length unit, unless it is given, and the internal origins: at the joint by which the
-    spanning tree reaches a body.
+    """Return the length unit, unless it is given, and the internal origins.
+
+    The origin of a body is at the joint by which the spanning tree reaches it.
     """
     if length_unit is None:
         length_unit = unit_near(size_of(mechanism))
@@ -93,8 +87,9 @@ def frames(mechanism: Mechanism, length_unit: float | None = None) -> Frames:
 
 
 def measured(mechanism: Mechanism) -> tuple[float, Frames]:
-    """A large mechanism's size, and frames whose unit of length is near the size of its bodies;
-    powers of two of metres.
+    """Return the size of a large mechanism, and frames with a unit near the size of its bodies.
+
+    Both lengths are powers of two of metres.
     """
     whole = frames(mechanism)
     points: dict[str, list[tuple[float, float, float]]] = defaultdict(list)
@@ -111,11 +106,10 @@ def measured(mechanism: Mechanism) -> tuple[float, Frames]:
 
 
 def size_of(mechanism: Mechanism) -> float:
-    """Return the extent of the joints' points [m]; where they have none, as around a single pivot,
-    of these and all others.
+    """Return the extent of the joints' points [m], or of all points if the joints' have none.
 
-    A metre in its place would be the unit of a mechanism of micrometres: its residuals are too
-    small to be seen, and its singular values too.
+    A single pivot has joints without extent. A metre instead would be the unit of a mechanism of
+    micrometres, whose residuals and singular values would be too small to detect.
     """
     joints = [point for joint in mechanism.joints for point in joint.points_on()]
     for places in (joints, joints + [point.position for point in mechanism.points]):
@@ -126,19 +120,17 @@ def size_of(mechanism: Mechanism) -> float:
 
 
 def extent(points: Sequence[Sequence[float]]) -> float:
-    """Return the largest extent of points along a global axis [m]; zero where there are none."""
+    """Return the largest extent of points along a global axis [m]; zero without points."""
     return max((max(axis) - min(axis) for axis in zip(*points, strict=True)), default=0.0)
 
 
 def unit_near(length: float) -> float:
-    """Return the power of two nearest to a positive length [m]: measured in it, lengths keep all
-    their digits.
-    """
+    """Return the power of two nearest to a positive length [m]; division by it is exact."""
     return 2.0 ** round(math.log2(length))
 
 
 class Style(StrEnum):
-    """How rows are written; the same solutions, the same machinery."""
+    """Style of the rows; all styles have the same solutions and share the solver."""
 
     NATIVE = "native"
     PAPER = "paper"
@@ -154,12 +146,12 @@ class Style(StrEnum):
 def constraints(
     mechanism: Mechanism, frame: Frames, drives: Mapping[str, Drive], style: Style = Style.NATIVE
 ) -> list[Constraint | Relation]:
-    """All constraints: joints in order, then couplers, then drivers in order.
+    """Return all constraints: joints in order, then couplers, then drivers in order.
 
     Args:
         drives: the motion of each driver by name; drivers not named hold their design value.
-        style: how rows are written. MIXED and RELATIVE name the coordinates of all axial joints,
-            the others those of couplers.
+        style: style of the rows. MIXED and RELATIVE name the coordinates of all axial joints, the
+            others those of couplers.
     """
     mixed = style in (Style.MIXED, Style.RELATIVE)
     coupled = {
@@ -201,8 +193,9 @@ def constraints(
 def _axial(
     original: AxialJoint, frame: Frames, coupled: Collection[str], *, mixed: bool, fixed_last: bool
 ) -> list[Constraint | Relation]:
-    """An axial joint; its coordinates are named where they are coupled, related to each other, or
-    the style names all.
+    """Return the constraints of an axial joint.
+
+    Its coordinates are named if they are coupled, related to each other, or named by the style.
     """
     related = {
         f"{original.name}.{freedom}" for relation in original.relations for freedom in relation
@@ -236,9 +229,7 @@ def _axial(
 
 
 def _relation(owner: str, weights: Mapping[str, float], frame: Frames) -> Relation:
-    """Weights in metres and radians to weights in units and radians, the largest of those that are
-    known made one.
-    """
+    """Convert weights from metres and radians to units and radians, with the largest at one."""
     scaled = {
         name: k * (frame.unit if name.endswith(".translation") else 1.0)
         for name, k in weights.items()
@@ -251,7 +242,7 @@ def _relation(owner: str, weights: Mapping[str, float], frame: Frames) -> Relati
 def _driven(
     mechanism: Mechanism, frame: Frames, driver: Driver, drive: Drive, mixed: bool
 ) -> Constraint | Relation:
-    """The constraint of a driver that moves as the drive says."""
+    """Return the constraint of a driver with the motion of its drive."""
     if isinstance(driver, PointCoordinate):
         point = mechanism.point(driver.point)
         arm = frame.arm(point.body, point.position)
@@ -278,7 +269,7 @@ def _driven(
 
 
 def _restyled(found: Sequence[Constraint | Relation], style: Style) -> list[Constraint | Relation]:
-    """The constraints with every primitive replaced by its twins in the style."""
+    """Return the constraints with every primitive replaced by its equivalents in the style."""
     if style not in (Style.PAPER, Style.CONVENTIONAL):
         return list(found)
     from ...primitives import conventional, paper  # rarely asked for

@@ -1,4 +1,4 @@
-"""How drivers enter the equations: the numbers of a `Drive`, from values in SI units."""
+"""Inputs of drivers to the equations: the numbers of a `Drive` from values in SI units."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ from ...trajectory import Array
 
 
 def drive_numbers(drivers: Sequence[Driver], drive: Array, unit: float) -> Array:
-    """The numbers of a `Drive` for each driver, in the mechanism's unit of length, shape (5 *
-    drivers, n).
+    """Return the numbers of a `Drive` for each driver, shape (5 * drivers, n).
+
+    Lengths are in the mechanism's unit.
 
     Args:
         drive: value from the design, velocity and acceleration [SI], shape (3, drivers, n).
@@ -27,16 +28,14 @@ def drive_numbers(drivers: Sequence[Driver], drive: Array, unit: float) -> Array
 
 
 def turns(mechanism: Mechanism, drivers: Sequence[str]) -> list[str]:
-    """Return the scalars of a lane that hold the angles of those of the drivers that turn [rad from
-    the design].
-    """
+    """Return the names of a lane's scalars that hold angles of drivers [rad from the design]."""
     return [f"drive {name}.0" for name in drivers if mechanism.driver(name).turns]
 
 
 def standing_drives(
     mechanism: Mechanism, unit: float, change: Mapping[str, float]
 ) -> dict[str, Drive]:
-    """Drivers by name that stand at values from the design [SI]."""
+    """Return the drives, by name, of drivers at rest at values from the design [SI]."""
     values = np.array([[*change.values()], *np.zeros((2, len(change)))])[..., None]
     numbers = (
         drive_numbers([mechanism.driver(name) for name in change], values, unit)

@@ -1,8 +1,7 @@
-"""What a formulation is: its unknowns, what they mean for the poses of the bodies, and the
-equations over them.
+"""The interface of a formulation: unknowns, the poses they stand for, and the equations.
 
-Newton's iteration, velocities, accelerations, prediction and the selection of rows are the same for
-all formulations; they are written once, over this interface.
+Newton's iteration, velocities, accelerations, prediction and row selection are written once over
+this interface, for all formulations.
 """
 
 from __future__ import annotations
@@ -15,12 +14,12 @@ from ...algebra import ZERO, Scalar, Vec3, cross
 from ...primitives.base import Pose, Twist
 
 State: TypeAlias = Mapping[str, Sequence[Scalar]]
-"""Named vectors that fix the configuration (for Cartesian coordinates: displacement and Euler
+"""Named vectors that define the configuration (for Cartesian coordinates: displacement and Euler
 parameters of every body).
 """
 
 EULER_PARAMETERS = 4
-"""Numbers of a vector of a state that is Euler parameters."""
+"""Length of a state vector of Euler parameters."""
 
 Rows: TypeAlias = list[dict[int, Scalar]]
 """A matrix by rows; each row maps a column to its entry, literal zeros left out."""
@@ -36,11 +35,11 @@ class Configuration:
 
 @dataclass(frozen=True, slots=True)
 class Condition:
-    """Rows that say something together, such as that two axes stay parallel.
+    """Rows that form one geometric condition, such as two parallel axes.
 
     Attributes:
-        remote: joints between its bodies and the ground, those of both bodies summed.
-        steady: the rows do not turn with a body.
+        remote: joints between its bodies and the ground, summed over both bodies.
+        steady: whether the rows keep their direction when a body turns.
     """
 
     rows: Sequence[int]
@@ -56,7 +55,7 @@ class Acceleration:
     w_t: Vec3
 
     def of(self, arm: Vec3, twist: Twist) -> Vec3:
-        """Acceleration of the point at the end of the (turned) arm, while the body moves so."""
+        """Return the acceleration of the end of a (turned) arm on the body."""
         return self.v_t + cross(self.w_t, arm) + twist.centripetal(arm)
 
 
@@ -64,14 +63,13 @@ GROUND_ACCELERATION = Acceleration(ZERO, ZERO)
 
 
 class Formulation(Protocol):
-    """The equations of a mechanism over the unknowns of one formulation: joints first, drivers
-    last.
+    """The equations of a mechanism over the unknowns of one formulation: joints, then drivers.
 
     Attributes:
         unknowns: number of unknowns (columns).
         design: the state at the design position.
-        owners: for every row the joint or driver, and the primitive, it belongs to.
-        conditions: the rows that say something together, in order.
+        owners: for every row, its joint or driver and its primitive.
+        conditions: the geometric conditions of the rows, in order.
     """
 
     @property
@@ -84,44 +82,44 @@ class Formulation(Protocol):
     def conditions(self) -> Sequence[Condition]: ...
 
     def configuration(self, state: State) -> Configuration:
-        """The poses that a state means."""
+        """Return the poses of a state."""
         ...
 
     def retract(self, at: Configuration, step: Sequence[Scalar]) -> State:
-        """The state after a step of the unknowns, exact to second order."""
+        """Return the state after a step of the unknowns, exact to second order."""
         ...
 
     def phi(self, at: Configuration) -> list[Scalar]:
-        """All residuals."""
+        """Return all residuals."""
         ...
 
     def branch(self, at: Configuration) -> list[Scalar]:
-        """All branch tests: positive on the intended branch."""
+        """Return all branch tests: positive on the intended branch."""
         ...
 
     def rows(self, at: Configuration) -> Rows:
-        """The Jacobian by the unknowns."""
+        """Return the Jacobian by the unknowns."""
         ...
 
     def nu(self, at: Configuration) -> list[Scalar]:
-        """Right-hand sides of the velocity equations."""
+        """Return the right-hand sides of the velocity equations."""
         ...
 
     def gamma(self, at: Configuration, v: Sequence[Scalar]) -> list[Scalar]:
-        """Right-hand sides of the acceleration equations at unknown rates v."""
+        """Return the right-hand sides of the acceleration equations at unknown rates v."""
         ...
 
     def twists(self, at: Configuration, v: Sequence[Scalar]) -> Mapping[str, Twist]:
-        """How the bodies move at unknown rates v."""
+        """Return the twists of the bodies at unknown rates v."""
         ...
 
     def accelerations(
         self, at: Configuration, v: Sequence[Scalar], a: Sequence[Scalar]
     ) -> Mapping[str, Acceleration]:
-        """How the bodies accelerate at unknown rates v and accelerations a."""
+        """Return the accelerations of the bodies at unknown rates v and accelerations a."""
         ...
 
 
 def row_names(formulation: Formulation) -> list[str]:
-    """Return a name of every row to read: its joint or driver, and its primitive."""
+    """Return a readable name of every row: its joint or driver, and its primitive."""
     return [f"{owner}: {primitive}" for owner, primitive in formulation.owners]

@@ -1,7 +1,6 @@
-"""The geometry of a mechanism as named places, so that it can be varied: the hardpoints, axes and
-lengths of joints and points.
+"""The geometry of a mechanism as named places: hardpoints, axes and lengths that can vary.
 
-A place is named as in a case file: "joints.NAME.point", "joints.NAME.axis", "joints.NAME.points.0",
+Names are those of a case file: "joints.NAME.point", "joints.NAME.axis", "joints.NAME.points.0",
 "joints.NAME.lead", "points.NAME.position".
 """
 
@@ -17,7 +16,7 @@ from ...mechanism.mechanism import Mechanism, Point
 
 
 def places(mechanism: Mechanism) -> dict[str, tuple[float, ...]]:
-    """The value of every place [m or -]: three numbers of a point or direction, one of a length."""
+    """Return the value of every place [m or -]: three numbers of a point or direction, or one."""
     found: dict[str, tuple[float, ...]] = {}
     for joint in mechanism.joints:
         for name, kind, value in joint.parts():
@@ -26,7 +25,7 @@ def places(mechanism: Mechanism) -> dict[str, tuple[float, ...]]:
 
 
 def kinds(mechanism: Mechanism) -> dict[str, Kind]:
-    """What every place holds: a point, a direction or a length."""
+    """Return the kind of every place: a point, a direction or a length."""
     found = {
         f"joints.{joint.name}.{name}": kind
         for joint in mechanism.joints
@@ -36,9 +35,7 @@ def kinds(mechanism: Mechanism) -> dict[str, Kind]:
 
 
 def placed(mechanism: Mechanism, values: Mapping[str, Sequence[Scalar]]) -> Mechanism:
-    """The mechanism with other values at some places, numbers of any kind; they are not checked
-    again.
-    """
+    """Return the mechanism with other values, of any scalar type, at some places, unchecked."""
     joints = [joint.changed(**_changes(joint, values)) for joint in mechanism.joints]
     points = [
         _moved(point, values.get(f"points.{point.name}.position")) for point in mechanism.points

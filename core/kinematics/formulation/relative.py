@@ -1,16 +1,15 @@
-"""The relative formulation: joint coordinates of a spanning tree as unknowns, cut joints and
-drivers as rows.
+"""The relative formulation: joint coordinates of a spanning tree as unknowns, cut joints as rows.
 
-Formulation section 5. The rows are those of the Cartesian formulation for the joints left over,
-times the velocity transformation B of the tree, and b = Bdot y_t the accelerations at constant
-rates:
+Formulation section 5. The rows are those of the Cartesian formulation for the cut joints and the
+drivers, times the velocity transformation B of the tree. With b = Bdot y_t, the accelerations at
+constant rates:
 
     position      (Phi_Pi B) dy   = -Phi
     velocity      (Phi_Pi B) y_t  = nu
     acceleration  (Phi_Pi B) y_tt = gamma - Phi_Pi b
 
-Tree joints hold exactly by construction and have no rows; the system is small and dense where the
-Cartesian one is large and sparse.
+Tree joints hold by construction and have no rows; the system is small and dense, the Cartesian one
+large and sparse.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ class Relative:
     """A tree and the constraints that close it; implements `Formulation`.
 
     Attributes:
-        closed: the constraints left over, in Cartesian form; its named coordinates are those of the
+        closed: the other constraints, in Cartesian form; its named coordinates are those of the
             tree, then its own.
     """
 
@@ -43,8 +42,9 @@ class Relative:
 
     @staticmethod
     def of(mechanism: Mechanism, frame: Frames, found: Sequence[Constraint | Relation]) -> Relative:
-        """The formulation of a mechanism from its constraints in the mixed style, of which the tree
-        joints are dropped.
+        """Return the formulation of a mechanism from its constraints in the mixed style.
+
+        The constraints of tree joints are dropped.
         """
         chains, used = spanning_tree.chains(mechanism, frame)
         left = [c for c in found if isinstance(c, Relation) or c.owner not in used]
@@ -58,7 +58,7 @@ class Relative:
 
     @cached_property
     def _tree_columns(self) -> Mapping[str, int]:
-        """First unknown of every step of the tree, by the name of its state."""
+        """First unknown of every step of the tree, by the name of its state vector."""
         found, count = dict[str, int](), 0
         for step in (step for chain in self.chains for step in chain.steps):
             found[step.name] = count
@@ -71,7 +71,7 @@ class Relative:
 
     @cached_property
     def _own(self) -> Mapping[str, int]:
-        """Unknowns for coordinates of joints that are not in the tree; they come last."""
+        """Unknowns of coordinates of joints outside the tree; they come last."""
         names = [name for name in self.closed.coordinates if f"x {name}" not in self._tree_columns]
         return {name: self._tree_unknowns + k for k, name in enumerate(names)}
 
@@ -93,7 +93,7 @@ class Relative:
 
     @property
     def conditions(self) -> Sequence[Condition]:
-        # rows of joints that other loops hang on are none of these
+        # no joint in these rows carries another loop
         return [replace(each, remote=0) for each in self.closed.conditions]
 
     def configuration(self, state: State) -> Configuration:
@@ -149,7 +149,7 @@ class Relative:
         return self._tree_columns[name] if name in self._tree_columns else self._own[coordinate]
 
     def _transformed(self, row: Mapping[int, Scalar], at: TreeConfiguration) -> dict[int, Scalar]:
-        """A Cartesian row times B: only the unknowns that a body of the row depends on."""
+        """Return a Cartesian row times B, over the unknowns that move a body of the row."""
         entries: dict[int, Scalar] = {}
         for name, first in self.closed.columns.items():
             r = Vec3(*(row.get(first + k, 0.0) for k in range(3)))
@@ -175,12 +175,12 @@ class Relative:
 
 @dataclass(frozen=True, eq=False)
 class TreeConfiguration(Configuration):
-    """A configuration that remembers the tree it was computed with."""
+    """A configuration with the tree it was computed from."""
 
     tree: spanning_tree.Posed
 
     def arm(self, name: str, column: spanning_tree.Column, origins: Mapping[str, Vec3]) -> Vec3:
-        """Return the vector from the column's point P to the body's origin, now, global axes
+        """Return the vector from a column's point P to a body's origin, current global axes
         [units].
         """
         return (origins[name] - column.P_design) + (self.poses[name].u - column.P)

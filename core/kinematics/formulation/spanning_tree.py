@@ -1,13 +1,17 @@
-"""The spanning tree in joint coordinates: poses, velocities and accelerations of all bodies by recursion.  Formulation section 5.
+"""The spanning tree in joint coordinates: recursive poses, velocities and accelerations of bodies.
 
-A tree joint is a chain of steps from the parent to the child, each with its unknowns: a turn about
-an axis, a slide along one, or a ball (any rotation). Axes are given at design and carried by the
-chain: body axes are parallel to the global ones at design, so a turn by theta about a is the
-rotation [cos theta/2, a sin theta/2] after those before it. In global axes, with h the carried axis
-and p the joint's point on the chain:
+Formulation section 5. A tree joint is a chain of steps from the parent to the child, each with its
+unknowns: a turn about an axis, a slide along an axis, or a ball (any rotation). Axes are defined at
+design and carried by the chain. Body axes are parallel to the global ones at design, so a turn by
+theta about a is the rotation [cos theta/2, a sin theta/2] after those before it. In global axes,
+with h the carried axis and p the joint's point on the chain:
 
-    turn    q = q Q(theta)          w = w + theta_t h         wdot = wdot + theta_tt h + w x theta_t h
-    slide   p = p + d h             v = v + d_t h + w x d h   vdot = vdot + d_tt h + 2 w x d_t h + wdot x d h + w x (w x d h)
+    turn    q = q Q(theta)
+            w = w + theta_t h
+            wdot = wdot + theta_tt h + w x theta_t h
+    slide   p = p + d h
+            v = v + d_t h + w x d h
+            vdot = vdot + d_tt h + 2 w x d_t h + wdot x d h + w x (w x d h)
 """
 
 from __future__ import annotations
@@ -40,8 +44,12 @@ BALL = 3
 
 @dataclass(frozen=True)
 class Step:
-    """One step of a chain. name: of its state; axis: at design, None for a ball; slides: along the
-    axis, else it turns about it.
+    """One step of a chain.
+
+    Attributes:
+        name: of its state vector.
+        axis: at design; None for a ball.
+        slides: whether it slides along the axis; else it turns about it.
     """
 
     name: str
@@ -57,8 +65,9 @@ class Step:
 
 @dataclass(frozen=True)
 class Chain:
-    """A branch of the tree as steps at a point P, global at design; arms to it from the origins of
-    parent and child.
+    """A branch of the tree as steps at a point P (global, at design).
+
+    The arms to P start at the origins of parent and child.
     """
 
     parent: str
@@ -71,8 +80,9 @@ class Chain:
 
 @dataclass(frozen=True)
 class Column:
-    """What one unknown does: turns all that follows about an axis through P (given as displacement
-    from design), or shifts it.
+    """The effect of one unknown: a turn of all later bodies about an axis through P, or a shift.
+
+    P is a displacement from design.
     """
 
     axis: Vec3
@@ -82,9 +92,9 @@ class Column:
 
 
 def chains(mechanism: Mechanism, frame: Frames) -> tuple[list[Chain], set[str]]:
-    """The chains of all moving bodies, parents first, and the names of the joints they are made of.
+    """Return the chains of all moving bodies, parents first, and the names of their joints.
 
-    A joint that is no chain of turns, slides and a ball leaves its body free, with six unknowns;
+    A joint that is not made of turns, slides and a ball leaves its body free, with six unknowns;
     the joint then closes a loop.
     """
     found, used = list[Chain](), set[str]()
@@ -112,7 +122,7 @@ def chains(mechanism: Mechanism, frame: Frames) -> tuple[list[Chain], set[str]]:
 
 
 def _steps(branch: Branch) -> tuple[Step, ...] | None:
-    """The steps of a tree joint from parent to child, or None where it is no chain."""
+    """Return the steps of a tree joint from parent to child; None for a joint that is no chain."""
     joint = branch.joint
     steps: list[Step]
     match joint:
@@ -147,9 +157,7 @@ def _slide(joint: Joint, axis: Sequence[float]) -> Step:
 
 @dataclass(frozen=True, eq=False)
 class Posed:
-    """The tree at a state: poses of the bodies, what every unknown does, and on which unknowns each
-    body depends.
-    """
+    """The tree at a state: poses, the effect of every unknown, and the unknowns of each body."""
 
     poses: Mapping[str, Pose]
     columns: Sequence[Column]
@@ -157,7 +165,7 @@ class Posed:
 
 
 def posed(tree: Sequence[Chain], state: State) -> Posed:
-    """Poses and columns by recursion from the ground."""
+    """Compute poses and columns by recursion from the ground."""
     poses: dict[str, Pose] = {}
     columns: list[Column] = []
     ancestors: dict[str, list[int]] = {}
@@ -188,7 +196,7 @@ def posed(tree: Sequence[Chain], state: State) -> Posed:
 def retracted(
     tree: Sequence[Chain], state: State, step_of: Sequence[Scalar]
 ) -> dict[str, Sequence[Scalar]]:
-    """The state after a step of the unknowns."""
+    """Return the state after a step of the unknowns."""
     after: dict[str, Sequence[Scalar]] = {}
     k = 0
     for step in (step for chain in tree for step in chain.steps):
@@ -203,7 +211,7 @@ def retracted(
 
 
 def moving(tree: Sequence[Chain], at: Posed, state: State, v: Sequence[Scalar]) -> dict[str, Twist]:
-    """Velocities of all bodies at rates v."""
+    """Return the velocities of all bodies at rates v."""
     return {
         name: twist for name, (twist, _) in accelerating(tree, at, state, v, [0.0] * len(v)).items()
     }
@@ -212,7 +220,7 @@ def moving(tree: Sequence[Chain], at: Posed, state: State, v: Sequence[Scalar]) 
 def accelerating(
     tree: Sequence[Chain], at: Posed, state: State, v: Sequence[Scalar], a: Sequence[Scalar]
 ) -> dict[str, tuple[Twist, Acceleration]]:
-    """Velocities and accelerations of all bodies at rates v and accelerations a of the unknowns."""
+    """Return velocities and accelerations of all bodies at rates v and accelerations a."""
     found: dict[str, tuple[Twist, Acceleration]] = {}
     k = 0
     for chain in tree:

@@ -1,6 +1,4 @@
-"""Where bodies are, as poses and as the state of a formulation: the way from results and estimates
-back to the equations.
-"""
+"""Poses of bodies and states of a formulation, computed from results and estimates."""
 
 from __future__ import annotations
 
@@ -23,8 +21,10 @@ from .formulation import Configuration, Formulation
 def displaced(
     mechanism: Mechanism, frame: Frames, placed: Mapping[str, tuple[Array, Array]]
 ) -> dict[str, Pose]:
-    """Poses since design from origins r [m], shape (..., 3), and Euler parameters p [-], shape
-    (..., 4), by body.
+    """Return the poses of bodies, by name, relative to design.
+
+    Args:
+        placed: by body, origins r [m], shape (..., 3), and Euler parameters p [-], shape (..., 4).
     """
     found: dict[str, Pose] = {}
     for name, (r, p) in placed.items():
@@ -43,14 +43,12 @@ def state_of(
     poses: Mapping[str, Pose],
     values: Mapping[str, float],
 ) -> dict[str, Any]:
-    """The state of a Cartesian formulation that poses mean: named vectors, joint coordinates
-    included.
+    """Return the state vectors of a Cartesian formulation at poses, with joint coordinates.
 
     Args:
-        poses: of all moving bodies, or those left out are at design; scalars are floats or arrays
-            of lanes.
-        values: of the drivers, from design [m or rad]: an angle, which poses know up to two turns
-            only, is the one nearest to them.
+        poses: of moving bodies, as floats or arrays of lanes; missing bodies are at design.
+        values: of the drivers, from design [m or rad]. Poses determine an angle only up to two
+            turns: the one nearest to the driver's value is taken.
     """
     state: dict[str, Any] = dict(formulation.design)
     for name, pose in poses.items():
@@ -77,8 +75,9 @@ def state_of(
 
 
 def jacobian(formulation: Formulation, at: Configuration | None = None) -> Array:
-    """The Jacobian of all rows at one configuration, else at the design, shape (rows, unknowns), in
-    the units of the frames.
+    """Return the Jacobian of all rows at a configuration, or at design [units of the frames].
+
+    The shape is (rows, unknowns).
     """
     rows = formulation.rows(at or formulation.configuration(formulation.design))
     matrix = np.zeros((len(rows), formulation.unknowns))

@@ -9,7 +9,6 @@ here. Samples are accepted up to the first that is not.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +16,9 @@ from numpy.typing import NDArray
 from ...trajectory import Array
 from ..compiled.interpolation import lagrange
 from ..structure.sparse_lu import PIVOT_THRESHOLD
+from .sparse_equations import SparseEquations
 from .step_state import CONTRACTS, SETTLED, STALLS, Poses, Stand, distance, lacked
 from .tables import SparseTables
-
-if TYPE_CHECKING:
-    from .sparse_model import SparseModel
 
 REMEMBERED = 8
 """Samples that the next ones are predicted from: extrapolated by as many again, their rounding
@@ -44,7 +41,7 @@ class Batch:
             serve it.
     """
 
-    def __init__(self, model: SparseModel) -> None:
+    def __init__(self, model: SparseEquations) -> None:
         # not the model, which keeps this: what refers to each other stays in memory until somebody
         # looks for it
         self._kept, self._dropped, self._solved = model.kept, model.dropped, model.solved
@@ -57,7 +54,7 @@ class Batch:
         self.width = self._tables.width
         self.order(model)
 
-    def order(self, model: SparseModel) -> None:
+    def order(self, model: SparseEquations) -> None:
         """Eliminate from now on in the order that serves the pose where the model was last
         evaluated.
         """

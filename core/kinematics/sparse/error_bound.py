@@ -9,7 +9,7 @@ import numpy as np
 
 from ...trajectory import Array
 from ..formulation.acceptance_criteria import EPSILON
-from .sparse_model import FailedError, SparseModel
+from .sparse_equations import FailedError, SparseEquations
 from .step_state import Stand, distance
 
 # Steps of inverse iteration: each divides what is left of other directions by the square of how
@@ -17,7 +17,7 @@ from .step_state import Stand, distance
 STEPS = 3
 
 
-def uncertain(model: SparseModel, at: Stand, drives: Array) -> Sequence[float]:
+def uncertain(model: SparseEquations, at: Stand, drives: Array) -> Sequence[float]:
     """By how much what is left of residuals may have moved a pose [of the mechanism's size], its
     rates and accelerations [of their own].
 

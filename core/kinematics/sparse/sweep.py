@@ -11,19 +11,18 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from ...algebra import Quat, Vec3, quat, vec
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path, outwards
-from ...primitives.base import Pose, Twist
 from ...trajectory import Array, BodyMotion, PointMotion, Trajectory, largest_found
 from ..compiled.motion_start import Start, by_ways, start_of
 from ..continuation.step_halving import HALVINGS, MOST_PARTS, TOO_MANY
 from ..formulation.acceptance_criteria import AMPLIFIED, EPSILON, LOW, WORSE_BY_PIVOTS
-from ..formulation.body_kinematics import motion_of_frame, motion_of_point
-from ..formulation.formulation import Acceleration
 from .batched_newton import REMEMBERED
 from .error_bound import uncertain
-from .sparse_model import FailedError, SparseModel, Stand
+from .output_motions import OutputMotions
+from .sparse_equations import FailedError
+from .sparse_model import SparseModel
+from .step_state import Stand
 
 
 def solve_sparse(
@@ -51,7 +50,7 @@ def solve_sparse(
             the design position.
     """
     model = mechanism if isinstance(mechanism, SparseModel) else SparseModel(mechanism)
-    wanted = _Wanted(model, points), _Wanted(model, bodies, frames=True)
+    wanted = OutputMotions(model, points), OutputMotions(model, bodies, frames=True)
     sweep, start = (
         partial(_Sweep, model, path, tol, *wanted, order),
         start_of(model.mechanism, path),
@@ -69,67 +68,6 @@ WORTH = 4
 """
 
 
-class _Wanted:
-    """Points whose motion is wanted: of bodies the origins, and how their frames turn."""
-
-    def __init__(self, model: SparseModel, names: Sequence[str], *, frames: bool = False) -> None:
-        m, self.names, self._model = model.mechanism, names, model
-        found = [
-            (name, m.body(name).origin) if frames else (m.point(name).body, m.point(name).position)
-            for name in names
-        ]
-        number = {name: k for k, name in enumerate(model.frame.moving)}
-        # what is not among the moving bodies comes after them, and stands still
-        self._body = np.array([number.get(body, len(number)) for body, _ in found], np.intp)
-        self._position = _columns([position for _, position in found], 3)
-        self._arm = _columns(
-            [tuple(model.frame.arm(body, position)) for body, position in found], 3
-        )
-        self._frame = (
-            _columns([m.body(name).euler_parameters for name in names], 4) if frames else None
-        )
-
-    def _taken(self, at: Sequence[Stand]) -> list[Array]:
-        """What their motion follows from: poses, rates and accelerations of their bodies, shapes (7
-        or 6, stands, names).
-        """
-        n, found = self._model.bodies, list[Array]()
-        for rows, each in (
-            (7, [k.state for k in at]),
-            (6, [k.rates for k in at]),
-            (6, [k.accelerations for k in at]),
-        ):
-            whole = np.zeros((rows, len(at), n + 1))
-            whole[:, :, :n] = np.array(each)[:, : rows * n].reshape(len(at), rows, n).swapaxes(0, 1)
-            found.append(whole)
-        found[0][3, :, n] = 1.0
-        return [each[:, :, self._body] for each in found]
-
-    def motions(self, at: Sequence[Stand]) -> Array:
-        """Position, velocity and acceleration; of bodies then p, omega' and omega'dot, shape
-        (stands, components, names).
-        """
-        poses, rates, accelerations = self._taken(at)
-        moving = (
-            Pose.of(vec([*poses[:3]]), quat(poses[3:])),
-            Twist(vec([*rates[:3]]), vec([*rates[3:]])),
-            Acceleration(vec([*accelerations[:3]]), vec([*accelerations[3:]])),
-        )
-        found: list[Vec3 | Quat] = [
-            *motion_of_point([*self._position], vec([*self._arm]), self._model.frame.unit, *moving)
-        ]
-        if self._frame is not None:
-            found += motion_of_frame(quat(self._frame), *moving)
-        shape = len(at), len(self.names)
-        return np.stack(
-            [np.broadcast_to(component, shape) for each in found for component in each], axis=1
-        )
-
-
-def _columns(rows: Sequence[Sequence[float]], count: int) -> Array:
-    return np.array(rows).reshape(-1, count).T
-
-
 @dataclass
 class _Sweep:
     """A path through a model, and what is found along it; refused: by sample, how uncertain what is
@@ -139,8 +77,8 @@ class _Sweep:
     model: SparseModel
     path: Path
     tol: float
-    points: _Wanted
-    bodies: _Wanted
+    points: OutputMotions
+    bodies: OutputMotions
     order: int
     start: Start
     messages: list[str] = field(default_factory=list[str])

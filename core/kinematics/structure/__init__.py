@@ -1,3 +1,1 @@
-"""What can be said of the equations before they are solved: freedoms, redundant rows, components
-that go one after the other.
-"""
+"""Structure of the equations before the solution: freedoms, redundant rows and components."""

@@ -1,10 +1,9 @@
-"""A large mechanism in components: sets of bodies that can be solved one after the other, each with
-those before it given.
+"""Components of a large mechanism: sets of bodies solved one after the other.
 
-Found by matching rows with bodies' columns and the strongly connected sets of bodies that follow
-from it (block-triangular form). A component becomes a mechanism of its own, a section, with names
-by number: components that are built alike are then equal but for their geometry, and share
-programs.
+Earlier components prescribe the motion of their bodies to later ones. A matching of rows with
+bodies' columns and the strongly connected sets of bodies give the components (block-triangular
+form). A component becomes a mechanism of its own, a section, with numbered names: components of the
+same structure then differ in their geometry only and share programs.
 """
 
 from __future__ import annotations
@@ -30,9 +29,7 @@ from .degrees_of_freedom import COORDINATES, FreedomAccount, Selection
 from .redundancy import independent_rows
 
 ORIGIN = "origin "
-"""Before the name of a body: the point of a section that is its internal origin and nothing
-else.
-"""
+"""Prefix of the name of a section's point that is only the internal origin of a body."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,8 +37,8 @@ class Component:
     """Bodies that are solved together.
 
     Attributes:
-        given: moving bodies of components before, that its joints and drivers touch.
-        joints, drivers: those that belong to it.
+        given: moving bodies of earlier components, touched by its joints and drivers.
+        joints, drivers: those of the component.
     """
 
     bodies: tuple[str, ...]
@@ -51,7 +48,7 @@ class Component:
 
     @property
     def extent(self) -> float:
-        """A power of two of metres near its size; zero where all its joints are at one point."""
+        """A power of two of metres near its size; zero if all its joints are at one point."""
         points = [point for joint in self.joints for point in joint.points_on()]
         size = extent(points)
         return unit_near(size) if size > 0.0 else 0.0
@@ -62,8 +59,8 @@ class Section:
     """A component as a mechanism of its own.
 
     Attributes:
-        unit: of length [m], that of the whole mechanism.
-        given: moving bodies that are solved for elsewhere.
+        unit: length unit of the whole mechanism [m].
+        given: moving bodies that are solved elsewhere.
         origins: place (see `places`) of the internal origin of every moving body.
     """
 
@@ -74,7 +71,7 @@ class Section:
 
     @property
     def signature(self) -> object:
-        """Equal for sections that are equal but for their geometry."""
+        """A key, equal for sections that differ in their geometry only."""
         m = self.mechanism
         return (
             m.bodies,
@@ -85,7 +82,7 @@ class Section:
         )
 
     def frame(self, mechanism: Mechanism) -> Frames:
-        """How the section is measured, or the same section with its geometry known only later."""
+        """Return the frames of the section for a mechanism of its structure and traced geometry."""
         value = places(mechanism)
         fixed = dict.fromkeys(
             (GROUND, *(body.name for body in mechanism.bodies if body.fixed)), ZERO
@@ -101,7 +98,7 @@ class Section:
 
 
 def _besides_geometry(joint: Joint) -> list[object]:
-    """Further fields of a joint, and which of its optional lengths are given."""
+    """Return the other fields of a joint, and for each optional length whether it is absent."""
     values = [(each, getattr(joint, each.name)) for each in fields(joint)]
     return [
         value is None if "kind" in each.metadata else value
@@ -111,10 +108,10 @@ def _besides_geometry(joint: Joint) -> list[object]:
 
 
 def components(mechanism: Mechanism, frame: Frames) -> list[Component]:
-    """The components in an order in which each needs only those before it.
+    """Return the components in the order of their solution.
 
     Raises:
-        SolveError: couplers tie joints together, or the rows cannot be matched with the unknowns.
+        SolveError: couplers connect joints, or the rows cannot be matched with the unknowns.
     """
     if mechanism.couplers:
         raise SolveError(
@@ -128,7 +125,7 @@ def components(mechanism: Mechanism, frame: Frames) -> list[Component]:
     given: list[dict[str, None]] = [{} for _ in order]
 
     def place(bodies: Sequence[str]) -> int:
-        """The component of the body that is solved last; the others are given there."""
+        """Return the component of the body solved last; there the others are prescribed."""
         moving = [name for name in bodies if name in level]
         last = max(level[name] for name in moving)
         given[last] |= dict.fromkeys(name for name in moving if level[name] != last)
@@ -151,7 +148,7 @@ def _bodies(mechanism: Mechanism, driver: Driver) -> tuple[str, ...]:
 
 
 def _order(mechanism: Mechanism, formulation: Cartesian) -> list[tuple[str, ...]]:
-    """Sets of bodies, first what can be solved first."""
+    """Return the sets of bodies in the order of their solution."""
     sparse, graphs = (
         importlib.import_module(name) for name in ("scipy.sparse", "scipy.sparse.csgraph")
     )
@@ -167,7 +164,7 @@ def _order(mechanism: Mechanism, formulation: Cartesian) -> list[tuple[str, ...]
             f"mechanism {mechanism.name!r}: its rows cannot be matched with its unknowns; it is not"
             " driven enough"
         )
-    # a joint's own coordinate goes with the body that its joint is solved with
+    # a joint's own coordinate goes to the body with which its joint is solved
     owner = {
         name: mechanism.joint(name.rsplit(".", 1)[0]).bodies for name in formulation.coordinates
     }
@@ -201,13 +198,14 @@ def section(
     points: Sequence[Point],
     bodies: Sequence[Body],
 ) -> Section:
-    """The component with names by number: b0, b1, ... its bodies, g0, ... those given, j0, ... its
-    joints, p0, ... its points.
+    """Return the component with numbered names.
+
+    Bodies are b0, b1, ..., prescribed bodies g0, ..., joints j0, ..., points p0, ...
 
     Args:
         origins: internal origin of every moving body, global [m].
-        points: those wanted or driven.
-        bodies: those of its own whose motion is wanted.
+        points: output points and driven points.
+        bodies: its own bodies whose motion is an output.
     """
     own = {name: f"b{k}" for k, name in enumerate(component.bodies)}
     names = own | {name: f"g{k}" for k, name in enumerate(component.given)}
@@ -252,7 +250,7 @@ def section(
 
 
 def _joint_places(joints: Sequence[Joint], body: str) -> list[tuple[str, tuple[float, ...]]]:
-    """Places of the points that joints have on a body."""
+    """Return the places of the points of joints on a body, with their values."""
     parts = [
         (joint.name, part) for joint in joints if body in joint.bodies for part in joint.parts(body)
     ]
@@ -264,10 +262,10 @@ def _joint_places(joints: Sequence[Joint], body: str) -> list[tuple[str, tuple[f
 
 
 def select_section(mechanism: Mechanism, frame: Frames, formulation: Formulation) -> Selection:
-    """The rows of a section to solve for, drivers first.
+    """Select the rows of a section to solve, drivers first.
 
     Raises:
-        SolveError: they are too few.
+        SolveError: there are too few independent rows.
     """
     matrix, drivers = jacobian(formulation), len(mechanism.drivers)
     kept = independent_rows(matrix, drivers, formulation.conditions)

@@ -1,7 +1,7 @@
-"""Degrees of freedom: the paper's count, the numerical rank, and which rows are kept.
+"""Degrees of freedom: the paper's count, the numerical rank, and the choice of rows to solve.
 
-Rows that say what others say already (four spatial revolutes of a planar loop) are found once, at
-the design pose, and left out of the solution; they stay as a diagnostic, evaluated at every sample.
+Redundant rows (four spatial revolutes of a planar loop) are found once, at the design pose, and
+left out of the solution; they stay as a diagnostic, evaluated at every sample.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from .redundancy import RANK_TOLERANCE, SHARE, independent_joint_rows, independe
 
 COORDINATES = 7
 """Coordinates of a body in the paper's count: r and p."""
-# A body whose part of an orthonormal basis of the free motions is below this stands still:
-# round-off of the basis is far below.
+# A body with a smaller part of an orthonormal basis of the free motions is at rest: round-off of
+# the basis is far below.
 STILL = 1e-6
 
 
@@ -33,14 +33,14 @@ class FreedomAccount:
     """The degrees of freedom of a mechanism without its drivers.
 
     Attributes:
-        bodies: all bodies, fixed ones included (the ground itself is none).
-        coordinates: 7 per body: position and Euler parameters.
-        equations: joint rows, 6 ground rows per fixed body, 1 normalisation per body.
-        moving_coordinates: 6 per moving body, 1 per joint coordinate that is coupled: the unknowns
-            of the native formulation.
-        rows: joint rows, and those that name and couple coordinates.
+        bodies: number of bodies, fixed ones included, without the ground.
+        coordinates: 7 for each body: position and Euler parameters.
+        equations: joint rows, 6 ground rows for each fixed body, 1 normalisation for each body.
+        moving_coordinates: 6 for each moving body, 1 for each coupled joint coordinate: the
+            unknowns of the native formulation.
+        rows: joint rows, and rows that define and couple coordinates.
         rank: numerical rank of the joint rows.
-        redundant_rows: joint rows that are left out, as "joint: primitive".
+        redundant_rows: joint rows left out of the solution, as "joint: primitive".
     """
 
     bodies: int
@@ -63,7 +63,7 @@ class FreedomAccount:
 
     @property
     def details(self) -> dict[str, Any]:
-        """What the record of a solution says of it."""
+        """Entries for the record of a solution."""
         account = {
             "bodies": self.bodies,
             "coordinates": self.coordinates,
@@ -80,7 +80,7 @@ class FreedomAccount:
 
 @dataclass(frozen=True, eq=False)
 class Selection:
-    """The rows that are solved: as many as there are unknowns, drivers among them."""
+    """The rows to solve: as many as there are unknowns, drivers among them."""
 
     account: FreedomAccount
     chosen: tuple[int, ...]
@@ -88,7 +88,7 @@ class Selection:
 
 
 def account(mechanism: Mechanism, frame: Frames) -> FreedomAccount:
-    """Count and measure the degrees of freedom at the design pose."""
+    """Count the degrees of freedom at the design pose, with the numerical rank."""
     formulation, matrix = _matrix(mechanism, frame)
     joint_rows = len(matrix) - len(mechanism.drivers)
     kept = set(independent_joint_rows(formulation, matrix[:joint_rows]))
@@ -100,9 +100,7 @@ def account(mechanism: Mechanism, frame: Frames) -> FreedomAccount:
 def counted(
     mechanism: Mechanism, unknowns: int, rows: int, redundant_rows: Sequence[str]
 ) -> FreedomAccount:
-    """The account of a mechanism of which so many unknowns and joint rows are known, and which rows
-    are redundant.
-    """
+    """Return the account of a mechanism from its unknowns, joint rows and redundant rows."""
     bodies, fixed = len(mechanism.bodies), len(mechanism.bodies) - len(mechanism.moving)
     return FreedomAccount(
         bodies=bodies,
@@ -119,11 +117,12 @@ def counted(
 
 
 def driven_account(mechanism: Mechanism, frame: Frames) -> FreedomAccount:
-    """The account of a mechanism that has as many drivers as degrees of freedom; for any size there
-    is `driven.require_driven`.
+    """Return the account of a mechanism, with as many drivers as degrees of freedom.
+
+    `driver_count.require_driven` checks mechanisms of any size.
 
     Raises:
-        SolveError: it has more or fewer, or nothing moves.
+        SolveError: the numbers of drivers and degrees of freedom differ, or nothing moves.
     """
     if not mechanism.moving:
         raise SolveError(
@@ -138,12 +137,13 @@ def driven_account(mechanism: Mechanism, frame: Frames) -> FreedomAccount:
 def select_rows(
     mechanism: Mechanism, frame: Frames, formulation: Formulation, wanted: Sequence[int] = ()
 ) -> Selection:
-    """The rows of a formulation to solve for: those wanted, or if none are those independent at the
-    design, drivers first.
+    """Select the rows of a formulation to solve, drivers first.
+
+    They are the wanted rows, or without any the independent rows at the design.
 
     Raises:
-        SolveError: drivers and degrees of freedom do not match, or a driver does not move what is
-            free.
+        SolveError: drivers and degrees of freedom do not match, or a driver moves no free
+            coordinate.
     """
     found, drivers = driven_account(mechanism, frame), len(mechanism.drivers)
     matrix = jacobian(formulation)
@@ -153,19 +153,19 @@ def select_rows(
     taken = set(kept)
     dropped = tuple(k for k in range(len(matrix)) if k not in taken)
     names = row_names(formulation)
-    # taken with the drivers first, and in this formulation, the rows that are left out may be
-    # others
+    # drivers first and in this formulation, other rows may be left out
     found = replace(found, redundant_rows=tuple(names[k] for k in dropped))
     return Selection(found, tuple(kept), dropped)
 
 
 def _locked(mechanism: Mechanism, formulation: Formulation, matrix: Array) -> str:
-    """Says which drivers do not move the mechanism at the design position, and which joints and
-    drivers hold them.
+    """Return the message on drivers that do not move the mechanism at the design position.
+
+    The message names these drivers, and the joints and drivers that hold them.
     """
     joint_rows = len(matrix) - len(mechanism.drivers)
     rows = [*independent_rows(matrix[:joint_rows], 0), *range(joint_rows, len(matrix))]
-    # the sums of rows that vanish; those of joints are independent, so there is a driver in each
+    # vanishing combinations of rows; those of joints are independent, so each contains a driver
     left, sizes, _ = np.linalg.svd(matrix[rows])
     sums = left[:, int((sizes > RANK_TOLERANCE * sizes.max()).sum()) :]
     share = np.linalg.norm(sums, axis=1)
@@ -191,7 +191,7 @@ def _matrix(mechanism: Mechanism, frame: Frames) -> tuple[Cartesian, Array]:
 
 
 def mismatch(mechanism: Mechanism, dof: int, unknowns: int) -> str:
-    """Says how many degrees of freedom and how many drivers there are."""
+    """Return the message with the numbers of degrees of freedom and of drivers."""
     drivers = len(mechanism.drivers)
     return (
         f"mechanism {mechanism.name!r}: {dof} degree{'s' * (dof != 1)} of freedom ({unknowns}"
@@ -200,8 +200,9 @@ def mismatch(mechanism: Mechanism, dof: int, unknowns: int) -> str:
 
 
 def _mismatch(mechanism: Mechanism, frame: Frames, found: FreedomAccount) -> str:
-    """Says what is still free with the drivers held, by name: the bodies that move in the null
-    space of all rows.
+    """Return the message on a mismatch, with the bodies still free while the drivers hold.
+
+    These bodies move in the null space of all rows.
     """
     matrix, drivers = _matrix(mechanism, frame)[1], len(mechanism.drivers)
     head = mismatch(mechanism, found.dof, found.moving_coordinates)

@@ -1,17 +1,15 @@
-"""Whether a mechanism of any size has as many drivers as degrees of freedom, which is found before
-anything is solved.
+"""Number of drivers against degrees of freedom, checked before the solution at any size.
 
-A small one is counted by its dense Jacobian (see `freedom`), whose cost grows by the fourth power
-of its size: 27 bodies 0.03 s, 101 bodies 1.5 s, 301 bodies two minutes. A large one is counted by
-what its drivers leave over and what they ask too much, at the design position: motions that no row
-resists, A x = 0, and rates of the drivers that the rows contradict, A^T y = 0, where A has the rows
-of joints and drivers. With u of the first and o of the second there are drivers + u - o degrees of
-freedom.
+A small mechanism is counted by its dense Jacobian (see `degrees_of_freedom`), at a cost of the
+fourth power of its size: 27 bodies 0.03 s, 101 bodies 1.5 s, 301 bodies two minutes. A large one is
+counted by two null spaces at the design position: motions without resistance, A x = 0, and driver
+rates in contradiction to other rows, A^T y = 0. A holds the rows of joints and drivers. With u
+motions and o contradictions there are drivers + u - o degrees of freedom.
 
-Both are what is left of random vectors where every singular value s of A passes by e^2 / (s^2 +
-e^2). That is a solution with the symmetric matrix [[e I, A], [A^T, -e I]]: its eigenvalues are
-+-sqrt(s^2 + e^2), so that nothing is squared, e can be as small as `RANK_TOLERANCE`, and the matrix
-is never singular.
+Both null spaces remain of random vectors after a filter of e^2 / (s^2 + e^2) for every singular
+value s of A. The filter is a solution with the symmetric matrix [[e I, A], [A^T, -e I]]. Its
+eigenvalues are +-sqrt(s^2 + e^2): nothing is squared, e can be as small as `RANK_TOLERANCE`, and
+the matrix is never singular.
 """
 
 from __future__ import annotations
@@ -32,22 +30,22 @@ from .degrees_of_freedom import account, driven_account, mismatch
 from .redundancy import RANK_TOLERANCE
 from .sparse_lu import NARROW
 
-# Up to as many bodies the dense count takes some 20 ms.
+# Up to this number of bodies the dense count takes some 20 ms.
 DENSE = 25
-# Filtered as often, singular values from 1e-6 leave 1e-12 of a vector or less. What is in a null
-# space is left whole; the rate of a driver has a part there of one over the root of the rows that
-# share in the contradiction: of a million, 1e-3.
+# After these rounds of the filter, singular values from 1e-6 leave at most 1e-12 of a vector. A
+# null space passes unchanged; a driver's part in it is one over the root of the number of rows in
+# the contradiction: 1e-3 for a million rows.
 ROUNDS, LEFT = 2, 1e-6
 FEW = 5
-"""Names listed in a message, at most."""
+"""Largest number of names in a message."""
 
 
 def require_driven(mechanism: Mechanism) -> None:
-    """Make sure that a mechanism has as many drivers as degrees of freedom.
+    """Require as many drivers as degrees of freedom.
 
     Raises:
-        SolveError: it has more or fewer, or nothing moves; the message names what can still move,
-            or what contradicts.
+        SolveError: there are more or fewer drivers, or nothing moves; the message names the free
+            bodies or the contradicting drivers.
     """
     if len(mechanism.moving) <= DENSE:
         driven_account(mechanism, frames(mechanism))
@@ -60,7 +58,7 @@ def require_driven(mechanism: Mechanism) -> None:
 
 
 def degrees_of_freedom(mechanism: Mechanism) -> int:
-    """Degrees of freedom at the design position, its drivers apart."""
+    """Return the degrees of freedom at the design position, without drivers."""
     return (
         account(mechanism, frames(mechanism)).dof
         if len(mechanism.moving) <= DENSE
@@ -69,21 +67,19 @@ def degrees_of_freedom(mechanism: Mechanism) -> int:
 
 
 def locked_drivers(mechanism: Mechanism) -> str:
-    """Drivers that do not move it at design, as other rows prescribe the same; empty if there are
-    none. Of any size.
-    """
+    """Return the drivers, at any size, that duplicate other rows at design; empty without any."""
     return _balance(mechanism).dependent
 
 
 @dataclass(frozen=True, eq=False)
 class _Balance:
-    """What the drivers of a mechanism leave over and ask too much.
+    """Freedoms left by the drivers of a mechanism, and contradictions among them.
 
     Attributes:
         formulation: its rows, those of the drivers last.
-        free: motions that are left with all drivers held, orthonormal, shape (unknowns, motions).
-        excess: contradictions, orthonormal over all rows, and of each the share of each driver,
-            shape (drivers, contradictions).
+        free: remaining motions with all drivers held, orthonormal, shape (unknowns, motions).
+        excess: share of each driver in each contradiction, shape (drivers, contradictions); the
+            contradictions are orthonormal over all rows.
     """
 
     mechanism: Mechanism
@@ -104,7 +100,7 @@ class _Balance:
 
     @property
     def remedy(self) -> str:
-        """What is free and to be driven, or which drivers are too many."""
+        """Advice for the message: bodies that need a driver, or drivers to remove."""
         if self.dof < len(self.mechanism.drivers):
             many = len(self.mechanism.drivers) - self.dof
             return f"not independent are {self.dependent}; remove {many} or free the mechanism"
@@ -116,7 +112,7 @@ class _Balance:
 
 
 def _largest(sizes: Array, names: Sequence[str]) -> str:
-    """The names of the largest sizes."""
+    """Return the names with the largest sizes."""
     order: list[int] = np.argsort(-sizes, kind="stable").tolist()
     found = [repr(names[k]) for k in order if sizes[k] > LEFT]
     return ", ".join([*found[:FEW], "..."] if len(found) > FEW else found)
@@ -133,7 +129,7 @@ def _balance(mechanism: Mechanism) -> _Balance:
 
 
 class _NullSpaces:
-    """Both null spaces of a sparse matrix, its rows made one long."""
+    """Both null spaces of a sparse matrix with rows scaled to length one."""
 
     def __init__(self, rows: Sequence[Any], unknowns: int) -> None:
         sparse, linear = (
@@ -160,19 +156,22 @@ class _NullSpaces:
         self._random = np.random.default_rng(0)
 
     def motions(self) -> Array:
-        """x with A x = 0, orthonormal, shape (unknowns, motions)."""
+        """Return x with A x = 0, orthonormal, shape (unknowns, motions)."""
         here = slice(self._rows, self._rows + self._unknowns)
         return self._remains(here, self._unknowns)
 
     def contradictions(self, last: int) -> Array:
-        """y with A^T y = 0 that vectors over so many last rows have a part in, orthonormal, shape
-        (rows, contradictions).
+        """Return y with A^T y = 0, orthonormal, shape (rows, contradictions).
+
+        Only solutions with a part in the given number of last rows are found.
         """
         return self._remains(slice(0, self._rows), last)
 
     def _remains(self, here: slice, last: int) -> Array:
-        """What is left of random vectors, of which only so many last numbers are not zero; more are
-        tried until none is lost.
+        """Return an orthonormal basis of the filtered random vectors.
+
+        Only the given number of last components is nonzero at first. More vectors are tried until
+        none is missed.
         """
         size, tried = here.stop - here.start, min(4, last)
         while True:

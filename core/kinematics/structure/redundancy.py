@@ -1,6 +1,4 @@
-"""Which rows to solve, where some say what others say: as many as are independent, chosen so that
-they stay so along a sweep.
-"""
+"""Selection of independent rows among redundant ones, chosen to stay independent along a sweep."""
 
 from __future__ import annotations
 
@@ -12,34 +10,33 @@ import numpy as np
 from ...trajectory import Array
 from ..formulation.formulation import Condition, Formulation
 
-# Rows are of size one. At a feasible pose a redundant row is left with round-off (1e-15); the
-# smallest independent remainder in sound linkages is near 1e-2. In between lies nearly singular
-# geometry, which is to be solved, not reduced.
+# Rows are of size one. At a feasible pose a redundant row leaves round-off (1e-15); the smallest
+# independent remainder in sound linkages is near 1e-2. Values between belong to nearly singular
+# geometry, which is solved and not reduced.
 RANK_TOLERANCE = 1e-9
 SHARE = 1e-6
-"""A row takes part in a sum that vanishes with at least this weight, the weights' squares adding up
-to one: round-off is 1e-15.
-"""
-# Anything from 0.1 to 0.3 leaves out the same rows of 113 pairs of four-bars; 0.5 takes one of the
-# ground's hinges apart, 1 most.
+"""Smallest weight of a row in a vanishing sum, squares adding to one: round-off is 1e-15."""
+# Values from 0.1 to 0.3 leave out the same rows of 113 pairs of four-bars; 0.5 splits one of the
+# ground's hinges, 1 splits most.
 LARGE = 0.3
-"""Rows with this part of the largest weight can be left out as well as those that have it."""
+"""Rows with this fraction of the largest weight are candidates like the row with the largest."""
 DIGITS = 9
-"""Decimals to which parts are compared: what is equal but for round-off is so on every processor,
-and the first is chosen.
+"""Decimals in a comparison of weights: ties within round-off are ties on every processor, and the
+first one is chosen.
 """
-# Work and memory grow with the square of what is looked at together. Mechanisms have less,
-# senseless files have thousands.
+# Work and memory grow with the square of the portion. Mechanisms have fewer conditions; malformed
+# files have thousands.
 PORTION = 2
-"""Conditions that are looked at together, for every unknown."""
+"""Conditions in one portion, for every unknown."""
 
 
 def independent_rows(matrix: Array, last: int, conditions: Sequence[Condition] = ()) -> list[int]:
-    """Indices of a largest independent set of rows, the given number of last rows taken first.
+    """Return the indices of a largest independent set of rows, the last rows taken first.
 
     Args:
-        conditions: what the rows belong to; without, what is chosen is good where the matrix is
-            taken, and not along a sweep.
+        last: number of rows at the end that are taken first.
+        conditions: geometric conditions of the rows. Without them the choice is good at the pose of
+            the matrix only, not along a sweep.
     """
     left, taken = np.array(matrix), list[int]()
     enough = RANK_TOLERANCE * (float(np.abs(left).max(initial=0.0)) or 1.0)
@@ -58,16 +55,14 @@ def independent_rows(matrix: Array, last: int, conditions: Sequence[Condition] =
 
 
 def independent_joint_rows(formulation: Formulation, matrix: Array) -> list[int]:
-    """Indices of a largest independent set of the first rows of a formulation, which are those of
-    joints.
-    """
+    """Return the indices of a largest independent set of joint rows, a formulation's first rows."""
     return independent_rows(
         matrix, 0, [each for each in formulation.conditions if each.rows[-1] < len(matrix)]
     )
 
 
 def _independent(matrix: Array, conditions: Sequence[Condition], enough: float) -> list[Condition]:
-    """The conditions without the rows that are left out."""
+    """Return the conditions without their redundant rows."""
     rows = [k for each in conditions for k in each.rows]
     u, sizes, _ = np.linalg.svd(matrix[rows])
     out = _left_out(dict(zip(rows, u[:, int((sizes > enough).sum()) :], strict=True)), conditions)
@@ -79,13 +74,15 @@ def _independent(matrix: Array, conditions: Sequence[Condition], enough: float) 
 
 
 def _left_out(weights: Mapping[int, Array], conditions: Sequence[Condition]) -> set[int]:
-    """As many rows as there are sums of rows that vanish, by the rows' weights in those.
+    """Return the rows to leave out, one for each vanishing sum of rows, by their weights in the
+    sums.
 
-    The larger its weights the better conditioned are the other rows. Of those with large weights
-    - a condition is left out as a whole, or a row that does not turn with the bodies: of two hinges
-      that keep the same axis parallel one row each would agree or not as the hinges turn;
-    - and farthest from the ground: of the joint that closes a loop, not of one that other loops
-      hang on, as the rows of these would tie them into one system.
+    Rows with larger weights leave better conditioned rows. Preferred among large weights are:
+
+    - a whole condition, or a row that does not turn with the bodies: if two hinges keep the same
+      axis parallel, one row left of each would agree or not as the hinges turn;
+    - then the rows farthest from the ground: the joint that closes a loop, not one that carries
+      other loops, whose rows would merge these loops into one system.
     """
     found, left = set[int](), np.array([*weights.values()])
     place = {row: k for k, row in enumerate(weights)}
@@ -112,7 +109,7 @@ def _left_out(weights: Mapping[int, Array], conditions: Sequence[Condition]) -> 
 
 
 class _Candidate(NamedTuple):
-    """What may be left out: the largest is."""
+    """Rows that may be left out; the largest candidate is."""
 
     sound: bool
     remote: int
@@ -122,9 +119,7 @@ class _Candidate(NamedTuple):
 
 
 def _least(weights: Array) -> float:
-    """The least that remains of the rows' weights in any of their sums; zero where they are more
-    than the sums that vanish.
-    """
+    """Return the smallest singular value of the rows' weights, zero for more rows than sums."""
     return (
         float(np.linalg.svd(weights, compute_uv=False)[-1])
         if len(weights) <= weights.shape[1]
@@ -133,8 +128,9 @@ def _least(weights: Array) -> float:
 
 
 def _without(left: Array, basis: Array) -> Array:
-    """Rows less their components along orthonormal ones; twice, as the first time leaves
-    round-off.
+    """Return rows less their components along orthonormal ones.
+
+    The first projection leaves round-off, so it is repeated.
     """
     for _ in range(2):
         left = left - (left @ basis.T) @ basis

@@ -1,11 +1,11 @@
-"""A large sparse matrix of fixed pattern, factored by SuperLU in an order that is found once.
+"""A large sparse matrix of fixed pattern, factored by SuperLU in an order found once.
 
-The order is COLAMD's, with the rows as the first factorisation pivoted them. Measured on a ring of
-N spatial loops, where nothing can be solved before anything else, and a chain, in a given order
-(least of 15, one Zen 4 core, N = 1,000, ring and chain): COLAMD 2.4 and 1.7 ms, minimum degree of
-A^T A 3.0 and 1.6, reverse Cuthill-McKee of the bodies 2.9 and 1.5. COLAMD wins where it matters;
-finding it anew at every factorisation costs a quarter more. Minimum degree of A + A^T is not to be
-tried on matrices like these, whose diagonals mean nothing: it took 1.6 s.
+The order is COLAMD's, with the row pivots of the first factorisation. Times in a given order for a
+ring of N spatial loops, without any decomposition, and a chain (least of 15, one Zen 4 core, N =
+1,000, ring and chain): COLAMD 2.4 and 1.7 ms, minimum degree of A^T A 3.0 and 1.6, reverse
+Cuthill-McKee of the bodies 2.9 and 1.5. COLAMD wins on the ring, the critical case; a new order at
+every factorisation costs a quarter more. Minimum degree of A + A^T is unsuitable for these
+matrices, whose diagonals have no meaning: it took 1.6 s.
 """
 
 from __future__ import annotations
@@ -22,8 +22,7 @@ Indices = NDArray[np.intp]
 # Supernodes of these matrices are a few columns wide; SuperLU's own settings (10 and 20) double the
 # time.
 NARROW = {"relax": 4, "panel_size": 4}
-# A pivot may be this much smaller than the largest of its column, so that rows stay in the order
-# that was found.
+# Smallest pivot relative to the largest entry of its column: rows keep the order found first.
 PIVOT_THRESHOLD = 0.1
 
 
@@ -32,8 +31,8 @@ class Ordered(NamedTuple):
 
     Attributes:
         rows, columns: of the entries, in that order.
-        entries: their numbers among those given first.
-        row, column: for every row and column given its place.
+        entries: their indices among the original entries.
+        row, column: position of every original row and column.
     """
 
     rows: Indices
@@ -48,10 +47,10 @@ class SingularError(ArithmeticError):
 
 
 class Factors:
-    """A square matrix and its factors, which are old after an update until it is factored again.
+    """A square matrix and its factors, which are outdated from an update to the next factorisation.
 
     Raises:
-        SingularError: it is singular at the values given.
+        SingularError: the matrix is singular at the values given.
     """
 
     def __init__(self, rows: Indices, columns: Indices, values: Array, n: int) -> None:
@@ -75,14 +74,14 @@ class Factors:
         try:
             return self._splu(matrix, diag_pivot_thresh=PIVOT_THRESHOLD, **NARROW, **options)
         except RuntimeError as error:
-            # the second where numbers are lost on the way
+            # the second message means a loss of digits in the elimination
             if any(said in str(error) for said in ("singular", "failed to factorize")):
                 raise SingularError("exactly singular") from error
             raise
 
     @property
     def ordered(self) -> Ordered:
-        """The entries in the order that the last factorisation took them in."""
+        """The entries in the order of the last factorisation."""
         factors, by_place = self._factors, self._matrix.tocoo()
         rows, columns = factors.perm_r[by_place.row], factors.perm_c[by_place.col]
         return Ordered(
@@ -90,21 +89,21 @@ class Factors:
         )
 
     def update(self, values: Array) -> None:
-        """Give the matrix other values, in the order of the first; the factors stay."""
+        """Set the matrix to other values, in the original order; the factors stay."""
         self._matrix.data[:] = values[self._order]
 
     def factor(self) -> None:
-        """Factor the matrix as it is. Raises SingularError."""
+        """Factor the current matrix. Raises SingularError."""
         self._factors = self._factored(self._matrix, permc_spec="NATURAL")
 
     @property
     def signed_pivot(self) -> float:
-        """The pivot of the smallest size, with the sign of the determinant or always the opposite;
-        costs half a factorisation.
+        """The smallest pivot, with the sign of the determinant or always its opposite.
 
-        The smallest singular value, by a step of inverse iteration with these factors, says more of
-        a small matrix, but nothing of a large one: of a chain of 60 planar loops it is 1e-23 where
-        all is well, for rows that repeat others are left out at one end of it.
+        The cost is half a factorisation. The smallest singular value, by a step of inverse
+        iteration with these factors, is a better measure for a small matrix, but useless for a
+        large one: for a regular chain of 60 planar loops it is 1e-23, because redundant rows are
+        left out at one end.
         """
         diagonal = self._factors.U.diagonal()
         odd = np.count_nonzero(diagonal < 0.0) + len(diagonal) - _cycles(self._factors.perm_r)
@@ -113,7 +112,7 @@ class Factors:
 
     @property
     def log_determinant(self) -> float:
-        """The logarithm of the size of the determinant."""
+        """The logarithm of the determinant's absolute value."""
         return float(np.log(np.abs(self._factors.U.diagonal())).sum())
 
     @property
@@ -122,22 +121,20 @@ class Factors:
         return self._factors.nnz
 
     def solve(self, b: Array) -> Array:
-        """What the factors make of a right-hand side: the solution, or where they are old an
-        approximation.
-        """
+        """Solve for a right-hand side; outdated factors give an approximation."""
         placed = np.empty_like(b)
         placed[self._row] = b
         return self._factors.solve(placed)[self._column]
 
     def solve_transposed(self, b: Array) -> Array:
-        """Likewise with the matrix transposed; of several right-hand sides each is a column."""
+        """Solve with the transposed matrix; several right-hand sides are columns."""
         placed = np.empty_like(b)
         placed[self._column] = b
         return self._factors.solve(placed, "T")[self._row]
 
 
 def _cycles(permutation: Indices) -> int:
-    """How many cycles a permutation has: n less these is the number of exchanges that make it."""
+    """Return the number of cycles of a permutation; n less this is its number of exchanges."""
     n = len(permutation)
     if (permutation == np.arange(n)).all():
         return n

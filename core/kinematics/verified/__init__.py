@@ -1,1 +1,1 @@
-"""Samples that are proved: exact numbers, ball arithmetic, Krawczyk's test."""
+"""Verified samples: exact numbers, ball arithmetic, Krawczyk's test."""

@@ -1,13 +1,13 @@
-"""A mechanism with its numbers taken exactly, and its equations as programs for ball arithmetic.
+"""A mechanism with exact numbers, and its equations as programs for ball arithmetic.
 
-Coordinates, axes and lengths are fractions: their doubles, or the decimals that print them. What
-joints make of them (differences, directions, lengths) stays a fraction until a root is taken, and
-is a ball from there on, so nothing is rounded unseen. A joint type that calls `math` itself rounds
-to a double there; the joint types of kincheck do not. Pi of a screw's lead is its double.
+Coordinates, axes and lengths are fractions: their doubles, or the decimals that print them.
+Quantities that joints derive from them (differences, directions, lengths) stay fractions up to the
+first root and are balls from there on, so no rounding is ignored. A joint type that calls `math`
+itself rounds to a double; the joint types of kincheck do not. Pi of a screw's lead is its double.
 
-Besides the residuals no equation of the primitives is used: the Jacobian is the derivative of the
+The residuals are the only equations of the primitives in use: the Jacobian is the derivative of the
 traced residuals, and the unit length of the Euler parameters is an equation of its own. Proofs
-therefore check rows, nu and gamma rather than rest on them.
+therefore check rows, nu and gamma and do not rely on them.
 """
 
 from __future__ import annotations
@@ -28,23 +28,24 @@ from ..formulation.cartesian import Cartesian
 from ..formulation.constraints import Frames, constraints, frames
 
 Reading = Callable[[float], Fraction]
-"""How a float of a description is understood."""
+"""Interpretation of a float of a description as a fraction."""
 
 
 def as_double(x: float) -> Fraction:
-    """The double itself, which is what every engine is given."""
+    """Return the double itself, the number given to every engine."""
     return Fraction(x)
 
 
 def as_decimal(x: float) -> Fraction:
-    """The shortest decimal that denotes the double: what a case file says, where it has 15 digits
-    or less and is in SI units.
+    """Return the shortest decimal that denotes the double.
+
+    It is the number of a case file with 15 digits or fewer in SI units.
     """
     return Fraction(repr(float(x)))
 
 
 class Exact:
-    """A fraction, or a ball once a root was taken."""
+    """A fraction, or a ball after the first root."""
 
     __slots__ = ("value",)
 
@@ -53,18 +54,19 @@ class Exact:
 
     @staticmethod
     def of(x: Fraction) -> Exact:
-        """The number of a fraction."""
+        """Return the number of a fraction."""
         return Exact(flint().fmpq(x.numerator, x.denominator))
 
     @property
     def ball(self) -> Ball:
-        """The number at the precision of the block around."""
+        """The number at the precision of the enclosing block."""
         return flint().arb(self.value)
 
     @property
     def trivial(self) -> float | None:
-        """The number as a float where it is 0, 1 or -1: products with these, and their sums, are
-        exact in double precision.
+        """The number as a float if it is 0, 1 or -1, else None.
+
+        Products with these numbers, and their sums, are exact in double precision.
         """
         return next(
             (x for x in (0.0, 1.0, -1.0) if not self._is_ball and self.value == int(x)), None
@@ -100,8 +102,8 @@ class Exact:
     def __abs__(self) -> Exact:
         return Exact(abs(self.value))
 
-    # choices of a description (which axis is most nearly perpendicular) may fall either way where
-    # balls overlap
+    # choices of a description (the axis nearest to perpendicular) may fall either way if balls
+    # overlap
     def __lt__(self, b: Any) -> bool:
         return bool((self - b).ball < 0)
 
@@ -121,15 +123,13 @@ class Exact:
         return float(self.value)
 
     def sqrt(self) -> Exact:
-        """The square root, a fraction where it is one; of a ball around zero, that of its part >=
-        0.
-        """
+        """Return the square root, a fraction if possible; of a ball, that of its part >= 0."""
         if not self._is_ball and self.value.p.is_square() and self.value.q.is_square():
             return Exact(self.value.sqrt())
         return Exact(self.ball.nonnegative_part().sqrt())
 
     def arctan2(self, x: Any) -> Exact:
-        """The angle of the direction (x, self) [rad]; numpy asks for it by this name."""
+        """Return the angle of the direction (x, self) [rad]; numpy calls this name."""
         return Exact(flint().arb.atan2(self.ball, flint().arb(_value(x))))
 
 
@@ -140,8 +140,9 @@ def _value(b: Any) -> Any:
 
 
 def exact_mechanism(mechanism: Mechanism, reading: Reading) -> Mechanism:
-    """The mechanism with the numbers of joints, points, couplers and drivers as `Exact`; joints do
-    not see those of bodies.
+    """Return the mechanism with `Exact` numbers in joints, points, couplers and drivers.
+
+    The numbers of bodies stay: joints do not read them.
     """
 
     def read(value: Any) -> Any:
@@ -169,7 +170,7 @@ def exact_mechanism(mechanism: Mechanism, reading: Reading) -> Mechanism:
 
 
 class _Inputs:
-    """The slots of the programs: state, drivers, then geometry as it is met."""
+    """The slots of the programs: state, drivers, then geometry in the order of use."""
 
     def __init__(self) -> None:
         self.tape = Tape()
@@ -181,9 +182,7 @@ class _Inputs:
         return [self.tape.input(slot) for slot in range(first, self.count)]
 
     def lift(self, value: Any) -> Any:
-        """A value with every exact number in it made an input of the programs, or a literal where
-        it is trivial.
-        """
+        """Return a value with its exact numbers as program inputs, or literals if trivial."""
         if isinstance(value, Exact):
             return self._number(value)
         if isinstance(value, Mapping):
@@ -205,8 +204,7 @@ class _Inputs:
 
 @dataclass(frozen=True, eq=False)
 class ExactEquations:
-    """What a proof needs of a mechanism. All programs read: the state, then the drivers, then
-    `geometry`.
+    """The equations of a mechanism for a proof; inputs are state, drivers, then `geometry`.
 
     Attributes:
         state: names and sizes of the vectors of the state: displacement "u BODY" [units], Euler
@@ -214,11 +212,11 @@ class ExactEquations:
         drivers: three inputs for each moving driver: value [units or rad], cosine and sine of its
             half.
         geometry: values of the further inputs.
-        residuals: as many as there are scalars in the state: the kept rows, then the lengths of the
-            Euler parameters.
+        residuals: as many as scalars of the state: the kept rows, then the lengths of the Euler
+            parameters.
         derivative: their Jacobian; the slot of an entry is row * size + column, zeros are left out.
-        points: how far each point has come from the design [m], three slots each.
-        tests: the rows that were left out (`left_out` of them), then the branch tests.
+        points: displacement of each point from the design [m], three slots each.
+        tests: the rows left out (`left_out` of them), then the branch tests.
     """
 
     frame: Frames
@@ -233,21 +231,20 @@ class ExactEquations:
 
     @property
     def size(self) -> int:
-        """Scalars of the state."""
+        """Number of scalars of the state."""
         return sum(self.state.values())
 
 
 def equations(
     mechanism: Mechanism, drivers: Sequence[str], points: Sequence[str], kept: Sequence[int]
 ) -> ExactEquations:
-    """The programs of an exact mechanism.
+    """Return the programs of an exact mechanism.
 
     Args:
-        mechanism: as `exact_mechanism` gives it; called at the precision that the geometry is to
-            have.
-        drivers: names of those that move.
-        points: names of the points that are wanted.
-        kept: the rows that are solved; the others are tested.
+        mechanism: from `exact_mechanism`; the call sets the precision of the geometry.
+        drivers: names of the moving drivers.
+        points: names of the output points.
+        kept: the rows to solve; the others are tests.
     """
     frame, inputs = frames(mechanism), _Inputs()
     design = Cartesian.of(mechanism, frame).design

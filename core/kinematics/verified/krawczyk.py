@@ -1,18 +1,18 @@
-"""Proofs: near an approximate pose there is exactly one solution, and here is a ball that contains
-it.
+"""Krawczyk's test: a ball around an approximate pose with exactly one solution inside.
 
-Krawczyk's test. F(X) = 0 are the residuals of the traced equations over displacements, Euler
-parameters and coordinates, and the lengths of the Euler parameters. With an approximate solution X,
-any matrix Y near the inverse of F', and B the box of radius r around X, let
+F(X) = 0 are the residuals of the traced equations over displacements, Euler parameters and
+coordinates, and the lengths of the Euler parameters. With an approximate solution X, any matrix Y
+near the inverse of F', and B the box of radius r around X, let
 
-    c = |Y F(X)|,      k = |I - Y F'(B)|           (largest component, largest row sum; evaluated in balls)
+    c = |Y F(X)|            largest component
+    k = |I - Y F'(B)|       largest row sum
 
-If c + k r < r, B holds exactly one zero of F; it is no farther from X than c / (1 - k). F' is the
-derivative of the traced residuals, so nothing rests on the rows that the solver uses. That the zero
-is on the intended branch is proved by the sign of the branch tests. Velocities and accelerations
-follow from F(X(t), t) = 0, expanded in the time: linear systems with the matrix F'.
+both evaluated in balls. If c + k r < r, B holds exactly one zero of F; its distance from X is at
+most c / (1 - k). F' is the derivative of the traced residuals, so nothing relies on the rows of the
+solver. The sign of the branch tests proves that the zero is on the intended branch. Velocities and
+accelerations follow from F(X(t), t) = 0, expanded in the time: linear systems with the matrix F'.
 
-In a singular pose F' has no inverse, the test cannot succeed, and the sample is reported as not
+At a singular pose F' has no inverse, the test cannot succeed, and the sample is reported as not
 proved.
 """
 
@@ -29,12 +29,12 @@ from ...program.ball_executor import ORDER, Ball, evaluate, flint
 from ...trajectory import Array
 from .exact import ExactEquations
 
-# Radii of B that are tried, in units of the mechanism's size: the largest that succeeds says how
-# far around the solution is alone.
+# Radii of B to try, in units of the mechanism's size: the largest that succeeds bounds the region
+# with a single solution.
 RADII = tuple(2.0**-k for k in (7, 14, 21, 28, 35, 42, 49))
-# A step of Newton's iteration gains three digits or more, but near a singular pose.
+# A step of Newton's iteration gains three digits or more, except near a singular pose.
 MOST_STEPS = 60
-# Steps end this many bits above the working precision, where their own round-off begins.
+# Steps end this many bits above the working precision, at the level of their own round-off.
 SPARE_BITS = 40
 
 
@@ -45,11 +45,9 @@ class Enclosure:
     Attributes:
         points: position less that of the design [m], velocity [m/s] and acceleration [m/s^2] of
             each point, as balls, shape (3, 3).
-        alone: radius of the box in which the solution is the only one [units of the mechanism's
-            size, or rad].
+        alone: radius of the box with a single solution [units of the mechanism's size, or rad].
         contraction: k of the test in that box: below one.
-        left_out: the rows that were left out, at the solution: zero where the redundant rows agree
-            with the others.
+        left_out: residuals of the rows left out, at the solution: zero if the redundant rows agree.
         branch: the branch tests, all proved positive.
     """
 
@@ -61,7 +59,7 @@ class Enclosure:
 
 
 class UnprovedError(KincheckError, ArithmeticError):
-    """There is no proof for a sample; the message says why."""
+    """There is no proof for a sample; the message gives the reason."""
 
 
 def enclose(
@@ -71,13 +69,13 @@ def enclose(
     drives: Sequence[Sequence[Ball]],
     bits: int,
 ) -> Enclosure:
-    """Prove one sample; to be called at the precision of the equations.
+    """Prove one sample, at the precision of the equations.
 
     Args:
-        points: names of the points, as the equations were made for.
+        points: names of the points of the equations.
         pose: approximate state, shape (size,).
-        drives: for each moving driver value [units or rad], velocity and acceleration, exact or as
-            balls.
+        drives: for each moving driver value [units or rad], velocity and acceleration, as exact
+            numbers or balls.
         bits: the precision.
 
     Raises:
@@ -133,11 +131,11 @@ class _Sample:
         )
 
     def residuals(self, state: Sequence[Ball]) -> Any:
-        """F, shape (size, 1)."""
+        """Return F, shape (size, 1)."""
         return _column([*self._run("residuals", state, self._still).values()])
 
     def derivative(self, state: Sequence[Ball]) -> Any:
-        """F', shape (size, size)."""
+        """Return F', shape (size, size)."""
         n = self._equations.size
         matrix = flint().arb_mat(n, n)
         for slot, value in self._run("derivative", state, self._still).items():
@@ -145,11 +143,11 @@ class _Sample:
         return matrix
 
     def tests(self, state: Sequence[Ball]) -> list[Ball]:
-        """The rows that were left out, then the branch tests."""
+        """Return the rows left out, then the branch tests."""
         return [*self._run("tests", state, self._still).values()]
 
     def motion(self, state: Sequence[Ball]) -> list[list[list[Ball]]]:
-        """Displacement, velocity and acceleration of each point, shape (points, 3, 3).
+        """Return displacement, velocity and acceleration of each point, shape (points, 3, 3).
 
         Raises:
             ZeroDivisionError: F' is not proved to have an inverse.
@@ -172,7 +170,7 @@ class _Sample:
 
 
 def _inverse(sample: _Sample, x: Sequence[Ball]) -> Array:
-    """The inverse of F' in double precision."""
+    """Return the inverse of F' in double precision."""
     try:
         inverse = np.linalg.inv(np.array(sample.derivative(x).tolist(), dtype=np.float64)).astype(
             np.float64
@@ -185,8 +183,9 @@ def _inverse(sample: _Sample, x: Sequence[Ball]) -> Array:
 
 
 def _refine(sample: _Sample, start: Sequence[Ball], bits: int) -> tuple[list[Ball], Ball, Array]:
-    """The pose after Newton's iteration, c there, and Y; taken anew where it gains less than three
-    digits a step.
+    """Return the pose after Newton's iteration, c there, and Y.
+
+    Y is recomputed after a step that gains less than three digits.
     """
     x, inverse, before = list(start), _inverse(sample, start), float("inf")
     for _ in range(MOST_STEPS):
@@ -207,7 +206,7 @@ def _refine(sample: _Sample, start: Sequence[Ball], bits: int) -> tuple[list[Bal
 
 
 def _alone(sample: _Sample, inverse: Array, X: Sequence[Ball], c: Ball) -> tuple[float, Ball]:
-    """The largest radius tried for which the test succeeds, and k there."""
+    """Return the largest radius for which the test succeeds, and its k."""
     Y, identity, smallest = (
         flint().arb_mat(inverse.tolist()),
         flint().arb_mat(len(X), len(X), 1),
@@ -237,24 +236,24 @@ def _column(values: Sequence[Ball]) -> Any:
 
 
 def _coefficient(x: Ball, order: int) -> Ball:
-    """Of a series; a program may also put out a number that does not depend on the time."""
+    """Return a coefficient of a series; outputs independent of the time are constants."""
     if isinstance(x, flint().arb_series):
         return x[order]
     return x if order == 0 else flint().arb(0)
 
 
 def _largest(values: Sequence[Ball]) -> Ball:
-    """A number not below any |value|; infinite where a ball is not finite."""
+    """Return an upper bound of all |value|; infinite if a ball is not finite."""
     if not all(value.is_finite() for value in values):
         return flint().arb.pos_inf()
     return max((value.abs_upper() for value in values), default=flint().arb(0))
 
 
 def _around(radius: Ball) -> Ball:
-    """The ball of that radius around zero."""
+    """Return the ball of a radius around zero."""
     return flint().arb(0, radius.abs_upper())
 
 
 def _float(x: Ball) -> float:
-    """An upper bound as a float, for people to read."""
+    """Return an upper bound as a float, for messages."""
     return float(np.nextafter(float(x.abs_upper()), np.inf))

@@ -1,6 +1,4 @@
-"""Proved samples of a sweep: the native solution of each sample, and the ball that is proved to
-hold the true one.
-"""
+"""Proved samples of a sweep: native solutions, and balls proved to contain the exact ones."""
 
 from __future__ import annotations
 
@@ -38,10 +36,10 @@ class Proofs:
     Attributes:
         samples: in the order of the path.
         seconds: of each sample, without the native solution [s].
-        native: the native solution, from which the proofs start; they do not rest on it.
-        rows: the equations that the proofs are about, as "joint: primitive".
-        redundant: those that were left out, because the others say the same at the design position.
-        others: by sample, those left out where the choice at the design is worse than need be.
+        native: the native solution, the start of the proofs; they do not rely on it.
+        rows: the proved equations, as "joint: primitive".
+        redundant: those left out as redundant at the design position.
+        others: by sample, those left out if the choice at the design is unnecessarily poor there.
     """
 
     samples: Sequence[Enclosure | UnprovedError]
@@ -64,9 +62,9 @@ def prove(
     """Prove the samples of a path.
 
     Args:
-        points: names of the points whose motion is wanted.
-        drives: the exact values of the moving drivers, which the path has as doubles.
-        reading: how the numbers of the mechanism are understood.
+        points: names of the output points.
+        drives: exact values of the moving drivers; the path has them as doubles.
+        reading: interpretation of the numbers of the mechanism.
         bits: working precision.
         tol: of the native solution; see `solve`.
 
@@ -124,9 +122,7 @@ def _ball(x: Fraction) -> Ball:
 
 
 def _states(mechanism: Mechanism, native: Trajectory, times: Array, start: float = 0.0) -> Array:
-    """The scalars that fix the configuration (`Cartesian.design`), from the motion of the bodies,
-    shape (n, size).
-    """
+    """Return the state scalars (`Cartesian.design`) from the bodies' motion, shape (n, size)."""
     frame = frames(mechanism)
     poses = displaced(
         mechanism, frame, {name: (motion.r, motion.p) for name, motion in native.bodies.items()}
@@ -137,8 +133,8 @@ def _states(mechanism: Mechanism, native: Trajectory, times: Array, start: float
         for name, vector in state.items()
         if name.startswith("x ") and name.endswith(".rotation")
     ):
-        # turns are counted from the start outwards; a sweep so coarse that they are miscounted
-        # fails to be proved
+        # turns are counted from the start outwards; the proof fails for a sweep too coarse to count
+        # them
         for side in outwards(times, start):
             outward = side[native.solved[side]]
             turn[outward] = np.unwrap([0.0, *turn[outward]])[1:]

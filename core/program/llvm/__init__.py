@@ -1,3 +1,1 @@
-"""Programs and the loops that run them as machine code: text for LLVM, what it makes of that, and
-how it is kept and called.
-"""
+"""Programs and their loops as machine code: LLVM text, compilation, cache and calls."""

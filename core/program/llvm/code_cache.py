@@ -1,4 +1,6 @@
-"""Machine code of programs: compiled for this processor, kept by content, processor and version."""
+"""Machine code of programs, compiled for this processor and cached by content, processor and
+version.
+"""
 
 from __future__ import annotations
 
@@ -13,16 +15,16 @@ from . import compiler, elf_loader
 
 
 class Code:
-    """Machine code of functions; calls of them release Python's lock.
+    """Machine code of functions; calls release the GIL.
 
     Args:
-        signatures: by function, how many arguments it takes: addresses and whole numbers. All
-            return a whole number; what those without a result return means nothing. Others are
-            known by their address.
+        signatures: number of arguments by function: addresses and integers. All return an integer,
+            which is meaningless for functions without a result. Other functions are reached by
+            address only.
 
     Attributes:
-        address: where the function of a name stands.
-        calls: functions of known signatures.
+        address: return the address of a function by name.
+        calls: functions with a signature.
     """
 
     def __init__(self, code: bytes, signatures: Mapping[str, int]) -> None:
@@ -31,7 +33,7 @@ class Code:
             if elf_loader.possible()
             else compiler.loaded(code)
         )
-        # whole numbers are passed as addresses are: ctypes takes a third of the time for those
+        # # integers are passed as addresses: ctypes takes a third of the time for those
         types = {
             name: ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_void_p] * count)
             for name, count in signatures.items()
@@ -44,20 +46,18 @@ class Code:
 def load(
     content: str, text: Callable[[], str], signatures: Mapping[str, int] | None = None
 ) -> Code:
-    """Compile the text, or fetch what the content meant before."""
+    """Return the cached code of a content; compile the text if there is none."""
     return Code(disk_cache.kept(told(content), lambda: _made(text())), signatures or {})
 
 
 def find(content: str) -> Code | None:
-    """What the content meant before, if it was kept."""
+    """Return the cached code of a content, or None."""
     code = disk_cache.find(told(content))
     return None if code is None else Code(code, {})
 
 
 def told(content: str) -> bytes:
-    """What determines machine code: this for any processor and compiler, both of them, and what is
-    made of it here.
-    """
+    """Return the cache key: content, processor, compiler, and sources that process its output."""
     return "\n".join(
         (*compiler.processor(), str(elf_loader.possible()), _sources(), content)
     ).encode()
@@ -65,7 +65,7 @@ def told(content: str) -> bytes:
 
 @cache
 def _sources() -> str:
-    """The text that says how code is compiled, and put together."""
+    """Return the source of the modules that compile and link."""
     return "".join(inspect.getsource(each) for each in (compiler, elf_loader))
 
 

@@ -1,5 +1,5 @@
-"""LLVM, as llvmlite has it: what it says of this processor, what it makes of a text, and how it
-loads that.
+"""Interface to LLVM by llvmlite: processor features, compilation of a text, and loading of the
+result.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from ..disk_cache import kept
 from . import elf_loader
 
 TRAITS = b"vendor_id", b"cpu family", b"model", b"stepping", b"flags"
-"""What the system says of a processor, and LLVM goes by."""
+"""Fields of /proc/cpuinfo that LLVM depends on."""
 
 
 class Processor(NamedTuple):
-    """What machine code is made for and by: as LLVM names the processor, what that can do, its
-    system, and llvmlite's version.
+    """Target of machine code: LLVM's processor name, its features, the system, and llvmlite's
+    version.
     """
 
     name: str
@@ -30,26 +30,24 @@ class Processor(NamedTuple):
 
 
 def available() -> bool:
-    """Whether llvmlite is installed, and its library could be loaded here when that was needed
-    first.
-    """
+    """Return whether llvmlite is installed and its library loads, or did when first needed."""
     return importlib.util.find_spec("llvmlite") is not None and _loads()
 
 
 @cache
 def _loads() -> bool:
     try:
-        # asks LLVM only if it was never asked here: whoever has its products does without
+        # # asks LLVM only without a cached answer
         processor()
-    except (ImportError, OSError):  # `kincheck doctor` tells it
+    except (ImportError, OSError):  # # `kincheck doctor` reports it
         return False
     return True
 
 
 @cache
 def llvm() -> Any:
-    """Its binding. Importing it takes three times as long as making a known model ready: whoever
-    has its products does without.
+    """Return LLVM's binding. Its import takes three times as long as loading a cached model; cached
+    code needs none.
     """
     found: Any = importlib.import_module("llvmlite.binding")
     found.initialize_native_target()
@@ -59,10 +57,10 @@ def llvm() -> Any:
 
 @cache
 def processor() -> Processor:
-    """LLVM's opinion; where machine code runs without LLVM, the one it had before, of a processor
-    that the system called the same.
+    """Return LLVM's description of the processor; with `elf_loader` from the cache, keyed by the
+    system's description.
 
-    An emulator that hides instructions of the processor (valgrind) needs a cache of its own.
+    An emulator that hides instructions of the processor (valgrind) needs a separate cache.
     """
     known = _described()
     said = _asked() if known is None else kept(known, _asked)
@@ -71,15 +69,16 @@ def processor() -> Processor:
 
 @cache
 def vector_width() -> int:
-    """Doubles in a vector register of this processor."""
+    """Return the doubles in a vector register of this processor."""
     features = processor().features.split(",")
     return 8 if "+avx512f" in features else 4 if "+avx" in features else 2
 
 
 def emitted(text: str) -> bytes:
-    """Machine code of a text: an object file."""
+    """Return the machine code of a text: an object file."""
     here = processor()
-    # level 1: the optimiser's passes cost ten times the time and gain nothing on straight-line code
+    # # level 1: the optimiser's passes cost ten times the time and gain nothing on straight-line
+    # code
     options = (
         {"opt": 1, "reloc": "pic", "codemodel": "small"} if elf_loader.possible() else {"opt": 1}
     )
@@ -92,8 +91,8 @@ def emitted(text: str) -> bytes:
 
 
 def loaded(file: bytes) -> Callable[[str], int]:
-    """Have LLVM put an object file into memory, for as long as what is returned is kept: where each
-    function stands.
+    """Load an object file by LLVM; return a function from name to address, which also keeps the
+    code alive.
     """
     engine = llvm().create_mcjit_compiler(
         llvm().parse_assembly(""), llvm().Target.from_default_triple().create_target_machine()
@@ -115,8 +114,8 @@ def _asked() -> bytes:
 
 
 def _described() -> bytes | None:
-    """What the system says of the first processor, and which llvmlite is installed; None where that
-    is not known.
+    """Return the system's description of the first processor and the llvmlite version; None if
+    unknown.
     """
     if not elf_loader.possible():
         return None
@@ -124,7 +123,7 @@ def _described() -> bytes | None:
     if found is None or found.origin is None:
         return None
     try:
-        # importing importlib.metadata takes longer than making a model ready
+        # # the import of importlib.metadata takes longer than loading a cached model
         version = Path(found.origin).with_name("_version.py").read_bytes()
         with Path("/proc/cpuinfo").open("rb") as file:
             lines = iter(file.readline, b"\n")

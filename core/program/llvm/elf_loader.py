@@ -1,10 +1,9 @@
-"""Machine code as one piece of memory that runs wherever it stands: what an object file holds, put
-together once and for all.
+"""Loader of ELF object files: one position-independent block of machine code, linked once.
 
-LLVM can load what it compiled, but importing it takes three times as long as making ready a model
-that was known before. An image needs no LLVM. It is read from an ELF object for x86-64 (System V
-ABI with its AMD64 supplement, chapter 4), whose parts refer to each other by distances only, for it
-calls nothing outside itself.
+LLVM can load its own object files, but its import takes three times as long as loading a cached
+model. An image needs no LLVM. Its source is an ELF object for x86-64 (System V ABI with its AMD64
+supplement, chapter 4). Its sections refer to each other by relative addresses only, for it calls
+nothing outside itself.
 """
 
 from __future__ import annotations
@@ -19,17 +18,16 @@ from struct import Struct, pack_into, unpack_from
 from typing import NamedTuple
 
 SECTIONS_AT, SECTIONS = 0x28, 0x3C
-"""Places in the head of the file: where the list of sections stands, and how many there are."""
+"""Offsets in the file header: address and number of sections."""
 PROGRAM, SYMBOLS, RELOCATIONS, ALLOCATED = 1, 2, 4, 2
-"""Types of sections, and the flag of those that are in memory when the code runs."""
+"""Types of sections, and the flag of those in memory at run time."""
 DISTANCES = 2, 4
-"""Types of relocations, R_X86_64_PC32 and R_X86_64_PLT32: a distance of 32 bits from where it
-stands.
+"""Types of relocations, R_X86_64_PC32 and R_X86_64_PLT32: a 32-bit distance from its own address.
 """
 
 
 class Image(NamedTuple):
-    """Machine code, and the place of each function in it."""
+    """Machine code, and the offset of each function in it."""
 
     code: bytes
     places: Mapping[str, int]
@@ -62,19 +60,21 @@ _SECTION, _SYMBOL, _RELOCATION = Struct("<IIQQQQIIQQ"), Struct("<IBBHQQ"), Struc
 
 @cache
 def possible() -> bool:
-    """Whether images run here: on x86-64 under Linux, where what was written may be run."""
+    """Return whether images run here: x86-64 under Linux, with permission to execute written
+    memory.
+    """
     if sys.platform != "linux" or machine() != "x86_64":
         return False
     try:
         _runnable(b"\0")
-    except OSError:  # some systems let nobody do that
+    except OSError:  # # some systems forbid it
         return False
     return True
 
 
 def joined(file: bytes) -> Image:
-    """The image of an object file. Raises ValueError where its parts do not refer to each other by
-    distances only.
+    """Return the image of an object file. Raise ValueError for a relocation other than a relative
+    address.
     """
     (at,), (count,) = unpack_from("<Q", file, SECTIONS_AT), unpack_from("<H", file, SECTIONS)
     sections = [_Section(*_SECTION.unpack_from(file, at + k * _SECTION.size)) for k in range(count)]
@@ -116,7 +116,7 @@ def joined(file: bytes) -> Image:
 
 
 def placed(image: Image) -> Callable[[str], int]:
-    """Put it into memory, for as long as what is returned is kept: where each function stands."""
+    """Load an image; return a function from name to address, which also keeps the memory alive."""
     memory = _runnable(image.code)
     start = _address(memory)
 
@@ -127,7 +127,7 @@ def placed(image: Image) -> Callable[[str], int]:
 
 
 def _runnable(code: bytes) -> mmap.mmap:
-    """Memory that holds the code, and is written no more."""
+    """Return executable, read-only memory with the code."""
     memory = mmap.mmap(
         -1, len(code), mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS, mmap.PROT_READ | mmap.PROT_WRITE
     )

@@ -1,6 +1,4 @@
-"""Run programs by machine code over vectors of lanes: one call for a whole motion, without Python's
-lock.
-"""
+"""Execution of plans by machine code over vectors of lanes: a call per motion, without the GIL."""
 
 from __future__ import annotations
 
@@ -12,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from ...trajectory import Array
+from ..executor_protocol import Parts, Side, Table
 from ..memory import BYTES, address, aligned
-from ..plan import LINE, Parts, Side, Table
+from ..plan import LINE
 from .jit import LlvmCode
 from .one_motion import MOTION, SIDE
 
@@ -24,7 +23,7 @@ REACHED = SIDE.index("i64 reached")
 class LlvmExecutor:
     """A plan bound to lanes: groups of a vector's width W, memory of shape (groups, slots, W).
 
-    The last group is filled up with copies of the last lane.
+    Copies of the last lane fill up the last group.
     """
 
     def __init__(self, code: LlvmCode, lanes: int) -> None:
@@ -42,7 +41,7 @@ class LlvmExecutor:
 
     def put(self, slots: Sequence[int], values: Array) -> None:
         """See `Executor`."""
-        # the same in all lanes needs no arranging
+        # # equal values of all lanes need no arrangement
         self._memory[:, _places(slots)] = values if values.shape[1] == 1 else self.arranged(values)
 
     def get(self, slots: Sequence[int]) -> Array:
@@ -133,8 +132,8 @@ class LlvmExecutor:
 
 
 class LlvmTrack:
-    """See `Track`. Its tables are such that both ways from the start the vectors of samples are
-    cache lines: two take longer.
+    """See `Track`. Vectors of samples are aligned to cache lines on both sides of the start: a
+    vector across two lines takes longer.
     """
 
     def __init__(
@@ -163,7 +162,7 @@ class LlvmTrack:
             (address(table), table.shape[1], margin + side.first, side.step, side.count, anchor, 0)
             for side, table, anchor in zip(sides, tables, anchors, strict=True)
         ]
-        # never empty: that has no address
+        # # never empty: an empty array has no address
         self._sides = np.array([*told, (0,) * len(SIDE)], np.int64)
         self._counts, motion = [side.count for side in sides], address(self._motion)
         self._run = partial(code.call("follow", "run"), motion, address(self._sides))
@@ -176,7 +175,7 @@ class LlvmTrack:
             for at, anchor in places
         ]
         self._code, self._groups = code, sum(-(-side.count // width) for side in sides)
-        self._alive = memory, tables  # their addresses are held
+        self._alive = memory, tables  # # keeps their addresses valid
 
     def begin(self) -> Array:
         """See `Track`."""
@@ -199,12 +198,12 @@ class LlvmTrack:
 
 
 def _places(slots: Sequence[int]) -> Sequence[int] | slice:
-    """Slots as an index; numpy would make an array of a range each time."""
+    """Return slots as an index; numpy would convert a range to an array each time."""
     return slice(slots.start, slots.stop) if isinstance(slots, range) and slots.step == 1 else slots
 
 
 def _in_lines(samples: Array) -> Array:
-    """A copy of which every row begins with a cache line."""
+    """Return a copy with each row aligned to a cache line."""
     rows, columns = samples.shape
     room = columns + -columns % LINE
     found = aligned(rows * room).reshape(rows, room)

@@ -1,4 +1,4 @@
-"""LLVM code that goes through the table of a program: see `bytecode`."""
+"""Interpreter of program tables as LLVM code: see `bytecode`."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from ..bytecode import ARITY, KINDS
 from .ir_writer import Lines
 
 MASK = "larger"
-"""The operation whose values are true or false: all bits of a number, or none."""
+"""The operation with a boolean result: all bits of a number set, or none."""
 
 
 def interpret(width: int) -> str:
-    """A function of W lanes and a table."""
+    """Return the LLVM function of W lanes and a table."""
     kinds = "\n    ".join(f"i32 {kind}, label %kind{kind}" for kind in KINDS.values())
     ends = ", ".join(f"[%end, %kind{kind}_run]" for kind in KINDS.values())
     return f"""define void @interpret(ptr %lane, ptr %table) {{
@@ -34,7 +34,7 @@ next:
 
 
 def _stretch(op: str, width: int) -> str:
-    """The rows of operations of one kind."""
+    """Return the loop over the rows of one kind of operation."""
     name = f"kind{KINDS[op]}"
     row = _Row(width, f"{name}_")
     row.result(row.value(op))
@@ -50,20 +50,20 @@ def _stretch(op: str, width: int) -> str:
 
 
 class _Row(Lines):
-    """One row of a table."""
+    """Lines of one row of a table."""
 
     def place(self, k: int) -> str:
-        """Where the number of that place in the row points."""
+        """Return the address that entry k of the row names."""
         word = self.let(f"getelementptr i32, ptr %{self.prefix}row, i64 {k}")
         offset = self.let(f"zext i32 {self.let(f'load i32, ptr {word}, align 4')} to i64")
         return self.let(f"getelementptr i8, ptr %lane, i64 {offset}")
 
     def operand(self, k: int, kind: str = "double") -> str:
-        """A vector that the row names."""
+        """Return a vector that the row names."""
         return self.let(f"load <{self.width} x {kind}>, ptr {self.place(k)}, align 8")
 
     def value(self, op: str) -> str:
-        """What the operation of the row gives."""
+        """Return the result of the row's operation."""
         if op == "const":
             number = self.let(f"getelementptr i32, ptr %{self.prefix}row, i64 1")
             return self.spread(self.let(f"load double, ptr {number}, align 4"))
@@ -83,5 +83,5 @@ class _Row(Lines):
         return value
 
     def result(self, value: str) -> None:
-        """Put it where the row says."""
+        """Store the result at its place."""
         self.lines.append(f"store {self.vector} {value}, ptr {self.place(0)}, align 8")

@@ -1,9 +1,8 @@
-"""LLVM code over a vector of lanes, line by line; what is written of it is in the modules beside
-this one.
+"""LLVM text over a vector of lanes, line by line; the modules beside this one use it.
 
-The text calls nothing but LLVM's own instructions: no library, no runtime. Sine and cosine are
-reduced and summed in place. The W lanes of a vector stand together in memory, slot by slot: what a
-program touches is one stretch of a few kilobytes.
+The text calls LLVM instructions only: no library, no runtime. Sine and cosine are reduced and
+summed in place. The W lanes of a vector are contiguous, slot by slot: a program touches one stretch
+of a few kilobytes.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ CALLS = {"sqrt": "sqrt", "abs": "fabs", "min": "minimum", "max": "maximum"}
 
 
 class Lines:
-    """The body of a function over vectors of W lanes, written line by line in single assignment."""
+    """Body of a function over vectors of W lanes, line by line in static single assignment."""
 
     def __init__(self, width: int, prefix: str = "x", lane: str = "%lane") -> None:
         self.width, self.prefix, self.lines, self._lane = width, prefix, list[str](), lane
@@ -32,13 +31,13 @@ class Lines:
         self._known: dict[str, str] = {}
 
     def let(self, text: str) -> str:
-        """The name of the value of an expression, computed once."""
+        """Return the name of an expression's value, computed once."""
         if text not in self._known:
             self._known[text] = self.anew(text)
         return self._known[text]
 
     def anew(self, text: str) -> str:
-        """The name of the value of an expression, computed here even where it has been before."""
+        """Return the name of an expression's value, computed here even if computed before."""
         name = f"%{self.prefix}{len(self.lines)}"
         self.lines.append(f"{name} = {text}")
         return name
@@ -49,19 +48,19 @@ class Lines:
         return "\n  ".join(self.lines)
 
     def sum(self, a: str | int, b: str | int) -> str:
-        """Of two whole numbers."""
+        """Return the sum of two integers."""
         return self.let(f"add i64 {a}, {b}")
 
     def product(self, a: str | int, b: str | int) -> str:
-        """Of two whole numbers."""
+        """Return the product of two integers."""
         return self.let(f"mul i64 {a}, {b}")
 
     def number(self, pointer: str, index: str | int) -> str:
-        """Where a number of an array stands."""
+        """Return the address of a number in an array."""
         return self.let(f"getelementptr double, ptr {pointer}, i64 {index}")
 
     def spread(self, x: str) -> str:
-        """A vector of W times the same number."""
+        """Return a vector of W times the same number."""
         one = self.let(f"insertelement {self.vector} poison, double {x}, i64 0")
         return self.let(
             f"shufflevector {self.vector} {one}, {self.vector} poison, <{self.width} x i32>"
@@ -69,41 +68,41 @@ class Lines:
         )
 
     def turned(self, x: str) -> str:
-        """The lanes in the opposite order."""
+        """Return the lanes in reverse order."""
         order = ", ".join(f"i32 {k}" for k in reversed(range(self.width)))
         return self.let(
             f"shufflevector {self.vector} {x}, {self.vector} poison, <{self.width} x i32> <{order}>"
         )
 
     def slot(self, number: str | int) -> str:
-        """Where a slot of the lanes stands."""
+        """Return the address of a slot."""
         return self.let(f"getelementptr {self.vector}, ptr {self._lane}, i64 {number}")
 
     def read(self, number: str | int) -> str:
-        """A slot of the lanes."""
+        """Return the value of a slot."""
         return self.let(f"load {self.vector}, ptr {self.slot(number)}, align 8")
 
     def write(self, number: str | int, value: str) -> None:
-        """Set a slot of the lanes."""
+        """Set a slot."""
         self.lines.append(f"store {self.vector} {value}, ptr {self.slot(number)}, align 8")
 
     def constant(self, x: float) -> str:
-        """A vector of equal numbers, exact to the last bit."""
+        """Return a vector of equal numbers, exact to the last bit."""
         bits = struct.unpack("<Q", struct.pack("<d", x))[0]
         return "<" + ", ".join([f"double 0x{bits:016X}"] * self.width) + ">"
 
     def call(self, name: str, *operands: str) -> str:
-        """One of LLVM's own vector functions."""
+        """Call one of LLVM's vector functions."""
         arguments = ", ".join(f"{self.vector} {x}" for x in operands)
-        # nsz: which of two zeros is the larger does not matter, and costs three more instructions
+        # # nsz: the order of the two zeros does not matter, and costs three more instructions
         return self.let(f"call nsz {self.vector} @llvm.{name}.v{self.width}f64({arguments})")
 
     def umax(self, a: str, b: str) -> str:
-        """The larger of two numbers without a sign, or NaN: their bits are ordered as they are, and
-        NaN comes last.
+        """Return the larger of two numbers without a sign, or NaN: their bits have the same order,
+        NaN last.
 
-        As whole numbers with a sign, although they have none: AVX2 compares only those, and takes
-        four instructions for others.
+        The comparison is of signed integers, although the numbers have no sign: AVX2 compares only
+        those, and takes four instructions for unsigned ones.
         """
         words = f"<{self.width} x i64>"
         x, y = (self.let(f"bitcast {self.vector} {each} to {words}") for each in (a, b))
@@ -111,32 +110,32 @@ class Lines:
         return self.let(f"bitcast {words} {larger} to {self.vector}")
 
     def arithmetic(self, op: str, a: str, b: str) -> str:
-        """a op b."""
+        """Return a op b."""
         return self.let(f"{BINARY[op]} {self.vector} {a}, {b}")
 
     def fused(self, op: str, a: str, b: str, c: str) -> str:
-        """A product and a sum; see `lowering.FUSED`. Rounded once where the processor can."""
+        """Return a product and a sum, see `lowering.FUSED`; rounded once if the processor can."""
         first = self.let(f"fneg {self.vector} {a}") if op == "fnma" else a
         last = self.let(f"fneg {self.vector} {c}") if op == "fms" else c
         return self.call("fmuladd", first, b, last)
 
     def choose(self, mask: str, p: str, q: str) -> str:
-        """p where the mask is true, else q."""
+        """Return p if the mask is true, else q."""
         return self.let(f"select <{self.width} x i1> {mask}, {self.vector} {p}, {self.vector} {q}")
 
     def polynomial(self, x: str, coefficients: Sequence[float]) -> str:
-        """By Horner, lowest coefficient first."""
+        """Return a polynomial by Horner's rule, lowest coefficient first."""
         total = self.constant(coefficients[-1])
         for c in reversed(coefficients[:-1]):
             total = self.fused("fma", total, x, self.constant(c))
         return total
 
     def trigonometric(self, x: str, quadrant: float) -> str:
-        """sin(x + quadrant * pi/2)."""
+        """Return sin(x + quadrant * pi/2)."""
         k = self.call("rint", self.arithmetic("*", x, self.constant(2.0 / math.pi)))
         y = x
         for part in HALF_PI:
-            # not rounded once: the products are exact, the differences must be seen as such
+            # # not fused: the products are exact, and the differences must see them as such
             y = self.arithmetic("-", y, self.arithmetic("*", k, self.constant(part)))
         z = self.arithmetic("*", y, y)
         odd = [(-1.0) ** n / math.factorial(2 * n + 1) for n in range(SINE_TERMS)]
@@ -154,7 +153,7 @@ class Lines:
         return self.choose(negative, self.let(f"fneg {self.vector} {value}"), value)
 
     def operation(self, op: str, operands: Sequence[str]) -> str:
-        """The value of a traced operation."""
+        """Return the value of a traced operation."""
         if op in BINARY:
             return self.arithmetic(op, *operands)
         if op in FUSED:
@@ -182,7 +181,7 @@ class Lines:
 
 
 def declarations(width: int) -> str:
-    """LLVM's own vector functions that programs use."""
+    """Return the declarations of LLVM's vector functions that programs use."""
     vector = f"<{width} x double>"
     one = "\n".join(
         f"declare {vector} @llvm.{name}.v{width}f64({vector})"

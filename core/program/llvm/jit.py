@@ -1,5 +1,5 @@
-"""A plan that this processor can run: loops that are the same for all plans, and programs,
-interpreted or compiled.
+"""A plan ready to run on this processor: loops common to all plans, and programs interpreted or
+compiled.
 """
 
 from __future__ import annotations
@@ -37,23 +37,20 @@ LOOPS: Mapping[str, tuple[Sequence[Callable[[int], str]], Mapping[str, int]]] = 
     "fold": ([rows, fold], {"fold": 6}),
     "parts": ([*_NEEDED, parts], {"parts": 13}),
 }
-"""What runs the programs of any plan: what writes it, and its functions with how many arguments
-they take.
-"""
+"""Modules of loops: their writers, and their functions with the number of arguments."""
 OFTEN, AGAIN, OPERATIONS = 150, 20, 3000
-"""Programs of so many operations are interpreted for so many groups of lanes; longer ones, which
-take longer to compile, for more. Whoever comes back after that comes many times: a sweep of 161
-samples is 21 groups of eight, and six sweeps of `kincheck run` are interpreted to the end. For
-those whose tables are in the cache somebody did come back: they are compiled after the second
-number, in the first sweep."""
+"""Limits of interpretation, in groups of lanes, for programs up to `OPERATIONS` operations;
+proportionally more for longer ones, which take longer to compile. `OFTEN` holds for new plans: a
+sweep of 161 samples is 21 groups of eight, so `kincheck run` interprets six sweeps to the end.
+`AGAIN` holds for plans with tables in the cache: they come back often, so they are compiled in the
+first sweep.
+"""
 _AT_ONCE = ContextVar("at once", default=False)
 
 
 @contextmanager
 def compiled_at_once() -> Generator[None]:
-    """Have programs that are made meanwhile compiled when they have run once: for whoever measures
-    what they cost warm.
-    """
+    """Compile programs made in this block after their first run, to measure the warm cost."""
     before = _AT_ONCE.set(True)
     try:
         yield
@@ -62,20 +59,20 @@ def compiled_at_once() -> Generator[None]:
 
 
 class LlvmCode:
-    """A plan that this processor can run: its programs are interpreted at first, and compiled where
-    they are run often.
+    """A plan ready to run on this processor; its programs are interpreted first, and compiled if
+    run often.
 
-    Raises ImportError where llvmlite is missing.
+    Raises ImportError if llvmlite is missing.
 
     Attributes:
-        stride: slots of a lane, with those after `Plan.slots` that programs keep their values in.
+        stride: slots of a lane, with the cells of intermediate values after `Plan.slots`.
         memory: the plan, as loops read it.
         interpreted: whether programs are not compiled yet.
     """
 
     def __init__(self, plan: Plan) -> None:
         self.width, self.plan, self._lock = compiler.vector_width(), plan, Lock()
-        # what determines the code; writing its text takes longer than loading it
+        # # content of the code as a key: writing the text takes longer than loading the code
         self._content = repr([plan.programs, self.width, _sources()])
         code = code_cache.find(self._content)
         again = code is None and disk_cache.known(self._of_tables)
@@ -94,16 +91,16 @@ class LlvmCode:
         self._alive, self._left = tables, often * max(OPERATIONS, operations) // OPERATIONS
 
     def call(self, loop: str, name: str) -> Callable[..., int]:
-        """A function of a loop, for this plan."""
+        """Return a function of a loop, bound to this plan."""
         return partial(_loop(loop, self.width).calls[name], self.memory.address)
 
     def count(self, groups: int) -> None:
-        """Said by whoever has run programs for so many groups of lanes."""
+        """Count groups of lanes run so far, and compile at the limit."""
         if not self.interpreted:
             return
-        self._left -= groups  # what is lost where two threads do so at once only delays compiling
+        self._left -= groups  # # an update lost between two threads only delays compilation
         if self._left <= 0:
-            with self._lock:  # what one thread compiled is not taken away from others that run it
+            with self._lock:  # # do not replace compiled code that other threads run
                 if self.interpreted:
                     self._take(code_cache.load(self._content, self._text))
                     self.interpreted = False
@@ -111,7 +108,7 @@ class LlvmCode:
     def _take(self, code: code_cache.Code) -> None:
         self._code = code
         for name, at in self.memory.calls.items():
-            # a function that is compiled needs no table
+            # # a compiled function needs no table
             self.memory.entries[at, 0] = code.address(name)
 
     def _tables(self) -> dict[str, bytecode.Bytecode]:
@@ -138,11 +135,11 @@ class LlvmCode:
 
 @cache
 def make_loops_ready() -> None:
-    """Compile what is needed first, if it never was, while programs are traced: the compiler does
-    not wait for Python's lock.
+    """Compile the first loops in a thread, if not in the cache, during tracing: the compiler needs
+    no GIL.
 
-    To import and to read files does: in a thread, beside whatever else Python does, that would take
-    three times as long.
+    Imports and file reads do need it: in a thread beside other Python code they take three times as
+    long.
     """
     width = compiler.vector_width()
     missing = [
@@ -156,7 +153,7 @@ def make_loops_ready() -> None:
 
 
 def interpreter(width: int) -> Callable[..., int]:
-    """A function that goes through a table: of the addresses of lanes and table."""
+    """Return the interpreter function of the addresses of lanes and table."""
     return _loop("interpret", width).calls["interpret"]
 
 
@@ -170,7 +167,7 @@ _LOCK = Lock()
 
 @cache
 def _made(name: str, width: int) -> code_cache.Code:
-    """Functions that run any plan."""
+    """Return functions that run any plan."""
     writers, signatures = LOOPS[name]
     text = partial("\n".join, [*(write(width) for write in writers), declarations(width)])
     return code_cache.load(_content(name, width), text, signatures)
@@ -182,7 +179,7 @@ def _content(name: str, width: int) -> str:
 
 @cache
 def _sources() -> str:
-    """A digest of all that writes text or tables: this room, and what it takes from others."""
+    """Return a digest of all writers of text or tables: this folder, and the modules it uses."""
     files = (
         *sorted(Path(__file__).parent.glob("*.py")),
         *(Path(str(each.__file__)) for each in (executor, lowering, tape, bytecode)),

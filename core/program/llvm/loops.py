@@ -1,7 +1,7 @@
-"""The loops of plans as LLVM code: Newton's iteration, and parts of a mechanism; for motions, see
+"""Loops of plans as LLVM code: Newton's iteration, and parts of a mechanism; for motions, see
 `follow` and `fan`.
 
-They are the same for all plans, each of which is read from memory: see `plan`.
+They are the same for all plans and read the plan from memory: see `plan`.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from .plan import Rows, call, function, over
 
 
 def settle(width: int) -> str:
-    """An attempt at W lanes that are predicted, but for the test: iterate until every one has met
-    the tolerance or is lost.
+    """Return the attempt at W predicted lanes without its test: iterate until each converged or is
+    not finite.
     """
     vector, mask, lines = f"<{width} x double>", f"<{width} x i1>", Lines(width)
     at = {name: lines.slot(f"%plan_{name}") for name in ("residual", "iterations", "done")}
@@ -50,7 +50,7 @@ finish:
 
 
 def run(width: int) -> str:
-    """Functions that make an attempt, run a program, given the address of its call, or carry, on
+    """Return functions that attempt, run a program (given the address of its call) or carry, for
     every group of W lanes.
     """
     head = "void @{}(ptr %plan, ptr %memory, i64 %groups{})"
@@ -83,7 +83,7 @@ end:
 
 
 def parts(width: int) -> str:
-    """See `Executor.parts`."""
+    """Return the LLVM functions of `Executor.parts`."""
     source = Rows(width)
     row = source.let(f"load i64, ptr {source.number('%rows', '%row')}, align 8")
     place = source.number("%world", source.product("%room", row))

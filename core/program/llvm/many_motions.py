@@ -1,4 +1,4 @@
-"""Following many motions through the same samples as LLVM code, lanes as motions."""
+"""Loop along many motions through the same samples as LLVM code; lanes are motions."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from .plan import TOGETHER, Rows, call, function, over
 
 
 def fan(width: int) -> str:
-    """See `Executor.fan`: every group of W motions goes through all samples while its slots are in
-    the nearest cache.
+    """Return the LLVM functions of `Executor.fan`: a group of W motions passes all samples while
+    its slots are in the L1 cache.
 
-    A group that has come through `NODES` samples is extended by what is remembered of them. Where
-    that fails for a motion that goes on, the group goes back, and is predicted by its rates.
+    After `NODES` samples a group is predicted by `extend`. If this fails for a live motion, the
+    group goes back and is predicted by its rates.
     """
     vector, mask, test = f"<{width} x double>", f"<{width} x i1>", Lines(width, "test")
     accepted = test.let(f"fcmp ogt {vector} {test.read('%plan_margin')}, zeroinitializer")
@@ -109,18 +109,17 @@ end:
 
 
 def _kept(width: int) -> str:
-    """Functions that put out a sample, NaN where a motion has ended, remember it, and say so where
-    the worst is found.
+    """Return functions that store a sample (NaN for an ended motion), remember it, and mark ended
+    motions in the worst.
     """
     keep, lose, remember = Rows(width), Rows(width), Rows(width, TOGETHER)
-    # whole cache lines go straight to memory: to have each fetched first, only to be overwritten,
-    # takes a third of all time
+    # # whole cache lines bypass the caches: a fetch before each overwrite takes a third of all time
     whole = width == LINE
     past_caches = ", !nontemporal !{i32 1}" if whole else ""
     place = keep.number("%numbers", keep.product("%stride", "%row"))
     value = keep.choose("%still", keep.read(keep.entry()), keep.constant(math.nan))
     keep.lines.append(f"store {keep.vector} {value}, ptr {place}, align {8 * width}{past_caches}")
-    # parts of them are fetched a sample ahead; to put them aside until they are whole takes as long
+    # # partial lines are prefetched a sample ahead; collecting them into whole lines takes as long
     # as waiting
     if not whole:
         keep.lines.append(

@@ -1,4 +1,4 @@
-"""Following one motion as LLVM code, lanes as samples."""
+"""Loop along one motion as LLVM code; lanes are samples."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ SIDE = (
     "ptr anchor",
     "i64 reached",
 )
-"""What is told of a motion and of each of its sides, eight bytes each: few arguments make a quick
-call. A call that is told to forget begins the worst anew, and clears that field: the calls after it
-go on. `run` writes how far it came.
+"""Fields of a motion and of each side, eight bytes each: few arguments make a call fast. If
+`forget` is set, a call restarts `worst` and clears the field, so later calls continue. `run` writes
+the number of samples it reached.
 """
 
 
 def follow(width: int) -> str:
-    """See `Track`: W samples at a time, and on from the last one accepted. Where nobody stays at
-    the end, no anchor is left there.
+    """Return the LLVM functions of `Track.follow`: W samples at a time, on from the last accepted
+    one. An anchor remains at the end only if the motion stays there.
 
-    What is extrapolated begins at a multiple of W: the group after one that was accepted whole ends
-    there. Of few lanes several such groups come before it.
+    Extrapolated groups begin at a multiple of W: the group after a fully accepted one ends there.
+    With few lanes, several such groups must precede.
     """
     vector, test = f"<{width} x double>", Lines(width, "test")
     accepted = test.let(f"fcmp ogt {vector} {test.read('%plan_margin')}, zeroinitializer")
@@ -150,7 +150,7 @@ declare i64 @llvm.smax.i64(i64, i64)
 
 
 def _run() -> str:
-    """Follow every side from the start to its end; how many of them ended early."""
+    """Return the function that follows every side and counts the sides that end early."""
     return f"""define i64 @run(ptr %plan, ptr %motion, ptr %table) {{
 entry:
   {_told("motion", MOTION)}
@@ -179,7 +179,7 @@ end:
 
 
 def _told(name: str, told: Sequence[str]) -> str:
-    """Read what stands at an address, each under its own name."""
+    """Return lines that read the fields of a struct, each under its own name."""
     lines = Lines(0, f"{name}_")
     for k, (kind, field) in enumerate(each.split() for each in told):
         lines.lines.append(f"%{field} = load {kind}, ptr {lines.number(f'%{name}', k)}, align 8")
@@ -191,9 +191,10 @@ def _index(told: Sequence[str], name: str) -> int:
 
 
 def _worst(width: int) -> str:
-    """The largest of slots, times a sign, over the lanes that are kept: in vectors until the end.
+    """Return functions for the largest of slots, times a sign, over accepted lanes; vectors until
+    the end.
 
-    Functions that begin, take account of a group, and put the largest where it is found.
+    They begin, update by a group, and write the largest to its place.
     """
     begin, update, end = (Rows(width) for _ in range(3))
     vector, words = begin.vector, f"<{width} x i64>"

@@ -1,10 +1,10 @@
-"""In which order machine code goes through a program: first what most of the rest waits for.
+"""Order of the operations in machine code: first those with the longest chain of dependent
+operations.
 
-A processor begins several operations in each cycle, but looks only a few hundred ahead for those
-that need not wait. The pivots of an elimination wait for one another, each for a division. What
-else a program has to do belongs between them; it is traced before them, or after. This is list
-scheduling by the longest way to the end (Hu, Parallel sequencing and assembly line problems,
-Operations Research 9, 1961).
+A processor begins several operations per cycle, but looks only a few hundred ahead for ready ones.
+The pivots of an elimination form a chain, each with a division. The other operations of a program
+belong between them, but are traced before or after. The method is list scheduling by the longest
+path to the end (Hu, Parallel sequencing and assembly line problems, Operations Research 9, 1961).
 """
 
 from __future__ import annotations
@@ -15,22 +15,20 @@ from ..straight_line import Program
 from ..tape import LEAVES, operands
 
 CYCLES = {"/": 24, "sqrt": 32, "larger": 5, "before": 3, "umax": 3, "where": 1, "abs": 1, "neg": 1}
-"""After how many cycles a result is there, of vectors of eight on Intel's Golden Cove (uops.info);
-of all others after four.
+"""Latency [cycles] on vectors of eight on Intel's Golden Cove (uops.info); `OTHERS` for all other
+operations.
 """
 OTHERS = 4
 AT_ONCE = 2
 """Operations on such vectors that begin in one cycle."""
 PART = 0.65
-"""Of the time that all operations take. Programs that wait for less gain little, and lose more:
-much is computed too early.
+"""Threshold of the critical path, relative to the time of all operations. Programs with a shorter
+path gain little and lose more: many values are computed too early.
 """
 
 
 def ordered(program: Program) -> Program:
-    """The same program, where its operations wait for one another for much of the time; others are
-    left as they are.
-    """
+    """Return the same program, rescheduled if its critical path dominates; else unchanged."""
     nodes = program.nodes
     reads = [operands(node) for node in nodes]
     cycles = [0 if node[0] in LEAVES else CYCLES.get(node[0], OTHERS) for node in nodes]

@@ -1,5 +1,5 @@
-"""A plan in memory, as the loops over lanes read it: whole numbers of eight bytes each, and the
-addresses of tables of such.
+"""Memory layout of a plan for the loops over lanes: integers of eight bytes, and addresses of
+tables.
 """
 
 from __future__ import annotations
@@ -18,11 +18,12 @@ from .ir_writer import Lines
 SLOTS = {"residual": "residual", "iterations": ITERATIONS, "done": DONE, "margin": MARGIN}
 """Slots that loops read and write, by their names in the plan."""
 NUMBERS = ("stride", *SLOTS, "tolerance", "most", "behind", "quick", "past", "state")
-"""Slots and what decides how the loops go; "stride" is in slots, from one group of lanes to the
-next, and "state" is how many slots are remembered. Where nothing is extrapolated "behind" is
-zero."""
+"""Slots and control numbers of the loops; "stride" is the number of slots between groups of lanes,
+and "state" the number of remembered slots. "behind" is zero without extrapolation.
+"""
 PROGRAMS = ("newton", "predict", "extrapolate", "extend")
-"""Each the address of a call: that of a function of lanes and a table, and that of the table."""
+"""Addresses of calls: each holds the address of a function of lanes and a table, and of the table.
+"""
 CALLS = ("after", "alone", "joined", "onward", "remaining")
 PAIRS = ("carried", "returned", "moves", "continued", "remembered", "shifted")
 TABLES: Mapping[str, int] = {
@@ -30,21 +31,20 @@ TABLES: Mapping[str, int] = {
     **dict.fromkeys(PAIRS, 2),
     **dict.fromkeys(("targets", "sampled", "kept", "fixed", "taken"), 1),
     "left": 2,
-    "worst": 3,  # a slot, 1 or -1 where the smallest is wanted, and where to begin
+    "worst": 3,  # # slot; 1, or -1 for the smallest; start value
 }
-"""Columns of each. A table takes two numbers of the plan: its address, and how many rows it has."""
+"""Columns of each table. A table takes two numbers of the plan: its address and its number of rows.
+"""
 PAGE = 64
 """Slots of vectors of eight numbers in a page of memory."""
 TOGETHER = 4
-"""Pairs of slots that are copied at a time; the last of a table is repeated until it has so
-many.
-"""
+"""Pairs of slots copied at a time; the last pair of a table is repeated to a multiple of this."""
 FIELDS = [*NUMBERS, *PROGRAMS, *(field for name in TABLES for field in (name, f"{name}_count"))]
 
 
 def function(head: str, body: str) -> str:
-    """A function that is told of a plan: fields that its body names, "plan_" before each, are read
-    at its begin.
+    """Return a function of a plan: the fields that its body names as "%plan_..." are read at its
+    entry.
     """
     named, lines = set(re.findall(r"%plan_(\w+)", body)), Lines(0, "plan")
     for k, name in enumerate(FIELDS):
@@ -68,7 +68,7 @@ entry:
 
 
 def call(prefix: str, program: str) -> str:
-    """Call a program, given the address of its call."""
+    """Return lines that call a program, given the address of its call."""
     lines = Lines(0, f"{prefix}_call")
     function = lines.let(f"load ptr, ptr {program}, align 8")
     table = lines.let(f"load ptr, ptr {lines.number(program, 1)}, align 8")
@@ -77,24 +77,25 @@ def call(prefix: str, program: str) -> str:
 
 
 class Rows(Lines):
-    """A loop over the rows of a table: its lines are those of one row, or of a few."""
+    """A loop over the rows of a table; its lines are those of one row, or of `step` rows."""
 
     def __init__(self, width: int, step: int = 1) -> None:
         super().__init__(width, "r")
         self._step, self.at = step, "%row"
 
     def entry(self, column: int = 0, columns: int = 1, kind: str = "i64") -> str:
-        """A number of the row."""
+        """Return a number of the row."""
         at = self.sum(self.product(self.at, columns), column)
         return self.let(f"load {kind}, ptr {self.number('%table', at)}, align 8")
 
     def slot(self, number: str | int) -> str:
-        """Where a slot stands, of which a table says how many bytes that is from the lanes."""
+        """Return the address of a slot, given its byte offset from the lanes."""
         return self.let(f"getelementptr i8, ptr %lane, i64 {number}")
 
     def function(self, name: str, *arguments: str) -> str:
-        """A function that does this for the lanes and a table."""
-        return f"""define internal void @{name}({", ".join(("ptr %lane, ptr %table, i64 %count", *arguments))}) {{
+        """Return the loop as a function of lanes and a table."""
+        head = ", ".join(("ptr %lane, ptr %table, i64 %count", *arguments))
+        return f"""define internal void @{name}({head}) {{
 entry:
   %any = icmp ne i64 %count, 0
   br i1 %any, label %loop, label %end
@@ -111,15 +112,13 @@ end:
 
 
 def over(name: str, table: str, *arguments: str) -> str:
-    """Call such a function for a table of the plan."""
-    return (
-        "call void"
-        f" @{name}({', '.join((f'ptr %lane, ptr %plan_{table}, i64 %plan_{table}_count', *arguments))})"
-    )
+    """Return a call of such a function for a table of the plan."""
+    rows_of = f"ptr %lane, ptr %plan_{table}, i64 %plan_{table}_count"
+    return f"call void @{name}({', '.join((rows_of, *arguments))})"
 
 
 def rows(width: int) -> str:
-    """What is done with slots that tables name, and the programs called that they list."""
+    """Return functions on slots of a table, and the function that calls the programs of a table."""
     vector = f"<{width} x double>"
     calls, give, take, keep, put, worsen = (Rows(width) for _ in range(6))
     copy, spread = Rows(width, TOGETHER), Rows(width, TOGETHER)
@@ -168,13 +167,13 @@ def rows(width: int) -> str:
 
 
 class PlanInMemory:
-    """A plan as functions read it: see `function`.
+    """A plan in memory; see `function`.
 
     Attributes:
-        address: where it stands.
+        address: address of the plan.
         calls: by program, its row of `entries`.
-        entries: the addresses of a function of lanes and a table, and of the table; they may be
-            changed while programs run.
+        entries: the addresses of a function of lanes and a table, and of the table; they may change
+            while programs run.
     """
 
     def __init__(self, plan: Plan, width: int, stride: int) -> None:
@@ -232,17 +231,16 @@ class PlanInMemory:
         self.address: int = self._words.ctypes.data
 
     def entry(self, name: str) -> int:
-        """The address of the call of a program."""
+        """Return the address of the call of a program."""
         return self.entries.ctypes.data + 16 * self.calls[name]
 
 
 def in_order(pairs: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
-    """Slots that are carried, in an order in which no slot is read soon after one was written that
-    is a page away, or several.
+    """Return slot pairs in an order without a read soon after a write a whole number of pages away.
 
-    Processors take that for the same place at first, and wait: a twentieth of a sweep. Slots that
-    move by up to half a page go upwards, the others downwards. What stays where it is is left out,
-    and a slot that is read and written is read first.
+    Processors first take both for the same address, and wait: a twentieth of a sweep. Slots that
+    move by up to half a page go upwards, the others downwards. Unmoved slots are left out; a slot
+    that is both source and target is read first.
     """
     targets = {target for _, target in pairs}
     first = [pair for pair in pairs if pair[0] in targets and pair[0] != pair[1]]

@@ -10,19 +10,18 @@ from ..tape import LEAVES, Node, operands, place_of
 from .ir_writer import Lines
 from .ordering import ordered
 
-# Values held at once, of 32 registers: LLVM's own schedule moves lines about. With 16, narrower
-# vectors, LLVM does as well alone.
+# # Values held at once, of 32 registers: LLVM's own schedule moves lines. With 16 registers and
+# narrower vectors, LLVM alone does as well.
 HELD, WIDE = 24, 8
-# So many more lines for each node, to put values away and fetch them, cost as much as waiting for
-# divisions does.
+# # Spill and reload lines per node that cost as much as waiting for divisions.
 PUT_AWAY = 0.4
 
 
 def function(program: Program, width: int) -> str:
-    """A program as a function of its W lanes.
+    """Return a program as a function of its W lanes.
 
-    In the order in which it waits least, where there are registers for that: with 16 it takes up to
-    half as long again.
+    The order with the shortest waits is used if 32 registers allow it: with 16 it takes up to half
+    as long again.
     """
     program = lowered(program)
     if program.times > 1:
@@ -39,7 +38,7 @@ def function(program: Program, width: int) -> str:
 
 
 def _repeated(program: Program, width: int) -> str:
-    """A program that is run several times, as a loop that keeps the largest of each output."""
+    """Return a repeated program as a loop that keeps the largest of each output."""
     body, end = Lines(width, lane="%here"), Lines(width, "e")
     values = list[str]()
     for node in program.nodes:
@@ -78,11 +77,11 @@ end:
 
 
 class _Straight(Lines):
-    """The lines of a program that holds no more values at once than there are registers for.
+    """Lines of a program that holds no more values at once than there are registers.
 
-    What is too much goes to memory: that which is used again last (Belady 1966), inputs to where
-    they came from. Left to itself, LLVM's allocator takes as long for that as all else together,
-    and its code is a few percent slower.
+    Excess values are spilled: first the one with the farthest next use (Belady 1966); inputs are
+    reloaded from their slots. Without this LLVM's allocator takes as long as all other passes
+    together, and its code is a few percent slower.
     """
 
     def __init__(self, program: Program, width: int) -> None:
@@ -111,16 +110,14 @@ class _Straight(Lines):
             self._hold(number, result, ())
 
     def _write_all(self, writes: Sequence[tuple[int, int]]) -> None:
-        """Write slots; all that stands in slots is read before."""
+        """Write slots; all reads of old values come first."""
         values = [(slot, self._held.get(k) or self._fetched(k, ())) for slot, k in writes]
         for slot, value in values:
             self.write(slot, value)
         self._used(k for _, k in writes)
 
     def _fetched(self, k: int, wanted: Sequence[int]) -> str:
-        """The name of a value that is not held; for it, none of those wanted with it is given
-        up.
-        """
+        """Return the name of a value loaded again; no operand in `wanted` is spilled for it."""
         node = self._nodes[k]
         if node[0] == "const":
             return self.constant(float(node[1]))
@@ -150,7 +147,7 @@ class _Straight(Lines):
         self._held[k] = name
 
     def _used(self, values: Iterable[int]) -> None:
-        """What will not be used again needs no place any more."""
+        """Release the places of values without a further use."""
         for k in values:
             due = self._due[k]
             due.pop()
@@ -164,10 +161,10 @@ class _Straight(Lines):
 
 
 def _uses(program: Program) -> tuple[list[list[int]], dict[int, list[tuple[int, int]]]]:
-    """By value, the operations that use it, the first one last; by operation, the slots written
-    after it, with their values.
+    """Return the users of each value, the first one last, and the slot writes after each operation,
+    with their values.
 
-    A slot is written as soon as its value is there and nothing is to read what stood in it before.
+    A slot is written as soon as its value exists and its old value has no further reader.
     """
     nodes, end = program.nodes, len(program.nodes)
     due: list[list[int]] = [[] for _ in nodes]
@@ -183,8 +180,7 @@ def _uses(program: Program) -> tuple[list[list[int]], dict[int, list[tuple[int, 
         for slot, k in program.outputs.items()
         if nodes[k][0] in ("input", "node")
     }
-    # what stands in a slot is put out where it is used last anyway, if nobody reads what it
-    # overwrites
+    # # an input with another slot as output is written at its last use, if its target has no reader
     read = last_read.keys() | stands.values()
     early = {slot for slot in stands if due[program.outputs[slot]] and slot not in read}
     last_read |= {source: end for slot, source in stands.items() if slot not in early}

@@ -1,4 +1,4 @@
-"""Taking the numbers of many lanes into a few totals as LLVM code."""
+"""Reduction of the numbers of many lanes to a few totals as LLVM code."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from .plan import function, over
 
 
 def fold(width: int) -> str:
-    """See `Executor.fold`: totals stay in the nearest cache, and what they are made of is read
+    """Return the LLVM function of `Executor.fold`: totals stay in the L1 cache, inputs are read
     once.
     """
     body = f"""%all = mul i64 %columns, {width}

@@ -1,6 +1,4 @@
-"""Diagnosis: what can be said of a case before and beside its results; why it cannot be solved, or
-how well.
-"""
+"""Diagnosis of a case: why it cannot be solved, or how well conditioned it is."""
 
 from .diagnose import Diagnosis, diagnose
 

@@ -1,5 +1,5 @@
-"""The diagnosis of a case: freedom and rank by name, conditioning along the sweep, what its outputs
-depend on.
+"""Diagnosis of a case: freedom and rank by name, conditioning along the
+sweep, output sensitivities.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import numpy as np
 from ...case.case import MARKER, ORDERS, Case
 from ...case.notes import notes
 from ...errors import SolveError, shortened
+from ...harness.program_account import explain
 from ...kinematics.diagnosis.conditioning import Conditioning, conditioning
 from ...kinematics.diagnosis.instantaneous_screws import Screw, described
 from ...kinematics.diagnosis.rank import (
@@ -21,7 +22,6 @@ from ...kinematics.diagnosis.rank import (
     Violation,
 )
 from ...kinematics.formulation.parameters import places
-from ..explain import explain
 from .outputs import Budget, Sensitivity, binding, budgets, read_points, sensitivities
 
 SCHEMA = "kincheck-explain/1"
@@ -39,18 +39,14 @@ class Freedom(msgspec.Struct, frozen=True):
 
 
 class Nearly(msgspec.Struct, frozen=True):
-    """Rows of which a combination nearly vanishes: its size, which is a singular value of the joint
-    rows.
-    """
+    """Rows with a nearly vanishing combination; size: its singular value of the joint rows."""
 
     size: float
     rows: list[NamedRow]
 
 
 class Sample(msgspec.Struct, frozen=True):
-    """How well a pose of the sweep is determined; see `PoseConditioning`. condition is null where
-    it is singular.
-    """
+    """Conditioning of a pose of the sweep; see `PoseConditioning`. condition: null if singular."""
 
     value: float
     smallest: float
@@ -61,15 +57,14 @@ class Sample(msgspec.Struct, frozen=True):
 
 
 class Diagnosis(msgspec.Struct, frozen=True):
-    """All that is found. findings: why the case cannot be solved as described; empty where it can.
+    """The diagnosis. findings: why the case cannot be solved as described; empty where it can.
 
     Attributes:
-        notes: what is to be known of the joints' geometry.
+        notes: remarks on the joints' geometry.
         binding: numbers of the geometry that cannot be changed alone without contradiction.
-        signs: the convention of the outputs that have one, in words; empty without.
-        not_derived: outputs that are not functions of the pose alone, and have no budget and
-            sensitivities.
-        programs: what the native engine computes, and leaves out, in lines to read.
+        signs: sign conventions of the outputs; empty without.
+        not_derived: outputs that depend on more than the pose, without budget and sensitivities.
+        programs: lines on the native engine's programs and the parts left out.
     """
 
     schema: str
@@ -101,11 +96,11 @@ class Diagnosis(msgspec.Struct, frozen=True):
 
 
 def diagnose(case: Case, *, samples: int, tol: float) -> Diagnosis:
-    """Diagnose a case; one that cannot be solved is diagnosed as far as it goes.
+    """Diagnose a case, as far as possible if it cannot be solved.
 
     Args:
-        samples: of the sweep to look at.
-        tol: residuals that engines leave, relative to the mechanism's size.
+        samples: number of samples of the sweep to examine.
+        tol: residuals left by engines, relative to the mechanism's size.
 
     Raises:
         SolveError: no body can move.
@@ -188,7 +183,7 @@ def _samples(swept: Conditioning) -> list[Sample]:
 
 
 def _findings(ranks: Ranks) -> list[str]:
-    """Why the mechanism cannot be solved as described."""
+    """Return why the mechanism cannot be solved as described."""
     found: list[str] = []
     count, drivers = ranks.account.dof, len(ranks.mechanism.drivers)
     if ranks.contradictions:

@@ -1,6 +1,4 @@
-"""What outputs depend on: residuals that solvers leave, hence the tolerance that makes sense, and
-hardpoints.
-"""
+"""Dependence of outputs on solvers' residuals, hence a sensible tolerance, and on hardpoints."""
 
 from __future__ import annotations
 
@@ -15,7 +13,8 @@ from ...algebra import Vec3, vec
 from ...case.case import ORDERS, Case, Quantity
 from ...jet import Jet
 from ...joints import Kind
-from ...kinematics.diagnosis.conditioning import Conditioning, Gradient, PoseConditioning
+from ...kinematics.diagnosis.conditioning import Conditioning, PoseConditioning
+from ...kinematics.diagnosis.position_gradients import Gradient
 from ...kinematics.formulation.parameters import kinds
 from ...trajectory import Array
 
@@ -28,15 +27,15 @@ ROUND_OFF = float(np.finfo(np.float64).eps)
 
 
 class Budget(msgspec.Struct, frozen=True):
-    """What residuals do to an output, and the tolerance that follows.
+    """Effect of residuals on an output, and the resulting tolerance.
 
     Attributes:
         shift: by residuals of the tolerance in every row, at most over the samples [unit].
         round_off: by residuals and a result rounded to double precision [unit].
         at: driver value of the largest shift.
-        row: the row with the largest share in it, and that share of the whole.
+        row: the row with the largest share of the shift; share: its share.
         suggested: tolerance by the house formula [unit].
-        atol: the case's.
+        atol: tolerance of the case.
     """
 
     output: str
@@ -56,8 +55,8 @@ class Sensitivity(msgspec.Struct, frozen=True):
 
     Attributes:
         number: "joints.NAME.point x", "joints.NAME.length".
-        unit: the output's unit by m, or by rad where the place is a direction.
-        by_sample: at the samples that were looked at.
+        unit: the output's unit by m, or by rad for a direction.
+        by_sample: at the examined samples.
     """
 
     output: str
@@ -72,7 +71,7 @@ class Sensitivity(msgspec.Struct, frozen=True):
 
 
 def budgets(case: Case, found: Conditioning, tol: float, design: dict[str, Array]) -> list[Budget]:
-    """The budget of every output that is a function of the pose alone."""
+    """Return the budget of every output that is a function of the pose alone."""
     return [
         _budget(output, found, tol, design) for output in case.outputs if output.orders == ORDERS
     ]
@@ -111,7 +110,7 @@ def _budget(output: Quantity, found: Conditioning, tol: float, design: dict[str,
 
 
 def sensitivities(case: Case, found: Conditioning, design: dict[str, Array]) -> list[Sensitivity]:
-    """The derivatives that are not zero throughout, the largest of each output first."""
+    """Return the nonzero derivatives, the largest of each output first."""
     scales = np.array([scale for _, _, scale in found.numbers])
     names, turning = (
         _names(found),
@@ -134,7 +133,7 @@ def sensitivities(case: Case, found: Conditioning, design: dict[str, Array]) -> 
 
 
 def binding(found: Conditioning) -> list[str]:
-    """The numbers of the geometry that cannot be changed alone: redundant rows would then
+    """Return the numbers of the geometry that cannot be changed alone: redundant rows would then
     contradict the others.
     """
     contradicted = np.max(
@@ -144,7 +143,7 @@ def binding(found: Conditioning) -> list[str]:
 
 
 def _names(found: Conditioning) -> list[str]:
-    """The numbers of the geometry by name; a length has no components."""
+    """Return the names of the geometry's numbers; a length has no components."""
     count = Counter(place for place, _, _ in found.numbers)
     return [
         place if count[place] == 1 else f"{place} {'xyz'[component]}"
@@ -155,7 +154,7 @@ def _names(found: Conditioning) -> list[str]:
 def _derivative(
     output: Quantity, pose: PoseConditioning, design: dict[str, Array], by: str
 ) -> tuple[Array, Array]:
-    """Value and derivatives of an output by what its points move by."""
+    """Return value and derivatives of an output from the derivatives of its points."""
     at = {
         name: _jets(gradient.position, getattr(gradient, by))
         for name, gradient in pose.points.items()
@@ -166,7 +165,7 @@ def _derivative(
 
 
 def _design(gradient: Gradient, position: Array, by: str) -> Vec3:
-    """Where a point is at design: residuals do not shift it, hardpoints do."""
+    """Return a point at design: hardpoints shift it, residuals do not."""
     moved = (
         gradient.design_by_geometry if by == "by_geometry" else np.zeros_like(gradient.by_residuals)
     )
@@ -174,7 +173,7 @@ def _design(gradient: Gradient, position: Array, by: str) -> Vec3:
 
 
 def _jets(position: Array, derivatives: Array) -> Vec3:
-    """A position as jets, what it is derived by in the place of time."""
+    """Return a position as jets, with derivatives in place of time derivatives."""
     return vec(
         [
             Jet(np.full_like(d, x), d, np.zeros_like(d))
@@ -184,7 +183,7 @@ def _jets(position: Array, derivatives: Array) -> Vec3:
 
 
 def _two_digits(x: float) -> float:
-    """Rounded up to two digits."""
+    """Return a number rounded up to two digits."""
     if not (x > 0.0 and math.isfinite(x)):
         return x
     digit = 10.0 ** (math.floor(math.log10(x)) - 1)
@@ -192,7 +191,7 @@ def _two_digits(x: float) -> float:
 
 
 def read_points(case: Case) -> Sequence[str]:
-    """The points that outputs which are functions of the pose read."""
+    """Return the points read by outputs that are functions of the pose."""
     return tuple(
         dict.fromkeys(
             point for output in case.outputs if output.orders == ORDERS for point in output.points

@@ -14,12 +14,12 @@ from ...kinematics.diagnosis.rank import NamedRow
 from ...report.terminal import columns, listed
 from .diagnose import Diagnosis, Sample
 
-# Lines of tables that are only to show where to look; the JSON has all.
+# Rows of tables, which only show where to look; the JSON has all.
 SAMPLES, PLACES, TERMS = 9, 5, 6
 
 
 def print_diagnosis(found: Diagnosis, console: Console) -> None:
-    """Print all of it: findings first."""
+    """Print the diagnosis, findings first."""
     for each in _parts(found):
         console.print(each, soft_wrap=isinstance(each, Text))
 

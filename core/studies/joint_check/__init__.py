@@ -1,1 +1,1 @@
-"""Checking a joint type: the battery behind `kincheck check-joint`."""
+"""The checks of a joint type behind `kincheck check-joint`."""

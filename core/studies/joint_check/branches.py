@@ -1,9 +1,9 @@
-"""Where Newton's iteration ends from anywhere: on the intended branch of a joint's zeros, on
-another that its branch tests name, or on another that they do not.
+"""The branches reached by Newton's iteration from random poses: the intended branch of a joint's
+zeros, another one refused by its branch tests, or another one that they accept.
 
 A pose is on the intended branch if small steps over the manifold lead from it to the design, or to
-a pose to which small steps lead from there. No step crosses a pose where the rows are nearly
-dependent: there branches meet.
+a pose reached by small steps from the design. No step crosses a pose with nearly dependent rows:
+branches meet there.
 """
 
 from __future__ import annotations
@@ -22,18 +22,21 @@ ITERATIONS = 60
 # Body i stays at design; body j and the joint's coordinates move.
 MOVING = slice(COLUMNS, None)
 SHIFT, TURN = slice(7, 10), slice(10, POSES)
-# Walks from the design, which pass through the poses that others are led to.
+# Walks from the design; their poses are the aims of the other walks.
 WALKS, STRIDES = 48, 24
-# Steps at a time, how many times at most, and the progress in all below which they lead nowhere.
+# Steps of a leg, largest number of legs, and the smallest progress of a leg: with less, the walk is
+# abandoned.
 STRIDE, LEGS, PROGRESS = 6, 12, 0.2 * STEP
-# An aim may be out of reach by the straightest way and still on the branch: so many others are
-# tried.
+# A pose may be on the branch although the straight path to its aim is blocked: this number of
+# further aims is tried.
 AIMS = 24
 ARRIVED = STEP
 
 
 def branches(s: Specimen, starts: int) -> Iterator[Finding]:
-    """Newton with the declared rows from random poses of body j, and what became of each start."""
+    """Run Newton with the declared rows from random poses of body j, and yield the outcome
+    of all starts.
+    """
     t, rng = s.traced, s.rng
     state = design(t, starts)
     state[SHIFT] = rng.normal(size=(3, starts))
@@ -80,7 +83,7 @@ def branches(s: Specimen, starts: int) -> Iterator[Finding]:
 
 
 def connected(s: Specimen, state: Array) -> Mask:
-    """Whether each pose is on the intended branch."""
+    """Return whether each pose is on the intended branch."""
     t = s.traced
     directions = s.rng.normal(size=(t.columns, WALKS))
     directions[:COLUMNS] = 0.0
@@ -98,7 +101,7 @@ def connected(s: Specimen, state: Array) -> Mask:
 
 
 def _led(t: TracedJoint, state: Array, aim: Array) -> Mask:
-    """Whether small steps over the manifold lead from each pose to its aim."""
+    """Return whether small steps over the manifold lead from each pose to its aim."""
     there, state = np.zeros(state.shape[1], dtype=bool), state.copy()
     waiting = np.flatnonzero(~there)
     for _ in range(LEGS):
@@ -120,8 +123,8 @@ def _led(t: TracedJoint, state: Array, aim: Array) -> Mask:
 
 
 def difference(t: TracedJoint, state: Array, aim: Array) -> Array:
-    """The step of body j and of the coordinates from a state to an aim, its rotation by its sine,
-    shape (columns, lanes).
+    """Return the step of body j and of the coordinates from a state to an aim, its rotation by its
+    sine, shape (columns, lanes).
     """
     step = np.zeros((t.columns, state.shape[1]))
     a0, a, b0, b = aim[10], aim[11:14], state[10], state[11:14]
@@ -134,7 +137,7 @@ def difference(t: TracedJoint, state: Array, aim: Array) -> Array:
 
 
 def _distances(state: Array, known: Array) -> Array:
-    """Squared, by pose and known pose."""
+    """Return the squared distances by pose and known pose."""
     a, b = state[:, :, None], known[:, None, :]
     cosine = (a[10:14] * b[10:14]).sum(axis=0)
     return np.asarray(

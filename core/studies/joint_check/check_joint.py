@@ -1,5 +1,4 @@
-"""Check a joint type: everything that can be found out about a Joint class without knowing what it
-is.
+"""Examination of a Joint class, without knowledge of its meaning.
 
     from kincheck.core import check_joint
 
@@ -7,15 +6,15 @@ is.
         report = check_joint(MyJoint)
         assert report.passed, report
 
-Each check is a row of the report: the worst number found, the limit and its reason, where it was
-found. What cannot be checked is a row too. A class may offer two things of its own:
+Each check is a row of the report: the worst number found, the limit with its reason, the place. A
+check that cannot run is a row too. A class may offer two methods of its own:
 
     @classmethod
-    def specimens(cls) -> list[Self]          joints to examine, where random geometry of the fields' kinds does not do
+    def specimens(cls) -> list[Self]
+        joints to examine, if random geometry by the kinds of the fields does not fit
     def equivalent(self) -> tuple[list[Body], list[Joint]]
-                                              further bodies and known joints that do between self.i
-                                              and self.j what this joint does: with them simulators
-                                              that do not know the joint can be compared with it
+        further bodies and known joints with the same effect between self.i and self.j;
+        simulators that do not know the joint are compared on them
 """
 
 from __future__ import annotations
@@ -30,25 +29,24 @@ import numpy as np
 from ...harness.engine import Engine
 from ...joints import Joint
 from . import specimens as joint_specimens
+from .arithmetic import cost, round_off
 from .branches import branches
 from .checks import (
     Specimen,
     composition,
     convergence,
-    cost,
     derivatives,
     freedoms,
     intended_branch,
     right_sides,
-    round_off,
     specimen,
 )
 from .findings import Finding, Report, Verdict
 from .loop import loops
 from .variants import axis_lengths, exchange, named_coordinates, rigid_motion, size_and_place
 
-# Random specimens of a class that offers none, poses of each, and starts of Newton's iteration of
-# the first.
+# Number of random specimens of a class that offers none, poses of each specimen, and starts of
+# Newton's iteration for the first specimen.
 SPECIMENS, POSES, STARTS = 3, 32, 150
 
 Check = Callable[[Specimen], Iterator[Finding]]
@@ -70,9 +68,9 @@ VARIANTS: Mapping[Check, tuple[str, ...]] = {
     size_and_place: ("size", "place"),
     named_coordinates: ("mixed style",),
 }
-"""With the names of their findings."""
-# What a variant is judged by: where the joint's own equations fail there, it fails too and says
-# nothing new.
+"""Each check of a variant, with the names of its findings."""
+# Checks of the joint's own equations that every variant repeats: if one fails, the variants fail
+# too and add no information.
 FIRST = ("rank", "rows", "nu", "gamma")
 
 
@@ -87,10 +85,10 @@ def check_joint(
     """Examine a joint type.
 
     Args:
-        specimens: joints of the type to examine; otherwise those the class offers, or random ones.
-        samples: poses of each specimen.
-        seed: of all random numbers.
-        engines: to solve a small closed loop with the joint, beside the native one.
+        specimens: joints of the type to examine; by default those the class offers, or random ones.
+        samples: number of poses of each specimen.
+        seed: seed of all random numbers.
+        engines: engines for a small closed loop with the joint, beside the native one.
 
     Raises:
         SpecimenError: no specimen can be made.
@@ -121,12 +119,12 @@ def check_joint(
 
 
 def _examined(joint: Joint, number: int, samples: int, seed: list[int]) -> Iterator[Finding]:
-    """All findings of one specimen."""
+    """Yield all findings of one specimen."""
     rng = np.random.default_rng(seed)
     try:
         joint = joint_specimens.between(joint)
         one = specimen(joint, joint_specimens.place(joint, rng), samples, rng)
-    except Exception as error:  # whatever the joint's own code raises; said in full, with its place
+    except Exception as error:  # any error of the joint's own code, reported with its line
         remedy = (
             "an equation is made of + - * / over any scalar, and of the functions of"
             " kincheck.core.program"
@@ -140,7 +138,7 @@ def _examined(joint: Joint, number: int, samples: int, seed: list[int]) -> Itera
     found = [each for examine in EQUATIONS for each in _made(examine, one)]
     failing = [each.check for each in found if each.check in FIRST and each.verdict is Verdict.FAIL]
     for examine, names in VARIANTS.items():
-        # an axis that is not unit is often why the others fail
+        # an axis that is not a unit vector is often the reason of the other failures
         if failing and examine is not axis_lengths:
             found += [
                 Finding(name, Verdict.SKIP, message=f"first repair {', '.join(failing)}")
@@ -154,14 +152,14 @@ def _examined(joint: Joint, number: int, samples: int, seed: list[int]) -> Itera
 
 
 def _made(examine: Check, one: Specimen) -> list[Finding]:
-    """The findings of a check; where the joint's own code raises, that is the finding."""
+    """Return the findings of a check; an error of the joint's own code becomes the finding."""
     try:
         return list(examine(one))
-    except Exception as error:  # whatever the joint's own code raises
+    except Exception as error:  # any error of the joint's own code
         return [Finding(examine.__name__.replace("_", " "), Verdict.FAIL, message=_told(error))]
 
 
 def _told(error: Exception) -> str:
-    """An error with the line that raised it."""
+    """Return the text of an error with the line that raised it."""
     where = traceback.extract_tb(error.__traceback__)[-1]
     return f"{type(error).__name__}: {error} (in {where.name}: {where.line})"

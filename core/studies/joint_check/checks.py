@@ -1,9 +1,9 @@
-"""The checks of a joint's equations: each a function of one specimen that gives its findings.
+"""Checks of a joint's equations, each a function of one specimen that yields its findings.
 
-Poses are reached from the design by small steps over the manifold, so they are on the intended
-branch; motions through them have random admissible velocities and accelerations, from the exact
-derivatives of phi alone. Nothing the joint says of itself (rows, nu, gamma, branch) takes part in
-making them.
+Small steps over the manifold lead from the design to the poses, so the poses are on the
+intended branch. Motions through them have random admissible velocities and accelerations, from
+exact derivatives of phi alone. The joint's own statements (rows, nu, gamma, branch) take no
+part in either.
 """
 
 from __future__ import annotations
@@ -15,22 +15,20 @@ from typing import Any
 import numpy as np
 
 from ...joints import AxialJoint, Joint
-from ...kinematics.formulation.constraints import Style
 from ...trajectory import Array
 from .findings import Finding, Verdict, judged
 from .manifold import design, min_norm, newton, rank, smallest, straight, walk
-from .scalars import execute, precise
 from .traced import Place, TracedJoint
 
-# Twelve steps of this length [rad, or units of the joint's size] leave the design far behind.
+# Twelve steps of this length [rad, or units of the joint's size] lead far from the design.
 STEP, STEPS = 0.15, 12
-# After so many of them any joint must still be within its reach.
+# Any joint must still be within its reach after this number of steps.
 NEAR = 2
 # Sums of some thirty products of numbers of size one, each rounded at 1e-16.
 ROUND_OFF = 1e-13
 ROUND_OFF_WHY = "round-off of sums of numbers of size one"
-# The same, divided by the smallest singular value that poses may have (a twentieth of that at
-# design), and once more.
+# ROUND_OFF over the smallest singular value of accepted poses (a twentieth of the value at design),
+# and the same factor once more.
 AMPLIFIED = 1e-10
 AMPLIFIED_WHY = "round-off over the smallest singular value, x100"
 DIFFERENCE_WHY = "truncation and round-off of differences at step 0.01 (1e-13), x1e4"
@@ -39,13 +37,13 @@ NEWTON_WHY = "quadratic from 1e-3: 3 passes; 2 more where an exact row is made u
 
 @dataclass(frozen=True, eq=False)
 class Specimen:
-    """A joint, its equations, and motions that it admits.
+    """A joint, its equations and motions admitted by the joint.
 
     Attributes:
-        state: poses on the manifold, shape (size, lanes), as `TracedJoint` has them.
-        near: poses that were passed on the way, near the design.
-        rate, acceleration: of an admissible motion through each, shape (columns, lanes).
-        exact: the Jacobian of phi there, shape (lanes, rows, columns).
+        state: poses on the manifold, shape (size, lanes), in the layout of `TracedJoint`.
+        near: earlier poses of the walk, near the design.
+        rate, acceleration: an admissible motion through each pose, shape (columns, lanes).
+        exact: the Jacobian of phi at each pose, shape (lanes, rows, columns).
     """
 
     joint: Joint
@@ -65,10 +63,10 @@ class Specimen:
 
 
 def specimen(joint: Joint, place: Place, lanes: int, rng: np.random.Generator) -> Specimen:
-    """The joint with that many poses and motions on its manifold.
+    """Return the joint with random poses and motions on its manifold, one of each a lane.
 
     Raises:
-        MechanismError, or what the joint's own code raises: its equations cannot be traced.
+        MechanismError, or any error of the joint's own code: the equations cannot be traced.
     """
     traced = TracedJoint(joint, place)
     directions = rng.normal(size=(traced.columns, lanes))
@@ -83,17 +81,19 @@ def specimen(joint: Joint, place: Place, lanes: int, rng: np.random.Generator) -
 
 
 def _along(jacobian: Array, wanted: Array) -> Array:
-    """The part of the wanted rates that the rows allow."""
+    """Return the part of the wanted rates admitted by the rows."""
     return wanted - min_norm(jacobian, times(jacobian, wanted))
 
 
 def times(jacobian: Array, rate: Array) -> Array:
-    """Rows times rates, (lanes, rows, columns) and (columns, lanes) -> (rows, lanes)."""
+    """Multiply rows by rates, shapes (lanes, rows, columns) and (columns,
+    lanes) -> (rows, lanes).
+    """
     return np.einsum("lmn,nl->ml", jacobian, rate)
 
 
 def composition(s: Specimen) -> Iterator[Finding]:
-    """phi at the design position, and whether all numbers are finite."""
+    """Check phi at the design position, and that all its numbers are finite."""
     remedy = (
         "phi must vanish at the design position: check the constants that primitives() makes of the"
         " geometry"
@@ -109,7 +109,7 @@ def composition(s: Specimen) -> Iterator[Finding]:
 
 
 def freedoms(s: Specimen) -> Iterator[Finding]:
-    """Rank of the rows, and what they leave of six freedoms against what the class says."""
+    """Check the rank of the rows, and 6 - rank against the freedoms named by the class."""
     found, t = rank(s.traced.rows(s.state)), s.traced
     apart = f"smallest singular value {smallest(s.exact).min():.2g}, rows of size one"
     lost = np.abs(len(t.names) - found)[None, :].astype(float)
@@ -153,8 +153,8 @@ def freedoms(s: Specimen) -> Iterator[Finding]:
 
 
 def derivatives(s: Specimen) -> Iterator[Finding]:
-    """The rows against the derivative of phi: the same row space; and the two ways to differentiate
-    against each other.
+    """Check the rows against the derivative of phi (same row space), and the two methods of
+    differentiation against each other.
     """
     t, declared = s.traced, s.traced.rows(s.state)
     entrywise = np.abs(declared - s.exact).max(axis=2).T
@@ -183,8 +183,8 @@ def derivatives(s: Specimen) -> Iterator[Finding]:
 
 
 def _outside(rows: Array, space: Array) -> Array:
-    """The part of each row (relative) that is no combination of the rows of the space, shape (rows,
-    lanes).
+    """Return the relative part of each row outside the row space of `space`,
+    shape (rows, lanes).
     """
     size = np.linalg.norm(rows, axis=2).T
     projected = np.stack(
@@ -196,7 +196,7 @@ def _outside(rows: Array, space: Array) -> Array:
 
 
 def right_sides(s: Specimen) -> Iterator[Finding]:
-    """rows . v = nu and rows . a = gamma along motions that phi admits."""
+    """Check rows . v = nu and rows . a = gamma along motions admitted by phi."""
     _, velocity, acceleration = defects(s.traced, s.state, s.rate, s.acceleration)
     names = s.traced.names
     yield judged(
@@ -217,11 +217,11 @@ def right_sides(s: Specimen) -> Iterator[Finding]:
 def defects(
     t: TracedJoint, state: Array, rate: Array, acceleration: Array, units: Any = 1.0
 ) -> tuple[Array, Array, Array]:
-    """How far a motion is from the equations: position, velocity, acceleration, by row and pose,
-    relative to the row's size.
+    """Return the defects of a motion in position, velocity and acceleration, by row and pose,
+    relative to the size of the row.
 
     Args:
-        units: of the columns of the equations in those of the rates, shape (columns, 1).
+        units: units of the equations' columns in those of the rates, shape (columns, 1).
     """
     jacobian = t.rows(state) * np.reshape(units, (1, 1, -1))
     size = np.linalg.norm(jacobian, axis=2).T
@@ -237,7 +237,7 @@ def defects(
 
 
 def convergence(s: Specimen) -> Iterator[Finding]:
-    """Newton's iteration with the declared rows, from a little off the manifold."""
+    """Check Newton's iteration with the declared rows, from poses a little off the manifold."""
     off = s.rng.normal(size=s.rate.shape)
     start = s.traced.retract(s.state, 1e-3 * off / np.linalg.norm(off, axis=0))
     _, taken = newton(s.traced, start, s.traced.rows, 20)
@@ -256,7 +256,7 @@ def convergence(s: Specimen) -> Iterator[Finding]:
 
 
 def intended_branch(s: Specimen) -> Iterator[Finding]:
-    """The branch tests where no branch was left."""
+    """Check that the branch tests accept poses of the intended branch."""
     tests = len(s.traced.programs["branch"].outputs)
     if not tests:
         yield Finding("branch tests", Verdict.PASS, message="none declared")
@@ -275,72 +275,4 @@ def intended_branch(s: Specimen) -> Iterator[Finding]:
         ["refused"],
         text,
         remedy,
-    )
-
-
-def cost(s: Specimen) -> Iterator[Finding]:
-    """Operations of the traced equations, beside those of the conventional form where there is
-    one.
-    """
-
-    def flops(t: TracedJoint) -> dict[str, int]:
-        return {name: t.programs[name].flops for name in ("phi", "rows", "gamma")}
-
-    own, other = flops(s.traced), _conventional(s)
-    text = ", ".join(f"{name} {count}" for name, count in own.items())
-    if other is not None:
-        text += "; in conventional form " + ", ".join(
-            f"{name} {count}" for name, count in flops(other).items()
-        )
-    yield Finding("operations", Verdict.PASS, float(sum(own.values())), message=f"flops {text}")
-
-
-def _conventional(s: Specimen) -> TracedJoint | None:
-    try:
-        return TracedJoint(s.joint, s.place, Style.CONVENTIONAL)
-    except KeyError:  # a primitive of the user's own has no twin there
-        return None
-
-
-def round_off(s: Specimen) -> Iterator[Finding]:
-    """Rounding errors: the same operations with 40 digits, at the poses and very near the
-    design.
-    """
-    try:
-        kind, lift = precise(40)
-    except ModuleNotFoundError:
-        yield Finding(
-            "round-off", Verdict.SKIP, message="mpmath is not installed: pip install mpmath"
-        )
-        return
-
-    def error(t: TracedJoint, state: Array) -> Array:
-        true = execute(t.programs["phi"], kind, lift(state), lift)
-        return np.abs(
-            np.array(
-                [
-                    np.broadcast_to(lift(a) - b, state.shape[1:])
-                    for a, b in zip(t.phi(state), true, strict=True)
-                ]
-            ).astype(float)
-        )
-
-    few = s.state[:, :8]
-    tiny = 1e-8
-    near = s.traced.retract(design(s.traced, 8), tiny * s.rng.normal(size=(s.traced.columns, 8)))
-    lost = {"here": error(s.traced, near).max() / tiny}
-    other = _conventional(s) if not s.traced.coordinates else None
-    if other is not None:
-        lost["in conventional form"] = error(other, near).max() / tiny
-    text = f"of a displacement of {tiny:g} from the design phi loses " + ", ".join(
-        f"{x:.1g} {where}" for where, x in lost.items()
-    )
-    yield judged(
-        "round-off",
-        error(s.traced, few),
-        ROUND_OFF,
-        ROUND_OFF_WHY,
-        s.traced.names,
-        text,
-        "a difference of large numbers is formed: start from what changed",
     )

@@ -1,4 +1,4 @@
-"""What a check of a joint type found, as data and as a table."""
+"""Findings of the checks of a joint type, as data and as a table."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ...trajectory import Array
 
 
 class Verdict(StrEnum):
-    """What became of a check. A check that was not made is a row with its reason."""
+    """The outcome of a check. A check that was not run is a row with its reason."""
 
     PASS = "pass"
     FAIL = "fail"
@@ -28,13 +28,13 @@ class Finding:
     """One check.
 
     Attributes:
-        figure: the worst number found, and `limit` the largest accepted one; None where there is
-            nothing to measure or to exceed.
+        figure: the worst number found, and `limit` the largest accepted one; None if nothing is
+            measured or limited.
         why: the reason of the limit.
-        specimen, pose: numbers of the specimen and of the pose at which the worst was found; the
+        specimen, pose: numbers of the specimen and pose with the worst figure; the
             seed reproduces them.
-        row: the equation it was found in, as "Dot11 row 2".
-        message: what the figure does not say; of a failure, what to do.
+        row: the equation with the worst figure, as "Dot11 row 2".
+        message: text beside the figure; of a failure, the remedy.
     """
 
     check: str
@@ -49,7 +49,7 @@ class Finding:
 
     @property
     def badness(self) -> tuple[int, float]:
-        """For choosing the worst of several findings of one check."""
+        """Sort key: the worst of several findings of one check has the largest."""
         order = {Verdict.SKIP: 0, Verdict.PASS: 1, Verdict.FAIL: 2}
         return order[self.verdict], self.figure if self.figure is not None else 0.0
 
@@ -63,12 +63,11 @@ def judged(
     message: str = "",
     remedy: str = "",
 ) -> Finding:
-    """The finding of figures by row and pose, shape (len(names), poses); what is not a number
-    fails.
+    """Return the finding of figures by row and pose, shape (len(names), poses); NaN fails.
 
     Args:
-        message: said whatever the verdict.
-        remedy: said of a failure.
+        message: text of the finding, whatever the verdict.
+        remedy: text added to a failure.
     """
     figures = np.where(np.isnan(figures), math.inf, np.atleast_2d(figures))
     row, pose = np.unravel_index(int(figures.argmax()), figures.shape)
@@ -94,9 +93,9 @@ class Report:
     """The checks of a joint type.
 
     Attributes:
-        joint: the name of the class.
-        specimens: the joints that were examined, as text.
-        seed: of all random numbers.
+        joint: name of the class.
+        specimens: the examined joints, as text.
+        seed: seed of all random numbers.
     """
 
     joint: str
@@ -111,7 +110,7 @@ class Report:
 
     @property
     def failures(self) -> tuple[str, ...]:
-        """Names of the checks that failed."""
+        """Names of the failed checks."""
         return tuple(each.check for each in self.findings if each.verdict is Verdict.FAIL)
 
     def __getitem__(self, check: str) -> Finding:
@@ -123,7 +122,7 @@ class Report:
         return text.getvalue()
 
     def print(self, file: TextIO) -> None:
-        """Print one line per check, then what was said of failures and skips, then a count."""
+        """Print one line per check, then the messages, the specimens and a count."""
         from rich.table import Table
         from rich.text import Text
 

@@ -1,5 +1,5 @@
-"""Joint types of users, by module and class. Only who gives a command names them; a case file
-imports nothing.
+"""Joint types of users, loaded by module and class. The command line alone names them; a case
+file imports nothing.
 """
 
 from __future__ import annotations
@@ -16,17 +16,19 @@ from ...errors import KincheckError, similar
 from ...harness.execution import said
 from ...joints import Coupler, Joint
 
-# Files whose lines say nothing of an import that fails, also those that are none; and how many
-# lines of others are read.
+# Files, also pseudo-files, whose lines do not explain a failed import; and the number of lines
+# shown of other files.
 _NOT_THEIRS, MOST_PLACES = (str(Path(__file__).parents[2]), importlib.__file__, "<"), 3
 
 INSTALLED = "site-packages"
-"""Folder of installed modules: one of them in the user's folder is not the user's."""
+"""Folder of installed modules: a module in it below the user's folder does not
+belong to the user.
+"""
 
 
 def _raised(error: Exception) -> str:
-    """An error of an import with its places, the last first: those of the importer and of kincheck
-    are not the user's.
+    """Return the text of an error of an import with its places, the last first, without those in
+    the importer and in kincheck.
     """
     frames = [
         each
@@ -38,7 +40,7 @@ def _raised(error: Exception) -> str:
         for each in (*frames[:MOST_PLACES], *frames[MOST_PLACES:][-1:])
     ]
     told = said(error)
-    # has a place of its own, where nothing was running yet
+    # a syntax error has a place of its own, outside the traceback
     if isinstance(error, SyntaxError) and error.text:
         told = f"{type(error).__name__}: {error.msg}"
         places.append(f"{error.filename}, line {error.lineno}: {error.text.strip()}")
@@ -46,8 +48,8 @@ def _raised(error: Exception) -> str:
 
 
 def _joints(module: ModuleType) -> list[str]:
-    """Names of the joint types that a module or package defines itself, also of one that loads them
-    when they are asked for.
+    """Return the names of the joint types that a module or package defines itself, including those
+    that it loads on first use.
     """
     offered = {
         name: getattr(module, name, None)
@@ -66,13 +68,13 @@ def _joints(module: ModuleType) -> list[str]:
 
 
 def load_joint(where: str) -> type[Joint]:
-    """The joint class at MODULE:CLASS; modules of the current folder are found too.
+    """Return the joint class at MODULE:CLASS; modules of the current folder are found too.
 
     Case files can name it from then on.
 
     Raises:
-        KincheckError: there is no such module or class, it is no joint, its type is none or taken,
-            or the module cannot be imported.
+        KincheckError: there is no such module or class, it is no joint, its type is missing or
+            taken, or the module cannot be imported.
     """
     module_name, _, name = where.partition(":")
     if not (module_name and name):
@@ -86,14 +88,12 @@ def load_joint(where: str) -> type[Joint]:
         module = importlib.import_module(module_name)
         found = getattr(module, name, None)
         joints = [] if found is not None else _joints(module)
-    except (
-        SystemExit
-    ) as end:  # a script: its class would go unchecked, with the status that it ends in
+    except SystemExit as end:  # a script: the end would skip the check and set its status
         raise KincheckError(
             f"module {module_name!r} ends the process when it is imported (status {end.code});"
             ' guard what it does there by if __name__ == "__main__":'
         ) from end
-    except Exception as error:  # whatever the module does when it is imported
+    except Exception as error:  # any error of the module's own code
         if isinstance(error, ModuleNotFoundError) and f"{module_name}.".startswith(
             f"{error.name}."
         ):
@@ -126,12 +126,12 @@ def load_joint(where: str) -> type[Joint]:
 
 
 def sources(names: Iterable[str]) -> dict[str, str]:
-    """Return SHA-256 of the source of every module that joint types at MODULE:CLASS come from, by
-    its name.
+    """Return the SHA-256 of the source of every module behind joint types at MODULE:CLASS,
+    by module name.
 
-    These are the modules themselves and those that are loaded from their folders or below, not
-    installed ones and not kincheck's. A module that is imported only later, and files that a module
-    reads, are not among them.
+    Included are the modules themselves and those loaded from their folders or below, but neither
+    installed modules nor kincheck's. Modules imported only later, and files read by a module,
+    are not included.
     """
     named = [sys.modules.get(name.partition(":")[0]) for name in names]
     folders = {
@@ -154,7 +154,7 @@ def sources(names: Iterable[str]) -> dict[str, str]:
 
 
 def _file(module: object) -> Path | None:
-    """Return the file that a module was loaded from; None where there is none to be read."""
+    """Return the file a module was loaded from; None if there is no readable one."""
     name = getattr(module, "__file__", None)
     file = Path(name).resolve() if isinstance(name, str) else None
     return file if file is not None and file.is_file() else None

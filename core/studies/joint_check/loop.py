@@ -1,5 +1,5 @@
-"""A joint in a small closed loop: solved natively, and by every engine given, on the joint itself
-or on its equivalent.
+"""A joint in a small closed loop, solved natively and by every given engine, on the joint itself or
+on its equivalent.
 """
 
 from __future__ import annotations
@@ -26,22 +26,24 @@ from .findings import Finding, Verdict, judged
 # Largest accepted constraint residual of an engine [m or -]: round-off of metre-sized coordinates,
 # x1000.
 TOL = 1e-12
-# The probe's rods may lock a joint that they were not chosen for before the end of its sweep:
-# others are tried, and where all do it is halved, so often.
+# The probe's rods may lock a joint of another kind before the end of the sweep. Other rods are
+# tried, then shorter sweeps: at most this number of halvings.
 HALVINGS = 3
 # Weights of sixth-order differences over seven samples.
 WEIGHTS = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60.0
-# Samples for the differences, between each two of the probe's.
+# Intervals of the differences in each interval of the probe.
 FINER = 4
 RATES_WHY = "what the differences change by as their step is doubled: 63 times their error"
 AGREE_WHY = "error over the tolerance of the probe's outputs"
 
 
 def loops(tested: Joint | type[Joint], engines: Sequence[Engine]) -> Iterator[Finding]:
-    """The probe of a joint, or of a type, in the native engine and in the others."""
+    """Solve the probe of a joint, or of a joint type, natively and in the other engines, and
+    yield the findings.
+    """
     try:
         case, native = _unlocked(tested)
-    except Exception as error:  # whatever the joint's own code raises
+    except Exception as error:  # any error of the joint's own code
         yield Finding("loop", Verdict.FAIL, message=f"{type(error).__name__}: {error}")
         return
     solved = (
@@ -80,7 +82,7 @@ def loops(tested: Joint | type[Joint], engines: Sequence[Engine]) -> Iterator[Fi
 
 
 def _unlocked(tested: Joint | type[Joint]) -> tuple[Case, Trajectory]:
-    """The first probe that is solved whole; the last that was tried, if none is."""
+    """Return the first probe with all samples solved; the last one tried if none is."""
     first, *others = alternatives(tested)
     shorter = [
         replace(first, sweep=replace(first.sweep, values=0.5**k * first.sweep.values))
@@ -101,8 +103,8 @@ def _solved(case: Case) -> Trajectory:
 
 
 def _rates(case: Case) -> Iterator[Finding]:
-    """Velocities and accelerations against differences, which know nothing of rows and right-hand
-    sides.
+    """Check velocities and accelerations against differences, which are independent of rows
+    and right-hand sides.
     """
     first, *_, last = grid = case.sweep.values.tolist()
     values: Array = np.linspace(first, last, FINER * (len(grid) - 1) + 1, dtype=np.float64)
@@ -134,8 +136,8 @@ def _differences(values: Array, dt: float) -> Array:
 
 
 def _equivalent(case: Case) -> Case | None:
-    """The case with the tested joint replaced by the bodies and joints it says it is equivalent
-    to.
+    """Return the case with the tested joint replaced by its `equivalent()` bodies and joints; None
+    if it has none.
     """
     tested = next(joint for joint in case.mechanism.joints if joint.type == case.name)
     offered = getattr(tested, "equivalent", None)
@@ -152,8 +154,8 @@ def _equivalent(case: Case) -> Case | None:
 def _simulated(
     engine: Engine, case: Case, other: Case | str, reference: dict[str, Series]
 ) -> Finding:
-    """An engine's answer compared with the native one, or why there is none; `other` is the
-    equivalent, or why there is none.
+    """Compare an engine's answer with the native one; `other` is the equivalent case, or the reason
+    for its absence.
     """
     name = f"loop: {engine.name}"
     if engine.version() is None:
@@ -170,7 +172,7 @@ def _simulated(
     try:
         solved = engine.solve(engine.build(chosen), chosen, TOL)
         check(chosen, engine.name, solved)
-    except Exception as error:  # anything a simulator may raise
+    except Exception as error:  # any error of a simulator
         return Finding(name, Verdict.FAIL, message=f"{type(error).__name__}: {error}")
     found = _compared(name, chosen, solved, reference)
     how = "on the joint itself" if chosen is case else "on the equivalent"
@@ -178,7 +180,7 @@ def _simulated(
 
 
 def _compared(name: str, case: Case, found: Trajectory, reference: dict[str, Series]) -> Finding:
-    """Positions, velocities and accelerations against the native ones of the joint itself."""
+    """Compare positions, velocities and accelerations with the native ones of the joint itself."""
     if not found.solved.all():
         return Finding(
             name,

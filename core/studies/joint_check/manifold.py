@@ -1,5 +1,5 @@
-"""Ways over the manifold of a joint, the poses where its equations hold: to it by Newton's
-iteration, over it by small steps.
+"""Motion over the manifold of a joint, the poses that satisfy its equations: Newton's iteration to
+reach it, small steps along it.
 
 Matrices are Jacobians of lanes, shape (lanes, rows, columns).
 """
@@ -16,28 +16,28 @@ from .traced import TracedJoint
 
 Mask = NDArray[np.bool_]
 
-# Newton is quadratic: a step below this ends at round-off.
+# Newton is quadratic: a step below this value ends at round-off.
 SETTLED = 1e-13
-# A pose whose rows are nearer to dependence than this part of their distance at design is on no
-# branch but between two.
+# Branches meet near a pose whose rows are closer to dependence than this part of their distance at
+# design. Such a pose belongs to no branch.
 NEARLY_SINGULAR = 0.1
-# A step that has to be corrected by more than this part of itself may have left its branch; it is
-# halved.
+# A step corrected by more than this part of itself may have left its branch, and is halved.
 LARGEST_CORRECTION = 0.25
-# What is left of a dependent row of size one is round-off (1e-15); of an independent one, in sound
-# geometry, 1e-2.
+# A dependent row of size one leaves round-off (1e-15); an independent one, in sound geometry,
+# leaves 1e-2.
 DEPENDENT = 1e-9
 
 
 def design(joint: TracedJoint, lanes: int) -> Array:
-    """The design position, in all lanes."""
+    """Return the design position in all lanes."""
     state = np.zeros((joint.size, lanes))
     state[[3, 10]] = 1.0
     return state
 
 
 def min_norm(matrix: Array, right: Array, columns: slice = slice(None)) -> Array:
-    """The smallest solutions of matrix x = right over the columns, rows brought to the same size.
+    """Return the smallest solutions of matrix x = right over the columns, rows scaled to
+    the same size.
 
     Shapes (lanes, rows, columns), (rows, lanes) -> (columns, lanes).
     """
@@ -54,10 +54,10 @@ def newton(
     iterations: int,
     columns: slice = slice(None),
 ) -> tuple[Array, NDArray[np.int64]]:
-    """Newton's iteration by smallest steps over the given columns: where it ends, and iterations
-    until the steps vanish.
+    """Run Newton's iteration by smallest steps over the given columns; return the final states and
+    the iterations until the steps vanish.
 
-    A lane that does not settle has as many iterations as were allowed, plus one.
+    A lane that does not converge has the allowed number of iterations plus one.
     """
     state = state.copy()
     taken = np.full(state.shape[1], iterations + 1)
@@ -81,15 +81,14 @@ def walk(
     steps: int,
     columns: slice = slice(None),
 ) -> list[Array]:
-    """Small steps over the manifold, each followed by a return to it: the states after every step,
-    the start first.
+    """Take small steps over the manifold, each followed by a return to it; return the states after
+    every step, the start first.
 
-    A lane stays where it is if its step would reach a nearly singular pose, or does not return to
-    the manifold nearby; its next step is shorter.
+    A lane does not move if its step reaches a nearly singular pose or does not return to the
+    manifold nearby. The next step of the lane is shorter.
 
     Args:
-        aims: state, last step -> the step wanted (columns, lanes); its part along the manifold is
-            taken.
+        aims: state, last step -> the wanted step (columns, lanes), projected onto the manifold.
     """
     states, share, last = (
         [start],
@@ -115,8 +114,8 @@ def walk(
 
 
 def straight(directions: Array, length: float) -> Callable[[Array, Array], Array]:
-    """Aims that start in the given directions and go straight on, as far as the manifold is
-    straight.
+    """Return aims that start in the given directions and then keep the
+    direction of the last step.
     """
 
     def aims(_: Array, last: Array) -> Array:
@@ -127,8 +126,8 @@ def straight(directions: Array, length: float) -> Callable[[Array, Array], Array
 
 
 def regular(joint: TracedJoint, state: Array, columns: slice = slice(None)) -> Mask:
-    """Lanes whose rows are not nearly dependent, and none nearly zero, by the measure of the design
-    position.
+    """Return which lanes have neither nearly dependent nor nearly zero rows, relative to
+    the design position.
     """
     at_design = joint.exact(design(joint, 1))[:, :, columns]
     size = np.linalg.norm(at_design, axis=2, keepdims=True)
@@ -140,8 +139,8 @@ def regular(joint: TracedJoint, state: Array, columns: slice = slice(None)) -> M
 
 
 def smallest(matrix: Array) -> Array:
-    """How far the rows of each lane are from dependence: the smallest singular value, rows brought
-    to size one, shape (lanes,).
+    """Return the distance of each lane's rows from dependence: the smallest singular value, rows
+    scaled to size one, shape (lanes,).
     """
     return _smallest(_even(matrix)[0])
 
@@ -154,13 +153,13 @@ def _smallest(matrix: Array) -> Array:
 
 
 def rank(matrix: Array) -> NDArray[np.int64]:
-    """Numerical rank of the rows of each lane, shape (lanes,)."""
+    """Return the numerical rank of each lane's rows, shape (lanes,)."""
     return np.asarray(np.linalg.matrix_rank(_even(matrix)[0], tol=DEPENDENT))
 
 
 def _even(matrix: Array) -> tuple[Array, Array]:
-    """The rows brought to size one, and their sizes; a row of zeros stays, one that is not finite
-    becomes zeros.
+    """Return the rows scaled to size one, and their sizes; zero rows stay, rows that are not
+    finite become zero.
     """
     finite = np.where(np.isfinite(matrix).all(axis=2, keepdims=True), matrix, 0.0)
     size = np.linalg.norm(finite, axis=2)

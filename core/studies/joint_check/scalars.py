@@ -1,7 +1,7 @@
-"""Programs run over any kind of scalar: lanes of real or complex numbers, jets, numbers of any
-precision.
+"""Programs run over any kind of scalar: lanes of real or complex numbers, jets, numbers
+of any precision.
 
-A kind is a table of what the operations of a program are for it.
+A kind is a table of the operations of a program for its scalars.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ Operation: TypeAlias = Callable[..., Any]
 
 
 def _ordered(key: Operation) -> dict[str, Operation]:
-    """The operations that compare, by a key of the scalars."""
+    """Return the operations that compare, by a key of the scalars."""
     where: Operation = np.where
 
     def absolute(a: Any) -> Any:
@@ -48,8 +48,8 @@ _PRODUCTS: dict[str, Any] = {
 }
 
 NUMBERS: Mapping[str, Operation] = {**_SUMS, **_PRODUCTS, **_ordered(np.real)}
-"""Arrays of numbers. Complex ones are ordered by their real parts, so that their imaginary parts
-stay derivatives.
+"""Operations of arrays of numbers. Complex numbers are ordered by their real parts, so the
+imaginary parts stay derivatives.
 """
 
 
@@ -66,7 +66,7 @@ def _quotient(a: Array, b: Array) -> Array:
 
 
 def _chain(f: Callable[[Array], tuple[Array, Array, Array]]) -> Operation:
-    """A function of a jet, from its value and first two derivatives."""
+    """Return a function of a jet, from its value and first two derivatives."""
 
     def of(a: Array) -> Array:
         y, slope, bend = f(a[0])
@@ -84,12 +84,12 @@ JETS: Mapping[str, Operation] = {
     "cos": _chain(lambda x: (np.cos(x), -np.sin(x), -np.cos(x))),
     **_ordered(operator.itemgetter(0)),
 }
-"""Arrays (3, ...): value, first and second derivative by time."""
+"""Operations of arrays (3, ...): value, first and second derivative by time."""
 
 
 def precise(digits: int) -> tuple[Mapping[str, Operation], Operation]:
-    """The operations of numbers of that many digits, in arrays of objects; and what makes such
-    arrays of floats.
+    """Return the operations of numbers with the given digits, in arrays of objects, and the
+    function that converts floats to them.
 
     Raises:
         ModuleNotFoundError: mpmath is not installed.
@@ -110,8 +110,11 @@ def execute(
     inputs: Any,
     lift: Callable[[float], Any] = float,
 ) -> list[Any]:
-    """Run a program over a kind of scalar: inputs by slot; the outputs in order. Constants are
-    lifted to the kind.
+    """Run a program over a kind of scalar and return its outputs in order.
+
+    Args:
+        inputs: values by slot.
+        lift: conversion of constants to the kind.
     """
     values: list[Any] = []
     for op, *rest in program.nodes:

@@ -1,5 +1,5 @@
-"""Specimens of a joint type, made from the kinds of its fields; and the same specimen moved, drawn
-larger or from longer axes.
+"""Specimens of a joint type, made from the kinds of its fields; and the same specimen moved, scaled
+or with longer axes.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from ...joints import Joint, Kind
 from ...trajectory import Array
 from .traced import BODIES, Place
 
-# A usual size of a joint [m].
+# Usual size of a joint [m].
 SIZE = 0.1
-# Coordinates are whole multiples of this [m], so that they can be moved a thousand kilometres
-# without rounding.
+# Coordinates are whole multiples of this length [m], so a move by a thousand kilometres does not
+# round them.
 GRID = 2.0**-30
-# Angles [degrees] of the two directions of a pair: the cross of a universal joint (over a right
-# angle by round-off, so that what wants a positive cosine refuses it), then shafts that point the
-# same way on.
+# Angles [degrees] of the two directions of a pair. First the cross of a universal joint, over a
+# right angle by round-off, so that a joint with a positive cosine refuses it; then shafts that
+# point in the same direction.
 ANGLES = (90.0 + 1e-8, 40.0)
 
 
@@ -32,11 +32,12 @@ class SpecimenError(KincheckError):
 
 
 def specimens(joint_class: type[Joint], rng: np.random.Generator, count: int) -> list[Joint]:
-    """Instances of a joint type between bodies i and j: what its classmethod `specimens` offers,
-    else that many random ones.
+    """Return instances of a joint type between bodies i and j: those of its classmethod
+    `specimens`, or `count` random ones.
 
     Raises:
-        SpecimenError: the class refuses what its fields' kinds say, or has a field of no kind.
+        SpecimenError: the class refuses geometry by the kinds of its fields, or a field
+            has no kind.
     """
     offered: Callable[[], Sequence[Joint]] | None = getattr(joint_class, "specimens", None)
     if offered is not None:
@@ -98,7 +99,7 @@ def _value(kind: Any, rng: np.random.Generator, angle: float) -> Any:
 
 
 def place(joint: Joint, rng: np.random.Generator) -> Place:
-    """Body origins near the joint, but at none of its points, and a unit near its size."""
+    """Return body origins near the joint, but at none of its points, and a unit near its size."""
     points = np.array(joint.points_on()).reshape(-1, 3)
     lengths = [value for _, kind, value in joint.parts() if kind is Kind.LENGTH]
     size = (
@@ -117,22 +118,26 @@ def place(joint: Joint, rng: np.random.Generator) -> Place:
 
 
 def between(joint: Joint) -> Joint:
-    """The joint between the bodies i and j, whatever it was between; its points on the grid."""
+    """Return the joint between the bodies i and j instead of its own, with its
+    points on the grid.
+    """
     return changed(replace(joint, i=BODIES[0], j=BODIES[1]), {Kind.POSITION: _snapped})
 
 
 def moved(joint: Joint, offset: float) -> Joint:
-    """The joint shifted along all three axes [m]."""
+    """Return the joint shifted along all three axes [m]."""
     return changed(joint, {Kind.POSITION: lambda point: tuple(x + offset for x in point)})
 
 
 def stretched(joint: Joint, factor: float) -> Joint:
-    """The joint with all directions that much longer."""
+    """Return the joint with all directions longer by a factor."""
     return changed(joint, {Kind.DIRECTION: lambda axis: tuple(factor * x for x in axis)})
 
 
 def changed(joint: Joint, ways: Mapping[Kind, Callable[[Any], Any]]) -> Joint:
-    """The joint with its geometry sent through the way for each kind, and checked again."""
+    """Return the joint with its geometry mapped by the function for each kind,
+    and validated again.
+    """
     return replace(joint, **joint.mapped(ways))
 
 

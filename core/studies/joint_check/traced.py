@@ -1,13 +1,13 @@
 """One joint between two free bodies, its equations traced once and run over any scalar.
 
-The operations that an engine runs are the ones examined here. They are run over lanes of floats,
-over complex numbers (an exact Jacobian: phi(x + i h) = phi + i h phi', without cancellation), over
-jets (value, first and second derivative by time) and over numbers of any precision.
+The examined operations are those of an engine. They run over lanes of floats, over complex numbers
+(an exact Jacobian: phi(x + i h) = phi + i h phi', without cancellation), over jets (value, first
+and second derivative by time) and over numbers of any precision.
 
 A state is an array (size, lanes): displacement and Euler parameters of body i, of body j, then the
-joint's named coordinates if it relates any; a rate is (unknowns, lanes): v and w of body i, of body
-j, rates of the coordinates. Lengths are in the unit of the frame, so that a joint of any size has
-numbers of size one.
+joint's named coordinates, if any. A rate is (unknowns, lanes): v and w of body i, of body j, then
+rates of the coordinates. Lengths are in the unit of the frame, so a joint of any size has numbers
+of size one.
 """
 
 from __future__ import annotations
@@ -40,15 +40,13 @@ WEIGHTS = ((-3, -1 / 60), (-2, 3 / 20), (-1, -3 / 4), (1, 3 / 4), (2, -3 / 20), 
 
 @dataclass(frozen=True)
 class Place:
-    """Where the two bodies of a joint have their origins at design [m], and the unit in which
-    lengths are measured [m].
-    """
+    """The origins of a joint's two bodies at design [m], and the unit of length [m]."""
 
     origins: tuple[tuple[float, ...], tuple[float, ...]]
     unit: float
 
     def scaled(self, factor: float) -> Place:
-        """The same place, drawn larger and measured in metres."""
+        """Return the place scaled by a factor, measured in metres."""
         return Place((_times(factor, self.origins[0]), _times(factor, self.origins[1])), 1.0)
 
 
@@ -56,8 +54,8 @@ class TracedJoint:
     """The equations of a joint as programs.
 
     Attributes:
-        names: of the rows, as "Dot11 row 2".
-        parts: the rows of each primitive, first and end.
+        names: names of the rows, as "Dot11 row 2".
+        parts: first and end row of each primitive.
         coordinates: named coordinates of the joint, as "joint.rotation".
         programs: phi, rows, nu, gamma and branch, over the slots of a state and a rate.
 
@@ -135,8 +133,8 @@ class TracedJoint:
 
     @property
     def rows_left(self) -> int:
-        """Rows less named coordinates: what the joint takes of the six freedoms, if its rows are
-        independent.
+        """Number of rows less named coordinates: freedoms removed by the joint if its
+        rows are independent.
         """
         return len(self.names) - len(self.coordinates)
 
@@ -148,37 +146,39 @@ class TracedJoint:
         )
 
     def phi(self, state: Array) -> Array:
-        """Residuals, shape (rows, ...)."""
+        """Return the residuals, shape (rows, ...)."""
         return self._run("phi", state, state.shape[1:])
 
     def rows(self, state: Array) -> Array:
-        """The Jacobian as the joint declares it, shape (lanes, rows, columns)."""
+        """Return the Jacobian declared by the joint, shape (lanes, rows, columns)."""
         found = self._run("rows", state, state.shape[1:])
         return np.moveaxis(found.reshape(len(self.names), self.columns, -1), 2, 0)
 
     def nu(self, state: Array) -> Array:
-        """Right-hand sides of the velocity equations, shape (rows, lanes)."""
+        """Return the right-hand sides of the velocity equations, shape (rows, lanes)."""
         return self._run("nu", state, state.shape[1:])
 
     def gamma(self, state: Array, rate: Array) -> Array:
-        """Right-hand sides of the acceleration equations, shape (rows, lanes)."""
+        """Return the right-hand sides of the acceleration equations, shape (rows, lanes)."""
         return self._run("gamma", np.concatenate([state, rate]), state.shape[1:])
 
     def branch(self, state: Array) -> Array:
-        """The smallest of the branch tests, shape (lanes,); 1 where there is none."""
+        """Return the smallest of the branch tests, shape (lanes,); 1 if there is none."""
         return self._run("branch", state, state.shape[1:]).min(axis=0, initial=1.0)
 
     def exact(self, state: Array) -> Array:
-        """The Jacobian that phi has, by complex steps, shape (lanes, rows, columns)."""
+        """Return the exact Jacobian of phi by complex steps, shape (lanes, rows, columns)."""
         steps = np.repeat(np.eye(self.columns)[:, :, None], state.shape[1], axis=2) * (
             1j * COMPLEX_STEP
         )
-        # the length changes by the square of the step: not at all
+        # the length changes by the square of the step, below round-off
         moved = self._moved(state[:, None, :], steps, lambda a: a)
         return np.moveaxis(self.phi(moved).imag / COMPLEX_STEP, (0, 1, 2), (1, 2, 0))
 
     def differences(self, state: Array) -> Array:
-        """The same by central differences of sixth order."""
+        """Return the Jacobian of phi by central differences of sixth order, shape
+        (lanes, rows, columns).
+        """
         directions = np.repeat(np.eye(self.columns)[:, :, None], state.shape[1], axis=2)
         total: Any = 0.0
         for k, weight in WEIGHTS:
@@ -188,7 +188,7 @@ class TracedJoint:
         return np.moveaxis(total / DIFFERENCE, (0, 1, 2), (1, 2, 0))
 
     def retract(self, state: Array, step: Array) -> Array:
-        """The state after a step (columns, lanes)."""
+        """Return the state after a step (columns, lanes)."""
         return self._moved(state, step, _normalised)
 
     def _moved(self, state: Array, step: Any, ended: Callable[[Any], Any]) -> Any:
@@ -204,8 +204,8 @@ class TracedJoint:
         return np.concatenate([*parts, state[POSES:] + step[2 * COLUMNS :]])
 
     def jets(self, state: Array, rate: Array, acceleration: Array) -> Array:
-        """phi along a motion: value, first and second derivative by time, shape (3, rows,
-        lanes).
+        """Return phi along a motion: value, first and second derivative by time, shape
+        (3, rows, lanes).
         """
         jets: list[Array] = []
         for k in range(2):

@@ -1,7 +1,8 @@
-"""The same joint written differently: bodies exchanged, both moved together, drawn larger, far
-away, in other unknowns.
+"""Variants of one joint: bodies exchanged, both bodies moved together, scaled, far from the origin,
+in other unknowns.
 
-A motion that the one admits the other must admit too: position, velocity and acceleration.
+A motion admitted by the specimen must be admitted by the variant too: position,
+velocity and acceleration.
 """
 
 from __future__ import annotations
@@ -23,12 +24,12 @@ from .specimens import moved, stretched
 from .traced import COLUMNS, POSES, Place, TracedJoint
 
 FACTORS = (1e-6, 1e-3, 1e3)
-# A joint a thousand kilometres from the global origin [m].
+# Offset of a joint a thousand kilometres from the global origin [m].
 AWAY = 1e6
 
 
 def exchange(s: Specimen) -> Iterator[Finding]:
-    """The same motion with both bodies exchanged."""
+    """Check the same motion with both bodies exchanged."""
     if not s.joint.symmetric:
         yield Finding(
             "exchange",
@@ -40,7 +41,7 @@ def exchange(s: Specimen) -> Iterator[Finding]:
     other = TracedJoint(back, Place((s.place.origins[1], s.place.origins[0]), s.place.unit))
 
     def exchanged(a: Array, half: int) -> Array:
-        # a coordinate is that of body j relative to body i
+        # a coordinate describes body j relative to body i
         return np.concatenate([a[half : 2 * half], a[:half], -a[2 * half :]])
 
     motion = (
@@ -58,8 +59,8 @@ def exchange(s: Specimen) -> Iterator[Finding]:
 
 
 def rigid_motion(s: Specimen) -> Iterator[Finding]:
-    """The same motion seen from elsewhere: both bodies turned and shifted; and residuals off the
-    manifold.
+    """Check the same motion with both bodies turned and shifted together, and residuals
+    off the manifold.
     """
     q = s.rng.normal(size=4)
     turn = quat((q / np.linalg.norm(q)).tolist())
@@ -101,10 +102,10 @@ def rigid_motion(s: Specimen) -> Iterator[Finding]:
 
 
 def axis_lengths(s: Specimen) -> Iterator[Finding]:
-    """The same motion, and the same residuals where it is not met, with longer directions.
+    """Check the same motion with longer directions, and the same residuals off the manifold.
 
-    A row that is a multiple of what it was has the same solutions, until it is so small or large
-    that nothing meets its tolerance.
+    A multiple of a row has the same solutions; but a row may become so small or large that no
+    solution meets its tolerance.
     """
     long = TracedJoint(stretched(s.joint, 137.0), s.place)
     remedy = "a direction may have any length: use unit() or triad()"
@@ -124,7 +125,7 @@ def axis_lengths(s: Specimen) -> Iterator[Finding]:
 
 
 def size_and_place(s: Specimen) -> Iterator[Finding]:
-    """The same motion of the joint drawn larger and smaller, and far away."""
+    """Check the same motion of the joint scaled up and down, and far from the origin."""
     remedy = (
         "a length that is not declared so is not scaled: declare it by position(), positions() or"
         " length()"
@@ -165,9 +166,7 @@ def size_and_place(s: Specimen) -> Iterator[Finding]:
 
 
 def named_coordinates(s: Specimen) -> Iterator[Finding]:
-    """The same motion by the equations with the joint's coordinates as unknowns (mixed
-    formulation).
-    """
+    """Check the same motion by the mixed formulation: the joint's coordinates are unknowns."""
     if not isinstance(s.joint, AxialJoint):
         yield Finding(
             "mixed style", Verdict.SKIP, message="no AxialJoint: it has no coordinates of its own"
@@ -202,8 +201,8 @@ def _same(
     units: Any = 1.0,
     message: str = "",
 ) -> Finding:
-    """Whether a motion of the specimen satisfies other equations too, and whether these leave as
-    many freedoms.
+    """Check that a motion of the specimen satisfies other equations too, and that these leave the
+    same number of freedoms.
     """
     worst = np.max(defects(other, *motion, units), axis=0)
     mine = rank(s.exact) - len(s.traced.coordinates)

@@ -1,8 +1,7 @@
-"""Table 3 counted: multiplications and additions of the rows between two moving bodies.
+"""Operation counts of Table 3: multiplications and additions of rows between two moving bodies.
 
-Two counters. One traces the rows as the solver does and counts the operations of the program: equal
-ones are shared, zeros and ones fold. The other counts each operation that is executed, and so
-multiplies full matrices out. For both, A of either body is given.
+One counter traces the rows as the solver does and counts the program: equal operations are shared,
+zeros and ones fold. The other counts executed operations, full matrix products included.
 """
 
 from __future__ import annotations
@@ -49,15 +48,12 @@ CONVENTIONS = (
     ),
 )
 
-# A figure of Table 3 is met nearly if a count differs by a few operations in a hundred: a sum or a
-# sign counted otherwise.
+# A near figure differs by a few percent: a sum or a sign counted otherwise.
 NEARLY = 0.03
 
 
 class Operations(msgspec.Struct, frozen=True):
-    """Multiplications and additions of each stage, as CONVENTIONS say; null where it is not
-    known.
-    """
+    """Multiplications and additions of each stage, by CONVENTIONS; null if unknown."""
 
     jacobian: int
     velocity: int
@@ -66,12 +62,11 @@ class Operations(msgspec.Struct, frozen=True):
 
 
 class Counted(msgspec.Struct, frozen=True):
-    """A condition of Table 3 in one way of writing it.
+    """A condition of Table 3, in one form (`way`) and by one counter.
 
     Attributes:
-        rows: DOTS or SIMPLIFIED; the conditions d10 and d20 are dot products themselves.
-        way: how they are written and counted.
-        unit_axes: with the axes of the joint along those of the bodies; null where nothing folds.
+        rows: DOTS or SIMPLIFIED; d10 and d20 are dot products themselves.
+        unit_axes: with joint axes along body axes; null where nothing folds.
     """
 
     condition: str
@@ -89,12 +84,9 @@ TABLE_3, MULTIPLIED_OUT, FROM_THE_LEFT = (
 )
 AXES = {"conventional": "conventional", "paper": "paper's axes", "native": "native axes"}
 TRACED = {style: f"{axes}, traced" for style, axes in AXES.items()}
-"""Row style -> how its counts are named: full products, or vector products in body axes, or those
-in global axes.
-"""
+"""Row style -> name of its counts: full, or vector products in body or global axes."""
 
-# d10's velocity is printed as "-159"; d21's acceleration may have lost a zero (formulation section
-# 8.1).
+# d10's velocity is printed as "-159"; d21's acceleration may lack a zero (formulation 8.1).
 PRINTED = {
     "d10": Operations(150, 159, 277),
     "d11": Operations(48, 57, 137),
@@ -105,9 +97,7 @@ PRINTED = {
 
 
 class Executed:
-    """A scalar that counts what is done with it. A literal one multiplies for free, and so does a
-    sign.
-    """
+    """A scalar that counts its operations, except multiplications by literal ones and signs."""
 
     def __init__(self, tally: list[int]) -> None:
         self.tally = tally
@@ -141,7 +131,7 @@ class Pair:
 
     @staticmethod
     def of(number: Callable[[], Scalar]) -> Pair:
-        """All its numbers from a source."""
+        """Return a pair with all its numbers from a source."""
 
         def vector() -> Vec3:
             return Vec3(number(), number(), number())
@@ -151,9 +141,7 @@ class Pair:
 
 
 def executed(equations: Sequence[Countable], pair: Pair, tally: list[int]) -> Operations:
-    """Operations of rows as they are executed, one after the other; the tally is what the pair's
-    numbers add to.
-    """
+    """Return the operations of executed rows; the pair's numbers add to the tally."""
 
     def cost(values: Callable[[], Sequence[Any]]) -> tuple[int, Sequence[Any]]:
         before, found = tally[0], values()
@@ -169,7 +157,7 @@ def executed(equations: Sequence[Countable], pair: Pair, tally: list[int]) -> Op
 
 
 def traced(equations: Sequence[Countable]) -> Operations:
-    """Operations of the traced programs of rows."""
+    """Return the operations of the traced programs of rows."""
     tape, slots = Tape(), count()
     pair = Pair.of(lambda: tape.input(next(slots)))
     rows = [row for each in equations for row in each.rows(pair.i, pair.j)]
@@ -180,19 +168,15 @@ def traced(equations: Sequence[Countable]) -> Operations:
         found = program("counted", tape, dict(enumerate(values))).operations
         return found["+"] + found["-"] + found["*"]
 
-    velocity, acceleration = (
-        _times(rows, pair.vi, pair.vj),
-        _less(_times(rows, pair.ai, pair.aj), gamma),
-    )
+    velocity = _times(rows, pair.vi, pair.vj)
+    acceleration = _less(_times(rows, pair.ai, pair.aj), gamma)
     return Operations(
         cost(entries), cost([*entries, *velocity]), cost([*entries, *acceleration]), cost(gamma)
     )
 
 
 def _times(rows: Sequence[Row], i: Twist, j: Twist) -> list[Scalar]:
-    """The rows times the velocities or accelerations of both bodies; blocks of zeros are left
-    out.
-    """
+    """Return the rows times the velocities or accelerations of both bodies, without zero blocks."""
     found: list[Scalar] = []
     for row in rows:
         terms = [
@@ -206,14 +190,14 @@ def _times(rows: Sequence[Row], i: Twist, j: Twist) -> list[Scalar]:
 
 
 def _less(left: Sequence[Scalar], right: Sequence[Scalar]) -> list[Scalar]:
-    """Differences, but for a right-hand side that is literally zero."""
+    """Return the differences; a literal zero on the right costs nothing."""
     return [
         a if isinstance(b, float) and b == 0.0 else a - b for a, b in zip(left, right, strict=True)
     ]
 
 
 def count_operations() -> list[Counted]:
-    """Table 3 beside our counts, condition by condition."""
+    """Return Table 3 beside our counts, condition by condition."""
     found = [
         Counted(name, SIMPLIFIED if name in ("d11", "d12", "d21") else DOTS, TABLE_3, each)
         for name, each in PRINTED.items()
@@ -237,16 +221,16 @@ def count_operations() -> list[Counted]:
             for style in ("paper", "native"):
                 counts = (traced(each.simplified(style)) for each in both)
                 found.append(Counted(both[0].name, SIMPLIFIED, TRACED[style], *counts))
-    # stable: within a condition in the order in which they were counted
+    # stable: keeps the order of counting within a condition
     return sorted(found, key=lambda each: each.condition)
 
 
 def _as_printed(vector: Callable[[], Vec3]) -> Iterator[tuple[str, str, str, Sequence[Countable]]]:
-    """Condition, rows, way and equations of all that is printed, from a source of constants."""
+    """Yield condition, rows, form and equations of all that is printed, from constants."""
     f, g, h, s_i, s_j, *constant = (vector() for _ in range(8))
     for way, formed in ((MULTIPLIED_OUT, True), (FROM_THE_LEFT, False)):
         simplified: dict[str, Countable] = {"d11": PrintedDot11(f, g, formed=formed)}
-        if formed:  # these have no product that could go either way
+        if formed:  # these have no product with two orders
             simplified |= {"d12": PrintedDot12(Mat3(*constant)), "d21": PrintedDot21(f, g)}
         for condition in conditions(f, g, h, s_i, s_j):
             yield condition.name, DOTS, way, condition.printed(formed=formed)
@@ -255,7 +239,7 @@ def _as_printed(vector: Callable[[], Vec3]) -> Iterator[tuple[str, str, str, Seq
 
 
 def verdict(counts: Sequence[Counted]) -> list[str]:
-    """What the counts say; every figure in it is one of them."""
+    """Return the conclusions from the counts."""
     by = {(each.condition, each.rows, each.way): each.general_axes for each in counts}
     simplified = [
         each.condition for each in counts if each.rows == SIMPLIFIED and each.way == TABLE_3
@@ -289,7 +273,7 @@ def verdict(counts: Sequence[Counted]) -> list[str]:
 
 
 def _met(counts: Sequence[Counted], gamma: int | None) -> str:
-    """Which figures of Table 3 some count meets, or nearly."""
+    """Return the figures of Table 3 that some count meets, or nearly meets."""
     met: list[str] = []
     nearly: list[str] = []
     for name, row in PRINTED.items():

@@ -1,3 +1,3 @@
-"""Stress: situations that break kinematic solvers, an independent truth for each, and what engines
-make of them.
+"""Stress: situations that break kinematic solvers, independent reference
+motions, engines' outcomes.
 """

@@ -1,5 +1,5 @@
-"""The tables of a stress run: shares by family and engine, findings, proofs, and which
-contradictions are accepted.
+"""Tables of a stress run: shares by family and engine, findings, proofs,
+accepted contradictions.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ NOTES = (
 
 
 def report(found: Stress) -> Report:
-    """The tables."""
+    """Return the tables of a run."""
     sections = [_shares(found), _families(found)]
     sections += [_findings(found.findings)] if found.findings else []
     sections += [_proofs(found)] if found.proofs else []
@@ -56,8 +56,8 @@ def report(found: Stress) -> Report:
 
 
 def headline(cells: Sequence[Cell]) -> str:
-    """Return how many of the examined samples are silently wrong, and how many were not
-    examined.
+    """Return the number of silently wrong samples among the examined ones, and the
+    number not examined.
     """
     count = {verdict: sum(cell.samples[verdict] for cell in cells) for verdict in Verdict}
     apart = [
@@ -75,7 +75,7 @@ def headline(cells: Sequence[Cell]) -> str:
 
 
 def _examined(cell: Cell) -> int:
-    """Return how many samples have a verdict on an answer."""
+    """Return the number of samples with a verdict on an answer."""
     return (
         sum(cell.samples.values())
         - cell.samples[Verdict.UNJUDGED]
@@ -84,7 +84,7 @@ def _examined(cell: Cell) -> int:
 
 
 def idle(found: Stress) -> list[str]:
-    """Return which engines had none of their samples examined, and why."""
+    """Return a line with the reason for each engine without any examined sample."""
     lines: list[str] = []
     for engine in dict.fromkeys(map(_engine, found.cells)):
         cells = [cell for cell in found.cells if _engine(cell) == engine]
@@ -145,7 +145,7 @@ def _verdict(found: Stress) -> str:
 
 
 def _counts(cell: Cell) -> list[str]:
-    """Numbers, with the share of what is supported."""
+    """Return the number of samples by verdict, with the share of the supported ones."""
     supported = sum(cell.samples.values()) - cell.samples[Verdict.UNSUPPORTED]
     texts: list[str] = []
     for verdict in SHORT:
@@ -255,7 +255,7 @@ def _ratio(value: float | None) -> str:
 
 
 def markdown(made: Report) -> str:
-    """The same tables in Markdown."""
+    """Return the tables in Markdown."""
     lines = [f"# {escaped(made.headline)}", "", escaped(" · ".join(made.facts))]
     for section in made.sections:
         lines += ["", f"## {section.title}", "", *(escaped(each) for each in section.verdict), ""]

@@ -1,4 +1,4 @@
-"""Bad cases made small and saved as case files, and case files judged again."""
+"""Bad cases reduced and saved as case files, and case files judged again."""
 
 from __future__ import annotations
 
@@ -26,24 +26,26 @@ from .verdicts import Judgement, Verdict, judged
 def judge(
     case: Case, engine: Engine, tol: float, truth: Callable[[Case], Truth] | None = followed
 ) -> Judgement:
-    """A case of any origin with an engine, its motion followed from the design unless its truth is
-    known better.
+    """Judge a case of any origin with an engine; by default its reference is followed
+    from the design.
 
     Raises:
-        KincheckError: the truth cannot be had.
+        KincheckError: the reference cannot be computed.
     """
     watched = with_all_coordinates(case, case.points)
     return judge_as(Specimen(case.name, lambda: watched, truth, tol), watched, engine)
 
 
 def judge_as(specimen: Specimen, case: Case, engine: Engine) -> Judgement:
-    """A case in the place of a specimen's own: judged by its truth and its excuses."""
+    """Judge a case in place of a specimen's own, by the reference and the
+    excuses of the specimen.
+    """
     (answer,) = solve_all([Pair(case, engine, specimen.tol)])
     return judged(specimen, case, specimen.truth(case) if specimen.truth else None, answer)
 
 
 def save(example: Example, folder: Path) -> Finding:
-    """Reduce an example and write it as a case file; the finding with the name of the file.
+    """Reduce an example and write it as a case file; return the finding with the name of the file.
 
     Raises:
         KincheckError: the file cannot be written.
@@ -60,8 +62,7 @@ def save(example: Example, folder: Path) -> Finding:
     if len(case.sweep.values) < len(example.case.sweep.values):
         words.append(f"samples {len(example.case.sweep.values)} to {len(case.sweep.values)}")
     if example.verdict is Verdict.SILENTLY_WRONG or not specimen.excused:
-        # what is taken off a closed form is none of it any more: the rest is judged by following
-        # the motion
+        # a reduced case no longer has the closed form: its reference is the followed motion
         try:
             known = bad_by_itself(case)
         except KincheckError:

@@ -1,4 +1,4 @@
-"""A stress run as data: the JSON schema kincheck-stress/1."""
+"""Results of a stress run: the JSON schema kincheck-stress/1."""
 
 from __future__ import annotations
 
@@ -11,14 +11,15 @@ class Finding(msgspec.Struct, frozen=True, kw_only=True):
     """The smallest example of a bad outcome of an engine in a family.
 
     Attributes:
-        specimen, number: its name, and its number in the family: with the run's seed that makes it
-            again.
-        sample: the first bad one: its number, and the value there of what is swept [m, rad or s].
-        message: what the engine said.
-        tol: largest residual that was accepted.
+        specimen, number: its name, and its number in the family; with the seed of the run, the
+            number reproduces it.
+        sample: number of the first bad sample; `value` is its value of the swept driver [m,
+            rad or s].
+        message: message of the engine.
+        tol: largest accepted residual.
         worst: see `Cell`.
-        file: name of the case file, where one was written.
-        reduced: what was taken off the case, in words.
+        file: name of the case file, if one was written.
+        reduced: reductions of the case, in words.
     """
 
     family: str
@@ -40,11 +41,11 @@ class Cell(msgspec.Struct, frozen=True, kw_only=True):
     """An engine in a family.
 
     Attributes:
-        samples: by verdict.
-        elsewhere: how many of the silently wrong ones are in another assembly, or in none.
-        worst: largest error of position, velocity and acceleration of samples that are right, over
-            what is round-off.
-        bad: how many specimens have a bad sample.
+        samples: number of samples by verdict.
+        elsewhere: number of silently wrong samples in another assembly, or in none.
+        worst: largest error of position, velocity and acceleration of right samples, over
+            the round-off bound.
+        bad: number of specimens with a bad sample.
     """
 
     family: str
@@ -61,12 +62,12 @@ class Cell(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Proofs(msgspec.Struct, frozen=True, kw_only=True):
-    """Samples of a family whose truth was proved, by Krawczyk's test in ball arithmetic.
+    """Samples of a family with a proved reference, by Krawczyk's test in ball arithmetic.
 
     Attributes:
-        worst: the largest distance of the truth from the proved ball, over what is round-off of an
-            engine.
-        reasons: why others were not proved.
+        worst: largest distance of the reference from the proved ball, over an
+            engine's round-off bound.
+        reasons: reasons of the failed proofs.
     """
 
     family: str
@@ -77,8 +78,8 @@ class Proofs(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Acceptance(msgspec.Struct, frozen=True, kw_only=True):
-    """A specimen of contradictory geometry: whether it was accepted, the residual told, and what
-    could not be avoided [m].
+    """A specimen of contradictory geometry: whether it was accepted, the reported residual, and the
+    unavoidable one [m].
     """
 
     engine: str
@@ -89,8 +90,12 @@ class Acceptance(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Stress(msgspec.Struct, frozen=True, kw_only=True):
-    """A run. abouts: what each family is; seconds: by what took them; unfinished: families that
-    could not be run, and why.
+    """A run.
+
+    Attributes:
+        abouts: description of each family.
+        seconds: time of each part of the run [s].
+        unfinished: families that could not be run, with the reason.
     """
 
     schema: Literal["kincheck-stress/1"] = "kincheck-stress/1"

@@ -1,4 +1,4 @@
-"""A stress run: specimens of all families, their truth, and what every engine makes of them."""
+"""A stress run: specimens of all families, their references and the outcomes of every engine."""
 
 from __future__ import annotations
 
@@ -25,11 +25,10 @@ from .truth.proofs import distance_from_proof
 from .truth.reference_motion import Reach, Truth
 from .verdicts import BAD, Judgement, Verdict, described_wrong, judged
 
-# However few samples a family gets, they are of so many specimens, and not fewer than three each.
+# Smallest number of specimens of a small share, and samples of each.
 FEWEST_SPECIMENS, FEWEST_SAMPLES = 4, 3
 COARSEST = 5
-# A proof takes some ms, making its equations a hundred times as long: of small mechanisms, and
-# every other one.
+# A proof takes ms, its equations 100 times as long: every other small mechanism is proved.
 LARGEST_PROVED = 6
 
 
@@ -46,7 +45,7 @@ class Example:
 
 @dataclass(frozen=True, eq=False)
 class Made:
-    """A specimen with its case, or why there is none, and its truth."""
+    """A specimen with its case, or the reason of its refusal, and its reference."""
 
     number: int
     samples: int
@@ -58,8 +57,6 @@ class Made:
 
 @dataclass(eq=False)
 class _Results:
-    """What has been found so far."""
-
     cells: list[Cell] = field(default_factory=list[Cell])
     proofs: list[Proofs] = field(default_factory=list[Proofs])
     examples: list[Example] = field(default_factory=list[Example])
@@ -77,16 +74,10 @@ def stress(
     prove: bool = True,
     tell: Callable[[str], object] = lambda line: None,
 ) -> tuple[Stress, list[Example]]:
-    """Run specimens of the families until each has its share of the samples.
+    """Run all families; return the results and the smallest example of each bad engine and outcome.
 
-    Args:
-        prove: prove a share of the samples whose truth was followed; needs python-flint.
-
-    Returns:
-        The results, and the smallest example of every bad outcome of an engine in a family.
-
-    Raises:
-        KincheckError: this machine has no extended precision.
+    `prove` proves a share of the followed samples and needs python-flint. A KincheckError is raised
+    if this machine has no extended precision.
     """
     require_extended()
     found, seconds = _Results(), {"truth": 0.0, "proofs": 0.0, "engines": 0.0}
@@ -102,7 +93,7 @@ def stress(
                 prove=prove,
                 tell=tell,
             )
-        except KincheckError as error:  # what the others gave is not lost
+        except KincheckError as error:  # the results of the other families are kept
             found.unfinished[family.name] = str(error)
             tell(f"{family.name}: not finished: {error}")
     results = Stress(
@@ -145,7 +136,7 @@ def _family(
 
 
 def specimens(family: Family, seed: int, share: int) -> list[Made]:
-    """Return as many specimens as make up a share of samples."""
+    """Return specimens with a share of samples in all."""
     most = max(FEWEST_SAMPLES, share // FEWEST_SPECIMENS) if family.several else share
     found: list[Made] = []
     while (done := sum(one.samples for one in found)) < share:
@@ -156,11 +147,11 @@ def specimens(family: Family, seed: int, share: int) -> list[Made]:
 
 
 def specimen(family: Family, seed: int, number: int, most: int) -> Made:
-    """Return that specimen of a family, the same mechanism whatever else is run, and samples too
-    unless those are too many.
+    """Return specimen `number` of a family; its mechanism does not depend on
+    the rest of the run.
     """
     rng = np.random.default_rng([seed, zlib.crc32(family.name.encode()), number])
-    # a coarse sweep leaves most to the solver, a fine one has more to judge
+    # a coarse sweep is harder to solve, a fine one has more samples to judge
     fineness = float(rng.random()) ** 0.5
     wanted = int(COARSEST * (family.samples / COARSEST) ** fineness) if family.several else most
     samples = min(wanted, most)
@@ -173,7 +164,7 @@ def specimen(family: Family, seed: int, number: int, most: int) -> Made:
 
 
 def _solve(family: Family, engine: Engine, made: Sequence[Made], found: _Results) -> None:
-    """All specimens of a family with an engine."""
+    """Solve all specimens of a family with an engine."""
     begun = perf_counter()
     there = [(one, one.case) for one in made if one.case is not None]
     answers = solve_all(
@@ -276,7 +267,7 @@ def _example(
 
 
 def _proofs(family: str, made: Sequence[Made], seed: int) -> list[Proofs]:
-    """A sample each of every other small mechanism whose truth was followed."""
+    """Prove a random sample of every other small mechanism with a followed reference."""
     rng, tried, proved, worst = np.random.default_rng([seed, 1]), 0, 0, 0.0
     reasons: list[str] = []
     for one in made[::2]:
@@ -298,7 +289,7 @@ def _proofs(family: str, made: Sequence[Made], seed: int) -> list[Proofs]:
         except (
             UnprovedError,
             SolveError,
-        ) as error:  # or its equations cannot even be written, so near is it to a singular design
+        ) as error:  # also: too near to a singular design
             reasons.append(f"{one.specimen.name}: {error}")
     return (
         [Proofs(family=family, tried=tried, proved=proved, worst=worst, reasons=reasons)]

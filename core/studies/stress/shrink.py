@@ -1,13 +1,11 @@
-"""Making a bad case smaller, as long as its outcome stays as bad: fewer samples, points, bodies and
-digits.
-"""
+"""Reduction of a bad case with the same outcome: fewer samples, points, bodies and digits."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import product
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -20,7 +18,7 @@ from ...mechanism.mechanism import Mechanism
 Bad = Callable[[Case], bool]
 """Whether a case still has the outcome; a case that cannot be judged has not."""
 
-# Judging a candidate takes a tenth of a second to some: a minute in all.
+# Judging a candidate takes 0.1 s to a few seconds: a minute in all.
 TRIES = 150
 
 
@@ -39,7 +37,9 @@ class _Budget:
 
 
 def fewer_samples(case: Case, sample: int, bad: Bad) -> Case:
-    """The case with as few samples as it takes, from the design to the bad one or all of them."""
+    """Return the case with the fewest samples that keep the outcome, from the design to the bad
+    sample or over the whole sweep.
+    """
     still, values = _Budget(bad), case.sweep.values
     stop = float(values[sample])
     ends = [(case.sweep.design, stop), (float(values[0]), float(values[-1]))]
@@ -62,7 +62,7 @@ def fewer_samples(case: Case, sample: int, bad: Bad) -> Case:
 
 
 def reduced(case: Case, bad: Bad) -> tuple[Case, list[str]]:
-    """The case with less of everything, and what was taken off in words."""
+    """Return the smallest case found with the outcome, and the reductions in words."""
     still, words = _Budget(bad), list[str]()
     before = len(case.mechanism.bodies), len(case.mechanism.joints)
     going = True
@@ -82,7 +82,9 @@ def reduced(case: Case, bad: Bad) -> tuple[Case, list[str]]:
 
 
 def _smaller(case: Case) -> Iterator[Case]:
-    """Cases with a body less, free to move as they are driven; the largest steps first."""
+    """Yield cases with one point or body less and one freedom per driver; the
+    largest steps first.
+    """
     mechanism = case.mechanism
     if len(mechanism.points) > 1:
         driven = {getattr(driver, "point", "") for driver in mechanism.drivers}
@@ -118,7 +120,9 @@ def _without(mechanism: Mechanism, body: str, joints: Sequence[str]) -> Mechanis
 def _parts(
     mechanism: Mechanism, bodies: Sequence[Any], joints: Sequence[Joint]
 ) -> Mechanism | None:
-    """What is left with these bodies and joints; None where a driver or all points are gone."""
+    """Return the mechanism of these bodies and joints; None if a driver or all
+    points are missing.
+    """
     names, known = {"ground", *(body.name for body in bodies)}, {joint.name for joint in joints}
     points = [point for point in mechanism.points if point.body in names]
     couplers = [coupler for coupler in mechanism.couplers if set(coupler.joints) <= known]
@@ -136,7 +140,7 @@ def _parts(
 
 
 def _driven(case: Case, mechanism: Mechanism | None) -> Iterator[Case]:
-    """The case of a mechanism, where it has as many freedoms as drivers."""
+    """Yield the case of a mechanism with as many freedoms as drivers."""
     if mechanism is None:
         return
     try:
@@ -154,14 +158,12 @@ def _with(case: Case, mechanism: Mechanism, hidden: set[str]) -> Case:
 
 
 def rounded(case: Case, digits: int) -> Case | None:
-    """The case with its geometry to so many digits; None where that makes no sense."""
+    """Return the case with its geometry rounded to some digits; None if the result is invalid."""
 
     def short(value: Any) -> Any:
-        return (
-            tuple(map(short, value))
-            if isinstance(value, tuple)
-            else float(f"{value:.{digits - 1}e}")
-        )  # pyright: ignore
+        if isinstance(value, tuple):
+            return tuple(map(short, cast("tuple[Any, ...]", value)))
+        return float(f"{value:.{digits - 1}e}")
 
     mechanism = case.mechanism
     try:

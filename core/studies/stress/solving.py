@@ -1,5 +1,5 @@
-"""Having specimens solved: the native engine here, by machine code and by numpy, simulators in
-worker processes.
+"""Solution of specimens: by the native engine in this process, compiled and by numpy, and by
+simulators in worker processes.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ from ...kinematics.compiled.samples import Route
 from ...kinematics.continuation.sweep import follow
 from ...trajectory import Trajectory
 
-# A simulator that takes longer for a sweep of this size hangs [s].
+# A simulator hangs if a sweep of this size takes longer [s].
 PATIENCE = 60.0
 MEMORY = 4.0
-# Up to so many bodies numpy costs no more than compiling; the search around singular poses makes
-# larger ones slow.
+# Up to this number of bodies numpy is not slower than compilation; the search around singular poses
+# makes larger mechanisms slow.
 LARGEST_INTERPRETED = 4
 MOST_INTERPRETED = 2000
-"""Samples for which it is not compiled."""
+"""Largest number of samples solved without compilation."""
 
 
 class Interpreted:
-    """The native engine with its programs run by numpy: nothing is compiled for a mechanism that is
-    met once.
+    """The native engine with its programs run by numpy: a mechanism that is solved once
+    is not compiled.
     """
 
     name = NATIVE
@@ -50,11 +50,11 @@ class Interpreted:
         return self._native.version()
 
     def unsupported(self, case: Case) -> str | None:
-        """Never."""
+        """Return the native engine's reason, which is always None."""
         return self._native.unsupported(case)
 
     def build(self, case: Case) -> Route:
-        """Make the model that the native engine makes, without a compiler."""
+        """Build the native engine's model without a compiler."""
         path = case.sweep.path
         return Route(
             compile_model(
@@ -64,13 +64,13 @@ class Interpreted:
         )
 
     def solve(self, model: Route, case: Case, tol: float) -> Trajectory:
-        """March all samples."""
+        """Solve all samples along the motion."""
         return follow(model, tol)
 
 
 def suited(engine: Engine, case: Case, number: int) -> Engine:
-    """The native engine, interpreted for every other small mechanism, so that both executors are
-    met; simulators as they are.
+    """Return the native engine, interpreted for every other small mechanism so that both executors
+    are tested; return simulators unchanged.
     """
     small = (
         len(case.mechanism.moving) <= LARGEST_INTERPRETED
@@ -80,7 +80,7 @@ def suited(engine: Engine, case: Case, number: int) -> Engine:
 
 
 def solve_all(pairs: Sequence[Pair]) -> list[Answer | Failure]:
-    """The answers, in order; whatever is raised is a failure."""
+    """Return the answers in order; any error becomes a failure."""
     found: dict[int, Answer | Failure] = {}
     away = [k for k, pair in enumerate(pairs) if pair.engine.name != NATIVE]
     for k, pair in enumerate(pairs):
@@ -95,7 +95,7 @@ def solve_all(pairs: Sequence[Pair]) -> list[Answer | Failure]:
 
 
 def once(pair: Pair) -> Answer | Failure:
-    """Solve a pair here, once: no time is taken."""
+    """Solve a pair in this process, once and without timing."""
     case, engine = pair.case, pair.engine
     try:
         reason = engine.unsupported(case)
@@ -105,7 +105,7 @@ def once(pair: Pair) -> Answer | Failure:
         check(case, engine.name, trajectory)
     except KincheckError as error:
         return Failure(Outcome.ERROR, str(error))
-    except Exception as error:  # a defect: no refusal, and judged as what it is by its text
+    except Exception as error:  # a defect, judged by its text
         return Failure(Outcome.ERROR, said(error))
     return Answer(
         outputs={output.name: output_series(case, output, trajectory) for output in case.outputs},

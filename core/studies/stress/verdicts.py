@@ -1,5 +1,5 @@
-"""What became of the samples of a specimen: right, refused with the right reason or a wrong one, or
-silently wrong.
+"""Verdicts on the samples of a specimen: right, refused with the right or a wrong reason,
+or silently wrong.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from .truth.reference_motion import Reach, Truth
 
 
 class Verdict(StrEnum):
-    """What is said of one sample. Every sample gets exactly one."""
+    """The verdict on one sample; every sample has exactly one."""
 
     RIGHT = "right"
     REFUSED_RIGHTLY = "refused, right reason"
@@ -32,32 +32,32 @@ class Verdict(StrEnum):
 
 
 BAD = (Verdict.SILENTLY_WRONG, Verdict.REFUSED_WRONGLY)
-"""The worst first."""
+"""The bad verdicts, the worst first."""
 
-# A refusal at or behind a singular pose, or beyond the end of the motion, is right if it says so in
-# any of these words.
+# A refusal at or behind a singular pose, or beyond the end of the motion, is right if its message
+# has any of these words.
 THE_MOTION_ENDS = (
     r"lock-up|dead centre|singular|bifurcat|beyond|out of reach|not assemble|contradict"
 )
-# An error of more than this part of the mechanism's size is another assembly, or none, and no lack
-# of digits.
+# A larger error, relative to the mechanism's size, is another assembly or none, not a lack of
+# digits.
 ELSEWHERE = 1e-3
-# What the rows of contradictory geometry leave over can be spread over them, or be put into one: by
-# ten that is the same.
+# The residual of contradictory geometry may be spread over the rows or lie in one; the factor of
+# ten makes both equal.
 SPREAD = 10.0
 
 
 @dataclass(frozen=True, eq=False)
 class Judgement:
-    """What became of a specimen with an engine.
+    """The outcome of a specimen with an engine.
 
     Attributes:
-        verdicts: of the samples.
-        worst: largest error of positions, velocities and accelerations over what is round-off; None
-            where nothing was compared.
-        elsewhere: how many of the silently wrong samples are in another assembly.
-        message: what the engine said.
-        told: the residual that it reported [m or -].
+        verdicts: verdicts of the samples.
+        worst: largest error of positions, velocities and accelerations over the round-off bound;
+            None if nothing was compared.
+        elsewhere: number of silently wrong samples in another assembly.
+        message: message of the engine.
+        told: residual reported by the engine [m or -].
     """
 
     verdicts: NDArray[np.object_]
@@ -73,14 +73,14 @@ class Judgement:
         )
 
     def first(self, verdict: Verdict) -> int | None:
-        """The first sample of that verdict."""
+        """Return the first sample with a verdict; None if there is none."""
         found = np.flatnonzero(self.verdicts == verdict)
         return int(found[0]) if len(found) else None
 
 
 def described_wrong(specimen: Specimen, samples: int, message: str) -> Judgement:
-    """The judgement of a specimen whose description was refused, which is the same for every
-    engine.
+    """Return the judgement of a specimen whose description was refused; it is the same
+    for every engine.
     """
     right = specimen.truth is None and re.search(specimen.reasons, message)
     return _all(samples, Verdict.REFUSED_RIGHTLY if right else Verdict.REFUSED_WRONGLY, message)
@@ -89,14 +89,14 @@ def described_wrong(specimen: Specimen, samples: int, message: str) -> Judgement
 def judged(
     specimen: Specimen, case: Case, truth: Truth | None, result: Answer | Failure
 ) -> Judgement:
-    """Compare an answer, or a refusal, with the truth; None is that of a specimen of which no
-    sample makes sense.
+    """Compare an answer, or a refusal, with the reference; None stands for a specimen without
+    any valid sample.
     """
     n = len(case.sweep.values)
     if isinstance(result, Failure):
         if result.outcome in (Outcome.UNSUPPORTED, Outcome.UNAVAILABLE):
             return _all(n, Verdict.UNSUPPORTED, result.message)
-        if result.outcome is not Outcome.ERROR:  # a crash or a hang is no reason
+        if result.outcome is not Outcome.ERROR:  # a crash or a hang is no valid refusal
             return _all(n, Verdict.REFUSED_WRONGLY, result.message)
         return _refused(specimen, truth, n, result.message)
     positions = {name: _moved(result, name, "position") for name in case.points}
@@ -115,7 +115,7 @@ def judged(
             if not np.isfinite(found[known]).any():
                 continue
             compared[k] = True
-            # what is missing of a solved sample is infinitely wrong
+            # a missing value of a solved sample is infinitely wrong
             off = (
                 np.where(np.isfinite(found), np.abs(found - moved[k]), np.inf)[known]
                 .max(axis=1)
@@ -135,8 +135,7 @@ def judged(
     verdicts[beyond] = Verdict.SILENTLY_WRONG
     far = (errors > ELSEWHERE * truth.system.rows.stated.unit) | beyond
     worst = tuple(float(ratios[k].max()) if compared[k] and known.any() else None for k in range(3))
-    # what an engine notes beside its samples warns nobody who reads the samples, but tells where to
-    # look
+    # notes of an engine beside its samples warn no reader of the samples, but explain the outcome
     message = "; ".join(
         [*filter(None, [result.message]), *map(str, result.details.get("notes", []))]
     )
@@ -146,7 +145,7 @@ def judged(
 
 
 def _refused(specimen: Specimen, truth: Truth | None, n: int, message: str) -> Judgement:
-    """All samples refused, as far as the reason goes."""
+    """Return the judgement of a refusal of all samples, by its reason."""
     named = bool(specimen.reasons and re.search(specimen.reasons, message))
     ended = bool(re.search(THE_MOTION_ENDS, message))
     if truth is None:
@@ -165,7 +164,7 @@ def _all(n: int, verdict: Verdict, message: str) -> Judgement:
 
 
 def _moved(result: Answer, point: str, quantity: str) -> Array:
-    """A point's motion of that kind, shape (n, 3); NaN where there is none."""
+    """Return a quantity of a point's motion, shape (n, 3); NaN if there is none."""
     series = [getattr(result.outputs[f"{point}.{axis}"], quantity) for axis in "xyz"]
     n = len(result.outputs[f"{point}.x"].position)
     return np.stack([np.full(n, np.nan) if each is None else each for each in series], axis=1)

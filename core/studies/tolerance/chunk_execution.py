@@ -1,6 +1,4 @@
-"""Where the chunks of a study are solved, in threads here or on a cluster; either gives them in
-order, and a few at a time only.
-"""
+"""Execution of a study's chunks, in threads or on a cluster: in order, a few at a time."""
 
 from __future__ import annotations
 
@@ -23,17 +21,14 @@ from .study import Chunk, Ready, Study
 
 Chunks: TypeAlias = Generator[Chunk]
 Source: TypeAlias = Callable[[Study, int], Chunks]
-"""Solves the chunks of a study somewhere, from the one of that index on: gives each once, in
-order.
-"""
+"""Solves the chunks of a study from an index on, and yields each once, in order."""
 
-# Chunks that are under way for each thread: one is solved, one waits, and results come back in
-# order.
+# Chunks in progress for each thread: one is solved, others wait for their turn in the order.
 AHEAD = 3
 
 
 def on_threads(ready: Ready, jobs: int) -> Source:
-    """The source in this process: the programs run without Python's lock."""
+    """Return the source in this process: the programs run without Python's lock."""
 
     def solve(study: Study, first: int = 0) -> Chunks:
         if jobs == 1:
@@ -55,18 +50,18 @@ def on_threads(ready: Ready, jobs: int) -> Source:
 
 
 def on_cluster(address: str) -> Source:
-    """The source on the workers of a dask.distributed scheduler. What a lost worker had is solved
-    by another.
+    """Return the source on the workers of a dask.distributed scheduler. Other workers repeat the
+    tasks of a lost one.
 
     Raises:
-        ClusterError: dask.distributed is not installed, the scheduler does not answer or has gone,
-            every worker that had a task was lost, or a worker cannot solve.
+        ClusterError: dask.distributed is not installed, the scheduler does not answer or
+            disappeared, every worker of a task was lost, or a worker cannot solve.
     """
 
     def solve(study: Study, first: int = 0) -> Chunks:
         distributed = loaded()
         packed = pack(study)
-        # the scheduler takes equal names for one and the same task
+        # the scheduler treats tasks with equal names as one task
         name = f"kincheck-sweep-{uuid4().hex}"
         with connected(distributed, address) as client, _explained(distributed, address):
             waiting = deque[Any]()
@@ -86,7 +81,7 @@ def on_cluster(address: str) -> Source:
 
 @contextmanager
 def _explained(distributed: Any, address: str) -> Generator[None]:
-    """What goes wrong on a cluster, as an error that says so."""
+    """Turn errors of a cluster into errors with an explanation."""
     try:
         yield
     except KincheckError:

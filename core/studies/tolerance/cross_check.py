@@ -1,5 +1,5 @@
-"""Cross-checking: some variants rebuilt as cases of their own and solved by another engine,
-compared with what the sweep has.
+"""Cross-check: some variants are rebuilt as cases, solved by another engine and compared
+with the sweep.
 """
 
 from __future__ import annotations
@@ -28,11 +28,10 @@ from .study import Study
 
 
 class Checked(msgspec.Struct, frozen=True, kw_only=True):
-    """A variant that was solved by the other engine too, and the quantity that is off most, in
-    tolerances.
+    """A cross-checked variant, with the quantity of the largest deviation in tolerances.
 
     Attributes:
-        message: empty where it passes: by how much it deviates, or why there is no answer.
+        message: the deviation, or the reason for no answer; empty where it passes.
         ratio: the largest deviation by its tolerance; null where nothing was compared.
     """
 
@@ -46,7 +45,7 @@ class Checked(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def chosen(samples: int, share: float, seed: int) -> frozenset[int]:
-    """Variants to be checked: a random share, at least one."""
+    """Return the variants to check: a random share, at least one."""
     count = min(samples, max(1, round(share * samples)))
     random = np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=())))
     return frozenset(random.choice(samples, size=count, replace=False, shuffle=False).tolist())
@@ -54,9 +53,7 @@ def chosen(samples: int, share: float, seed: int) -> frozenset[int]:
 
 @dataclass(frozen=True, eq=False)
 class _Pairs(Sequence[Pair]):
-    """The pairs of variants with an engine; a case is made when it is asked for, so that thousands
-    need no room.
-    """
+    """Pairs of variants with an engine; cases are built on demand, so thousands need no memory."""
 
     study: Study
     engine: Engine
@@ -77,10 +74,10 @@ class _Pairs(Sequence[Pair]):
 
 
 def require_able(study: Study, engine: Engine, solver: Solver, tol: float) -> None:
-    """Solve the nominal design with the engine, to know that it can.
+    """Solve the nominal design with the engine, to check its ability.
 
     Raises:
-        KincheckError: it is not installed, or cannot express the case.
+        KincheckError: the engine is not installed, or cannot express the case.
     """
     ((_, found),) = solver([Pair(study.case, engine, tol, timed=False)])
     result = found.result
@@ -120,13 +117,13 @@ def judged(
     study: Study, variant: int, attempt: Attempt, ours: Array, tol: float = math.inf
 ) -> Checked:
     """Compare an engine's answer with the sweep's values: every row within its output's tolerance,
-    wherever both have one.
+    at all samples with both values.
 
-    A variant without a row that both have a value of is not judged. One fails where the engine has
-    values and the sweep has no solution, or the engine has none and the sweep has one.
+    A variant without any common value is not judged. A variant fails if only one of engine and
+    sweep has a solution.
 
     Args:
-        tol: the largest residual that the engine promises, relative to the mechanism's size.
+        tol: the largest residual promised by the engine, relative to the mechanism's size.
     """
     result = attempt.result
     if not isinstance(result, Answer):
@@ -146,8 +143,7 @@ def judged(
         theirs: Array | None = getattr(series, QUANTITIES[row.derivative])
         if theirs is None:
             continue
-        # where the sweep has no value either, nothing is lost: such a variant is counted among
-        # those without a solution
+        # without a value of the sweep nothing is lost: the variant already counts as unsolved
         if count := int((np.isfinite(values) & ~np.isfinite(theirs)).sum()):
             lost = (
                 f"{row.name}: {count} samples without a value where the sweep has one:"
@@ -185,11 +181,11 @@ def judged(
 
 
 def _contradicted(study: Study, case: Case, answer: Answer, ours: Array) -> str:
-    """Return what an engine has where native cannot reach the sample, with native's reason; empty
-    where there is nothing.
+    """Return a message if an engine has values at samples that native cannot reach, with native's
+    reason; else an empty text.
 
-    Many variants at once are refused beside singular poses that one by itself passes, so that
-    native solves a variant in question again, alone.
+    A batch of variants is refused near singular poses that a single variant passes, so native
+    solves the variant again alone.
     """
     values = np.logical_or.reduce(
         [np.isfinite(series.position) for series in answer.outputs.values()]

@@ -1,14 +1,14 @@
 """Gradients of outputs by the coordinates of a variation, at the nominal design: central
 differences of solved variants.
 
-A coordinate is moved by h and h/2 both ways. The difference over h is off by f''' h^2 / 6 + f'''''
-h^4 / 120, so four times the one over h/2 less the one over h, by three, is off by terms of h^4 only
-(Richardson). By how much the two differ says what was left out: a third of it is the error of the
-difference over h/2, and bounds that of the result wherever the series converges.
+A coordinate moves by h and h/2 in both directions. The error of the difference over h is f''' h^2 /
+6 + f''''' h^4 / 120. Richardson's combination, four times the difference over h/2 minus the one
+over h, by three, has errors of h^4 only. A third of the distance between the two differences is the
+error of the one over h/2, and bounds the error of the result wherever the series converges.
 
-With h/size = 2e-4 the share of the second term is about (h/size)^2 / 6 = 7e-9, that of the third
-1e-17, and round-off of 1e-15 of the size in an output is 5e-12 of a gradient of one: room for
-outputs that bend a hundred times as much as the mechanism is large.
+With h/size = 2e-4 the share of the second term is about (h/size)^2 / 6 = 7e-9, of the third 1e-17.
+Round-off of 1e-15 of the size in an output is 5e-12 of a gradient of one: enough room for outputs
+that bend a hundred times as much as the mechanism is large.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from ...trajectory import Array
 from .study import Ready
 
 STEP = 2e-4
-# What gradients are to be good for: the error relative to the largest gradient of the output by a
-# coordinate of the same unit.
+# Required accuracy: error relative to the output's largest gradient by a coordinate of the
+# same unit.
 ACCURATE = 1e-6
-# Of an output that no such coordinate changes in first order, differences are round-off: this part
-# of its size, or the mechanism's, a thousand times that of a number, over the step.
+# Round-off of differences of an output without first-order change: this part of its size, or the
+# mechanism's, over the step; a thousand times that of a number.
 ROUND_OFF = 1e-13
 MOVES = np.array([1.0, -1.0, 0.5, -0.5])
 
@@ -40,12 +40,12 @@ class Gradients:
     Attributes:
         along: over the samples [unit of row / unit of coordinate], shape (coordinates, rows, n);
             NaN where a neighbour of the nominal design has no value.
-        design: at the design position, shape (coordinates, rows); None where the case does not pass
-            through it.
-        error: bound of the error over the samples and at design, from the two steps, shape
-            (coordinates, rows).
-        accurate: whether that is at most `ACCURATE` of the row's largest gradient, or round-off,
+        design: at the design position, shape (coordinates, rows); None where the case does not
+            pass through it.
+        error: bound of the error over the samples and at design, from the two steps,
             shape (coordinates, rows).
+        accurate: whether the error is at most `ACCURATE` of the row's largest gradient, or
+            round-off, shape (coordinates, rows).
         messages: by coordinate, why neighbours have no solution.
     """
 
@@ -57,7 +57,7 @@ class Gradients:
 
 
 def gradients(ready: Ready) -> Gradients:
-    """The gradients of a study."""
+    """Return the gradients of a study."""
     study, path = ready.study, ready.study.case.sweep.path
     n, count = len(path.times), len(study.variation.coordinates)
     start = ready.route.begin
@@ -95,8 +95,8 @@ def gradients(ready: Ready) -> Gradients:
 
 
 def _largest(ready: Ready, found: Array) -> Array:
-    """The largest size of each row's gradients by coordinates of the same unit, shape (coordinates,
-    rows).
+    """Return the largest size of each row's gradients by coordinates of the same unit,
+    shape (coordinates, rows).
     """
     units = [each.unit for each in ready.study.variation.coordinates]
     largest = np.fmax.reduce(np.abs(found), axis=2)
@@ -109,7 +109,7 @@ def _largest(ready: Ready, found: Array) -> Array:
 
 
 def _noise(ready: Ready, steps: Array) -> Array:
-    """What round-off makes of a difference that is zero, shape (coordinates, rows)."""
+    """Return the round-off of a zero difference, shape (coordinates, rows)."""
     sizes = [size(ready.study.case) if row.unit == "m" else 1.0 for row in ready.study.rows]
     values = np.fmax(np.fmax.reduce(np.abs(ready.nominal), axis=1), sizes)
     return ROUND_OFF * values / steps[:, None]

@@ -149,9 +149,16 @@ def _environment() -> Environment:
 
 def _axis(results: SweepResults) -> Axis:
     record = Record(
-        case=results.case, truth="", engine="", mode="", loop="", version=None, outcome=Outcome.PASS, message="",
+        case=results.case,
+        truth="",
+        engine="",
+        mode="",
+        loop="",
+        version=None,
+        outcome=Outcome.PASS,
+        message="",
         driver=results.driver,
-    )  # fmt: skip
+    )
     return driver_axis(results.run["cases"].get(results.case, {}), [record], ())
 
 

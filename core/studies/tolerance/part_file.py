@@ -1,9 +1,7 @@
-"""The finished part of a study: its chunks in a file, each as soon as it is solved, from which the
-study is taken up again.
+"""File of a study's finished chunks, written as they are solved, from which the study resumes.
 
-The file holds an identity and then the chunks in their order, each with its length and SHA-256
-before it: what was cut off in the middle of a write is left out. Numbers are kept bit by bit, so
-that a study that is taken up is equal to one that was never stopped.
+The file holds an identity and the chunks in order, each after its length and SHA-256; a truncated
+chunk is ignored. Numbers are kept bit by bit, so a resumed study equals one that was never stopped.
 """
 
 from __future__ import annotations
@@ -31,16 +29,16 @@ class Part:
     """The file of a study's finished chunks.
 
     Attributes:
-        problems: what could not be written; the study goes on without the file.
+        problems: write errors; the study goes on without the file.
     """
 
     def __init__(self, path: Path, facts: Mapping[str, Any], *, resume: bool) -> None:
-        """Begin a file, or take up the one that is there.
+        """Begin a file, or take up an existing one.
 
         Args:
-            facts: what the chunks depend on besides the study: versions, the machine, modules of
-                joint types.
-            resume: take up the chunks that are there.
+            facts: dependencies of the chunks besides the study: versions, the machine, modules
+                of joint types.
+            resume: take up the chunks in the file.
         """
         self.path, self.problems = path, list[str]()
         self._facts, self._resume = facts, resume
@@ -54,7 +52,7 @@ class Part:
             self._file.close()
 
     def finished(self, study: Study) -> Iterator[Chunk]:
-        """Give the chunks that the file has of a study; from then on `add` appends to them.
+        """Yield the study's chunks in the file; from then on `add` appends to them.
 
         Raises:
             KincheckError: the file is of another study.
@@ -90,7 +88,7 @@ class Part:
             self._try(lambda: file.write(frame))
 
     def remove(self) -> None:
-        """Remove the file: the study has come to its end."""
+        """Remove the file after the study's end."""
         self.path.unlink(missing_ok=True)
 
     def _append_at(self, end: int) -> None:
@@ -110,7 +108,7 @@ class Part:
 
 
 def _next(file: BinaryIO) -> Chunk | None:
-    """Return the next chunk of a file; None at its end, or where what follows is not whole."""
+    """Return the next chunk of a file; None at its end, or where the rest is incomplete."""
     head = file.read(LENGTH + HASH)
     packed = (
         file.read(int.from_bytes(head[:LENGTH], "little")) if len(head) == LENGTH + HASH else b""

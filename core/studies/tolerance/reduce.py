@@ -1,8 +1,6 @@
-"""Many variants to a few numbers: extremes, mean and spread as they come, in any number of steps;
-quantiles of those that are kept.
+"""Reduction of many variants: running extremes, mean and spread, and quantiles of kept values.
 
-Summaries are merged in the order of the chunks, whoever has computed them, so that a sum is rounded
-the same way every time.
+Summaries are merged in the order of the chunks, so that sums are rounded the same way every time.
 """
 
 from __future__ import annotations
@@ -20,11 +18,11 @@ QUANTILES = (0.01, 0.05, 0.5, 0.95, 0.99)
 
 @dataclass(frozen=True, eq=False)
 class Summary:
-    """Values of quantities over variants. Shape (quantities, n): one number for each quantity and
-    sample.
+    """Statistics of quantities over variants. Shape (quantities, n): one number for each
+    quantity and sample.
 
     Attributes:
-        count: variants that have a value.
+        count: variants with a value.
         least, most, mean: NaN without any.
         squares: sum of the squared distances from the mean.
         extremes: of each quantity, the variants with the least and the most of all samples, shape
@@ -40,27 +38,24 @@ class Summary:
 
     @property
     def deviation(self) -> Array:
-        """Standard deviation of what the variants are a sample of: over count - 1; NaN of fewer
-        than two.
-        """
+        """Sample standard deviation, over count - 1; NaN for fewer than two variants."""
         with np.errstate(all="ignore"):
             return np.where(self.count > 1, np.sqrt(self.squares / (self.count - 1)), np.nan)
 
 
 def nothing(quantities: int, n: int) -> Summary:
-    """The summary of no variants."""
+    """Return the summary of no variants."""
     none, unknown = np.zeros((quantities, n)), np.full((quantities, n), np.nan)
-    return Summary(
-        none.astype(np.int64), unknown, unknown, unknown, none, np.full((quantities, 2), -1, dtype=np.int64)
-    )  # fmt: skip
+    extremes = np.full((quantities, 2), -1, dtype=np.int64)
+    return Summary(none.astype(np.int64), unknown, unknown, unknown, none, extremes)
 
 
 def merged(a: Summary, b: Summary) -> Summary:
-    """The summary of the variants of both; b's come after a's.
+    """Return the summary of the variants of both; b's come after a's.
 
-    Mean and squares by Chan, Golub and LeVeque: Updating formulae and a pairwise algorithm for
-    computing sample variances (1979), which lose no digits where the mean is large against the
-    spread.
+    Mean and squares by Chan, Golub and LeVeque: Updating formulae and a pairwise algorithm
+    for computing sample variances (1979), which lose no digits where the mean is large
+    against the spread.
     """
     count = a.count + b.count
     with np.errstate(all="ignore"):
@@ -69,7 +64,7 @@ def merged(a: Summary, b: Summary) -> Summary:
         mean = np.where(a.count == 0, b.mean, np.where(b.count == 0, a.mean, a.mean + step * share))
         both = np.where((a.count == 0) | (b.count == 0), 0.0, step * step * a.count * share)
         least, most = np.fmin(a.least, b.least), np.fmax(a.most, b.most)
-        # b's only where it is further out, or a has none: the first of equals stays
+        # b's only if it is further out or a has none: the first of equals stays
         none = a.extremes[:, 0] < 0
         below = none | (np.fmin.reduce(b.least, axis=1) < np.fmin.reduce(a.least, axis=1))
         above = none | (np.fmax.reduce(b.most, axis=1) > np.fmax.reduce(a.most, axis=1))
@@ -83,10 +78,10 @@ class Quantiles:
 
     Attributes:
         values: by linear interpolation between neighbours in order, shape (len(QUANTILES), n).
-        errors: standard errors: half the distance between the quantiles at p - s and p + s, s =
-            sqrt(p (1 - p) / m), which is the standard error of the share of m variants below a
-            value; shape as of the values, None where these are exact.
-        kept: how many variants they are of.
+        errors: standard errors: half the distance between the quantiles at p - s and p + s, with s
+            = sqrt(p (1 - p) / m), the standard error of the share of m variants below a value;
+            shape of the values, None where these are exact.
+        kept: number of variants behind the quantiles.
     """
 
     values: Array
@@ -95,11 +90,11 @@ class Quantiles:
 
 
 def quantiles(kept: Sequence[Array], *, exact: bool) -> Quantiles:
-    """Quantiles of variants, NaN where there is no value.
+    """Return the quantiles of variants, NaN where there is no value.
 
     Args:
         kept: values, shape (n, V) each.
-        exact: whether these are all variants that there are, rather than a sample of them.
+        exact: whether these are all variants, rather than a sample of them.
     """
     values = np.concatenate(kept, axis=1)
     count = values.shape[1]
@@ -113,7 +108,7 @@ def quantiles(kept: Sequence[Array], *, exact: bool) -> Quantiles:
         some = ~np.isnan(values).all(axis=1)
         found[:, some] = np.nanquantile(values[some], wanted, axis=1)
     else:
-        # by vectors of numbers: half the time of looking for each quantile in turn
+        # vectorized: half the time of a search for each quantile
         values.sort(axis=1)
         found = np.quantile(values, wanted, axis=1, overwrite_input=True)
     if exact:

@@ -1,5 +1,5 @@
-"""A sweep over designs from beginning to end: solve all variants, reduce them on the way,
-differentiate, cross-check.
+"""Sweep over design variants: solve all variants, reduce them chunk by
+chunk, differentiate, cross-check.
 """
 
 from __future__ import annotations
@@ -32,22 +32,20 @@ from .part_file import Part
 from .reduce import merged, nothing, quantiles
 from .study import Chunk, Ready, Study, Unsolved
 
-# Variants whose values are kept for quantiles: among ten thousand, the standard error of a 1 %
-# quantile is a tenth of a percent.
+# Variants kept for quantiles: the standard error of a 1 % quantile is then a tenth of a percent.
 KEPT = 10_000
-# Bytes that they may take; with many outputs over many samples there are fewer.
+# Limit of their memory [bytes]; many outputs over many samples leave room for fewer variants.
 KEPT_BYTES = 64_000_000
-# Variants without a solution that are listed; all are counted.
+# Unsolved variants listed in the results; all are counted.
 LISTED = 50
-# A grid is counted in whole numbers; more than this is a mistake in it (a variant costs some ten
-# microseconds, so it is a day).
+# A larger grid is a mistake: at ten microseconds a variant this is a day.
 MOST_VARIANTS = 10**10
 
 
 @dataclass(frozen=True, eq=False)
 class Progress:
-    """How far a sweep is: variants solved of all, without a solution among them, seconds, and
-    variants solved in these.
+    """Progress of a sweep: finished variants, total, unsolved ones, and seconds with the variants
+    solved in them.
     """
 
     done: int
@@ -58,16 +56,16 @@ class Progress:
 
 
 class Store(Protocol):
-    """Takes the values of all variants, chunk by chunk."""
+    """Storage for the values of all variants, chunk by chunk."""
 
     def write(self, chunk: Chunk) -> None:
-        """Take a chunk's values and offsets; chunks come in order."""
+        """Store a chunk's values and offsets; chunks come in order."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class Check:
-    """A share of the variants is to be solved by an engine too, by a solver of pairs."""
+    """A cross-check: a share of the variants is solved by another engine too."""
 
     engine: Engine
     share: float
@@ -93,31 +91,30 @@ def sweep_designs(
     part: Part | None = None,
     stopped: Callable[[KeyboardInterrupt | ClusterError], None] | None = None,
 ) -> results.SweepResults:
-    """Solve all variants of a case and reduce its outputs over them; never are all variants held at
-    once.
+    """Solve all variants of a case and reduce its outputs over them, without holding all
+    variants at once.
 
     Args:
-        case: a case, as `kincheck run` takes it; its reference is not looked at.
-        variation: what varies, from `read_variation`.
-        samples: how many variants are drawn; None where the variation lists them.
-        seed: of the draws; the same seed gives the same variants on any machine and with any number
-            of jobs.
-        order: derivatives of the outputs by time that are reduced too: 0, 1 or 2.
+        case: the case; its reference is not used.
+        variation: the varied coordinates, from `read_variation`.
+        samples: number of variants to draw; None where the variation lists them.
+        seed: of the draws; equal seeds give equal variants on any machine and with any `jobs`.
+        order: highest time derivative of the outputs to reduce: 0, 1 or 2.
         tol: largest accepted constraint residual, relative to the mechanism's size.
         jobs: threads.
-        source: where chunks are solved, if not in threads of this process.
+        source: solver of the chunks; None for threads of this process.
         check: an engine to cross-check with.
-        store: takes the values of all variants.
-        progress: told after every chunk.
+        store: receives the values of all variants.
+        progress: called after every chunk.
         command: the command line, kept with the results.
-        part: keeps the chunks that are solved, and has those of an earlier sweep that was stopped.
-        stopped: told what stops the sweep before its end: the results are then of the variants
-            solved so far. Without it, and where there are none yet, that is raised.
+        part: keeps the solved chunks, and has those of an earlier, stopped sweep.
+        stopped: called with the reason of an early stop; the results then have the variants solved
+            so far. Without it, or without any solved variant, the reason is raised.
 
     Raises:
-        KincheckError: the number of variants is missing or not for this mode, the nominal design
-            cannot be solved, the engine of the check is not there or not able, or there is no
-            cluster.
+        KincheckError: the number of variants is missing or does not fit the mode, the
+            nominal design cannot be solved, the engine of the check is missing or unable, or
+            there is no cluster.
     """
     started = datetime.now(UTC)
     case = replace(case, reference={})
@@ -184,7 +181,7 @@ def sweep_designs(
         and found.done == study.samples
     )
     by_row = [[each[k] for each in found.kept] for k in range(len(study.rows))]
-    with ThreadPoolExecutor(jobs) as pool:  # sorting is done without Python's lock
+    with ThreadPoolExecutor(jobs) as pool:  # sorting runs without Python's lock
         kept = list(pool.map(partial(quantiles, exact=exact), by_row))
     run = circumstances([case], started=started, tol=tol, command=command)
     run["cases"][case.name]["notes"] += start_notes(
@@ -219,7 +216,7 @@ def sweep_designs(
 
 
 class _Gathered:
-    """What has come of the chunks so far."""
+    """Results of the chunks so far."""
 
     def __init__(self, study: Study) -> None:
         self.summary = nothing(len(study.rows), len(study.case.sweep.values))
@@ -230,7 +227,7 @@ class _Gathered:
         self.done = self.chunks = self.failures = self.retried = 0
 
     def add(self, chunk: Chunk) -> None:
-        """Take a chunk; chunks come in order."""
+        """Add a chunk; chunks come in order."""
         self.summary = merged(self.summary, chunk.summary)
         self.kept.append(chunk.kept)
         self.picked |= chunk.picked
@@ -246,14 +243,13 @@ class _Gathered:
 
 
 def how_many(variation: Variation, samples: int | None) -> int:
-    """How many variants there are.
+    """Return the number of variants.
 
     Args:
-        samples: as many as are drawn; None where they are listed.
+        samples: number of draws; None where the variants are listed.
 
     Raises:
-        KincheckError: it is not given where it is needed, or given where it is not, or there are
-            too many.
+        KincheckError: the number is missing, superfluous or too large.
     """
     listed = variation.count
     if listed is None:
@@ -282,9 +278,7 @@ def _kept(study: Study) -> int:
 def _measured(
     study: Study, solved: int, jobs: int | None, seconds: float, cpu: float
 ) -> dict[str, Any]:
-    """Rates of the solution and reduction of the variants; those by core are not known of a
-    cluster.
-    """
+    """Return the rates of solving and reducing variants; a cluster has no rates by core."""
     points = solved * len(study.case.sweep.values)
     found: dict[str, Any] = {"seconds": seconds, "variants_per_second": solved / seconds}
     if jobs is not None and points:
@@ -297,7 +291,7 @@ def _measured(
 
 
 def _peak_memory() -> float | None:
-    """The most that this process has had in memory [MB, 1e6 bytes]; None where it is not told."""
+    """Return the peak memory of this process [MB, 1e6 bytes]; None on Windows."""
     if sys.platform == "win32":
         return None
     import resource

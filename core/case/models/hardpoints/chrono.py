@@ -11,7 +11,8 @@ import re
 from pathlib import Path
 from typing import cast
 
-from ...io.document import as_table, fault, parse, shown
+from ...io.document import fault, parse, shown
+from ...io.typed_tables import as_table
 from .table import Hardpoint, HardpointTable, number
 
 WHEEL_CENTER = "Spindle/COM"

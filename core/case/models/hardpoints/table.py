@@ -34,7 +34,7 @@ _NAMED_AXES: Mapping[str, str] = {
 
 @dataclass(frozen=True)
 class Hardpoint:
-    """Coordinates as the file has them, and where they stand there, for messages."""
+    """Coordinates as in the file, and their place there for messages."""
 
     position: Vector
     where: str
@@ -42,15 +42,15 @@ class Hardpoint:
 
 @dataclass(frozen=True)
 class HardpointTable:
-    """What a file of hardpoints holds.
+    """Content of a file of hardpoints.
 
     Attributes:
-        tool: whose format it is.
+        tool: program of the format.
         points: by the name in the file.
-        unit: of the coordinates, where file or format say so.
-        axes: where x, y and z point, where file or format say so: "forward,left,up".
-        template: the suspension the points belong to, where the file says so.
-        left_out: what else is in the file, and has no meaning for kinematics or for a template.
+        unit: unit of the coordinates, if file or format define it.
+        axes: directions of x, y and z, if file or format define them: "forward,left,up".
+        template: suspension of the points, if the file names it.
+        left_out: other content, of no use for kinematics or a template.
     """
 
     file: Path
@@ -63,10 +63,10 @@ class HardpointTable:
 
 
 def number(file: Path, where: str, text: object) -> float:
-    """A coordinate.
+    """Return a coordinate.
 
     Raises:
-        CaseError: not a number that can be worked with.
+        CaseError: not a usable number.
     """
     found = math.nan
     if isinstance(text, str | int | float) and not isinstance(text, bool):
@@ -80,14 +80,14 @@ def number(file: Path, where: str, text: object) -> float:
 
 
 def placed(table: HardpointTable, units: str | None, axes: str | None) -> dict[str, Vector]:
-    """The points in metres, x forward, y left, z up.
+    """Return the points in metres, x forward, y left, z up.
 
     Args:
-        units, axes: what the user says of them; needed where the file does not say, and not to
-            contradict it.
+        units, axes: values from the user, required if the file gives none; they must not contradict
+            it.
 
     Raises:
-        CaseError: unit or axes are not known, or contradict each other.
+        CaseError: unit or axes are unknown, or contradict each other.
     """
     convert = unit_of(table, units)
     places = _axes(table, axes)
@@ -114,7 +114,7 @@ def coordinate(
 
 
 def require_size(table: HardpointTable, used: Mapping[str, Vector], units: str | None) -> None:
-    """Refuse points that are as far apart as those of no suspension: their unit is another one."""
+    """Refuse points as far apart as in no suspension: their unit is wrong."""
     positions = list(used.values())
     size = max(math.dist(a, b) for a in positions for b in positions)
     if found := SUSPENSIONS.improbable(size, unit_of(table, units)):
@@ -123,7 +123,7 @@ def require_size(table: HardpointTable, used: Mapping[str, Vector], units: str |
 
 
 def unit_of(table: HardpointTable, said: str | None) -> Unit:
-    """The unit of the coordinates, which is what makes SI of them."""
+    """Return the unit of the coordinates, which converts them to SI."""
     return LENGTHS[_unit(table, said)]
 
 

@@ -1,4 +1,4 @@
-"""What moves a model: nothing in MJCF says it, so the options --drive and --hold do."""
+"""Drive of a model: MJCF defines none, so the options --drive and --hold do."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ _FORM = (
 
 @dataclass(frozen=True)
 class Driving:
-    """How a model is driven.
+    """Driven and held joints of a model.
 
     Attributes:
-        joint: the one that is swept; none where nobody has said it.
-        values: its coordinates, as the model has them, its reference included [rad or m].
+        joint: swept joint; None if not given.
+        values: its coordinates in the model, reference included [rad or m].
         held: hinges and slides that keep their coordinate in the pose of the file.
-        fixed: balls, and bodies that are free otherwise, which keep their place.
+        fixed: balls, and otherwise free bodies, that keep their place.
     """
 
     joint: str | None
@@ -46,10 +46,10 @@ class Driving:
 
 
 def read_driving(file: Path, tree: Tree, supplied: Supplied) -> Driving:
-    """What the options say.
+    """Read the options.
 
     Raises:
-        CaseError: they name what there is not, or name it twice, or sweep several joints.
+        CaseError: they name an unknown joint, name one twice, or sweep several joints.
     """
     if len(supplied.drive) > 1:
         raise fault(
@@ -84,7 +84,7 @@ def read_driving(file: Path, tree: Tree, supplied: Supplied) -> Driving:
 
 
 def _swept(file: Path, tree: Tree, text: str) -> tuple[str, Array]:
-    """The joint and its values; names may hold colons too."""
+    """Return the joint and its values; names may hold colons too."""
     parts = text.split(":")
     named = [
         (":".join(parts[:k]), parts[k:]) for k in range(max(1, len(parts) - 3), len(parts) + 1)
@@ -131,7 +131,7 @@ def _swept(file: Path, tree: Tree, text: str) -> tuple[str, Array]:
 
 
 def undriven(file: Path, root: Element, tree: Tree, driving: Driving, dof: int) -> CaseError:
-    """The error of a model whose freedom is not what is driven."""
+    """Return the error of a model whose degrees of freedom differ from the driven ones."""
     driven, actuated = (
         len(driving.joints),
         [each.attributes.get("joint") for each in root.below() if each.tag in _ACTUATORS],

@@ -49,7 +49,7 @@ class Element:
             yield from child.below()
 
     def require_known(self, known: Sequence[str]) -> None:
-        """Refuse attributes that are none of the known ones."""
+        """Refuse unknown attributes."""
         for name in self.attributes:
             if name not in known:
                 raise self.fault(
@@ -60,11 +60,10 @@ class Element:
     def numbers(
         self, name: str, counts: Sequence[int], default: Sequence[float] | None = None
     ) -> tuple[float, ...]:
-        """The numbers of an attribute, as many as one of the counts says.
+        """Return the numbers of an attribute, in one of the allowed counts.
 
         Raises:
-            CaseError: missing without a default, another number of them, or one that cannot be
-                worked with.
+            CaseError: missing without a default, a wrong count, or an unusable number.
         """
         text = self.attributes.get(name)
         expected = f"{' or '.join(map(str, counts))} numbers"
@@ -83,7 +82,7 @@ class Element:
         return found
 
     def choice(self, name: str, known: Sequence[str], default: str) -> str:
-        """The value of an attribute that is one of a few words."""
+        """Return an attribute with one of a few values."""
         found = self.attributes.get(name, default)
         if found not in known:
             raise self.fault(

@@ -1,6 +1,4 @@
-"""Equalities of a model: what closes its loops. They must hold in the pose qpos0 of the file, from
-which the motion starts.
-"""
+"""Equalities of a model, which close its loops. They must hold in the pose qpos0 at the start."""
 
 from __future__ import annotations
 
@@ -18,17 +16,14 @@ from .elements import Element
 from .frames import Place, unit_quaternion
 from .tree import WORLD, Tree
 
-# An equality that is open by more than that [m, rad] is not the rounding of composed frames
-# (1e-15), and the motion that kincheck would compute is not the one that MuJoCo's residual vanishes
-# on, by as much.
+# A larger gap [m, rad] is not the rounding of composed frames (1e-15): the motion of kincheck would
+# differ by as much from the one on which MuJoCo's residual vanishes.
 OPEN = 1e-12
 
 
 @dataclass(frozen=True)
 class Connect:
-    """A point common to two bodies of the mechanism, global at qpos0; with the orientation too, a
-    weld.
-    """
+    """A common point of two bodies, global at qpos0; a weld also fixes the orientation."""
 
     name: str
     i: str
@@ -40,7 +35,7 @@ class Connect:
 
 @dataclass(frozen=True)
 class Relation:
-    """Joint coordinates whose weighted sum keeps its value at qpos0 [rad, m]: weights by joint."""
+    """Joint coordinates with a constant weighted sum, as at qpos0 [rad, m]; weights by joint."""
 
     name: str
     weights: Mapping[str, float]
@@ -49,9 +44,7 @@ class Relation:
 
 @dataclass(frozen=True)
 class Rod:
-    """Two points that keep their distance at qpos0, global there, each on a body of the
-    mechanism.
-    """
+    """Two points of two bodies at constant distance, global at qpos0."""
 
     name: str
     i: str
@@ -64,11 +57,11 @@ Equality: TypeAlias = Connect | Relation | Rod
 
 
 def read_equalities(root: Element, tree: Tree) -> Iterator[Equality]:
-    """The active equalities, in order.
+    """Yield the active equalities in order.
 
     Raises:
-        CaseError: one that refers to what does not exist, is open at qpos0, is not linear, or is of
-            a kind there is no joint for.
+        CaseError: an equality refers to a missing element, is open at qpos0, is not linear, or has
+            no equivalent joint.
     """
     tendons, names = _tendons(root), set[str]()
     off = any(
@@ -187,7 +180,7 @@ def _tendon(name: str, element: Element, tree: Tree, tendons: _Tendons) -> Relat
 
 
 def _rod(name: str, element: Element, tendon: Element, tree: Tree) -> Rod:
-    """A spatial tendon of constant length."""
+    """Return the rod of a spatial tendon of constant length."""
     if [child.tag for child in tendon.children] != ["site", "site"]:
         way = ", ".join(child.tag for child in tendon.children) or "nothing"
         raise element.fault(
@@ -231,7 +224,7 @@ def _nonzero(weights: Mapping[str, float]) -> dict[str, float]:
 
 
 def _slope(element: Element) -> float:
-    """The factor of a polynomial that is linear and goes through the pose of the file."""
+    """Return the factor of a linear polynomial through the pose of the file."""
     constant, slope, *higher = (*_coefficients(element), 0.0, 0.0)[:5]
     if len(element.attributes.get("polycoef", "0 1").split()) == 1:
         slope = 1.0  # what is left out of polycoef keeps its default

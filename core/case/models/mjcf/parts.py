@@ -25,12 +25,12 @@ from .tree import ModelJoint, Tree
 
 @dataclass
 class Parts:
-    """What a mechanism is made of.
+    """Parts of a mechanism.
 
     Attributes:
-        bodies: moving ones and held ones, with their places.
-        fixed: names of those that are held.
-        left_out: what bodies and freedoms were left out, to read.
+        bodies: moving and held bodies, with their places.
+        fixed: names of the held ones.
+        left_out: omitted bodies and freedoms, in words.
     """
 
     bodies: dict[str, Place]
@@ -40,7 +40,7 @@ class Parts:
     left_out: list[str] = field(default_factory=list[str])
 
     def name(self, wanted: str) -> str:
-        """A name that nothing has yet: equalities, joints and bodies of a model may share names."""
+        """Return an unused name: equalities, joints and bodies of a model may share names."""
         while wanted in self.joints or wanted in self.couplers or wanted in self.bodies:
             wanted += "'"
         return wanted

@@ -1,5 +1,5 @@
-"""The tree of bodies of a model, in the pose qpos0 that its file draws: what moves, on which
-joints, and what is fixed to what.
+"""Tree of bodies of a model in the file's pose qpos0: moving bodies, their joints, and fixed
+bodies.
 
 A body without a joint is part of the body around it. A body with several joints hangs on a chain of
 massless ones, a joint each.
@@ -27,11 +27,11 @@ MOST_BODIES, MOST_MOVING = 2_000, 150
 
 @dataclass(frozen=True)
 class ModelJoint:
-    """A hinge, slide or ball of a model: global at qpos0 [m].
+    """A hinge, slide or ball of a model, global at qpos0 [m].
 
     Attributes:
-        outer, inner: the bodies it joins, of the mechanism; the inner one moves on it.
-        ref: its coordinate in the pose of the file [rad or m].
+        outer, inner: bodies of the mechanism it joins; the inner one moves on the outer.
+        ref: coordinate in the pose of the file [rad or m].
     """
 
     name: str
@@ -105,7 +105,7 @@ class Tree:
                 self.count(f"{element.tag}s" if element.tag != "inertial" else "inertia")
 
     def count(self, what: str) -> None:
-        """One more of what is left out."""
+        """Count one more omitted item."""
         self.left_out[what] = self.left_out.get(what, 0) + 1
 
     def _body(self, element: Element, around: Place, outer: str, childclass: str) -> None:
@@ -176,7 +176,7 @@ class Tree:
             outer = inner
 
     def _unused(self, wanted: str) -> str:
-        """A name for a body that the file does not name: none of its own names."""
+        """Return a name for an unnamed body, unlike all names of the file."""
         while wanted in self.names:
             wanted += "'"
         return wanted
@@ -233,7 +233,7 @@ def _class(element: Element, childclass: str) -> str:
 
 
 def read_tree(root: Element, classes: Classes, compiler: Compiler) -> Tree:
-    """The tree of a model."""
+    """Read the tree of a model."""
     tree = Tree(classes, compiler)
     for world in root.only("worldbody"):
         world.require_known(KNOWN["worldbody"])

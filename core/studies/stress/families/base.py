@@ -74,7 +74,7 @@ class Family(ABC):
 
     @abstractmethod
     def specimen(self, rng: Rng, samples: int) -> Specimen:
-        """A random specimen of so many samples."""
+        """Return a random specimen with a number of samples."""
 
 
 def as_case(
@@ -86,7 +86,7 @@ def as_case(
     motions: dict[str, Motion] | None = None,
     source: str = "kincheck stress",
 ) -> Case:
-    """The case of a mechanism, all coordinates of all its points as outputs."""
+    """Return the case of a mechanism, all coordinates of all its points as outputs."""
     sweep = Sweep(driver, np.asarray(values, dtype=np.float64), rate, motions=motions or {})
     return with_all_coordinates(
         Case(mechanism.name, source, Truth.CONSENSUS_ONLY, mechanism, sweep, ())
@@ -100,13 +100,13 @@ def triple(x: Sequence[float] | Array) -> tuple[float, float, float]:
 
 
 def direction(rng: Rng) -> Array:
-    """A random unit vector."""
+    """Return a random unit vector."""
     found = rng.normal(size=3)
     return found / np.linalg.norm(found)
 
 
 def power(rng: Rng, low: float, high: float) -> float:
-    """A number between 10^low and 10^high, all sizes alike."""
+    """Return a number between 10^low and 10^high, uniform in its logarithm."""
     return float(10.0 ** rng.uniform(low, high))
 
 

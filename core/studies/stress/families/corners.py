@@ -12,17 +12,9 @@ import numpy as np
 from ..truth.long_double import extended
 from ..truth.reference_motion import closed
 from .base import Family, Rng, Specimen, as_case, power
+from .dimensions import crank_rocker
 from .pairs import beside, beside_motion
-from .planar import (
-    JOINTS_OF_A_LOOP,
-    Plan,
-    any_plane,
-    crank_rocker,
-    flats,
-    four_bar,
-    four_bar_motion,
-    meet,
-)
+from .planar import JOINTS_OF_A_LOOP, Plan, any_plane, flats, four_bar, four_bar_motion, meet
 
 # The design is not to be near a corner itself: of what is folded more, coordinates hold too few
 # digits of the shape.

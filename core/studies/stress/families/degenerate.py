@@ -25,7 +25,8 @@ from ....mechanism.drivers import JointAngle, PointCoordinate
 from ....mechanism.mechanism import GROUND, Body, Mechanism, Point
 from ..truth.reference_motion import followed
 from .base import Family, Rng, Specimen, as_case, direction, triple
-from .planar import any_plane, crank_rocker, four_bar, slider_crank
+from .dimensions import crank_rocker
+from .planar import any_plane, four_bar, slider_crank
 
 Values = np.ndarray[Any, Any]
 

@@ -9,7 +9,8 @@ import numpy as np
 
 from ..truth.reference_motion import closed
 from .base import Family, Rng, Specimen, as_case, power
-from .planar import JOINTS_OF_A_LOOP, any_plane, crank_rocker, four_bar, four_bar_motion
+from .dimensions import crank_rocker
+from .planar import JOINTS_OF_A_LOOP, any_plane, four_bar, four_bar_motion
 from .sizes import linkage
 
 TURNS = 1000

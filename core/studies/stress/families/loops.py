@@ -28,8 +28,8 @@ from .base import Family, Rng, Specimen, as_case, bodies, direction, triple
 LARGEST = 30
 # Types that carry a body, and those that close: what leaves five freedoms carries nothing.
 CARRIERS = (
-    "revolute", "spherical", "universal", "translational", "cylindrical", "screw", "constant_velocity", "planar", "fixed", "inline",
-    "orientation_lock", "revolute_spherical",
+    "revolute", "spherical", "universal", "translational", "cylindrical", "screw",
+    "constant_velocity", "planar", "fixed", "inline", "orientation_lock", "revolute_spherical",
 )  # fmt: skip
 CLOSERS = (*CARRIERS, "distance", "distance", "in_plane", "parallel_axes", "perpendicular_axes")
 # A singular value below this is not counted on: the joint is left out, the driver is not taken.

@@ -1,4 +1,4 @@
-"""Strokes beyond reach: what cannot be assembled must not be answered."""
+"""Strokes beyond reach: a pose that cannot be assembled must not be answered."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ import numpy as np
 
 from ..truth.reference_motion import closed
 from .base import Family, Rng, Specimen, as_case, power
+from .dimensions import rockers
 from .planar import (
     JOINTS_OF_A_LOOP,
     Plan,
     any_plane,
     four_bar,
     four_bar_motion,
-    rockers,
     slider_crank,
     slider_crank_motion,
 )
 
 
 class Reach(Family):
-    """Drivers that ask for more than there is."""
+    """Drivers that ask for more than the mechanism reaches."""
 
     name = "reach"
     about = (
@@ -32,11 +32,11 @@ class Reach(Family):
     samples = 81
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
-        """A driven slider, or a four-bar whose driven bar cannot turn round."""
+        """Return a driven slider, or a four-bar with a driven bar that cannot turn fully."""
         plane, way = any_plane(rng), str(rng.choice(JOINTS_OF_A_LOOP))
         if rng.random() < 0.5:
             crank, rod = float(rng.uniform(0.2, 0.6)), float(rng.uniform(0.7, 1.3))
-            # the angle at the crank pin: at 0 or pi it is stretched out or folded
+            # the angle at the crank pin: stretched out at 0, folded at pi
             bend = power(rng, -6.0, 0.0) if rng.random() < 0.5 else float(rng.uniform(0.3, 2.8))
             c: Plan = (float(np.sqrt(crank**2 + rod**2 + 2.0 * crank * rod * np.cos(bend))), 0.0)
             up = float(np.arctan2(rod * np.sin(bend), crank + rod * np.cos(bend)))

@@ -13,7 +13,8 @@ from ....mechanism.mechanism import Mechanism
 from ..truth.newton_kantorovich import LANES, System
 from ..truth.reference_motion import Motion, Truth, closed, closed_poses
 from .base import TOL, Family, Rng, Specimen, as_case, direction, power, triple
-from .planar import any_plane, crank_rocker, four_bar, four_bar_motion
+from .dimensions import crank_rocker
+from .planar import any_plane, four_bar, four_bar_motion
 
 # Directions are given to 1e-16, and what redundant rows make of that is no contradiction.
 ROUNDED = 1e-14

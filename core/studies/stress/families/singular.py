@@ -15,15 +15,8 @@ from ....mechanism.mechanism import GROUND, Body, Mechanism, Point
 from ....trajectory import Array
 from ..truth.reference_motion import closed, followed
 from .base import Family, Rng, Specimen, as_case, direction, power, triple
-from .planar import (
-    JOINTS_OF_A_LOOP,
-    any_plane,
-    flats,
-    four_bar,
-    four_bar_motion,
-    nearly_kite,
-    nearly_parallel,
-)
+from .dimensions import nearly_kite, nearly_parallel
+from .planar import JOINTS_OF_A_LOOP, any_plane, flats, four_bar, four_bar_motion
 
 TURN = 0.97 * np.pi
 # A platform that is off by less may be told to have a freedom more: its smallest singular value is

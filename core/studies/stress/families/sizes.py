@@ -9,18 +9,17 @@ import numpy as np
 
 from ..truth.reference_motion import closed
 from .base import Family, Rng, Specimen, as_case, power, triple
+from .dimensions import crank_rocker, turning_crank
 from .planar import (
     JOINTS_OF_A_LOOP,
     Plan,
     Plane,
     any_plane,
-    crank_rocker,
     flat_plane,
     four_bar,
     four_bar_motion,
     slider_crank,
     slider_crank_motion,
-    turning_crank,
 )
 
 TURN = np.pi

@@ -10,18 +10,9 @@ import numpy as np
 
 from ..truth.reference_motion import closed
 from .base import Family, Rng, Specimen, as_case
+from .dimensions import nearly_kite, nearly_parallel, rockers
 from .pairs import beside, beside_motion
-from .planar import (
-    JOINTS_OF_A_LOOP,
-    Plan,
-    any_plane,
-    flats,
-    four_bar,
-    four_bar_motion,
-    nearly_kite,
-    nearly_parallel,
-    rockers,
-)
+from .planar import JOINTS_OF_A_LOOP, Plan, any_plane, flats, four_bar, four_bar_motion
 
 TURN, TWIN = 0.97 * np.pi, "twin "
 

@@ -1,3 +1,3 @@
-"""Reference motions for stress tests: equations written independently of the solver, in long
-double, with error bounds.
+"""Reference motions for stress tests: equations independent of the solver, in long double,
+with error bounds.
 """

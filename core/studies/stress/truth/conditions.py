@@ -1,16 +1,18 @@
-"""The conditions of a mechanism, written a second time: full products of vectors, in extended
-precision, nothing simplified.
+"""The conditions of a mechanism, written independently of the solver: full products of vectors, in
+extended precision, without simplification.
 
-Nothing here comes from the primitives, rows or programs that are under test; only what the fields
-of a joint mean is shared. Every joint is a few rows, each a sum of terms of four kinds (a, b:
-directions fixed in body i and j; d: from a point of body i to one of body j; all carried by the
-bodies)
+Nothing is shared with the tested primitives, rows or programs except the meaning of a joint's
+fields. Every joint is a few rows, each a sum of terms of four kinds (a, b: directions fixed in body
+i and j; d: from a point of body i to one of body j; all carried by the bodies)
 
-    dot     a . b          slide   a . d          rod     (d . d - L^2) / 2 L          turn    the angle from i to j about h
+    dot     a . b
+    slide   a . d
+    rod     (d . d - L^2) / 2 L
+    turn    the angle from i to j about h
 
-less a constant: the value at design, or zero. A row is of the size of what violates it, because
-lengths are measured in a unit near the mechanism's size. A turn is that of the arc tangent, taken
-to the whole turn that is nearest to a given angle.
+less a constant: the value at design, or zero. A row has the size of its violation, because lengths
+are measured in a unit near the mechanism's size. A turn is the arc tangent plus the whole turns
+that bring it nearest to a given angle.
 """
 
 from __future__ import annotations
@@ -26,14 +28,14 @@ from .long_double import extended, unit
 
 
 class NotStatedError(KincheckError):
-    """A joint or driver that has no conditions here."""
+    """A joint or driver without conditions here."""
 
 
 def conditions(mechanism: Mechanism) -> Conditions:
-    """The rows of all joints, couplers and drivers.
+    """Return the rows of all joints, couplers and drivers.
 
     Raises:
-        NotStatedError: a joint or driver of a type that is not known here.
+        NotStatedError: a joint or driver of an unknown type.
     """
     writer = Writer(mechanism)
     for joint in mechanism.joints:

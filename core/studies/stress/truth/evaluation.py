@@ -1,15 +1,18 @@
-"""The conditions evaluated at poses of many samples at once: residuals, Jacobian, and what the
-second derivative has beyond it.
+"""Evaluation of the conditions at poses of many samples at once: residuals, Jacobian, and the part
+of the second derivative beyond J times the accelerations.
 
-Bodies turn by quaternions since the design; the unknowns of a body are its shift and its turn in
-global axes (dA = w x A). With s an arm, r = w x (w x s) and a' = w x a:
+Bodies turn by quaternions since the design; the unknowns of a body are its shift and its turn
+in global axes (dA = w x A). With s an arm, r = w x (w x s) and a' = w x a, first derivative
+and part beyond:
 
-    dot     (a . b)'   = w_i . (a x b) + w_j . (b x a)                 beyond: a'' . b + 2 a' . b' + a . b''
+    dot     (a . b)'   = w_i . (a x b) + w_j . (b x a)
+                       beyond: a'' . b + 2 a' . b' + a . b''
     slide   (a . d)'   = w_i . (a x d) + a . d',  d' = v_j + w_j x s_j - v_i - w_i x s_i
-                                                                      beyond: a'' . d + 2 a' . d' +
-                                                                          a . (r_j - r_i)
-    rod     d . d' / L                                                beyond: (d' . d' + d . (r_j - r_i)) / L
-    turn    h_i . (w_j - w_i)                                         beyond: h_i' . (w_j - w_i)
+                       beyond: a'' . d + 2 a' . d' + a . (r_j - r_i)
+    rod     d . d' / L
+                       beyond: (d' . d' + d . (r_j - r_i)) / L
+    turn    h_i . (w_j - w_i)
+                       beyond: h_i' . (w_j - w_i)
 """
 
 from __future__ import annotations
@@ -41,14 +44,14 @@ class Poses:
 
     @staticmethod
     def design(bodies: int, n: int) -> Poses:
-        """All bodies at the design position."""
+        """Return all bodies at the design position."""
         q = np.zeros((bodies + 1, 4, n), dtype=np.longdouble)
         q[:, 0] = 1.0
         return Poses(np.zeros((bodies + 1, 3, n), dtype=np.longdouble), q)
 
     @property
     def samples(self) -> int:
-        """How many."""
+        """Number of samples."""
         return self.u.shape[-1]
 
     @cached_property
@@ -63,27 +66,27 @@ class Poses:
         return 2.0 * np.moveaxis(np.array(rows), 2, 0)
 
     def at(self, samples: Indices | slice) -> Poses:
-        """Some of the samples."""
+        """Return some of the samples."""
         return Poses(self.u[..., samples], self.q[..., samples])
 
     def moved(self, step: Real) -> Poses:
-        """After a shift and a turn of every body, shape (bodies, 6, n)."""
+        """Return the poses after a shift and a turn of every body, shape (bodies, 6, n)."""
         u, q = self.u.copy(), self.q.copy()
         u[1:] += step[:, :3]
         q[1:] += 0.5 * spun(step[:, 3:], q[1:])
-        # the tangent step and the projection onto the sphere turn by 2 atan(|w| / 2): the same turn
-        # to third order
+        # the tangent step and the projection onto the sphere turn by 2 atan(|w| / 2): |w| to third
+        # order
         return Poses(u, q / np.sqrt((q * q).sum(axis=1, keepdims=True)))
 
 
 def spun(w: Real, q: Real) -> Real:
-    """The quaternion product (0, w) q, shape (bodies, 4, n)."""
+    """Return the quaternion product (0, w) q, shape (bodies, 4, n)."""
     vector = w * q[:, :1] + cross(w, q[:, 1:])
     return np.concatenate([-(w * q[:, 1:]).sum(axis=1, keepdims=True), vector], axis=1)
 
 
 def cross(a: Real, b: Real) -> Real:
-    """The cross product along axis 1."""
+    """Return the cross product along axis 1."""
     ax, ay, az, bx, by, bz = a[:, 0], a[:, 1], a[:, 2], b[:, 0], b[:, 1], b[:, 2]
     first = ay * bz - az * by
     found = np.empty((len(first), 3, *first.shape[1:]), dtype=first.dtype)
@@ -92,15 +95,13 @@ def cross(a: Real, b: Real) -> Real:
 
 
 def inner(a: Real, b: Real) -> Real:
-    """The scalar product along axis 1."""
+    """Return the scalar product along axis 1."""
     return (a * b).sum(axis=1)
 
 
 @dataclass(frozen=True, eq=False)
 class _Kind:
-    """The terms of one kind as arrays: bodies, rows and weights of shape (m,), vectors of shape (m,
-    3, 1).
-    """
+    """The terms of one kind as arrays: bodies, rows and weights (m,), vectors (m, 3, 1)."""
 
     i: Indices
     j: Indices
@@ -130,11 +131,11 @@ class Evaluator:
 
     @property
     def unknowns(self) -> int:
-        """Six for each moving body."""
+        """Number of unknowns: six for each moving body."""
         return 6 * self.bodies
 
     def angles(self, poses: Poses) -> Real:
-        """The angle of every turn, within half a turn of zero [rad], shape (turns, n)."""
+        """Return the angle of every turn, within half a turn of zero [rad], shape (turns, n)."""
         k = self.turns
         if k is None:
             return np.zeros((0, poses.samples), dtype=np.longdouble)
@@ -145,11 +146,11 @@ class Evaluator:
         return np.arctan2(inner(g_i, f_j), inner(f_i, f_j))
 
     def residual(self, poses: Poses, driven: Real, near: Real) -> Real:
-        """All rows, shape (rows, n).
+        """Return the residuals of all rows, shape (rows, n).
 
         Args:
             driven: values of the drivers [m or rad], shape (drivers, n).
-            near: angles that the turns are near to, shape (turns, n) [rad].
+            near: angles near those of the turns [rad], shape (turns, n).
         """
         found = np.repeat(-self.stated.constants[:, None], poses.samples, axis=1)
         for row, values in self._values(poses, near):
@@ -182,8 +183,8 @@ class Evaluator:
         return found
 
     def jacobian(self, poses: Poses) -> NDArray[np.float64]:
-        """Derivative of the rows by the unknowns, in double precision, shape (n, rows,
-        unknowns).
+        """Return the derivative of the rows by the unknowns in doubles, shape
+        (n, rows, unknowns).
         """
         found = np.zeros((self.stated.rows, self.bodies + 1, 6, poses.samples))
         for k, parts in self._gradients(poses):
@@ -202,8 +203,8 @@ class Evaluator:
         )
 
     def _gradients(self, poses: Poses) -> list[tuple[_Kind, list[tuple[Real | None, Real]]]]:
-        """Of each kind the derivatives by shift and turn of body i, then of body j, each of shape
-        (m, 3, n).
+        """Return for each kind the derivatives by shift and turn of body i, then of body j, each of
+        shape (m, 3, n).
         """
         found: list[tuple[_Kind, list[tuple[Real | None, Real]]]] = []
         if k := self.dots:
@@ -223,10 +224,11 @@ class Evaluator:
         return found
 
     def beyond(self, poses: Poses, rates: Real) -> Real:
-        """The rows' second derivative by time less J times the accelerations, shape (rows, n).
+        """Return the rows' second derivative by time less J times the accelerations,
+        shape (rows, n).
 
         Args:
-            rates: of the unknowns, shape (bodies, 6, n).
+            rates: rates of the unknowns, shape (bodies, 6, n).
         """
         found = np.zeros((self.stated.rows, poses.samples), dtype=np.longdouble)
         still = np.zeros((1, 3, poses.samples), dtype=np.longdouble)
@@ -265,13 +267,13 @@ class Evaluator:
 
 
 def _carried(poses: Poses, body: Indices, a: Real) -> Real:
-    """Vectors of bodies as they stand now, shape (m, 3, n)."""
+    """Return vectors of bodies in their current directions, shape (m, 3, n)."""
     return a + (poses.turned[body] * a[:, None]).sum(axis=2)
 
 
 def _line(poses: Poses, k: _Kind, first: int) -> tuple[Real, Real, Real]:
-    """d, and the arms of body i and j; the arms and d at design are the vectors from the first
-    on.
+    """Return d and the arms of body i and j; vectors first, first + 1, first + 2 are the arms and
+    d at design.
     """
     s_i, s_j, d0 = (k.vectors[first + each] for each in range(3))
     now_i, now_j = _carried(poses, k.i, s_i), _carried(poses, k.j, s_j)

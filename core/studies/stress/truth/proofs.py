@@ -20,8 +20,8 @@ from ....kinematics.verified.krawczyk import enclose
 from ....program.ball_executor import flint, precision
 from ....trajectory import Array
 from .long_double import Real, extended, unit
-from .newton_kantorovich import Solved
 from .reference_motion import Truth
+from .solutions import Solved
 
 BITS = 160
 

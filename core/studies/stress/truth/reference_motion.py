@@ -1,18 +1,15 @@
-"""The truth about a case: where its points are at every sample that can be reached, and what error
-may be called round-off.
+"""The reference motion of a case: its points at every reachable sample, and their round-off bounds.
 
-An error is right up to 1e-14 of size times condition. That is 90 half units in the last place: a
-row is a sum of up to some forty products of carried vectors, each with a rounding or two.
+An error is right up to 1e-14 of size times condition. This is 90 half units in the last place: a
+row is a sum of up to forty products of carried vectors, each with a rounding or two.
 
-    position        1e-14 (K_x L + |x|)             K_x: how far the point moves for rows that are off by one each
-    velocity        1e-14 K_x (1 + K) V L           V: the fastest unknown
-    acceleration    1e-14 K_x (1 + K)^2 A L         A: the largest second rate, or V^2
+    position        1e-14 (K_x L + |x|)       K_x: move of the point per unit error of each row
+    velocity        1e-14 K_x (1 + K) V L     V: the fastest unknown
+    acceleration    1e-14 K_x (1 + K)^2 A L   A: the largest second rate, or V^2
 
-L is the mechanism's size and K the condition of all unknowns. The reason for the powers: J v = c_t
-is solved with a J that is off by the error of the pose, which has a K already, and J a = ... with a
-v that is. |x| is what a position far from the origin loses by being written down. Where two
-solutions meet, errors are roots of those of the rows: no position may be off by more than
-sqrt(1e-14) L, however large K is.
+L is the mechanism's size, K the condition of all unknowns. J of J v = c_t has the error of the pose
+(one K); J a = ... has the error of v. |x| is the rounding far from the origin. Where two solutions
+meet, errors are roots of the rows' errors: no position may be off by more than sqrt(1e-14) L.
 """
 
 from __future__ import annotations
@@ -30,21 +27,20 @@ from ....mechanism.motions import outwards
 from ....trajectory import Array
 from .evaluation import Poses, cross
 from .long_double import Real, extended
-from .newton_kantorovich import LANES, POLISHED, Solved, System, condition, inverted
+from .newton_kantorovich import LANES, System
+from .solutions import POLISHED, Solved, condition, inverted
 
 ROUND_OFF = 1e-14
 AT_A_FOLD = ROUND_OFF**0.5
-# A residual of the tolerance of a run, 1e-12, leaves rates uncertain by the square of the condition
-# times that. From here on it is more than 1e-9 of them, to which outputs are held by default: an
-# engine may give up, if it says why.
+# From here on a residual of 1e-12 (a run's tolerance), times the condition squared, exceeds 1e-9 of
+# the rates (the outputs' default tolerance): an engine may refuse, with the reason.
 SINGULAR = (1e-9 / 1e-12) ** 0.5
-# Here it is the rounding of the mechanism itself, 1e-16, that leaves digits to the closed form that
-# Newton's iteration has not.
+# From here on a closed form beats Newton, which is limited by the mechanism's rounding (1e-16).
 UNPOLISHED = 1e6
 
 
 class Reach(IntEnum):
-    """What is known of a sample."""
+    """A solution that continues the design is known (REACHED), none exists (BEYOND), or neither."""
 
     REACHED = 0
     BEYOND = 1
@@ -56,18 +52,14 @@ class Truth:
     """The motion of the case's points.
 
     Attributes:
-        reach: of each sample, shape (n,): a solution that continues the design is known, or there
-            is none, or neither is.
-        singular: whether the way to the sample leads through a pose at which it may be given up,
-            shape (n,).
-        points: position [m], velocity and acceleration of each point, each of shape (n, 3); NaN
-            where not reached.
+        reach: knowledge of each sample, shape (n,): see `Reach`.
+        singular: whether an engine may refuse the sample because of a pose before it, shape (n,).
+        points: position [m], velocity and acceleration by point, each (n, 3); NaN if not reached.
         bounds: largest errors that are round-off, by point, shape (3, n).
-        condition: of all unknowns, shape (n,).
-        how: how it is known.
+        condition: condition of all unknowns, shape (n,).
+        how: source of the motion.
         system, parts: the equations, and the solved samples by their numbers in the sweep.
-        violated: what no answer can avoid to leave over, of contradictory geometry, by sample [m];
-            zero is not looked at.
+        violated: unavoidable residual of contradictory geometry by sample [m]; zero: not checked.
     """
 
     reach: NDArray[np.int_]
@@ -82,18 +74,18 @@ class Truth:
 
 
 Motion = Callable[[Real], Mapping[str, tuple[Real, Real, Real]]]
-"""A closed form: from the drivers' values, shape (drivers, n), to each moving body's turn since the
-design, a unit quaternion of shape (4, n), a point of the body at design [m], shape (3,), and how
-far that has come [m], shape (3, n): not where it is, which has fewer digits far from the origin.
-NaN where there is no solution."""
+"""A closed form: drivers' values (drivers, n) to three values by moving body: its turn since
+design, a unit quaternion (4, n); a point of it at design [m], (3,); the point's displacement [m],
+(3, n), which has more digits than a position far from the origin. NaN: no solution.
+"""
 
 
 class DefectError(KincheckError):
-    """The stress run itself is wrong: a closed form does not satisfy the equations."""
+    """A defect of the stress run itself: a closed form does not satisfy the equations."""
 
 
 def followed(case: Case) -> Truth:
-    """The truth by following the motion from the design, both ways."""
+    """Return the reference followed from the design in both directions."""
     system = System(case)
     found, times = _Gathered(system, Reach.UNKNOWN), system.path.times
     for side in outwards(times, 0.0):
@@ -103,7 +95,7 @@ def followed(case: Case) -> Truth:
 
 
 def _follow(system: System, found: _Gathered, side: NDArray[np.intp]) -> None:
-    """The samples on one side of the design."""
+    """Solve the samples on one side of the design."""
     away = np.abs(system.path.times[side])
     stop = float(system.path.times[side][away.argmax()])
     knots, fold = system.knots(stop)
@@ -115,7 +107,7 @@ def _follow(system: System, found: _Gathered, side: NDArray[np.intp]) -> None:
     for chunk in np.split(there, range(LANES, len(there), LANES)):
         if not len(chunk):
             continue
-        # the design alone is where nothing moves: all samples are there
+        # only the design is known if nothing moves: all samples are there
         solved = system.between(knots, chunk) if len(knots) > 1 else knots[0].repeated(len(chunk))
         found.reach[chunk] = np.where(solved.step <= POLISHED, Reach.REACHED, Reach.UNKNOWN)
         passed = worst[np.searchsorted(at, np.abs(system.path.times[chunk]))]
@@ -124,20 +116,19 @@ def _follow(system: System, found: _Gathered, side: NDArray[np.intp]) -> None:
     past = side[away > at[-1]]
     found.singular[past] = True
     if fold is not None:
-        # what is so near to the fold that it may lie on either side is left open
+        # samples so near to the fold that they may lie on either side stay unknown
         found.reach[past[np.abs(system.path.times[past]) > abs(fold) + abs(abs(fold) - at[-1])]] = (
             Reach.BEYOND
         )
 
 
 def closed(case: Case, motion: Motion, nearest: Sequence[float] = ()) -> Truth:
-    """The truth by a closed form, polished to the last digit of the mechanism as it is written
-    down.
+    """Return the reference of a closed form, polished to the last digit of the
+    mechanism as described.
 
     Args:
-        nearest: values of the swept driver, from the design, at which it comes nearest to singular.
-            Samples may lie on both sides, and behind such a pose that double precision cannot tell
-            from a singular one an engine may give up.
+        nearest: swept values, from the design, at poses nearest to singular; an engine may refuse
+            samples behind one that doubles cannot tell from singular.
 
     Raises:
         DefectError: the closed form is not a solution of the case.
@@ -154,8 +145,7 @@ def closed(case: Case, motion: Motion, nearest: Sequence[float] = ()) -> Truth:
             poses, system.sampled(chunk), system.path.times[chunk], system.rows.angles(poses)
         )
         moved = np.abs(solved.poses.u - poses.u).max(axis=(0, 1)).astype(np.float64)
-        # the closed form is that of the mechanism without its rounding, which is one of 1e-16 of
-        # the rows
+        # the closed form lacks the mechanism's rounding, 1e-16 of the rows
         bad = (moved > ROUND_OFF * solved.condition) & (solved.condition < UNPOLISHED)
         if bad.any():
             k = int(np.flatnonzero(bad)[0])
@@ -166,7 +156,7 @@ def closed(case: Case, motion: Motion, nearest: Sequence[float] = ()) -> Truth:
             )
         found.reach[chunk] = Reach.REACHED
         found.singular[chunk] = solved.condition >= SINGULAR
-        # in a singular pose Newton's iteration cannot polish, and need not
+        # Newton's iteration cannot polish a singular pose
         found.add(chunk, _replaced(solved, poses, solved.condition >= UNPOLISHED), keep=False)
     found.singular |= bool(system.design().condition[0] >= SINGULAR)
     for time in np.divide(nearest, case.sweep.rate):
@@ -199,8 +189,8 @@ def _replaced(found: Solved, poses: Poses, where: NDArray[np.bool_]) -> Solved:
 
 
 def closed_poses(system: System, motion: Motion, values: Real) -> Poses:
-    """Poses of the bodies about their centres at values of the drivers, from those about the points
-    that a closed form is about.
+    """Return poses of the bodies about their centres, from a closed form at
+    values of the drivers.
     """
     stated, moved = system.rows.stated, motion(values)
     n = next(iter(moved.values()))[0].shape[-1]
@@ -218,8 +208,6 @@ def closed_poses(system: System, motion: Motion, values: Real) -> Poses:
 
 
 class _Gathered:
-    """The truth as it comes together, chunk by chunk."""
-
     def __init__(self, system: System, unknown: Reach) -> None:
         self.system, n = system, len(system.path.times)
         self.reach, self.singular = np.full(n, unknown), np.zeros(n, dtype=np.bool_)
@@ -233,9 +221,7 @@ class _Gathered:
         self.bounds = {name: np.full((3, n), np.inf) for name in names}
 
     def add(self, samples: NDArray[np.intp], found: Solved, *, keep: bool) -> None:
-        """Solved samples; the solutions themselves are kept for proofs, not where they are a
-        million.
-        """
+        """Add solved samples; keep the solutions for proofs, unless there are a million."""
         self.condition[samples] = found.condition
         for name, moved in self.points.items():
             for whole, part in zip(moved, _motion(self.system, found, name), strict=True):
@@ -245,7 +231,7 @@ class _Gathered:
             self.parts.append((samples, found))
 
     def truth(self, how: str) -> Truth:
-        """All of it; nothing is said of samples that are not reached."""
+        """Return the reference; points of unreached samples are NaN."""
         unreached = self.reach != Reach.REACHED
         for moved in self.points.values():
             for whole in moved:
@@ -264,7 +250,7 @@ class _Gathered:
 
 
 def _motion(system: System, found: Solved, name: str) -> tuple[Real, Real, Real]:
-    """Position, velocity and acceleration of a point, shape (3, n) each [SI]."""
+    """Return position, velocity and acceleration of a point, each of shape (3, n) [SI]."""
     position, body, arm = _place(system, name)
     unit, zero = system.rows.stated.unit, np.zeros((3, found.poses.samples), dtype=np.longdouble)
     if body == 0:
@@ -280,7 +266,7 @@ def _motion(system: System, found: Solved, name: str) -> tuple[Real, Real, Real]
 
 
 def _bounds(system: System, found: Solved, name: str) -> Array:
-    """See the head of this file; shape (3, n)."""
+    """Return the round-off bounds of a point by the formulas of the module, shape (3, n)."""
     _, body, arm = _place(system, name)
     size = system.rows.stated.unit
     x = np.abs(_motion(system, found, name)[0]).max(axis=0).astype(np.float64)
@@ -304,7 +290,7 @@ def _bounds(system: System, found: Solved, name: str) -> Array:
 
 
 def _place(system: System, name: str) -> tuple[Real, int, Real]:
-    """A point at design [m], its body and its arm there [units]."""
+    """Return a point at design [m], its body and its arm there [units]."""
     stated, point = system.rows.stated, system.mechanism.point(name)
     position = extended(point.position)
     if system.mechanism.is_fixed(point.body):

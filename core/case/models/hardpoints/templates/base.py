@@ -1,7 +1,6 @@
-"""What a template of a suspension is: roles that hardpoints fill, and the joints that follow from
-where they are.
+"""Suspension templates: roles of hardpoints, and the joints that follow from their places.
 
-Places are in metres, x forward, y left, z up; a template is of the left side, the chassis is the
+Places are in metres, x forward, y left, z up. A template is of the left side, the chassis is the
 ground, the steering is locked.
 """
 
@@ -42,12 +41,11 @@ class Template:
     """A kind of suspension.
 
     Attributes:
-        also: names that files have for it.
-        joints: from places by role; bodies are those that the joints name.
-        watched: roles, points of the knuckle that do not lie on a line: their motion is compared,
-            and the knuckle's with it.
-        upper, lower: roles, the first of which stands above the second in any car: axes that point
-            elsewhere show by it.
+        also: its names in files.
+        joints: from places by role; the bodies are those named by the joints.
+        watched: roles of non-collinear points of the knuckle: their motion is compared, and with it
+            the knuckle's.
+        upper, lower: roles; the first is above the second in any car, which detects wrong axes.
     """
 
     name: str

@@ -1,6 +1,4 @@
-"""What the native engine computes for a case, and what it leaves out because the case does not need
-it.
-"""
+"""Account of the native engine's programs for a case, and of the parts left out as not needed."""
 
 from __future__ import annotations
 
@@ -15,8 +13,8 @@ ORDERS = ("positions only", "and velocities", "and accelerations")
 
 
 def explain(case: Case) -> list[str]:
-    """Lines to read: unknowns, rows, drivers and points, used and left out, and the operations of
-    every program.
+    """Return lines of text: unknowns, rows, drivers and points, used and left out, and the
+    operations of every program.
 
     Raises:
         SolveError: the mechanism cannot be solved as described.
@@ -58,7 +56,7 @@ def explain(case: Case) -> list[str]:
 
 
 def _flops(model: Model) -> str:
-    """Operations of one sample: of each Newton iteration, and once at the end."""
+    """Return the operations of one sample: of each Newton iteration, and once at the end."""
     newton, outputs = (model.programs[name].flops for name in ("newton", "outputs"))
     return (
         f"{newton} operations an iteration, outputs {outputs} once: {newton + outputs} with one"

@@ -1,0 +1,163 @@
+"""Algebraic equations between the bodies of a mechanism in Exudyn; private to its adapter.
+
+A row may follow a value: that of a driver, or an unknown that is added for two rows to share. Two
+coordinates in a fixed ratio (screw, gear, rack and pinion) follow the same unknown, and so do the
+two products whose difference a constant-velocity joint keeps at zero. A displacement is compared
+with its value. An angle is followed by turning the frame on the first body, which leaves the sine
+of what is missing: any number of turns can be followed, in steps that leave less than a quarter
+turn missing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...core import joints
+from ...core.mechanism.mechanism import GROUND, Mechanism
+from ...core.trajectory import Array
+from ..shared.poses import frame_along, middle
+
+# Constrained axes of a generic joint.
+X, Y, Z, ABOUT_X, ABOUT_Y, ABOUT_Z = range(6)
+NO_ROTATION = (1.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Equation:
+    """An equation: a row of an object of Exudyn equals a constant [m or -]."""
+
+    item: int
+    index: int
+    keeps: float
+
+
+@dataclass(frozen=True)
+class Following:
+    """A row follows the weight times a value: one of the drivers, or a further unknown."""
+
+    row: int
+    value: int
+    weight: float
+
+
+class Equations:
+    """The bodies of a mechanism and the equations between them, as objects of an Exudyn system.
+
+    Attributes:
+        bodies: Exudyn's number and the origin [m] of each body; fixed ones are Exudyn's ground.
+        nodes: numbers of the nodes, one for each moving body.
+        rows: all equations, in order.
+        following: the equations among them that follow a value.
+        turning: rows that follow an angle, and their markers on the first and second body; the
+            first turns about its z axis.
+        values: the number of drivers and further unknowns.
+    """
+
+    def __init__(self, mbs: Any, items: Any, mechanism: Mechanism) -> None:
+        self.mbs, self.items, self.mechanism = mbs, items, mechanism
+        self.ground = int(mbs.AddObject(items.ObjectGround()))
+        self.bodies = {GROUND: (self.ground, np.zeros(3))}
+        self.nodes: list[int] = []
+        self.rows: list[Equation] = []
+        self.following: list[Following] = []
+        self.turning: dict[int, tuple[int, int]] = {}
+        self.values = len(mechanism.drivers)
+        self._add_bodies()
+
+    def _add_bodies(self) -> None:
+        for body in self.mechanism.bodies:
+            if body.fixed:
+                self.bodies[body.name] = self.bodies[GROUND]
+                continue
+            # Points and axes are given in global coordinates, so every node starts parallel to the
+            # global axes. It stands amid the body's joints: case files may leave the origin far
+            # away, and long arms cost digits of the differences.
+            origin = middle(self.mechanism, body)
+            node = self.mbs.AddNode(
+                self.items.NodeRigidBodyEP(referenceCoordinates=[*origin, *NO_ROTATION])
+            )
+            # Exudyn asks for a mass and inertias; kinematics does not depend on them.
+            rigid = self.items.ObjectRigidBody(
+                mass=1.0, inertia=[1.0, 1.0, 1.0, 0.0, 0.0, 0.0], nodeNumber=node
+            )
+            self.bodies[body.name] = int(self.mbs.AddObject(rigid)), origin
+            self.nodes.append(node)
+
+    def marker(
+        self, body: str, position: Sequence[float] | Array, rotation: Array | None = None
+    ) -> int:
+        """A frame on a body: its origin [m] and rotation matrix (aligned if None), both global at
+        design.
+        """
+        number, origin = self.bodies[body]
+        frame = np.eye(4)
+        frame[:3, 3] = np.array(position) - origin
+        if rotation is not None:
+            frame[:3, :3] = rotation
+        return self.mbs.AddMarker(self.items.MarkerBodyRigid(bodyNumber=number, localHT=frame))
+
+    def markers(
+        self, joint: joints.Joint, position: Sequence[float] | Array, rotation: Array | None = None
+    ) -> list[int]:
+        """Return new markers of the same frame on both bodies of a joint."""
+        return [self.marker(body, position, rotation) for body in joint.bodies]
+
+    def connect(self, item: Any, indices: Sequence[int], keeps: float = 0.0) -> int:
+        """Add an object with these rows as equations; return the number of the last row.
+
+        Args:
+            keeps: value of the last row [m or -]; the others are zero.
+        """
+        number = self.mbs.AddObject(item)
+        self.rows += [
+            Equation(number, index, keeps if index == indices[-1] else 0.0) for index in indices
+        ]
+        return len(self.rows) - 1
+
+    def connect_generic(
+        self, markers: Sequence[int], axes: Sequence[int], keeps: float = 0.0
+    ) -> int:
+        """Add a generic joint that constrains these axes; see `connect`."""
+        constrained = [int(axis in axes) for axis in range(6)]
+        item = self.items.ObjectJointGeneric(
+            markerNumbers=list(markers), constrainedAxes=constrained
+        )
+        return self.connect(item, axes, keeps)
+
+    def coordinate(self, name: str, freedom: str) -> int:
+        """Add a row for the rotation about or translation along a joint's axis; return its number.
+
+        The row is to follow a value.
+        """
+        joint: Any = self.mechanism.joint(name)
+        if freedom == "translation":
+            return self.connect_generic(
+                self.markers(joint, joint.point, frame_along(joint.axis, 0)), (X,)
+            )
+        # exchanged, so that the row is the sine of the angle and not of its negative
+        first, second = self.markers(joint, joint.point, frame_along(joint.axis, 2))
+        row = self.connect_generic((second, first), (ABOUT_Z,))
+        self.turning[row] = first, second
+        return row
+
+    def unknown(self) -> int:
+        """Add an unknown, zero at design; return its number among the values."""
+        self.values += 1
+        return self.values - 1
+
+    def follow(self, row: int, value: int, weight: float = 1.0) -> None:
+        """Let a row follow a value."""
+        self.following.append(Following(row, value, weight))
+
+
+def turned(angle: float) -> Array:
+    """Return the rotation about z by an angle [rad] as a homogeneous matrix, shape (4, 4)."""
+    frame = np.eye(4)
+    c, s = math.cos(angle), math.sin(angle)
+    frame[:2, :2] = [[c, -s], [s, c]]
+    return frame

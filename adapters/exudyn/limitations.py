@@ -1,0 +1,53 @@
+"""Joints, samples and starts of a case that Exudyn's own solvers cannot simulate; private to its
+adapter.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...core import joints
+from ...core.case.case import Case
+from ...core.joints.base import unit
+from ...core.kinematics.compiled.motion_start import start_of
+
+# Exudyn's objects keep products at zero only; a smaller value is round-off, below any residual.
+NOTHING = 1e-12
+# Largest difference in the spacing of equidistant samples, relative to the spacing: round-off.
+EQUIDISTANT = 1e-6
+
+
+def limitation_of(case: Case) -> str | None:
+    """Return why Exudyn's own solvers cannot simulate the case, or None."""
+    for joint in case.mechanism.joints:
+        if isinstance(joint, joints.ConstantVelocity):
+            return (
+                f"{joint}: Exudyn's own solvers have no object that ties two products, which"
+                " the joint needs"
+            )
+        kept = _kept(joint)
+        if abs(kept) > NOTHING:
+            return (
+                f"{joint} keeps a product at {kept:.3g}, at which Exudyn's own objects keep"
+                " only zero; make its axes exact"
+            )
+    times = case.sweep.path.times
+    if len(times) > 1 and np.ptp(np.diff(times)) > EQUIDISTANT * np.abs(np.diff(times)).max():
+        return (
+            "samples are not equidistant in time, and Exudyn's steps are; give the sweep by"
+            " start, stop and steps"
+        )
+    if case.mechanism.couplers and not start_of(case.mechanism, case.sweep.path).stands:
+        return (
+            "turns of coupled joints are counted from the design, where this motion does not begin"
+        )
+    return None
+
+
+def _kept(joint: joints.Joint) -> float:
+    """Return the constant value of the last row of a joint [m or -]."""
+    if isinstance(joint, joints.Universal | joints.PerpendicularAxes):
+        return unit(joint.axes[0]) @ unit(joint.axes[1])
+    if isinstance(joint, joints.RevoluteSpherical):
+        return float(np.array([*unit(joint.axis)]) @ np.subtract(joint.points[1], joint.points[0]))
+    return 0.0

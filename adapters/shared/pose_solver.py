@@ -1,0 +1,184 @@
+"""Poses of a simulator's model by Newton's method, with velocities and accelerations."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...core.case.case import Case, size
+from ...core.errors import SolveError
+from ...core.kinematics.formulation.acceptance_criteria import ROUNDING
+from ...core.mechanism.motions import Path
+from ...core.trajectory import Array
+from .length_scaling import GLOBAL, OwnFrame
+from .projection_model import ProjectionModel
+
+MAX_ITERATIONS = 20
+# Singular values below this part of the largest count as zero: far above round-off (1e-15), far
+# below a sound mechanism (1e-2).
+RANK_TOLERANCE = 1e-9
+# Least squares have arrived where a step is this short: no more is to be gained, and what is left
+# are rows that contradict others.
+ARRIVED = 1e-6
+
+LOST = "Newton does not converge or jumps to another assembly"
+"""Reason for the end of a motion by default."""
+STUCK = (
+    "drivers cannot move: it is a dead centre, or the motions that joints leave contradict each"
+    " other"
+)
+"""Reason for the end of a motion at a pose that closes."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """A solved pose with all data that the next step of the walk needs."""
+
+    t: float
+    c: Array  # of the drivers
+    saved: Any
+    x: Array
+    v: Array
+    a: Array
+    rows: tuple[Array, Array, Array]
+    jacobian: Array
+    corrected: Array
+    iterations: int
+    residual: float
+
+
+class PoseSolver:
+    """Newton's method on the rows of a model."""
+
+    def __init__(
+        self,
+        model: ProjectionModel,
+        case: Case,
+        tol: float,
+        corrections: int | None = None,
+        frame: OwnFrame = GLOBAL,
+    ) -> None:
+        self.model, self.case, self.tol, self.corrections, self.frame = (
+            model,
+            case,
+            tol,
+            corrections,
+            frame,
+        )
+        self.drivers = [driver.name for driver in case.mechanism.drivers]
+        self.turns = np.array([driver.turns for driver in case.mechanism.drivers], dtype=np.bool_)
+        self.units = np.where(self.turns, 1.0, frame.unit)[:, None]
+        self.size = size(case) / frame.unit
+        self.lost = LOST  # why the last pose that was looked for was not found
+        model.reset()
+        model.residual(np.zeros(len(case.mechanism.drivers)))
+        jacobian = model.jacobian()
+        singular = np.linalg.svd(jacobian, compute_uv=False)
+        self.rank = int((singular > RANK_TOLERANCE * singular[0]).sum())
+        joints = jacobian[~np.any(model.driver_columns(), axis=1)]
+        self.dof = jacobian.shape[1] - (
+            int(np.linalg.matrix_rank(joints, tol=RANK_TOLERANCE * singular[0]))
+            if len(joints)
+            else 0
+        )
+        self.square = jacobian.shape == (self.rank, self.rank)
+        self.rows, self.unknowns = jacobian.shape
+        if self.rank < self.unknowns:
+            raise SolveError(
+                f"case {case.name!r}: {self.unknowns - self.rank} of the {self.unknowns}"
+                " coordinates of the simulator's model are left free by joints and drivers at the"
+                " design position; add a driver, or join what moves freely; if their number is"
+                " right a driver does not move it there (a lock-up): give the design in another"
+                " pose"
+            )
+
+    def linear(self, A: Array, b: Array) -> Array:
+        """Solve A x = b; never assumed square: point closures of a planar loop are redundant."""
+        if self.square:
+            return np.asarray(np.linalg.solve(A, b), dtype=np.float64)
+        return np.asarray(np.linalg.lstsq(A, b, rcond=RANK_TOLERANCE)[0], dtype=np.float64)
+
+    def newton(self, c: Array) -> tuple[Array, int, float] | None:
+        """Return the sum of all steps, iterations and last residual at driver values c, or None."""
+        self.lost = LOST
+        met, worst, step, corrected = (
+            False,
+            math.inf,
+            np.full(self.unknowns, math.inf),
+            np.zeros(self.unknowns),
+        )
+        for iteration in range(1, MAX_ITERATIONS + 1):
+            r = self.model.residual(c)
+            worst = float(np.abs(r).max()) if np.isfinite(r).all() else math.inf
+            if not math.isfinite(worst):
+                return None
+            if iteration - 1 == self.corrections:
+                return corrected, iteration - 1, worst
+            # one step after meeting the tolerance: quadratic convergence makes it exact to
+            # round-off
+            if met and self.corrections is None:
+                if worst <= self.tol:
+                    return corrected, iteration - 1, worst
+                break
+            met = worst <= self.tol
+            try:
+                step = self.linear(self.model.jacobian(), -r)
+            except np.linalg.LinAlgError:
+                return None
+            if not np.isfinite(step).all():
+                return None
+            self.model.move(step)
+            corrected += step
+        if worst <= ROUNDING:
+            self.lost = (
+                f"the residual {worst:.3g} is rounding, and the tolerance {self.tol:.3g} is less;"
+                " allow more"
+            )
+        elif not self.square and np.abs(step).max() <= ARRIVED:
+            ends = "the motion ends, or joints contradict each other"
+            self.lost = (
+                f"no pose near there closes better than to {worst:.3g} of the mechanism's size:"
+                f" {ends}"
+            )
+        return None
+
+    def solve(self, path: Path, t: float) -> Sample | None:
+        """Return the pose with its rates on a path at time t, from the current one, or None."""
+        c, c_t, c_tt = (path.drive(self.drivers, np.array([t])) / self.units)[..., 0]
+        done = self.newton(c)
+        if done is None:
+            return None
+        jacobian, columns = np.array(self.model.jacobian()), self.model.driver_columns()
+        nu = columns @ c_t
+        try:
+            v = self.linear(jacobian, nu)
+            gamma = columns @ c_tt - self.model.bias(v)
+            a = self.linear(jacobian, gamma)
+        except np.linalg.LinAlgError:
+            return None
+        # least squares would hide rates that no row set can meet (a driver pushed at a dead centre)
+        if not (_met(jacobian, v, nu) and _met(jacobian, a, gamma)):
+            self.lost = STUCK
+            return None
+        position, velocity, acceleration = (
+            np.array(each, dtype=float) for each in zip(*self.model.points(v, a), strict=True)
+        )
+        return Sample(
+            t,
+            c,
+            self.model.save(),
+            position.ravel(),
+            v,
+            a,
+            (position, velocity, acceleration),
+            jacobian,
+            *done,
+        )
+
+
+def _met(jacobian: Array, v: Array, wanted: Array) -> bool:
+    # a millionth: far above round-off, far below a row that is not met
+    return bool(np.abs(jacobian @ v - wanted).max() <= 1e-6 * (1.0 + np.abs(wanted).max()))

@@ -1,0 +1,223 @@
+"""Samples of a reference table: from a CSV file beside the case file, or from rows inside it."""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from array import array
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
+
+from ..case import PER_TRAVEL, Quantity
+from .document import LARGEST, decimal, fault, read_text, shown
+
+LARGEST_FILE = 64_000_000
+# A line for each sample of the largest sweep, and as many lines between them.
+MOST_LINES = 2_000_000
+SIGNS = re.compile(r"\s*#\s*signs:\s*(\w+)")
+
+CITATION = "a text that says where the true values come from: author, title, page or address"
+DIGEST = "sha256:"
+
+
+class ReferenceKeys(msgspec.Struct, forbid_unknown_fields=True):
+    """Keys of [reference]: `file`, or `rows` with `columns` (default: the driver, then all outputs
+    in order), and their source.
+
+    Attributes:
+        citation: source of the true values; without it, agreement with them validates nothing.
+        digest: digest of the file; a file of other content is refused.
+    """
+
+    file: (
+        Annotated[
+            str, Meta(min_length=1, description="the name of a CSV file beside the case file")
+        ]
+        | None
+    ) = None
+    columns: (
+        Annotated[
+            list[str], Meta(min_length=2, description="a list of column names, the driver first")
+        ]
+        | None
+    ) = None
+    rows: (
+        Annotated[
+            list[list[int | float]], Meta(min_length=1, description="a list of rows of numbers")
+        ]
+        | None
+    ) = None
+    citation: Annotated[str, Meta(pattern=r"\S", description=CITATION)] | None = None
+    digest: (
+        Annotated[
+            str,
+            Meta(
+                pattern=f"^{DIGEST}[0-9a-f]{{64}}$",
+                description=f'"{DIGEST}" and 64 hexadecimal digits',
+            ),
+        ]
+        | None
+    ) = None
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Columns by name, and rows with their place for messages.
+
+    Attributes:
+        key: key of all rows.
+        signs: sign convention named in a comment.
+        lines: lines of a file of its own, for messages.
+    """
+
+    file: Path
+    header: str
+    columns: Sequence[str]
+    rows: Sequence[tuple[str, Sequence[float]]]
+    key: str = ""
+    signs: str = ""
+    lines: Sequence[str] = ()
+
+    def driver_value(self, k: int) -> str:
+        """Return the driver value of a row as written."""
+        where, row = self.rows[k]
+        line = self.lines[int(where.removeprefix("line ")) - 1] if self.lines else ""
+        cell = line.partition(",")[0].strip().strip('"').strip()
+        with suppress(ValueError):  # inline, or of several lines
+            if decimal(cell) == row[0]:
+                return cell
+        return repr(row[0])
+
+
+def inline(file: Path, keys: ReferenceKeys, outputs: Sequence[Quantity]) -> Samples:
+    """Return the samples of the rows in a case file."""
+    if keys.rows is None:
+        raise fault(
+            file,
+            "reference",
+            "found neither file nor rows, expected one of them; name a CSV file or give the rows",
+        )
+    columns = keys.columns or [
+        "driver",
+        *(output.name for output in outputs if not output.name.endswith(PER_TRAVEL)),
+    ]
+    key = "reference.rows"
+    rows = [(f"{key}[{k}]", row) for k, row in enumerate(keys.rows)]
+    samples = Samples(file, "reference.columns", columns, rows, key)
+    for where, row in rows:
+        _check_width(samples, where, len(row))
+    return samples
+
+
+def from_csv(case_file: Path, keys: ReferenceKeys) -> Samples:
+    """Read the samples of the CSV file beside a case file."""
+    file = only_beside(case_file, keys)
+    text = read_text(file, LARGEST_FILE, "thin out the samples")
+    lines = text.splitlines()
+    if len(lines) > MOST_LINES:
+        raise fault(
+            file,
+            "",
+            f"found {len(lines)} lines, expected a row for each sample of the sweep; thin out the"
+            " samples",
+        )
+    signs = next((found[1] for line in lines if (found := SIGNS.match(line))), "")
+    # comment lines are blanked, not dropped, so that the reader's line numbers are those of the
+    # file
+    lines = ["" if line.lstrip().startswith("#") else line for line in lines]
+    reader = csv.reader(lines, skipinitialspace=True, strict=True)
+    samples: Samples | None = None
+    rows: list[tuple[str, Sequence[float]]] = []
+    try:
+        for cells in filter(None, reader):
+            where = f"line {reader.line_num}"
+            if samples is None:
+                samples = Samples(
+                    file, where, [cell.strip() for cell in cells], rows, signs=signs, lines=lines
+                )
+                continue
+            _check_width(samples, where, len(cells))
+            # numbers at once: the cells of a large file as texts would take many times its size
+            numbers = (
+                _number(file, where, name, cell)
+                for name, cell in zip(samples.columns, cells, strict=True)
+            )
+            rows.append((where, array("d", numbers)))
+    except csv.Error as error:
+        raise fault(
+            file, f"line {reader.line_num}", f"not valid CSV: {error}; correct the line"
+        ) from None
+    if samples is None:
+        raise fault(
+            file,
+            "",
+            "found no samples, expected a line of column names and rows of numbers; add them",
+        )
+    return samples
+
+
+def only_beside(case_file: Path, keys: ReferenceKeys) -> Path:
+    """Return the path of the file, which must be the only source."""
+    if keys.rows is not None or keys.columns is not None:
+        raise fault(
+            case_file,
+            "reference",
+            "found file and rows or columns, expected one source; remove one of them",
+        )
+    return beside(case_file, keys.file or "")
+
+
+def beside(case_file: Path, name: str) -> Path:
+    """Return the path of a file in or below the case file's folder; no other is ever opened."""
+    folder = case_file.parent.resolve()
+    try:
+        file = (folder / name).resolve()
+        inside = not Path(name).is_absolute() and file.is_relative_to(folder)
+    except (OSError, ValueError, RuntimeError):  # a null byte, a loop of links
+        inside = False
+        file = folder
+    if not inside:
+        raise fault(
+            case_file,
+            "reference.file",
+            f"found {shown(name)}, expected a file in the folder of the case file or below; put it"
+            " there and give its name",
+        )
+    with suppress(OSError):  # an inaccessible file is reported when it is read
+        if not file.exists():
+            raise fault(
+                case_file,
+                "reference.file",
+                f"found {shown(name)}, but there is no such file; check the name",
+            )
+    return file
+
+
+def _number(file: Path, line: str, column: str, cell: str) -> float:
+    try:
+        number = decimal(cell)
+    except ValueError:
+        number = math.nan
+    if not abs(number) <= LARGEST:
+        expected = f"expected a finite number, at most {LARGEST:g}"
+        raise fault(
+            file,
+            f"{line}, column {column}",
+            f"found {shown(cell)}, {expected}; correct it or leave the column out",
+        )
+    return number
+
+
+def _check_width(samples: Samples, where: str, found: int) -> None:
+    if found != len(samples.columns):
+        expected = f"{len(samples.columns)} ({', '.join(samples.columns)})"
+        raise fault(
+            samples.file, where, f"found {found} numbers, expected {expected}; complete the row"
+        )

@@ -1,0 +1,126 @@
+"""Options of kincheck run, and defaults that other commands share."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import os
+from pathlib import Path
+
+from . import execution_options, import_options
+
+# Largest accepted constraint residual [m or -]: a thousand times the round-off of metre-sized
+# coordinates, and a thousandth of the outputs' 1e-9 m, so that a residual amplified a hundredfold
+# by the mechanism stays invisible.
+TOL = 1e-12
+
+MODES = ("projection", "simulate")
+
+HISTORY = "KINCHECK_HISTORY"
+"""Environment variable: the history file if --history is not given."""
+
+
+def add_options(run: argparse.ArgumentParser) -> None:
+    """Add the options to the parser of the command."""
+    run.add_argument(
+        "case",
+        nargs="*",
+        metavar="CASE",
+        help="built-in name, or path to a case file; default: all built-in cases",
+    )
+    run.add_argument(
+        "--joints",
+        action="store_true",
+        help="run a small closed loop around every joint type, and the cases named",
+    )
+    must = "only these, which must be installed (else status 2); default: all engines"
+    run.add_argument("--engine", nargs="+", action="extend", default=[], metavar="NAME", help=must)
+    run.add_argument(
+        "--mode",
+        choices=MODES,
+        help="the engines' mode; projection, unless an engine named has only the other",
+    )
+    run.add_argument(
+        "--tol",
+        type=positive,
+        default=TOL,
+        metavar="X",
+        help=f"largest constraint residual [m or -]; default {TOL:g}",
+    )
+    run.add_argument(
+        "--out", type=Path, metavar="DIR", help="write results.json and report.html there"
+    )
+    run.add_argument(
+        "--bench",
+        type=Path,
+        metavar="FILE",
+        help="show the work-precision data of this bench.json in the report",
+    )
+    run.add_argument(
+        "--json", metavar="FILE", help="write the results as JSON; - for standard output"
+    )
+    run.add_argument("--junit", type=Path, metavar="FILE", help="write the results as JUnit XML")
+    run.add_argument(
+        "--markdown",
+        type=Path,
+        metavar="FILE",
+        help="write the table of cases and engines as Markdown",
+    )
+    run.add_argument(
+        "--reference",
+        nargs="+",
+        action="extend",
+        default=[],
+        type=Path,
+        metavar="FILE",
+        help=(
+            "judge cases by these proved references, which kincheck reference wrote, instead of"
+            " their own"
+        ),
+    )
+    run.add_argument(
+        "--explain",
+        action="store_true",
+        help="print what the native engine computes for each case, and leaves out",
+    )
+    run.add_argument(
+        "--require",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="NAME",
+        help="engines that must be there and able (else status 2)",
+    )
+    import_options.add_options(run)
+    execution_options.add_options(run, positive)
+    run.add_argument(
+        "--history",
+        type=Path,
+        metavar="FILE",
+        default=os.environ.get(HISTORY) or None,
+        help=(
+            "keep the run in this file, each record as it is made; default: the environment"
+            f" variable {HISTORY}, else not at all"
+        ),
+    )
+    run.add_argument(
+        "--resume",
+        action="store_true",
+        help=(
+            "go on with the last run in the history of the same cases, engines, tolerance, limits,"
+            " versions and commit that has no end"
+        ),
+    )
+
+
+def positive(text: str) -> float:
+    """Return the positive number in the text of an option."""
+    try:
+        tol = float(text)
+    except ValueError:
+        tol = math.nan
+    if not (math.isfinite(tol) and tol > 0):
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not a positive number; give one such as 1, 0.5 or 1e-12"
+        )
+    return tol

@@ -1,0 +1,97 @@
+"""Options of kincheck sweep, and the names of its files."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from . import import_options
+from .registry import whole
+from .run_options import TOL, positive
+
+PART = "sweep.part"
+"""File of a sweep's finished part, in the folder of its results until the sweep ends."""
+
+FILES = ("sweep.json", "sweep.html", "envelope.csv", "gradients.csv")
+
+
+def add_options(sweep: argparse.ArgumentParser) -> None:
+    """Add the options to the parser of the command."""
+    sweep.add_argument(
+        "case", metavar="CASE", help="built-in name, or path to a case file or another tool's"
+    )
+    sweep.add_argument(
+        "--vary",
+        type=Path,
+        required=True,
+        metavar="FILE",
+        help="what varies, and by how much (kincheck-vary/1)",
+    )
+    sweep.add_argument("--samples", type=whole(1), metavar="N", help="variants that are drawn")
+    sweep.add_argument(
+        "--seed", type=whole(0), default=0, metavar="S", help="of the draws; default %(default)s"
+    )
+    sweep.add_argument(
+        "--output",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="NAME",
+        help="only these outputs; default: all",
+    )
+    sweep.add_argument(
+        "--order",
+        type=int,
+        choices=(0, 1, 2),
+        default=0,
+        help="derivatives of the outputs by time too; default %(default)s",
+    )
+    sweep.add_argument(
+        "--tol",
+        type=positive,
+        default=TOL,
+        metavar="X",
+        help=f"largest constraint residual; default {TOL:g}",
+    )
+    sweep.add_argument(
+        "--jobs", type=whole(1), metavar="N", help="threads; default: half the processors"
+    )
+    sweep.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="solve on the workers of this dask.distributed scheduler instead",
+    )
+    sweep.add_argument(
+        "--check",
+        metavar="ENGINE[:SHARE]",
+        help=(
+            "rebuild a share of the variants as cases of their own, at least one, and solve them"
+            " with this engine; default 0.01"
+        ),
+    )
+    sweep.add_argument(
+        "--replay",
+        type=whole(0),
+        nargs="+",
+        metavar="INDEX",
+        help=(
+            "solve only these variants of the seed, each as a case of its own, as kincheck run"
+            " does; with --check its engine too"
+        ),
+    )
+    sweep.add_argument(
+        "--store", type=Path, metavar="FILE", help="write the values of all variants as Parquet"
+    )
+    sweep.add_argument("--out", type=Path, metavar="DIR", help=f"write {', '.join(FILES)} there")
+    sweep.add_argument(
+        "--json", metavar="FILE", help="write the results as JSON; - for standard output"
+    )
+    sweep.add_argument(
+        "--resume",
+        action="store_true",
+        help=(
+            f"go on from the finished part of the same sweep, which is {PART} in the folder of"
+            " --out"
+        ),
+    )
+    import_options.add_options(sweep)
