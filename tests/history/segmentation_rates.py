@@ -1,13 +1,13 @@
-"""How often levels are found that are none, and how often those are found that are: python -m
-tests.history.segmentation_rates --series 1000
+"""Measure false alarms and detections of change points on random series.
+
+    python -m tests.history.segmentation_rates --series 1000
 
 Noise: the share of series without any step in which one is found, and in which one stands at the
 end, for the worse. Steps: the share of series whose changes are found, all, at the right places and
 no others; sizes are in standard deviations of the noise, a step is a factor of two in time. To
 measure another rule, give a module that has a function `change_points`:
 
-    git show HEAD~1:core/harness/regression/steps.py > core/harness/regression/old_steps.py
-    python -m tests.history.segmentation_rates --rule kincheck.core.history.regression.old_steps
+    python -m tests.history.segmentation_rates --rule MODULE
 """
 
 import argparse

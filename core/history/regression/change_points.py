@@ -29,7 +29,7 @@ LASTING = 3
 PACE = 1.5
 """Ratio of levels of times, at least. In 26 equal runs of 20 pairs, a quarter of a minute each, on
 a busy machine, the largest ratio of three or more successive runs to those before was 1.44; nights
-have less in common than minutes. One run: see `limits`."""
+have less in common than minutes. One run: see `thresholds`."""
 
 _Series: TypeAlias = Sequence[tuple[Entry, float]]
 

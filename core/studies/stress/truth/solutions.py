@@ -15,7 +15,7 @@ from .evaluation import Poses, cross
 from .long_double import Real
 
 # Singular values below this part of the largest are those of redundant rows: as
-# `freedom.RANK_TOLERANCE`.
+# `redundancy.RANK_TOLERANCE`.
 RANK = 1e-9
 
 
