@@ -16,9 +16,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import lru_cache, partial
-from threading import local
+from functools import partial
 
+from ..caches import keep_last
 from ..errors import SolveError
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.motions import Path
@@ -50,7 +50,7 @@ def prepare(mechanism: Mechanism, request: Request, path: Path) -> Solver:
     """
     if len(mechanism.moving) > ONE_PROGRAM and request.style is Style.NATIVE:
         known = ours(mechanism) and path.ours
-        make = (_OF_THREAD.large if known else _large)(mechanism, request)
+        make = (_recent_large if known else _large)(mechanism, request)
         if make:
             return make(path)
     return partial(follow, recent_route(mechanism, request, path))
@@ -86,7 +86,7 @@ def _large(mechanism: Mechanism, request: Request) -> Callable[[Path], Solver] |
         def along(path: Path) -> Solver:
             return CascadeSweep(cascade, path).solve
 
-        again = lru_cache(maxsize=1)(along)
+        again = keep_last(1)(along)
         return lambda path: (again if path.ours else along)(path)
     if len(mechanism.moving) <= IRREDUCIBLE:
         return None
@@ -99,15 +99,5 @@ def _large(mechanism: Mechanism, request: Request) -> Callable[[Path], Solver] |
     )
 
 
-class _OfThread(local):
-    """The same, and once for whoever solves one again and again. One only, and of its paths the
-    last: they fill much of the memory.
-
-    Each thread has its own, for it is solved in place.
-    """
-
-    def __init__(self) -> None:
-        self.large = lru_cache(maxsize=1)(_large)
-
-
-_OF_THREAD = _OfThread()
+# One only, and of its paths the last: they fill much of the memory. A thread solves it in place.
+_recent_large = keep_last(1, per_thread=True)(_large)

@@ -10,10 +10,10 @@ from ctypes import CFUNCTYPE, c_double, c_int64
 import numpy as np
 import pytest
 from kincheck.core import solve
+from kincheck.core.caches import clear_caches
 from kincheck.core.program.llvm import code_cache, compiler, elf_loader, jit
 
 from ..support.mechanisms import mcpherson
-from ..support.running import forget_recent
 
 pytest.importorskip("llvmlite", reason="llvmlite is not installed")
 images = pytest.mark.skipif(not elf_loader.possible(), reason="images run on x86-64 under Linux")
@@ -84,7 +84,7 @@ def test_code_that_calls_something_outside_makes_no_image():
 
 
 def positions() -> np.ndarray:
-    forget_recent()
+    clear_caches()
     jit._made.cache_clear()
     return solve(mcpherson(), "stroke", np.linspace(-0.08, 0.08, 33)).points["wheel"].position
 

@@ -5,12 +5,13 @@ out.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...caches import ThreadCache, keep_last
 from ...errors import SolveError
 from ...mechanism.mechanism import Mechanism
 from ...program import Executor, NumpyExecutor, Plan, Program
@@ -34,7 +35,6 @@ from .sample_rows import (
     rows_of_bodies,
     rows_of_points,
 )
-from .thread_cache import ThreadCache
 
 MAX_ITERATIONS = 12
 # Models that are kept for whoever solves one mechanism again and again: to fetch one from disk
@@ -61,7 +61,7 @@ def compile_model(mechanism: Mechanism, request: Request, section: Section | Non
     return Model(mechanism, request, traced(mechanism, request, section))
 
 
-@lru_cache(maxsize=RECENT)
+@keep_last(RECENT)
 def _recent(mechanism: Mechanism, request: Request) -> Model:
     return compile_model(mechanism, request)
 

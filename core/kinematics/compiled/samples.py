@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...caches import ThreadCache, keep_last
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path
 from ...program import Side
@@ -19,7 +20,6 @@ from .interpolation import weights_of_groups, weights_of_samples
 from .motion_start import Start, start_of
 from .program_cache import ours
 from .request import Request
-from .thread_cache import ThreadCache
 
 # Lanes of the numpy executor: many share the overhead of a call, and the block of a mechanism of
 # few bodies stays below a megabyte.
@@ -193,6 +193,6 @@ def recent_route(mechanism: Mechanism, request: Request, path: Path) -> Route:
     )
 
 
-@lru_cache(maxsize=RECENT)
+@keep_last(RECENT)
 def _recent(mechanism: Mechanism, request: Request, path: Path) -> Route:
     return Route(recent_model(mechanism, request), path)
