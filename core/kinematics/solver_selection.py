@@ -24,7 +24,7 @@ from ..mechanism.mechanism import Mechanism
 from ..mechanism.motions import Path
 from ..trajectory import Trajectory
 from .compiled.motion_start import start_of
-from .compiled.program_cache import ours
+from .compiled.program_cache import is_builtin
 from .compiled.request import Request
 from .compiled.samples import recent_route
 from .continuation.sweep import follow
@@ -49,7 +49,7 @@ def prepare(mechanism: Mechanism, request: Request, path: Path) -> Solver:
             the design position.
     """
     if len(mechanism.moving) > ONE_PROGRAM and request.style is Style.NATIVE:
-        known = ours(mechanism) and path.ours
+        known = is_builtin(mechanism) and path.is_builtin
         make = (_recent_large if known else _large)(mechanism, request)
         if make:
             return make(path)
@@ -87,7 +87,7 @@ def _large(mechanism: Mechanism, request: Request) -> Callable[[Path], Solver] |
             return CascadeSweep(cascade, path).solve
 
         again = keep_last(1)(along)
-        return lambda path: (again if path.ours else along)(path)
+        return lambda path: (again if path.is_builtin else along)(path)
     if len(mechanism.moving) <= IRREDUCIBLE:
         return None
     from .sparse.sparse_model import SparseModel

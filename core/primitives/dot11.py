@@ -59,7 +59,7 @@ class Dot11(Primitive):
         return (PaperDot11(self.f, self.g, self.h),)
 
     def conventional_form(self) -> tuple[Primitive, ...]:
-        return ParallelTest(self.g, self.h, self.h), ConventionalDot10(self.f, self.h)
+        return ParallelTest(self.g, self.h), ConventionalDot10(self.f, self.h)
 
 
 class PaperDot11(Dot11):
@@ -80,11 +80,10 @@ class PaperDot11(Dot11):
         return -(s * (self.g @ vi.w)), -(s * (self.f @ vi.w))
 
 
-@dataclass(frozen=True)
 class ParallelTest(ConventionalDot10):
-    """The first dot10 of a parallel pair: it also carries the pair's branch test, h_i . h_j > 0."""
-
-    h: Vec3 = ZERO
+    """The first dot10 of a parallel pair, b = h: it also carries the pair's branch test, h_i . h_j
+    > 0.
+    """
 
     def branch(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
-        return (self.h @ (relative(i, j) @ self.h),)
+        return (self.b @ (relative(i, j) @ self.b),)

@@ -206,14 +206,16 @@ def test_motions_of_a_users_own_are_followed_anew(bound):
     # their messages differ
     assert Path({}, np.ones(1), {"steer": 0.1}) != Path({}, np.ones(1), {"steer": 0.2})
     for motion in (Mine(), Absolute(Mine(), 0.0)):
-        assert not Path({"steer": motion}, np.ones(1)).ours
-    assert not Path({"steer": Ramp(np.array(1.0))}, np.ones(1)).ours  # whoever has it may change it
+        assert not Path({"steer": motion}, np.ones(1)).is_builtin
+    assert not Path(
+        {"steer": Ramp(np.array(1.0))}, np.ones(1)
+    ).is_builtin  # whoever has it may change it
     for motion in (
         Ramp(1.0),
         Absolute(Sine(1.0, 1.0, 0.0), 0.2),
         Table(np.arange(2.0), [0.0, 1.0]),
     ):
-        assert Path({"steer": motion}, np.ones(1)).ours
+        assert Path({"steer": motion}, np.ones(1)).is_builtin
     request = samples.Request(("stroke",), ("wheel",))
     for number in (1, 2):
         path = Path({"stroke": Mine()}, STROKES)

@@ -131,8 +131,8 @@ def test_who_comes_back_does_not_import_llvm(tmp_path):
 @images
 def test_what_llvm_says_of_the_processor_is_kept_for_this_one(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    expected, asked, ask = compiler.processor(), list[str](), compiler._asked
-    monkeypatch.setattr(compiler, "_asked", lambda: asked.append("once") or ask())
+    expected, asked, ask = compiler.processor(), list[str](), compiler._ask_llvm
+    monkeypatch.setattr(compiler, "_ask_llvm", lambda: asked.append("once") or ask())
 
     def found() -> compiler.Processor:
         compiler.processor.cache_clear()  # as another process
@@ -167,6 +167,6 @@ def test_a_processor_is_described_by_what_llvm_goes_by(monkeypatch):
 
 
 def test_code_is_known_by_how_it_is_made(monkeypatch):
-    before = code_cache.told(TEXT)
+    before = code_cache.cache_key(TEXT)
     monkeypatch.setattr(code_cache, "_sources", lambda: "another way")
-    assert code_cache.told(TEXT) != before
+    assert code_cache.cache_key(TEXT) != before

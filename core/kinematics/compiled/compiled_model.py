@@ -22,7 +22,7 @@ from ...trajectory import Array
 from ..formulation.driver_inputs import drive_numbers
 from ..structure.components import Section
 from . import acceptance, predictor
-from .program_cache import Tracing, ours, traced
+from .program_cache import Tracing, is_builtin, traced
 from .request import EARLIER, FROM, TIME, Request
 from .sample_rows import (
     LARGEST,
@@ -72,21 +72,19 @@ def recent_model(mechanism: Mechanism, request: Request) -> Model:
 
     Threads that ask for it at the same time may each make one.
     """
-    return _recent(mechanism, request) if ours(mechanism) else compile_model(mechanism, request)
+    return (
+        _recent(mechanism, request) if is_builtin(mechanism) else compile_model(mechanism, request)
+    )
 
 
 class Model:
     """The programs of a mechanism and the lanes they run on.
 
     Attributes:
-        slots: name of a scalar -> its place in a lane.
-        vectors: name of a vector -> the places of its components.
-        state: name of a vector of the state -> its value at design.
+        selection, frame, slots, vectors, state, prescribed, blocks: see `Tracing`.
         sampled: the places of what is given at every sample: the time, and five numbers of each
             moving driver.
         geometry: the places of the numbers of all varied places.
-        given: name of a vector that tells how a given body moves -> its value at rest at design.
-        blocks: of the rows (`Elimination.sigmas`).
         design: all slots of a lane that stands at the design position; NaN where the rows were
             chosen elsewhere.
         bound: what is made of it for a thread.
@@ -102,7 +100,7 @@ class Model:
             program.name: program for program in tracing.programs
         }
         self.slots, self.vectors = tracing.slots, tracing.vectors
-        self.state, self.given = tracing.state, tracing.given
+        self.state, self.prescribed = tracing.state, tracing.prescribed
         self._geometry = tracing.geometry
         self.geometry = [slot for place in tracing.geometry for slot in self.vectors[place]]
         self.sampled = [self.slots[TIME]]
@@ -137,7 +135,7 @@ class Model:
                 self.slots[name] for name in (SMALLEST_OF_PARTS if request.state else SMALLEST)
             ],
             fixed=[*(target for _, target in tracing.carried), *self.geometry, *tracing.prepared],
-            taken=[slot for name in self.given for slot in self.vectors[name]],
+            taken=[slot for name in self.prescribed for slot in self.vectors[name]],
             tolerance=self.request.last_iteration,
             most=MAX_ITERATIONS,
         )
@@ -256,7 +254,7 @@ class Model:
         of them close there.
         """
         executor.clear()
-        for name, value in (*state.items(), *self.given.items()):
+        for name, value in (*state.items(), *self.prescribed.items()):
             executor.put(self.vectors[name], np.array(value)[:, None])
         executor.put(self.sampled, sample)
         if len(geometry):

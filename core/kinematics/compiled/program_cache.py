@@ -38,7 +38,7 @@ class Tracing:
         vectors: name of a vector -> the places of its components.
         state: name of a vector of the state -> its value at design.
         geometry: the values of all varied places at design.
-        given: name of a vector that tells how a given body moves -> its value at rest at design.
+        prescribed: name of a vector of a prescribed body's motion -> its value at rest at design.
         carried, continued: slots of a solved lane, and of what the lanes after it are predicted
             from, or continued.
         prepared: slots of what depends on the geometry alone.
@@ -51,7 +51,7 @@ class Tracing:
     vectors: Mapping[str, Sequence[int]]
     state: Mapping[str, Sequence[float]]
     geometry: Mapping[str, Sequence[float]]
-    given: Mapping[str, Sequence[float]]
+    prescribed: Mapping[str, Sequence[float]]
     carried: Sequence[tuple[int, int]]
     continued: Sequence[tuple[int, int]]
     prepared: Sequence[int]
@@ -70,7 +70,7 @@ def traced(mechanism: Mechanism, request: Request, section: Section | None = Non
     """
     compiled = request.compiled and compiler.available()
     lanes = compiler.vector_width() if compiled else NODES  # numpy's are as many or more
-    if section or request.varied or not (ours(mechanism) and compiled):
+    if section or request.varied or not (is_builtin(mechanism) and compiled):
         return _trace(mechanism, request, section, lanes)
     content = _source() + pickle.dumps((mechanism, request, lanes))
     found: Tracing = pickle.loads(
@@ -79,7 +79,7 @@ def traced(mechanism: Mechanism, request: Request, section: Section | None = Non
     return found
 
 
-def ours(mechanism: Mechanism) -> bool:
+def is_builtin(mechanism: Mechanism) -> bool:
     """Whether all it is made of is of this package: what is equal then means the same."""
     parts = (*mechanism.joints, *mechanism.couplers, *mechanism.drivers)
     return all(type(each).__module__.startswith(f"{PACKAGE}.") for each in parts)

@@ -50,8 +50,8 @@ class Request:
 RATE, RATE_T = "rate", "rate_t"
 """The vectors that hold the rates and accelerations of the unknowns."""
 TIME = "time"
-GIVEN = {"u": 3, "q": 4, "v": 3, "w": 3, "v_t": 3, "w_t": 3}
-"""The vectors that tell how a given body moves, and how many numbers each has [units and
+PRESCRIBED = {"u": 3, "q": 4, "v": 3, "w": 3, "v_t": 3, "w_t": 3}
+"""The vectors that tell how a prescribed body moves, and how many numbers each has [units and
 seconds].
 """
 FROM, EARLIER = "from ", "earlier "

@@ -18,7 +18,7 @@ from ...trajectory import Array
 from .compiled_model import RECENT, Model, recent_model
 from .interpolation import weights_of_groups, weights_of_samples
 from .motion_start import Start, start_of
-from .program_cache import ours
+from .program_cache import is_builtin
 from .request import Request
 
 # Lanes of the numpy executor: many share the overhead of a call, and the block of a mechanism of
@@ -187,7 +187,7 @@ def recent_route(mechanism: Mechanism, request: Request, path: Path) -> Route:
 
     To make one and bind it to lanes takes twenty times as long as to solve it.
     """
-    kept = len(path.times) <= LONGEST_KEPT and path.ours and ours(mechanism)
+    kept = len(path.times) <= LONGEST_KEPT and path.is_builtin and is_builtin(mechanism)
     return (
         _recent(mechanism, request, path) if kept else Route(recent_model(mechanism, request), path)
     )
