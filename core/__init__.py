@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 from .version import VERSION
 
 if TYPE_CHECKING:
+    from .caches import clear_caches
     from .errors import CaseError, KincheckError, MechanismError, SolveError
     from .joints import (
         ConstantVelocity,
@@ -77,6 +78,7 @@ __all__ = [
     "__version__",
     "assemble",
     "check_joint",
+    "clear_caches",
     "find_assemblies",
     "solve",
     "solve_designs",
@@ -84,7 +86,14 @@ __all__ = [
 ]
 
 _ROOMS = (
-    *(".errors", ".mechanism.mechanism", ".mechanism.drivers", ".mechanism.motions", ".joints"),
+    *(
+        ".errors",
+        ".caches",
+        ".mechanism.mechanism",
+        ".mechanism.drivers",
+        ".mechanism.motions",
+        ".joints",
+    ),
     *(
         f".kinematics.{name}"
         for name in (

@@ -7,10 +7,10 @@ import kincheck.adapters
 import kincheck.cases
 import pytest
 from kincheck.core import Joint
+from kincheck.core.caches import clear_caches
 from kincheck.core.cli import main as cli
 
 from .support.fakes import Fake, crank
-from .support.running import forget_recent
 
 NATIVE = Fake("native")
 
@@ -19,7 +19,7 @@ NATIVE = Fake("native")
 def no_recent_models():
     """What a test has changed holds for the models it makes."""
     yield
-    forget_recent()
+    clear_caches()
 
 
 @pytest.fixture

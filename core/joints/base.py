@@ -109,11 +109,11 @@ class Joint(ABC):
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
-        for name, said in get_annotations(cls).items():
+        for name, annotation in get_annotations(cls).items():
             default = cls.__dict__.get(name)
-            if _several(said) and "kind" not in getattr(default, "metadata", {}):
+            if _several(annotation) and "kind" not in getattr(default, "metadata", {}):
                 raise MechanismError(
-                    f"{cls.__name__}: {name} holds several numbers, and it is not said which;"
+                    f"{cls.__name__}: {name} holds several numbers, but states no kind;"
                     f" declare it as {name}: ... = position(), direction(), positions() or"
                     " directions()"
                 )

@@ -16,15 +16,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import lru_cache, partial
-from threading import local
+from functools import partial
 
+from ..caches import keep_last
 from ..errors import SolveError
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.motions import Path
 from ..trajectory import Trajectory
 from .compiled.motion_start import start_of
-from .compiled.program_cache import ours
+from .compiled.program_cache import is_builtin
 from .compiled.request import Request
 from .compiled.samples import recent_route
 from .continuation.sweep import follow
@@ -49,8 +49,8 @@ def prepare(mechanism: Mechanism, request: Request, path: Path) -> Solver:
             the design position.
     """
     if len(mechanism.moving) > ONE_PROGRAM and request.style is Style.NATIVE:
-        known = ours(mechanism) and path.ours
-        make = (_OF_THREAD.large if known else _large)(mechanism, request)
+        known = is_builtin(mechanism) and path.is_builtin
+        make = (_recent_large if known else _large)(mechanism, request)
         if make:
             return make(path)
     return partial(follow, recent_route(mechanism, request, path))
@@ -86,8 +86,8 @@ def _large(mechanism: Mechanism, request: Request) -> Callable[[Path], Solver] |
         def along(path: Path) -> Solver:
             return CascadeSweep(cascade, path).solve
 
-        again = lru_cache(maxsize=1)(along)
-        return lambda path: (again if path.ours else along)(path)
+        again = keep_last(1)(along)
+        return lambda path: (again if path.is_builtin else along)(path)
     if len(mechanism.moving) <= IRREDUCIBLE:
         return None
     from .sparse.sparse_model import SparseModel
@@ -99,15 +99,5 @@ def _large(mechanism: Mechanism, request: Request) -> Callable[[Path], Solver] |
     )
 
 
-class _OfThread(local):
-    """The same, and once for whoever solves one again and again. One only, and of its paths the
-    last: they fill much of the memory.
-
-    Each thread has its own, for it is solved in place.
-    """
-
-    def __init__(self) -> None:
-        self.large = lru_cache(maxsize=1)(_large)
-
-
-_OF_THREAD = _OfThread()
+# One only, and of its paths the last: they fill much of the memory. A thread solves it in place.
+_recent_large = keep_last(1, per_thread=True)(_large)

@@ -194,7 +194,7 @@ class Path:
         return tuple(self.motions.items()), self.times.tobytes(), tuple(self.design.items())
 
     @property
-    def ours(self) -> bool:
+    def is_builtin(self) -> bool:
         """Whether all motions are of this module with immutable numbers: equal ones then mean the
         same.
         """

@@ -1,7 +1,7 @@
 """Primitive constraints: one geometric condition a file, its derivation on top.
 
-Where the paper's equations are (native rows here, those as printed and corrected in paper.py, once
-more unsimplified in tests/oracles/naive.py):
+Where the paper's equations are. Each file has its native, paper (body axes) and conventional rows
+one below the other; tests/oracles/naive.py has the equations unsimplified.
 
     (1)-(7)     A(p), virtual rotations, velocities     algebra.py, base.py
     (8)-(12)    dot10         Table 1                   dot10.py

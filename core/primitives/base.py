@@ -6,10 +6,24 @@ Conventions of every primitive (formulation section 1, in the native row style):
   Body axes are parallel to the global ones at design, so a body-fixed vector a is given by its
   global components at design; now it is A a.
 - Unknowns per body are (dr, dpi) with dpi the virtual rotation in global axes; velocities are (v,
-  w), accelerations (vdot, wdot), all global. The paper's body-axis rows are these times A.
+  w), accelerations (vdot, wdot), all global.
 - Phi = 0;  rows . velocity = nu;  rows . acceleration = gamma.
 - The ground is a body that never moves: its u, D, v and w are literal zeros and vanish from every
   program.
+
+Each file has up to three row styles of a condition, one below the other:
+
+- Native, as above.
+- Paper: Tables 1 and 2 as corrected (formulation section 9), in body axes. Unknowns are (dr, dpi'),
+  velocities (rdot, w'), accelerations (rddot, w'dot). The native rows are these times A^T. They are
+  kept to measure the paper's claims.
+- Conventional: full matrix products, not simplified by the geometry, as textbooks and DADS have
+  them (Haug; formulation section 2), in body axes. Orientation conditions consist of dot10, line
+  conditions of dot20. Spherical, distance and driver rows have no simplified form; their paper rows
+  serve here too.
+
+A_ij = A_i^T A_j maps frame j to frame i; Om = A_ij w_j - w_i; W = skew(w). In body axes, w of a
+twist and dpi of a row have components in their own body.
 """
 
 from __future__ import annotations
@@ -19,6 +33,7 @@ from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 from ..algebra import IDENTITY, UNIT, ZERO, Mat3, Quat, Scalar, Vec3, cross, rotation_less_identity
+from ..errors import SolveError
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +77,11 @@ class Twist:
     def centripetal(self, arm: Vec3) -> Vec3:
         """Return w x (w x arm): the acceleration of the point without vdot and wdot."""
         return cross(self.w, cross(self.w, arm))
+
+
+def relative(i: Pose, j: Pose) -> Mat3:
+    """Return A_ij: from frame j to frame i."""
+    return i.A.T.times(j.A)
 
 
 GROUND_POSE = Pose.of(ZERO, IDENTITY)
@@ -115,6 +135,13 @@ class Primitive(ABC):
     global ones.
     """
 
+    def __init_subclass__(cls) -> None:
+        """Inherit no forms in other styles: those of a base class are not those of other rows."""
+        super().__init_subclass__()
+        for form in ("paper_form", "conventional_form"):
+            if form not in vars(cls):
+                setattr(cls, form, getattr(Primitive, form))
+
     @abstractmethod
     def phi(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
         """Return the residuals; zero when the condition holds. Lengths [m] or plain numbers."""
@@ -140,3 +167,22 @@ class Primitive(ABC):
         spurious zeros.
         """
         return ()
+
+    def paper_form(self) -> tuple[Primitive, ...]:
+        """Return the primitives that replace this one in the paper's row style.
+
+        Raises:
+            SolveError: the primitive has none.
+        """
+        raise SolveError(
+            f"{type(self).__name__} has no rows in the styles paper and conventional; use the style"
+            " native, or write its paper_form"
+        )
+
+    def conventional_form(self) -> tuple[Primitive, ...]:
+        """Return the primitives that replace this one in the conventional row style.
+
+        Raises:
+            SolveError: the primitive has none.
+        """
+        return self.paper_form()

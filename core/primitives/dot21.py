@@ -10,6 +10,14 @@ origins, and a = A_i a0 for a0 = f, g:
           rows  = [ -a | a x e | a | 0 ]        exact for this phi everywhere
           gamma = -( (w_i x (w_i x a)) . e + 2 (w_i x a) . (v_j - v_i) )
 
+The paper in body axes, const-C, with y = A_i^T (r_j - r_i):
+
+    (23)  phi   = a . y - a . e0
+          rows  = [ -(A_i a) | a x y | A_i a | 0 ]
+          gamma = a . ( 2 w_i x A_i^T (v_j - v_i) - w_i x (w_i x y) )
+
+Conventional: dot20 between the body origins, with arms of zero.
+
 Only together with Dot12 of the same joint: the rows of the line constraint alone (Dot20) differ
 from these by multiples of the Dot12 rows. With the current A_ij in the residual, as the paper has
 it, the same rows take one or two Newton passes more and lose their basin for long arms; that form
@@ -22,6 +30,7 @@ from dataclasses import dataclass, field
 
 from ..algebra import ZERO, Scalar, Vec3, cross
 from .base import Drive, Pose, Primitive, Row, Twist
+from .dot20 import ConventionalDot20
 
 
 @dataclass(frozen=True)
@@ -43,6 +52,12 @@ class Dot21(Primitive):
 
     def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
         return tuple(along_gamma(a, self.e0, i, j, vi, vj) for a in (self.f, self.g))
+
+    def paper_form(self) -> tuple[Primitive, ...]:
+        return (PaperDot21(self.f, self.g, self.e0),)
+
+    def conventional_form(self) -> tuple[Primitive, ...]:
+        return tuple(ConventionalDot20(a, ZERO, ZERO, self.e0) for a in (self.f, self.g))
 
 
 @dataclass(frozen=True)
@@ -68,6 +83,12 @@ class LockedDisplacement(Primitive):
     def nu(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
         return (self.drive.c_t,)
 
+    def paper_form(self) -> tuple[Primitive, ...]:
+        return (PaperLockedDisplacement(self.h, self.e0, self.drive),)
+
+    def conventional_form(self) -> tuple[Primitive, ...]:
+        return (ConventionalDot20(self.h, ZERO, ZERO, self.e0, self.drive),)
+
 
 def along(a: Vec3, e0: Vec3, i: Pose, j: Pose) -> Scalar:
     """Return the change of a . e since design [m]."""
@@ -85,3 +106,47 @@ def along_gamma(a: Vec3, e0: Vec3, i: Pose, j: Pose, vi: Twist, vj: Twist) -> Sc
     """Return the right-hand side of a . e in the acceleration equation [m/s^2]."""
     a_dot = cross(vi.w, i.turn(a))
     return -(cross(vi.w, a_dot) @ (e0 + (j.u - i.u)) + 2.0 * (a_dot @ (vj.v - vi.v)))
+
+
+class PaperDot21(Dot21):
+    """Eq. (23) in body axes."""
+
+    body_axes = True
+
+    def phi(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
+        return tuple(_paper_along(a, self.e0, i, j) for a in (self.f, self.g))
+
+    def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
+        return tuple(_paper_along_row(a, self.e0, i, j) for a in (self.f, self.g))
+
+    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
+        return tuple(_paper_along_gamma(a, self.e0, i, j, vi, vj) for a in (self.f, self.g))
+
+
+class PaperLockedDisplacement(LockedDisplacement):
+    """(23) in body axes with a = h, driven."""
+
+    body_axes = True
+
+    def phi(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
+        return (_paper_along(self.h, self.e0, i, j) - self.drive.c,)
+
+    def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
+        return (_paper_along_row(self.h, self.e0, i, j),)
+
+    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
+        return (self.drive.c_tt + _paper_along_gamma(self.h, self.e0, i, j, vi, vj),)
+
+
+def _paper_along(a: Vec3, e0: Vec3, i: Pose, j: Pose) -> Scalar:
+    return a @ (i.A.T @ (e0 + (j.u - i.u))) - a @ e0
+
+
+def _paper_along_row(a: Vec3, e0: Vec3, i: Pose, j: Pose) -> Row:
+    a_G = i.A @ a
+    return Row(-a_G, cross(a, i.A.T @ (e0 + (j.u - i.u))), a_G, ZERO)
+
+
+def _paper_along_gamma(a: Vec3, e0: Vec3, i: Pose, j: Pose, vi: Twist, vj: Twist) -> Scalar:
+    y, y_t = i.A.T @ (e0 + (j.u - i.u)), i.A.T @ (vj.v - vi.v)
+    return a @ (2.0 * cross(vi.w, y_t) - cross(vi.w, cross(vi.w, y)))

@@ -23,7 +23,6 @@ from kincheck.core import (
 )
 from kincheck.core.algebra import ZERO, Quat, Vec3
 from kincheck.core.joints import Attachment
-from kincheck.core.primitives import conventional, paper
 from kincheck.core.primitives.base import GROUND_POSE, GROUND_TWIST, Pose, Twist
 
 from ..oracles import naive
@@ -32,7 +31,11 @@ CASES = json.loads(
     (Path(__file__).parents[1] / "data" / "adams_single_joints.json").read_text(encoding="utf-8")
 )["cases"]
 NAMES = ("joint", "ground", "body")
-STYLES = {"native": None, "paper": paper.TWINS, "conventional": conventional.TWINS}
+STYLES = {
+    "native": lambda primitive: (primitive,),
+    "paper": lambda primitive: primitive.paper_form(),
+    "conventional": lambda primitive: primitive.conventional_form(),
+}
 
 # The data have six significant digits, trailing zeros left out.
 DIGITS = 6
@@ -84,11 +87,7 @@ class Replay:
     def primitives(self, joint):
         at = {"ground": Attachment(ZERO), "body": Attachment(self.origin)}
         composed = joint.primitives(at[joint.i], at[joint.j])
-        return (
-            composed
-            if self.style is None
-            else [twin for each in composed for twin in self.style[type(each)](each)]
-        )
+        return [form for each in composed for form in self.style(each)]
 
     def residuals(self, joint, numbers):
         """phi, rows . v - nu and rows . a - gamma: shape (3, rows, samples)."""

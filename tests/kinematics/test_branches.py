@@ -20,8 +20,7 @@ from kincheck.core.algebra import ZERO, Quat, Vec3, X, Y, Z, cross, turned_by
 from kincheck.core.kinematics.solve import solve
 from kincheck.core.mechanism.motions import Ramp, Table
 from kincheck.core.primitives.base import GROUND_POSE, Drive, Pose
-from kincheck.core.primitives.conventional import LockTest
-from kincheck.core.primitives.paper import PaperDot12
+from kincheck.core.primitives.dot12 import LockTest, PaperDot12
 
 from ..oracles import naive
 from ..support.specimens import LANES, MAKERS, admissible, body, lanes, make, orientation, rotation

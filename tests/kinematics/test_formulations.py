@@ -8,17 +8,19 @@ the spurious zeros (formulation section 3).
 import kincheck.cases
 import numpy as np
 import pytest
-from kincheck.core import Body, Mechanism, OrientationLock, solve
+from kincheck.core import Body, Mechanism, OrientationLock, SolveError, solve
 from kincheck.core.algebra import ZERO, Quat, Vec3, X, turned_by
 from kincheck.core.case.joint_probe import probes
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.continuation.sweep import sweep
 from kincheck.core.kinematics.formulation.constraints import Style, constraints, frames
-from kincheck.core.primitives import conventional, paper
 from kincheck.core.primitives.base import Pose
-from kincheck.core.primitives.dot11 import Dot11
-from kincheck.core.primitives.dot12 import Dot12
+from kincheck.core.primitives.dot11 import Dot11, PaperDot11
+from kincheck.core.primitives.dot12 import Dot12, PaperDot12
+from kincheck.core.primitives.dot20 import PaperDot20
+from kincheck.core.primitives.dot21 import PaperDot21
+from kincheck.core.primitives.named import NamedTurn
 
 from ..support.mechanisms import mcpherson
 from ..support.specimens import LANES, direction, frame, lanes, orientation, rotation, vector
@@ -92,6 +94,13 @@ def test_all_cases_move_alike_in_all_styles(name):
             )
 
 
+def test_a_primitive_without_other_forms_is_named():
+    with pytest.raises(SolveError, match="NamedTurn has no rows in the styles paper"):
+        NamedTurn(X).paper_form()
+    with pytest.raises(SolveError, match="NamedTurn has no rows"):
+        NamedTurn(X).conventional_form()
+
+
 # Where the simplified rows are exact
 
 
@@ -106,11 +115,11 @@ def matrix(primitives, i, j):
 
 
 def both(native, i, j):
-    """Rows of a native primitive's twins: the simplified ones of the paper, and the exact ones by
-    full products.
+    """Rows of a native primitive's other forms: the simplified ones of the paper, and the exact
+    ones by full products.
     """
     simplified, exact = (
-        matrix(twins[type(native)](native), i, j) for twins in (paper.TWINS, conventional.TWINS)
+        matrix(forms, i, j) for forms in (native.paper_form(), native.conventional_form())
     )
     return simplified, exact
 
@@ -172,14 +181,14 @@ def test_a_simplified_line_needs_the_lock_beside_it(rng):
     """
     f, g, h = frame(rng)
     s_i, s_j = vector(rng), vector(rng)
-    line = [paper.PaperDot20(a, s_i, s_j, ZERO) for a in (f, g)]
-    simplified = [paper.PaperDot21(f, g, s_i - s_j)]
+    line = [PaperDot20(a, s_i, s_j, ZERO) for a in (f, g)]
+    simplified = [PaperDot21(f, g, s_i - s_j)]
 
     i, j = off_by(rng, rng.uniform(-3.0, 3.0, LANES))
-    assert beyond(matrix(line, i, j), matrix([*simplified, paper.PaperDot12()], i, j)).max() < 1e-12
+    assert beyond(matrix(line, i, j), matrix([*simplified, PaperDot12()], i, j)).max() < 1e-12
     # a cylindrical joint must not be made so, not even where its axes are parallel
     i, j = off_by(rng, rng.uniform(0.5, 2.5, LANES), h)
-    alone = beyond(matrix(line, i, j), matrix([*simplified, paper.PaperDot11(f, g, h)], i, j))
+    alone = beyond(matrix(line, i, j), matrix([*simplified, PaperDot11(f, g, h)], i, j))
     assert np.median(alone) > 0.1
 
 

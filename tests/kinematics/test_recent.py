@@ -9,10 +9,10 @@ from weakref import WeakSet
 import numpy as np
 import pytest
 from kincheck.core import Revolute, Spherical, solve, solve_designs
+from kincheck.core.caches import KEYS, ThreadCache, clear_caches, keep_last
 from kincheck.core.kinematics.by_components import block_solver
 from kincheck.core.kinematics.by_components import sweep as cascade_sweep
 from kincheck.core.kinematics.compiled import compiled_model, samples
-from kincheck.core.kinematics.compiled.thread_cache import ThreadCache
 from kincheck.core.kinematics.continuation import side_follower, walk
 from kincheck.core.kinematics.solver_selection import prepare
 from kincheck.core.kinematics.sparse import sparse_model as sparse
@@ -206,14 +206,16 @@ def test_motions_of_a_users_own_are_followed_anew(bound):
     # their messages differ
     assert Path({}, np.ones(1), {"steer": 0.1}) != Path({}, np.ones(1), {"steer": 0.2})
     for motion in (Mine(), Absolute(Mine(), 0.0)):
-        assert not Path({"steer": motion}, np.ones(1)).ours
-    assert not Path({"steer": Ramp(np.array(1.0))}, np.ones(1)).ours  # whoever has it may change it
+        assert not Path({"steer": motion}, np.ones(1)).is_builtin
+    assert not Path(
+        {"steer": Ramp(np.array(1.0))}, np.ones(1)
+    ).is_builtin  # whoever has it may change it
     for motion in (
         Ramp(1.0),
         Absolute(Sine(1.0, 1.0, 0.0), 0.2),
         Table(np.arange(2.0), [0.0, 1.0]),
     ):
-        assert Path({"steer": motion}, np.ones(1)).ours
+        assert Path({"steer": motion}, np.ones(1)).is_builtin
     request = samples.Request(("stroke",), ("wheel",))
     for number in (1, 2):
         path = Path({"stroke": Mine()}, STROKES)
@@ -273,3 +275,67 @@ def test_what_was_made_for_a_thread_goes_with_it():
     thread.join()
     collect()
     assert len(made) == 1
+
+
+def test_a_thread_keeps_what_it_used_last():
+    bound, made = ThreadCache(), list[int]()
+
+    def ask(key):
+        return bound(key, lambda: made.append(key) or key)
+
+    assert [ask(key) for key in range(KEYS)] == made == [*range(KEYS)]
+    ask(0)  # used most recently, so the next key replaces 1
+    ask(KEYS)
+    ask(0)
+    assert made == [*range(KEYS + 1)]
+    ask(1)
+    assert made == [*range(KEYS + 1), 1]
+
+
+@pytest.mark.parametrize("per_thread", [False, True])
+def test_a_function_keeps_its_last_results(per_thread):
+    made = list[int]()
+
+    @keep_last(2, per_thread=per_thread)
+    def ask(key):
+        made.append(key)
+        return [key]
+
+    assert ask(1) is ask(1)
+    for key in (2, 1, 3, 1, 2):  # 3 replaces 2
+        ask(key)
+    assert made == [1, 2, 3, 2]
+    with ThreadPoolExecutor(1) as threads:
+        other = threads.submit(ask, 1).result()
+    assert (other is ask(1)) is not per_thread
+
+
+@pytest.mark.parametrize("per_thread", [False, True])
+def test_clearing_reaches_every_thread(per_thread):
+    class Large:
+        pass
+
+    made = WeakSet()
+
+    @keep_last(2, per_thread=per_thread)
+    def ask(key):
+        found = Large()
+        made.add(found)
+        return found
+
+    with ThreadPoolExecutor(1) as threads:  # the other thread lives on
+        threads.submit(ask, 1).result()
+        ask(2)
+        collect()
+        assert len(made) == 2
+        clear_caches()
+        collect()
+        assert len(made) == 0
+
+
+def test_after_clearing_models_are_made_anew(made):
+    for number in (1, 2):
+        solve(mcpherson(), "stroke", STROKES)
+        solve(mcpherson(), "stroke", STROKES)
+        assert len(made) == number
+        clear_caches()

@@ -19,11 +19,10 @@ from kincheck.core import (
     Revolute,
     solve,
 )
+from kincheck.core.caches import clear_caches
 from kincheck.core.joints import Gear, Joint, RackPinion, Screw
 from kincheck.core.mechanism.motions import Ramp, Table
 from kincheck.core.studies.joint_check.specimens import specimens
-
-from ..support.running import forget_recent
 
 
 def rssr(held=tuple):
@@ -50,7 +49,7 @@ def test_points_may_be_lists_and_arrays(held):
     assert repr(rssr(held)) == repr(rssr())  # plain numbers all
     turn = np.linspace(0.0, 1.0, 5)
     expected = solve(rssr(), "turn", turn).points["end"].acceleration.copy()
-    forget_recent()
+    clear_caches()
     np.testing.assert_array_equal(
         solve(rssr(held), "turn", turn).points["end"].acceleration, expected
     )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from kincheck.core import primitives as p
 from kincheck.core.algebra import Quat, Vec3
-from kincheck.core.primitives.paper import PaperDot12
+from kincheck.core.primitives.dot12 import PaperDot12
 
 from ..oracles import naive
 from ..support.specimens import (

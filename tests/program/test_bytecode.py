@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from kincheck import cases
 from kincheck.core import solve, solve_designs
+from kincheck.core.caches import clear_caches
 from kincheck.core.kinematics.by_components.block_solver import Cascade
 from kincheck.core.kinematics.by_components.sweep import CascadeSweep
 from kincheck.core.kinematics.compiled import compiled_model as models
@@ -34,7 +35,6 @@ from kincheck.core.program.lowering import lowered, unrolled
 
 from ..kinematics.test_chain import chain
 from ..support.mechanisms import four_bar, mcpherson
-from ..support.running import forget_recent
 from .test_llvm import OPERATIONS
 
 pytest.importorskip("llvmlite", reason="llvmlite is not installed")
@@ -212,7 +212,7 @@ def request_of(mechanism) -> Request:
 @pytest.mark.parametrize("way", ["designs", "components"])
 def test_designs_and_components_are_the_same_before_and_after(way, monkeypatch):
     def run() -> list[np.ndarray]:
-        forget_recent()
+        clear_caches()
         rod = np.array([1.115, 0.665, 0.118])
         places = {"joints.tie_rod.points.0": rod + np.linspace(0.0, 0.01, 11)[:, None]}
         if way == "designs":

@@ -10,10 +10,10 @@ from ctypes import CFUNCTYPE, c_double, c_int64
 import numpy as np
 import pytest
 from kincheck.core import solve
+from kincheck.core.caches import clear_caches
 from kincheck.core.program.llvm import code_cache, compiler, elf_loader, jit
 
 from ..support.mechanisms import mcpherson
-from ..support.running import forget_recent
 
 pytest.importorskip("llvmlite", reason="llvmlite is not installed")
 images = pytest.mark.skipif(not elf_loader.possible(), reason="images run on x86-64 under Linux")
@@ -84,7 +84,7 @@ def test_code_that_calls_something_outside_makes_no_image():
 
 
 def positions() -> np.ndarray:
-    forget_recent()
+    clear_caches()
     jit._made.cache_clear()
     return solve(mcpherson(), "stroke", np.linspace(-0.08, 0.08, 33)).points["wheel"].position
 
@@ -131,8 +131,8 @@ def test_who_comes_back_does_not_import_llvm(tmp_path):
 @images
 def test_what_llvm_says_of_the_processor_is_kept_for_this_one(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    expected, asked, ask = compiler.processor(), list[str](), compiler._asked
-    monkeypatch.setattr(compiler, "_asked", lambda: asked.append("once") or ask())
+    expected, asked, ask = compiler.processor(), list[str](), compiler._ask_llvm
+    monkeypatch.setattr(compiler, "_ask_llvm", lambda: asked.append("once") or ask())
 
     def found() -> compiler.Processor:
         compiler.processor.cache_clear()  # as another process
@@ -167,6 +167,6 @@ def test_a_processor_is_described_by_what_llvm_goes_by(monkeypatch):
 
 
 def test_code_is_known_by_how_it_is_made(monkeypatch):
-    before = code_cache.told(TEXT)
+    before = code_cache.cache_key(TEXT)
     monkeypatch.setattr(code_cache, "_sources", lambda: "another way")
-    assert code_cache.told(TEXT) != before
+    assert code_cache.cache_key(TEXT) != before

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from kincheck.core import Revolute, solve, solve_designs
 from kincheck.core.algebra import root
+from kincheck.core.caches import clear_caches
 from kincheck.core.kinematics.compiled import program_cache
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.request import Request
@@ -39,7 +40,6 @@ from kincheck.core.program.llvm.jit import LlvmCode
 
 from ..kinematics.test_chain import chain
 from ..support.mechanisms import four_bar, mcpherson
-from ..support.running import forget_recent
 
 llvm = pytest.importorskip("llvmlite", reason="llvmlite is not installed")
 
@@ -299,7 +299,7 @@ TIE_ROD = np.array([1.115, 0.665, 0.118])
 def test_vectors_of_every_width_give_the_same(way, width, monkeypatch):
     expected, asked = WAYS[way](), list[int]()
     monkeypatch.setattr(compiler, "vector_width", lambda: asked.append(width) or width)
-    forget_recent()
+    clear_caches()
     found = WAYS[way]()
     assert asked  # whatever was kept was made for other vectors
     for name, motion in expected.items():

@@ -1,9 +1,12 @@
 """Traced programs: folding, sharing, dead code, executing in place."""
 
 import math
+import re
 from dataclasses import dataclass
 from operator import neg
+from pathlib import Path
 
+import kincheck.core.program
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
@@ -305,3 +308,15 @@ def test_division_by_zero_is_a_value():
     assert found[0].tolist() == [np.inf, -np.inf]
     assert found[1].tolist() == [np.inf, -np.inf]
     assert np.isnan(found[2, 0])
+
+
+def test_the_page_on_programs_names_every_module():
+    page = kincheck.core.program.__doc__ or ""
+    folder = Path(kincheck.core.program.__file__).parent
+    modules = {
+        ".".join(file.relative_to(folder).with_suffix("").parts)
+        for file in folder.rglob("*.py")
+        if file.stem != "__init__"
+    }
+    named = {name for name in re.findall(r"`([\w.]+)`", page) if name in modules}
+    assert sorted(modules - named) == []

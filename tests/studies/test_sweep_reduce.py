@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from kincheck.cases import load
 from kincheck.core import solve
+from kincheck.core.caches import clear_caches
 from kincheck.core.case.case import Output
-from kincheck.core.kinematics.compiled.thread_cache import ThreadCache
 from kincheck.core.studies.tolerance import streaming_totals as room
 from kincheck.core.studies.tolerance.gradients import gradients
 from kincheck.core.studies.tolerance.reduce import QUANTILES, merged, nothing, quantiles
@@ -67,7 +67,7 @@ def test_totals_leave_out_what_is_no_number(compiled, monkeypatch):
     holds; as numpy finds them.
     """
     monkeypatch.setattr(room, "available", lambda: compiled)
-    monkeypatch.setattr(room, "_bound", ThreadCache())
+    clear_caches()
     random = np.random.default_rng(3)
     values = -3e3 + random.normal(size=(2, 5, 3000))
     values[0, 0, :700], values[0, 1], values[1, 2, ::3], values[1, 3, 5] = (

@@ -1,8 +1,6 @@
-"""Run bare programs on a block, as the executors run a model's; and make all ready anew."""
+"""Run bare programs on a block, as the executors run a model's."""
 
 import numpy as np
-from kincheck.core.kinematics import solver_selection
-from kincheck.core.kinematics.compiled import compiled_model, samples
 from kincheck.core.program import NumpyExecutor, Plan
 
 
@@ -19,9 +17,3 @@ def run_on(programs, block, name="p"):
     executor = numpy_executor(programs, np.asarray(block, dtype=float))
     executor.run(name)
     block[:] = executor.get(range(len(block)))
-
-
-def forget_recent():
-    """What is solved next is made ready anew."""
-    for kept in (compiled_model._recent, samples._recent, solver_selection._OF_THREAD.large):
-        kept.cache_clear()

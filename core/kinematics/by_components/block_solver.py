@@ -177,7 +177,7 @@ class Cascade:
         )
 
     def body_rows(self, name: str) -> list[int]:
-        """Rows of the world that tell how a body moves, in the order of `GIVEN`."""
+        """Rows of the world that tell how a body moves, in the order of `PRESCRIBED`."""
         kind, member = self.place[self.part_of[name]]
         k = self.parts[kind.members[member]].bodies.index(name)
         u, q, v, a = (kind.rows(label, member) for label in (f"u b{k}", f"q b{k}", RATE, RATE_T))

@@ -5,38 +5,26 @@ out.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...caches import ThreadCache, keep_last
 from ...errors import SolveError
 from ...mechanism.mechanism import Mechanism
-from ...program import Executor, NumpyExecutor, Plan, Program
+from ...program import Executor, NumpyExecutor
 from ...program.llvm.compiler import available
 from ...program.llvm.executor import LlvmExecutor
 from ...program.llvm.jit import LlvmCode, make_loops_ready
 from ...trajectory import Array
 from ..formulation.driver_inputs import drive_numbers
 from ..structure.components import Section
-from . import acceptance, predictor
-from .program_cache import Tracing, ours, traced
-from .request import EARLIER, FROM, TIME, Request
-from .sample_rows import (
-    LARGEST,
-    LARGEST_OF_PARTS,
-    SMALLEST,
-    SMALLEST_OF_PARTS,
-    kept_motions,
-    kept_tests,
-    row_ranges,
-    rows_of_bodies,
-    rows_of_points,
-)
-from .thread_cache import ThreadCache
+from .program_cache import Tracing, is_builtin, traced
+from .request import EARLIER, FROM, TIME, Request, slots_of
+from .sample_rows import rows_of_bodies, rows_of_points
 
-MAX_ITERATIONS = 12
 # Models that are kept for whoever solves one mechanism again and again: to fetch one from disk
 # takes longer than many sweeps.
 RECENT = 8
@@ -61,7 +49,7 @@ def compile_model(mechanism: Mechanism, request: Request, section: Section | Non
     return Model(mechanism, request, traced(mechanism, request, section))
 
 
-@lru_cache(maxsize=RECENT)
+@keep_last(RECENT)
 def _recent(mechanism: Mechanism, request: Request) -> Model:
     return compile_model(mechanism, request)
 
@@ -72,75 +60,32 @@ def recent_model(mechanism: Mechanism, request: Request) -> Model:
 
     Threads that ask for it at the same time may each make one.
     """
-    return _recent(mechanism, request) if ours(mechanism) else compile_model(mechanism, request)
+    return (
+        _recent(mechanism, request) if is_builtin(mechanism) else compile_model(mechanism, request)
+    )
 
 
 class Model:
     """The programs of a mechanism and the lanes they run on.
 
     Attributes:
-        slots: name of a scalar -> its place in a lane.
-        vectors: name of a vector -> the places of its components.
-        state: name of a vector of the state -> its value at design.
-        sampled: the places of what is given at every sample: the time, and five numbers of each
-            moving driver.
-        geometry: the places of the numbers of all varied places.
-        given: name of a vector that tells how a given body moves -> its value at rest at design.
-        blocks: of the rows (`Elimination.sigmas`).
+        plan, vectors, state, prescribed, sampled, rows, blocks, selection, frame: see `Tracing`.
+        programs, slots: of the plan.
+        geometry: the slots of all varied places.
+        kept: number of rows kept of a sample.
         design: all slots of a lane that stands at the design position; NaN where the rows were
             chosen elsewhere.
         bound: what is made of it for a thread.
-        rows: name of a motion or test -> its rows among what is kept of a sample.
-        kept: how many rows there are.
-        plan: the programs and how they are looped.
     """
 
     def __init__(self, mechanism: Mechanism, request: Request, tracing: Tracing) -> None:
-        self.mechanism, self.request = mechanism, request
+        self.mechanism, self.request, self.plan = mechanism, request, tracing.plan
         self.selection, self.frame, self.blocks = tracing.selection, tracing.frame, tracing.blocks
-        self.programs: Mapping[str, Program] = {
-            program.name: program for program in tracing.programs
-        }
-        self.slots, self.vectors = tracing.slots, tracing.vectors
-        self.state, self.given = tracing.state, tracing.given
+        self.programs, self.slots = self.plan.programs, self.plan.slots
+        self.vectors, self.sampled, self.rows = tracing.vectors, tracing.sampled, tracing.rows
+        self.state, self.prescribed = tracing.state, tracing.prescribed
         self._geometry = tracing.geometry
-        self.geometry = [slot for place in tracing.geometry for slot in self.vectors[place]]
-        self.sampled = [self.slots[TIME]]
-        self.sampled += [
-            slot for name in self.request.drivers for slot in self.vectors[f"drive {name}"]
-        ]
-        self._tangent = "outputs" if self.request.order == 2 else "tangent"
-        motions, tests = kept_motions(request, self.state), kept_tests(request, self.blocks)
-        kept = [slot for name in motions for slot in self.vectors[name]]
-        self.rows = row_ranges({name: len(self.vectors[name]) for name in motions}, tests)
-        self.kept = len(kept) + len(tests)
-        self.plan = Plan(
-            self.programs,
-            self.slots,
-            after=("outputs",),
-            alone=acceptance.ALONE,
-            joined=() if self.request.state else acceptance.JOINED,
-            onward=(self._tangent,),
-            sampled=[*self.sampled, *self.vectors.get(predictor.WEIGHT, ())],
-            behind=tracing.behind,
-            remembered=(
-                [slot for name in self.state for slot in self.vectors[name]]
-                if predictor.PAST in self.vectors
-                else ()
-            ),
-            past=self.vectors.get(predictor.PAST, (0,))[0],
-            carried=tracing.carried,
-            continued=tracing.continued,
-            kept=[*kept, *(self.slots[name] for name in tests)],
-            largest=[self.slots[name] for name in (LARGEST_OF_PARTS if request.state else LARGEST)],
-            smallest=[
-                self.slots[name] for name in (SMALLEST_OF_PARTS if request.state else SMALLEST)
-            ],
-            fixed=[*(target for _, target in tracing.carried), *self.geometry, *tracing.prepared],
-            taken=[slot for name in self.given for slot in self.vectors[name]],
-            tolerance=self.request.last_iteration,
-            most=MAX_ITERATIONS,
-        )
+        self.geometry, self.kept = slots_of(self.vectors, self._geometry), len(self.plan.kept)
         compiled = self.request.compiled and available()
         self._code = LlvmCode(self.plan) if compiled else None
         self.bound = ThreadCache()
@@ -214,7 +159,7 @@ class Model:
         the drives gives them.
         """
         executor.put(self.sampled, sample[:, None])
-        executor.run(self._tangent)
+        executor.run(*self.plan.onward)
         executor.carry()
         # there is no step behind it
         executor.put([self.slots[EARLIER + TIME]], executor.get([self.slots[FROM + TIME]]))
@@ -256,7 +201,7 @@ class Model:
         of them close there.
         """
         executor.clear()
-        for name, value in (*state.items(), *self.given.items()):
+        for name, value in (*state.items(), *self.prescribed.items()):
             executor.put(self.vectors[name], np.array(value)[:, None])
         executor.put(self.sampled, sample)
         if len(geometry):

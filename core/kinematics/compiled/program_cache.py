@@ -16,14 +16,23 @@ from functools import cache
 from pathlib import Path
 
 from ...mechanism.mechanism import Mechanism
-from ...program import ITERATIONS, NODES, Program, groups_behind
+from ...program import ITERATIONS, NODES, Plan, groups_behind
 from ...program.disk_cache import kept
 from ...program.llvm import compiler
 from ..formulation.constraints import Frames
 from ..structure.components import Section
 from ..structure.degrees_of_freedom import Selection
 from . import acceptance, predictor
-from .request import Request
+from .request import MAX_ITERATIONS, TIME, Request, slots_of
+from .sample_rows import (
+    LARGEST,
+    LARGEST_OF_PARTS,
+    SMALLEST,
+    SMALLEST_OF_PARTS,
+    kept_motions,
+    kept_tests,
+    row_ranges,
+)
 
 CORE = Path(__file__).parents[2]
 PACKAGE = __name__.split(".kinematics.")[0]
@@ -34,28 +43,24 @@ class Tracing:
     """What tracing a mechanism for a request gives.
 
     Attributes:
-        slots: name of a scalar -> its place in a lane.
-        vectors: name of a vector -> the places of its components.
+        plan: the programs, the slots of a lane, and how the programs are looped.
+        vectors: name of a vector -> its slots.
         state: name of a vector of the state -> its value at design.
-        geometry: the values of all varied places at design.
-        given: name of a vector that tells how a given body moves -> its value at rest at design.
-        carried, continued: slots of a solved lane, and of what the lanes after it are predicted
-            from, or continued.
-        prepared: slots of what depends on the geometry alone.
-        behind: by how many groups of lanes those after them are extrapolated.
+        geometry: name of a varied place -> its values at design.
+        prescribed: name of a vector of a prescribed body's motion -> its value at rest at design.
+        sampled: slots with a given value at every sample: the time, and five numbers of each moving
+            driver.
+        rows: name of a motion or test -> its rows among those kept of a sample.
         blocks: of the rows (`Elimination.sigmas`).
     """
 
-    programs: Sequence[Program]
-    slots: Mapping[str, int]
+    plan: Plan
     vectors: Mapping[str, Sequence[int]]
     state: Mapping[str, Sequence[float]]
     geometry: Mapping[str, Sequence[float]]
-    given: Mapping[str, Sequence[float]]
-    carried: Sequence[tuple[int, int]]
-    continued: Sequence[tuple[int, int]]
-    prepared: Sequence[int]
-    behind: int
+    prescribed: Mapping[str, Sequence[float]]
+    sampled: Sequence[int]
+    rows: Mapping[str, slice]
     blocks: int
     selection: Selection
     frame: Frames
@@ -70,7 +75,7 @@ def traced(mechanism: Mechanism, request: Request, section: Section | None = Non
     """
     compiled = request.compiled and compiler.available()
     lanes = compiler.vector_width() if compiled else NODES  # numpy's are as many or more
-    if section or request.varied or not (ours(mechanism) and compiled):
+    if section or request.varied or not (is_builtin(mechanism) and compiled):
         return _trace(mechanism, request, section, lanes)
     content = _source() + pickle.dumps((mechanism, request, lanes))
     found: Tracing = pickle.loads(
@@ -79,7 +84,7 @@ def traced(mechanism: Mechanism, request: Request, section: Section | None = Non
     return found
 
 
-def ours(mechanism: Mechanism) -> bool:
+def is_builtin(mechanism: Mechanism) -> bool:
     """Whether all it is made of is of this package: what is equal then means the same."""
     parts = (*mechanism.joints, *mechanism.couplers, *mechanism.drivers)
     return all(type(each).__module__.startswith(f"{PACKAGE}.") for each in parts)
@@ -123,17 +128,39 @@ def _trace(mechanism: Mechanism, request: Request, section: Section | None, lane
             programs.append(predictor.extend(tracer))
     carried, continued = predictor.carried(tracer), predictor.continued(tracer)
     tracer.layout.scalar(ITERATIONS)
+    slots, vectors, state = tracer.layout.slots, tracer.layout.vectors, tracer.formulation.design
+    sampled = [slots[TIME], *slots_of(vectors, (f"drive {name}" for name in request.drivers))]
+    motions, tests = kept_motions(request, state), kept_tests(request, tracer.blocks)
+    fixed = [*(target for _, target in carried), *slots_of(vectors, tracer.geometry)]
+    plan = Plan(
+        {program.name: program for program in programs},
+        slots,
+        after=("outputs",),
+        alone=acceptance.ALONE,
+        joined=() if request.state else acceptance.JOINED,
+        onward=("outputs" if request.order == 2 else "tangent",),
+        sampled=[*sampled, *vectors.get(predictor.WEIGHT, ())],
+        behind=groups_behind(lanes),
+        remembered=slots_of(vectors, state) if predictor.PAST in vectors else (),
+        past=vectors.get(predictor.PAST, (0,))[0],
+        carried=carried,
+        continued=continued,
+        kept=[*slots_of(vectors, motions), *(slots[name] for name in tests)],
+        largest=[slots[name] for name in (LARGEST_OF_PARTS if request.state else LARGEST)],
+        smallest=[slots[name] for name in (SMALLEST_OF_PARTS if request.state else SMALLEST)],
+        fixed=[*fixed, *tracer.prepared.slots],
+        taken=slots_of(vectors, tracer.at_rest),
+        tolerance=request.last_iteration,
+        most=MAX_ITERATIONS,
+    )
     return Tracing(
-        programs,
-        tracer.layout.slots,
-        tracer.layout.vectors,
-        tracer.formulation.design,
+        plan,
+        vectors,
+        state,
         tracer.geometry,
         tracer.at_rest,
-        carried,
-        continued,
-        tracer.prepared.slots,
-        groups_behind(lanes),
+        sampled,
+        row_ranges({name: len(vectors[name]) for name in motions}, tests),
         tracer.blocks,
         tracer.selection,
         tracer.frame,

@@ -25,7 +25,7 @@ from ...program import Elimination, Prepared, Program, Tape, absolute, maximum, 
 from ...trajectory import QUANTITIES
 from ..formulation.acceptance_criteria import EPSILON
 from ..formulation.body_kinematics import motion_of_frame, motion_of_point
-from ..formulation.cartesian import Cartesian, Given
+from ..formulation.cartesian import Cartesian, PrescribedBody
 from ..formulation.constraints import Style, constraints, frames
 from ..formulation.driver_inputs import turns
 from ..formulation.formulation import GROUND_ACCELERATION, Acceleration, Formulation, State
@@ -36,8 +36,8 @@ from ..structure.degrees_of_freedom import select_rows
 from .request import (
     BLOCKS,
     FIRM,
-    GIVEN,
     ORIENTATION,
+    PRESCRIBED,
     RATE,
     RATE_T,
     SIGMA,
@@ -60,8 +60,8 @@ class Tracer:
         self.request, self.tape, self.layout = request, Tape(), Layout()
         self.mechanism, self._section = mechanism, section
         self.frame = section.frame(mechanism) if section else frames(mechanism)
-        self.given: Mapping[str, Given] = (
-            {name: Given() for name in section.given} if section else {}
+        self.prescribed: Mapping[str, PrescribedBody] = (
+            {name: PrescribedBody() for name in section.given} if section else {}
         )
         formulation = self._formulate({})
         if section:
@@ -79,7 +79,7 @@ class Tracer:
                 if section
                 else frames(self.mechanism, self.frame.unit)
             )
-        self.given = {name: self._moved(name) for name in self.given}
+        self.prescribed = {name: self._moved(name) for name in self.prescribed}
         self.formulation = self._formulate(
             {name: Drive(*self.vector(f"drive {name}", 5)) for name in request.drivers}
         )
@@ -96,14 +96,14 @@ class Tracer:
         found = constraints(self.mechanism, self.frame, drives, self.request.style)
         if self.request.style is Style.RELATIVE:
             return Relative.of(self.mechanism, self.frame, found)
-        return Cartesian(found, self.frame.moving, given=self.given)
+        return Cartesian(found, self.frame.moving, prescribed=self.prescribed)
 
-    def _moved(self, name: str) -> Given:
-        """A given body, its motion read from slots."""
+    def _moved(self, name: str) -> PrescribedBody:
+        """A prescribed body, its motion read from slots."""
         u, q, v, w, v_t, w_t = (
-            self.vector(f"given {label} {name}", count) for label, count in GIVEN.items()
+            self.vector(f"prescribed {label} {name}", count) for label, count in PRESCRIBED.items()
         )
-        return Given(
+        return PrescribedBody(
             Pose.of(vec(u), quat(q)), Twist(vec(v), vec(w)), Acceleration(vec(v_t), vec(w_t))
         )
 
@@ -187,12 +187,14 @@ class Tracer:
 
     @property
     def at_rest(self) -> Mapping[str, Sequence[float]]:
-        """The vectors that tell how given bodies move, at rest at the design position."""
+        """The vectors that tell how prescribed bodies move, at rest at the design position."""
         values = {
-            label: (1.0, 0.0, 0.0, 0.0) if label == "q" else (0.0, 0.0, 0.0) for label in GIVEN
+            label: (1.0, 0.0, 0.0, 0.0) if label == "q" else (0.0, 0.0, 0.0) for label in PRESCRIBED
         }
         return {
-            f"given {label} {name}": value for name in self.given for label, value in values.items()
+            f"prescribed {label} {name}": value
+            for name in self.prescribed
+            for label, value in values.items()
         }
 
     def outputs(self) -> Program:

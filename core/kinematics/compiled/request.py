@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -12,6 +12,7 @@ from ..formulation.constraints import Style
 # times the condition), where sigma is at least `FIRM`; where it is less, from a residual below as
 # many times less.
 LAST_ITERATION, FIRM = 1e-9, 1.0 / 16.0
+MAX_ITERATIONS = 12
 
 
 @dataclass(frozen=True)
@@ -50,8 +51,8 @@ class Request:
 RATE, RATE_T = "rate", "rate_t"
 """The vectors that hold the rates and accelerations of the unknowns."""
 TIME = "time"
-GIVEN = {"u": 3, "q": 4, "v": 3, "w": 3, "v_t": 3, "w_t": 3}
-"""The vectors that tell how a given body moves, and how many numbers each has [units and
+PRESCRIBED = {"u": 3, "q": 4, "v": 3, "w": 3, "v_t": 3, "w_t": 3}
+"""The vectors that tell how a prescribed body moves, and how many numbers each has [units and
 seconds].
 """
 FROM, EARLIER = "from ", "earlier "
@@ -112,6 +113,11 @@ def accept_by(tol: float, *, crossing: bool = False) -> Mapping[str, float]:
     return dict(
         zip(ACCEPT, (tol, max(CONSISTENT, tol), CROSSING if crossing else 0.0), strict=True)
     )
+
+
+def slots_of(vectors: Mapping[str, Sequence[int]], names: Iterable[str]) -> list[int]:
+    """Return the slots of the named vectors, one after the other."""
+    return [slot for name in names for slot in vectors[name]]
 
 
 class Layout:

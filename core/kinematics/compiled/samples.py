@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...caches import ThreadCache, keep_last
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path
 from ...program import Side
@@ -17,9 +18,8 @@ from ...trajectory import Array
 from .compiled_model import RECENT, Model, recent_model
 from .interpolation import weights_of_groups, weights_of_samples
 from .motion_start import Start, start_of
-from .program_cache import ours
+from .program_cache import is_builtin
 from .request import Request
-from .thread_cache import ThreadCache
 
 # Lanes of the numpy executor: many share the overhead of a call, and the block of a mechanism of
 # few bodies stays below a megabyte.
@@ -187,12 +187,12 @@ def recent_route(mechanism: Mechanism, request: Request, path: Path) -> Route:
 
     To make one and bind it to lanes takes twenty times as long as to solve it.
     """
-    kept = len(path.times) <= LONGEST_KEPT and path.ours and ours(mechanism)
+    kept = len(path.times) <= LONGEST_KEPT and path.is_builtin and is_builtin(mechanism)
     return (
         _recent(mechanism, request, path) if kept else Route(recent_model(mechanism, request), path)
     )
 
 
-@lru_cache(maxsize=RECENT)
+@keep_last(RECENT)
 def _recent(mechanism: Mechanism, request: Request, path: Path) -> Route:
     return Route(recent_model(mechanism, request), path)

@@ -24,7 +24,7 @@ COLUMNS = 6
 
 
 @dataclass(frozen=True, slots=True)
-class Given:
+class PrescribedBody:
     """The prescribed motion of a body that is solved elsewhere."""
 
     pose: Pose = GROUND_POSE
@@ -38,13 +38,13 @@ class Cartesian:
 
     Attributes:
         named: coordinates with a column even if no primitive is driven by them.
-        given: prescribed moving bodies, without columns.
+        prescribed: moving bodies, without columns.
     """
 
     constraints: Sequence[Constraint | Relation]
     bodies: Sequence[str]
     named: Sequence[str] = ()
-    given: Mapping[str, Given] = field(default_factory=dict[str, Given])
+    prescribed: Mapping[str, PrescribedBody] = field(default_factory=dict[str, PrescribedBody])
 
     @classmethod
     def of(
@@ -99,7 +99,8 @@ class Cartesian:
             pairs = [c for c in members if isinstance(c, Constraint)]
             remote = max((far.get(c.i, 0) + far.get(c.j, 0) for c in pairs), default=0)
             steady = all(
-                c.primitive.steady or not (c.i in self.columns or c.i in self.given) for c in pairs
+                c.primitive.steady or not (c.i in self.columns or c.i in self.prescribed)
+                for c in pairs
             )
             found.append(Condition(rows, remote, steady))
         return found
@@ -126,7 +127,7 @@ class Cartesian:
         return any(c.primitive.body_axes for c in self.constraints if isinstance(c, Constraint))
 
     def configuration(self, state: State) -> Configuration:
-        poses = {name: each.pose for name, each in self.given.items()}
+        poses = {name: each.pose for name, each in self.prescribed.items()}
         for name in self.bodies:
             poses[name] = Pose.of(vec(state[f"u {name}"]), quat(state[f"q {name}"]))
         return Configuration(state, poses)
@@ -178,7 +179,7 @@ class Cartesian:
         return found
 
     def nu(self, at: Configuration) -> list[Scalar]:
-        carried = {name: each.twist for name, each in self.given.items()}
+        carried = {name: each.twist for name, each in self.prescribed.items()}
         found: list[Scalar] = []
         for c in self.constraints:
             if isinstance(c, Relation):
@@ -188,10 +189,10 @@ class Cartesian:
         return found
 
     def gamma(self, at: Configuration, v: Sequence[Scalar]) -> list[Scalar]:
-        twists = self._own(v) | {name: each.twist for name, each in self.given.items()}
+        twists = self._own(v) | {name: each.twist for name, each in self.prescribed.items()}
         carried = {
             name: Twist(each.acceleration.v_t, each.acceleration.w_t)
-            for name, each in self.given.items()
+            for name, each in self.prescribed.items()
         }
         found: list[Scalar] = []
         for c in self.constraints:

@@ -272,14 +272,12 @@ def _restyled(found: Sequence[Constraint | Relation], style: Style) -> list[Cons
     """Return the constraints with every primitive replaced by its equivalents in the style."""
     if style not in (Style.PAPER, Style.CONVENTIONAL):
         return list(found)
-    from ...primitives import conventional, paper  # rarely asked for
-
-    twins = {Style.PAPER: paper.TWINS, Style.CONVENTIONAL: conventional.TWINS}[style]
     styled: list[Constraint | Relation] = []
     for c in found:
-        styled += (
-            [c]
-            if isinstance(c, Relation)
-            else [replace(c, primitive=t) for t in twins[type(c.primitive)](c.primitive)]
-        )
+        if isinstance(c, Relation):
+            styled.append(c)
+        else:
+            paper = style is Style.PAPER
+            forms = c.primitive.paper_form() if paper else c.primitive.conventional_form()
+            styled += [replace(c, primitive=form) for form in forms]
     return styled

@@ -20,7 +20,7 @@ from functools import cached_property
 import numpy as np
 
 from ...trajectory import Array
-from ..compiled.compiled_model import MAX_ITERATIONS
+from ..compiled.request import MAX_ITERATIONS
 from ..continuation.failure_reasons import in_words
 from ..structure.sparse_lu import SingularError
 from .batched_newton import Batch

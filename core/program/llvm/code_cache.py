@@ -47,16 +47,16 @@ def load(
     content: str, text: Callable[[], str], signatures: Mapping[str, int] | None = None
 ) -> Code:
     """Return the cached code of a content; compile the text if there is none."""
-    return Code(disk_cache.kept(told(content), lambda: _made(text())), signatures or {})
+    return Code(disk_cache.kept(cache_key(content), lambda: _made(text())), signatures or {})
 
 
 def find(content: str) -> Code | None:
     """Return the cached code of a content, or None."""
-    code = disk_cache.find(told(content))
+    code = disk_cache.find(cache_key(content))
     return None if code is None else Code(code, {})
 
 
-def told(content: str) -> bytes:
+def cache_key(content: str) -> bytes:
     """Return the cache key: content, processor, compiler, and sources that process its output."""
     return "\n".join(
         (*compiler.processor(), str(elf_loader.possible()), _sources(), content)

@@ -63,8 +63,8 @@ def processor() -> Processor:
     An emulator that hides instructions of the processor (valgrind) needs a separate cache.
     """
     known = _described()
-    said = _asked() if known is None else kept(known, _asked)
-    return Processor(*said.decode().split("\n"))
+    description = _ask_llvm() if known is None else kept(known, _ask_llvm)
+    return Processor(*description.decode().split("\n"))
 
 
 @cache
@@ -102,7 +102,7 @@ def loaded(file: bytes) -> Callable[[str], int]:
     return engine.get_function_address
 
 
-def _asked() -> bytes:
+def _ask_llvm() -> bytes:
     binding = llvm()
     features, version = (
         binding.get_host_cpu_features().flatten(),

@@ -158,12 +158,12 @@ class LlvmTrack:
             [address(memory), start_at, address(self.worst), 0, row, 1, len(sides)], np.int64
         )
         tables = [_in_lines(side.samples) for side in sides]
-        told = [
+        fields = [
             (address(table), table.shape[1], margin + side.first, side.step, side.count, anchor, 0)
             for side, table, anchor in zip(sides, tables, anchors, strict=True)
         ]
         # # never empty: an empty array has no address
-        self._sides = np.array([*told, (0,) * len(SIDE)], np.int64)
+        self._sides = np.array([*fields, (0,) * len(SIDE)], np.int64)
         self._counts, motion = [side.count for side in sides], address(self._motion)
         self._run = partial(code.call("follow", "run"), motion, address(self._sides))
         follow = partial(code.call("follow", "follow"), motion)

@@ -33,10 +33,10 @@ class Lines:
     def let(self, text: str) -> str:
         """Return the name of an expression's value, computed once."""
         if text not in self._known:
-            self._known[text] = self.anew(text)
+            self._known[text] = self.assign(text)
         return self._known[text]
 
-    def anew(self, text: str) -> str:
+    def assign(self, text: str) -> str:
         """Return the name of an expression's value, computed here even if computed before."""
         name = f"%{self.prefix}{len(self.lines)}"
         self.lines.append(f"{name} = {text}")

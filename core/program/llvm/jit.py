@@ -13,8 +13,7 @@ from functools import cache, partial
 from pathlib import Path
 from threading import Lock, Thread
 
-from .. import bytecode, disk_cache, lowering, tape
-from .. import plan as executor
+from .. import bytecode, disk_cache, lowering, plan, tape
 from ..plan import Plan
 from . import code_cache, compiler
 from .interpreter import interpret
@@ -145,7 +144,7 @@ def make_loops_ready() -> None:
     missing = [
         name
         for name in ("interpret", "follow")
-        if not disk_cache.known(code_cache.told(_content(name, width)))
+        if not disk_cache.known(code_cache.cache_key(_content(name, width)))
     ]
     if missing:
         compiler.llvm()
@@ -182,6 +181,6 @@ def _sources() -> str:
     """Return a digest of all writers of text or tables: this folder, and the modules it uses."""
     files = (
         *sorted(Path(__file__).parent.glob("*.py")),
-        *(Path(str(each.__file__)) for each in (executor, lowering, tape, bytecode)),
+        *(Path(str(each.__file__)) for each in (plan, lowering, tape, bytecode)),
     )
     return hashlib.sha256(b"".join(each.read_bytes() for each in files)).hexdigest()

@@ -135,7 +135,7 @@ def _kept(width: int) -> str:
         to = remember.sum("%past", remember.entry(1, 2))
         remember.write(
             to,
-            remember.anew(
+            remember.assign(
                 f"load {remember.vector}, ptr {remember.slot(remember.entry(0, 2))}, align 8"
             ),
         )

@@ -32,8 +32,8 @@ def follow(width: int) -> str:
     """
     vector, test = f"<{width} x double>", Lines(width, "test")
     accepted = test.let(f"fcmp ogt {vector} {test.read('%plan_margin')}, zeroinitializer")
-    body = f"""{_told("motion", MOTION)}
-  {_told("side", SIDE)}
+    body = f"""{_read_fields("motion", MOTION)}
+  {_read_fields("side", SIDE)}
   %descending = icmp slt i64 %step, 0
   %extrapolates = icmp ne i64 %plan_behind, 0
   %quick = icmp ne i64 %plan_quick, 0
@@ -153,7 +153,7 @@ def _run() -> str:
     """Return the function that follows every side and counts the sides that end early."""
     return f"""define i64 @run(ptr %plan, ptr %motion, ptr %table) {{
 entry:
-  {_told("motion", MOTION)}
+  {_read_fields("motion", MOTION)}
   br label %head
 head:
   %k = phi i64 [0, %entry], [%next, %one]
@@ -163,7 +163,7 @@ head:
 one:
   %offset = mul i64 %k, {len(SIDE)}
   %side = getelementptr i64, ptr %table, i64 %offset
-  {_told("side", SIDE)}
+  {_read_fields("side", SIDE)}
   %at = call i64 @go(ptr %plan, ptr %motion, ptr %side, ptr %start, i64 0, i64 %count, i1 false)
   %reached_at = getelementptr i64, ptr %side, i64 {_index(SIDE, "reached")}
   store i64 %at, ptr %reached_at, align 8
@@ -178,16 +178,16 @@ end:
 """
 
 
-def _told(name: str, told: Sequence[str]) -> str:
+def _read_fields(name: str, fields: Sequence[str]) -> str:
     """Return lines that read the fields of a struct, each under its own name."""
     lines = Lines(0, f"{name}_")
-    for k, (kind, field) in enumerate(each.split() for each in told):
+    for k, (kind, field) in enumerate(each.split() for each in fields):
         lines.lines.append(f"%{field} = load {kind}, ptr {lines.number(f'%{name}', k)}, align 8")
     return lines.text
 
 
-def _index(told: Sequence[str], name: str) -> int:
-    return [each.split()[1] for each in told].index(name)
+def _index(fields: Sequence[str], name: str) -> int:
+    return [each.split()[1] for each in fields].index(name)
 
 
 def _worst(width: int) -> str:

@@ -127,11 +127,11 @@ def rows(width: int) -> str:
         copy.at, spread.at = copy.sum("%row", k), spread.sum("%row", k)
         copy.write(
             copy.entry(1, 2),
-            copy.anew(f"load {vector}, ptr {copy.slot(copy.entry(0, 2))}, align 8"),
+            copy.assign(f"load {vector}, ptr {copy.slot(copy.entry(0, 2))}, align 8"),
         )
         number = spread.number(spread.slot(spread.entry(0, 2)), "%k")
         spread.write(
-            spread.entry(1, 2), spread.spread(spread.anew(f"load double, ptr {number}, align 8"))
+            spread.entry(1, 2), spread.spread(spread.assign(f"load double, ptr {number}, align 8"))
         )
     here = [
         each.number("%numbers", each.product("%stride", "%row")) for each in (give, take, keep, put)

@@ -125,10 +125,10 @@ class _Straight(Lines):
             return self._masks[k]
         if node[0] == "node":
             place = self.number(self.slot(int(node[1])), place_of(int(node[2]), self.width)[1])
-            name = self.spread(self.anew(f"load double, ptr {place}, align 8"))
+            name = self.spread(self.assign(f"load double, ptr {place}, align 8"))
         else:
             place = self.slot(int(node[1])) if node[0] == "input" else self._place(self._stacked[k])
-            name = self.anew(f"load {self.vector}, ptr {place}, align 8")
+            name = self.assign(f"load {self.vector}, ptr {place}, align 8")
         self._hold(k, name, wanted)
         return name
 

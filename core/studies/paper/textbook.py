@@ -36,8 +36,6 @@ from ...primitives import (
     Primitive,
     Row,
     Twist,
-    conventional,
-    paper,
 )
 
 
@@ -236,18 +234,17 @@ class Condition:
 
     def simplified(self, style: str) -> tuple[Primitive, ...]:
         """The condition as the row style "native" or "paper" has it."""
-        return (
-            (self.primitive,)
-            if style == "native"
-            else paper.TWINS[type(self.primitive)](self.primitive)
-        )
+        return (self.primitive,) if style == "native" else self.primitive.paper_form()
 
     def unsimplified(self, style: str) -> tuple[Primitive, ...]:
         """The scalar products as the row style "native", "paper" or "conventional" has them."""
         if style == "native":
             return self.dots
-        twins = paper.TWINS if style == "paper" else conventional.TWINS
-        return tuple(twin for dot in self.dots for twin in twins[type(dot)](dot))
+        return tuple(
+            form
+            for dot in self.dots
+            for form in (dot.paper_form() if style == "paper" else dot.conventional_form())
+        )
 
     def printed(self, *, formed: bool) -> tuple[PrintedDot10 | PrintedDot20, ...]:
         """The scalar products as printed; the poses they see hold positions, not displacements from

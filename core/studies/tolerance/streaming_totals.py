@@ -9,7 +9,7 @@ from functools import cache
 
 import numpy as np
 
-from ...kinematics.compiled.thread_cache import ThreadCache
+from ...caches import keep_last
 from ...program import Executor, NumpyExecutor, Plan, Tape, maximum, minimum, program, where_larger
 from ...program.llvm.compiler import available
 from ...program.llvm.executor import LlvmExecutor
@@ -65,7 +65,7 @@ class Totals:
 
     def __init__(self, quantities: int, n: int) -> None:
         # for this thread: its lanes hold totals while numbers are taken
-        self._executor = _bound(None, _executor)
+        self._executor = _executor()
         self.found = np.empty((quantities, len(BEGIN), n, self._executor.group))
         self.found[:] = np.array([*BEGIN.values()])[:, None, None]
         self.extremes = np.full((quantities, 2), -1, dtype=np.int64)
@@ -115,6 +115,7 @@ class Totals:
         return self.found[:, [*BEGIN].index(name)]
 
 
+@keep_last(1, per_thread=True)
 def _executor() -> Executor:
     return (
         LlvmExecutor(_code(), _code().width) if available() else NumpyExecutor(plan(), NUMPY_LANES)
@@ -124,6 +125,3 @@ def _executor() -> Executor:
 @cache
 def _code() -> LlvmCode:
     return LlvmCode(plan())
-
-
-_bound = ThreadCache()

@@ -1,0 +1,85 @@
+"""Caches of what repeated calls use again; `clear_caches` empties them.
+
+`keep_last` keeps the last results of a function, for the process or for each thread. `ThreadCache`
+keeps what one object needs in each thread, as lanes that a thread solves in place, and ends with
+the object. Both are bounded: a new result replaces the one that was used least recently.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from functools import lru_cache
+from threading import Lock, local
+from typing import Any, ParamSpec, TypeVar
+from weakref import WeakSet
+
+Arguments = ParamSpec("Arguments")
+Result = TypeVar("Result")
+
+# A sweep asks for less than ten keys; a batch of designs binds lanes by the number of its variants.
+KEYS = 16
+
+_results: WeakSet[Any] = WeakSet()
+_lock = Lock()
+
+
+def keep_last(
+    count: int, *, per_thread: bool = False
+) -> Callable[[Callable[Arguments, Result]], Callable[Arguments, Result]]:
+    """Return a decorator that keeps the last results of a function by its hashable arguments.
+
+    Threads that ask for a missing result at the same time may each compute it.
+
+    Args:
+        count: number of results.
+        per_thread: keep them for each thread, because a thread changes them in place.
+    """
+
+    def keep(function: Callable[Arguments, Result]) -> Any:
+        return _OfThread(count, function) if per_thread else _kept(count, function)
+
+    return keep
+
+
+def clear_caches() -> None:
+    """Drop the results that `keep_last` keeps, in all threads; the next calls compute them again.
+
+    Long-running processes free memory by this. Results in use stay valid.
+    """
+    with _lock:
+        every = list(_results)
+    for each in every:
+        each.cache_clear()
+
+
+def _kept(count: int, function: Callable[..., Any]) -> Any:
+    kept = lru_cache(maxsize=count)(function)
+    with _lock:
+        _results.add(kept)
+    return kept
+
+
+class _OfThread(local):
+    """A function with results of each thread, which end with the thread."""
+
+    def __init__(self, count: int, function: Callable[..., Any]) -> None:
+        self._call = _kept(count, function)
+
+    def __call__(self, *args: Hashable) -> Any:
+        return self._call(*args)
+
+
+class ThreadCache(local):
+    """Cache by key for each thread, which ends with the thread and with the cache."""
+
+    def __init__(self) -> None:
+        self._found: dict[Hashable, Any] = {}
+
+    def __call__(self, key: Hashable, make: Callable[[], Result]) -> Result:
+        """Return what this thread made under the key, or make it now."""
+        found = self._found
+        value = found.pop(key) if key in found else make()
+        found[key] = value  # # last in order: used most recently
+        if len(found) > KEYS:
+            del found[next(iter(found))]
+        return value
