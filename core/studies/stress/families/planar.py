@@ -58,12 +58,13 @@ class Plane:
         return np.concatenate([np.cos(angle / 2)[None], h[:, None] * np.sin(angle / 2)])
 
 
-def any_plane(rng: Rng) -> Plane:
-    """Anyhow in space, near the origin."""
+def any_plane(rng: Rng, origin: Array | None = None) -> Plane:
+    """Return a plane of any direction through a point, which is near the origin unless given."""
     e3, e1 = direction(rng), direction(rng)
     e1 = np.cross(e3, e1)
     e1 = e1 / np.linalg.norm(e1)
-    return Plane(rng.uniform(-1.0, 1.0, 3), e1, np.cross(e3, e1))
+    at = rng.uniform(-1.0, 1.0, 3) if origin is None else origin
+    return Plane(at, e1, np.cross(e3, e1))
 
 
 def flat_plane(rng: Rng, origin: Array) -> Plane:

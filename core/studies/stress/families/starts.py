@@ -11,9 +11,13 @@ from functools import partial
 import numpy as np
 
 from ....case.case import TIME
+from ....joints import RackPinion, Revolute, Translational
+from ....mechanism.drivers import PointCoordinate
+from ....mechanism.mechanism import GROUND, Body, Mechanism, Point
 from ....mechanism.motions import Absolute, Motion, Sine
-from .base import Family, Rng, Specimen, as_case
+from .base import Family, Rng, Specimen, as_case, triple
 from .loops import Builder
+from .planar import any_plane, flat_plane
 
 LARGEST, DRIVERS = 5, 3
 # The drivers stay within this part of the reach, so that most motions end before a fold.
@@ -43,36 +47,81 @@ class Starts(Family):
 
     name = "starts"
     about = (
-        f"random closed mechanisms of 1 to {LARGEST} bodies with 1 to {DRIVERS} absolute drivers on"
+        "hands whose tip goes round the base, a rack that counts the turns, and random closed"
+        f" mechanisms of 1 to {LARGEST} bodies, 1 to {DRIVERS} drivers; all absolute, on"
         " sines that pass the design values at time zero: exactly, up to rounding, or as typed with"
         " six digits; times around zero, after it or before it"
     )
     samples = 41
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
-        """Return a mechanism swept over time."""
-        while True:
-            count = int(rng.integers(1, LARGEST + 1))
-            found = Builder(rng, count, DRIVERS).built()
-            if found is not None:
-                break
-        mechanism, reach = found
-        mechanism = replace(
-            mechanism,
-            drivers=[replace(each, relative=False) for each in mechanism.drivers],
-        )
+        """Return a hand or a closed mechanism, swept over time."""
         digits = str(rng.choice(list(DIGITS)))
-        motions: dict[str, Motion] = {
-            driver.name: _sine(rng, mechanism.design_value(driver.name), EXCURSION * reach, digits)
-            for driver in mechanism.drivers
-        }
+        make = _hand if rng.random() < 0.5 else _closed
+        mechanism, motions = make(rng, digits)
         first, last = ((-1.0, 1.0), (0.2, 1.0), (-1.0, -0.2))[int(rng.integers(3))]
         times = np.linspace(first, last, samples)
         return Specimen(
-            f"{digits} start, {count} bodies, {len(mechanism.drivers)} drivers",
+            f"{digits} start, {mechanism.name}, {len(mechanism.drivers)} drivers",
             partial(as_case, mechanism, TIME, times, motions=motions),
-            facts=(("bodies", count),),
+            facts=(("bodies", len(mechanism.bodies)),),
         )
+
+
+def _closed(rng: Rng, digits: str) -> tuple[Mechanism, dict[str, Motion]]:
+    """Return a random closed mechanism whose drivers swing by a part of its reach."""
+    while True:
+        found = Builder(rng, int(rng.integers(1, LARGEST + 1)), DRIVERS).built()
+        if found is not None:
+            break
+    mechanism, reach = found
+    mechanism = replace(
+        mechanism, drivers=[replace(each, relative=False) for each in mechanism.drivers]
+    )
+    return mechanism, {
+        driver.name: _sine(rng, mechanism.design_value(driver.name), EXCURSION * reach, digits)
+        for driver in mechanism.drivers
+    }
+
+
+def _hand(rng: Rng, digits: str) -> tuple[Mechanism, dict[str, Motion]]:
+    """Return two links whose tip goes round the base once in a second.
+
+    A straight way of the drivers from the design to a later sample passes near the base: it ends in
+    the other assembly, in another turn, or nowhere.
+    """
+    origin, exact = np.zeros(3), digits == "exact"
+    plane = flat_plane(rng, origin) if exact else any_plane(rng, origin)
+    first, second = rng.uniform(0.3, 1.0, 2)
+    least, most = abs(first - second), first + second
+    radius = float(least + rng.uniform(0.2, 0.8) * (most - least))
+    angle = 0.0 if exact else float(rng.uniform(-np.pi, np.pi))
+    bend = np.arccos((first**2 + radius**2 - second**2) / (2.0 * first * radius))
+    elbow = angle + bend * float(rng.choice((-1.0, 1.0)))
+    at = plane.point((first * np.cos(elbow), first * np.sin(elbow)))
+    tip = plane.point((radius * np.cos(angle), radius * np.sin(angle)))
+    side = triple(plane.normal)
+    mechanism = Mechanism(
+        "hand",
+        [Body("upper"), Body("lower"), Body("rack")],
+        [
+            Revolute("base", GROUND, "upper", point=plane.point((0.0, 0.0)), axis=side),
+            Revolute("elbow", "upper", "lower", point=at, axis=side),
+            Translational("guide", GROUND, "rack", point=side, axis=plane.along((1.0, 0.0))),
+        ],
+        [Point("tip", "lower", tip), Point("on_rack", "rack", side)],
+        [
+            PointCoordinate("x", "tip", plane.along((1.0, 0.0)), relative=False),
+            PointCoordinate("y", "tip", plane.along((0.0, 1.0)), relative=False),
+        ],
+        [RackPinion("turns", ("base", "guide"), 0.1)],
+    )
+    keep = DIGITS[digits]
+    phases = {"x": angle + np.pi / 2.0, "y": angle}
+    return mechanism, {
+        name: Absolute(Sine(keep(radius), 1.0, keep(phase)), mechanism.design_value(name))
+        for name, phase in phases.items()
+    }
 
 
 def _sine(rng: Rng, design: float, excursion: float, digits: str) -> Motion:
