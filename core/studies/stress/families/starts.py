@@ -119,7 +119,7 @@ def _hand(rng: Rng, digits: str) -> tuple[Mechanism, dict[str, Motion]]:
     keep = DIGITS[digits]
     phases = {"x": angle + np.pi / 2.0, "y": angle}
     return mechanism, {
-        name: Absolute(Sine(keep(radius), 1.0, keep(phase)), mechanism.design_value(name))
+        name: _from(mechanism.design_value(name), Sine(keep(radius), 1.0, keep(phase)))
         for name, phase in phases.items()
     }
 
@@ -140,4 +140,9 @@ def _sine(rng: Rng, design: float, excursion: float, digits: str) -> Motion:
     turn = part / slope if slope > TURNING else np.sqrt(2.0 * part)
     frequency = min(float(turn), 1.0) * float(rng.uniform(0.3, 1.0)) / (2.0 * np.pi)
     keep = DIGITS[digits]
-    return Absolute(Sine(keep(float(amplitude)), keep(frequency), keep(phase)), design)
+    return _from(design, Sine(keep(float(amplitude)), keep(frequency), keep(phase)))
+
+
+def _from(design: float, motion: Motion) -> Motion:
+    """Return a motion of absolute values, as a case file reads it."""
+    return Absolute(motion, design) if design else motion
