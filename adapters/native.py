@@ -39,6 +39,7 @@ class Native:
     last_iteration: float = LAST_ITERATION
     name = "native"
     mode = "projection"
+    in_process = True
 
     @property
     def loop(self) -> str:

@@ -95,8 +95,8 @@ def unreachable(options: argparse.Namespace) -> list[str]:
 
 def solver(options: argparse.Namespace, engines: Sequence[Engine]) -> tuple[Solver, dict[str, Any]]:
     """Return the solver of the pairs, and its settings for the results."""
+    from ..harness.engine import may_run_here
     from ..harness.execution import here
-    from ..harness.run import NATIVE
     from ..harness.workers.distributed import on_cluster
     from ..harness.workers.pool import in_workers
 
@@ -106,9 +106,8 @@ def solver(options: argparse.Namespace, engines: Sequence[Engine]) -> tuple[Solv
         return on_cluster(options.scheduler, limits), {"scheduler": options.scheduler, **limited}
     jobs: int | None = options.jobs
     if jobs is None:
-        # A process would cost more time than most cases take natively, and the native engine runs
-        # no foreign code that needs isolation.
-        ours = all(engine.name == NATIVE for engine in engines) and not (
+        # A process would cost more time than most cases take natively.
+        ours = all(may_run_here(engine) for engine in engines) and not (
             options.timeout or options.memory
         )
         jobs = 0 if ours else default_jobs()

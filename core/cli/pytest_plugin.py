@@ -144,6 +144,7 @@ def _solved(case: Case, engine: Engine) -> Record:
     """Return the record of the pair. A simulator runs in its own process, because a crash would
     end the tests.
     """
+    from ..harness.engine import may_run_here
     from ..harness.execution import here
     from ..harness.resource_limits import Limits
     from ..harness.run import NATIVE, run
@@ -151,7 +152,7 @@ def _solved(case: Case, engine: Engine) -> Record:
     from .run_options import TOL
 
     native = engine.name == NATIVE
-    solver = here if native else in_workers(1, Limits())
+    solver = here if may_run_here(engine) else in_workers(1, Limits())
     (record,) = run(
         [case],
         [engine],

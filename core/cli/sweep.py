@@ -136,16 +136,19 @@ def _only(case: Case, names: list[str], problems: list[str]) -> Case:
 
 
 def _solver(options: argparse.Namespace, engine: Engine) -> Solver:
-    """Return the solver of checked variants: worker processes, except for the native engine."""
+    """Return the solver of checked variants: worker processes, except for an engine
+    that may run here."""
+    from ..harness.engine import may_run_here
     from ..harness.execution import here
     from ..harness.resource_limits import Limits, default_jobs
-    from ..harness.run import NATIVE
     from ..harness.workers.distributed import on_cluster
     from ..harness.workers.pool import in_workers
 
     if options.scheduler is not None:
         return on_cluster(options.scheduler, Limits())
-    return here if engine.name == NATIVE else in_workers(options.jobs or default_jobs(), Limits())
+    if may_run_here(engine):
+        return here
+    return in_workers(options.jobs or default_jobs(), Limits())
 
 
 def _part(options: argparse.Namespace) -> Part:

@@ -23,6 +23,9 @@ class Engine(Protocol):
             mode has the simulator's name, its variants have names of their own.
         loop: place of the loop over samples and iterations: "python", "simulator" or "compiled".
         settings: printed by the report, so that a reader can repeat the run.
+
+    An engine that loads no foreign code may say so by an attribute `in_process = True`
+    (`may_run_here`).
     """
 
     @property
@@ -60,6 +63,13 @@ class Engine(Protocol):
             numbers. Its iterations are Newton's; in simulate mode, time or load steps.
         """
         ...
+
+
+def may_run_here(engine: Engine) -> bool:
+    """Return whether an engine may run in this process; an engine that does not say so by its
+    attribute `in_process` is isolated in a process of its own.
+    """
+    return bool(getattr(engine, "in_process", False))
 
 
 @dataclass(frozen=True)

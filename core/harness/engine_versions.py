@@ -11,8 +11,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
-from .engine import Engine
-from .run import NATIVE
+from .engine import Engine, may_run_here
 
 # A library may also print, and end its process with status 0: this marker precedes the version.
 TOLD = "its version is "
@@ -39,7 +38,7 @@ def versions(engines: Sequence[Engine], patience: float = PATIENCE) -> list[str 
 
 
 def _version(engine: Engine, patience: float) -> str | None:
-    if engine.name == NATIVE:  # it loads no foreign code
+    if may_run_here(engine):
         return engine.version()
     ask = partial(
         subprocess.run, [sys.executable, "-P", "-c", COMMAND], capture_output=True, check=True

@@ -45,6 +45,27 @@ def test_versions_are_told_in_the_order_of_the_engines(monkeypatch):
     assert found == ["1.2", "3", *[None] * 6]
 
 
+@dataclass
+class Foreign:
+    """Tell by its version in which process it is asked."""
+
+    name: str
+
+    def version(self):
+        return str(os.getpid())
+
+
+class Ours(Foreign):
+    in_process = True
+
+
+def test_only_an_engine_that_says_so_is_asked_in_this_process(monkeypatch):
+    monkeypatch.syspath_prepend(str(Path(__file__).parents[2]))
+    ours, foreign = versions([Ours("any"), Foreign("native")])
+    assert ours == str(os.getpid())
+    assert foreign not in (ours, None)
+
+
 @pytest.mark.parametrize("deed", ["import sys; sys.exit(0)", "import os; os.abort()"])
 def test_a_run_with_a_history_outlives_a_simulator_that_cannot_be_loaded(deed, tmp_path):
     (tmp_path / "exudyn.py").write_text(deed)

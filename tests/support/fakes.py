@@ -75,6 +75,11 @@ class Fake:
     settings: dict = field(default_factory=dict)
     solves: int = 0
 
+    @property
+    def in_process(self):
+        """As the native engine, for which a fake of that name stands in."""
+        return self.name == "native"
+
     def version(self):
         return self.installed
 

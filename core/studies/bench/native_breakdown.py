@@ -41,6 +41,7 @@ class Level:
     compiled: bool = True
     name = "native"
     mode = "projection"
+    in_process = True
 
     @property
     def loop(self) -> str:

@@ -10,7 +10,7 @@ from typing import Any
 from ...case.case import Case
 from ...errors import KincheckError
 from ...harness.compare import output_series
-from ...harness.engine import Engine
+from ...harness.engine import Engine, may_run_here
 from ...harness.execution import Answer, Failure, Pair, bounded, check, said
 from ...harness.provenance import plain
 from ...harness.record import Outcome
@@ -40,6 +40,7 @@ class Interpreted:
     name = NATIVE
     mode = "projection"
     loop = "python"
+    in_process = True
     settings: Mapping[str, Any] = {"executor": "numpy, one call an operation over all lanes"}
 
     def __init__(self, native: Engine) -> None:
@@ -82,9 +83,9 @@ def suited(engine: Engine, case: Case, number: int) -> Engine:
 def solve_all(pairs: Sequence[Pair]) -> list[Answer | Failure]:
     """Return the answers in order; any error becomes a failure."""
     found: dict[int, Answer | Failure] = {}
-    away = [k for k, pair in enumerate(pairs) if pair.engine.name != NATIVE]
+    away = [k for k, pair in enumerate(pairs) if not may_run_here(pair.engine)]
     for k, pair in enumerate(pairs):
-        if pair.engine.name == NATIVE:
+        if may_run_here(pair.engine):
             found[k] = once(pair)
     if away:
         from ...harness.workers.pool import in_workers
