@@ -145,6 +145,7 @@ class ExudynModel:
         self.ground = rows.ground
         kinds = exu.OutputVariableType
         self.rotation = kinds.RotationMatrix
+        self.refusal: type[Exception] = exu.exudynCPP.InternalError
         self.output_types = kinds.Position, kinds.Velocity, kinds.Acceleration
         self.details = {"rows": len(self.target)}
         self.reset()
@@ -181,7 +182,12 @@ class ExudynModel:
             # quarter turn Newton would go to the other zero of the sine; a residual that is not
             # finite tells the walk to take a shorter step.
             values[row] = 0.0 if self._x_axis(first) @ self._x_axis(second) > 0.0 else np.nan
-        self.solver.ComputeAlgebraicEquations(self.mbs)
+        try:
+            self.solver.ComputeAlgebraicEquations(self.mbs)
+        except self.refusal:
+            # Exudyn stops at a pose that it cannot evaluate, such as a rod without length (a
+            # diverged iteration has one): no residual there either, and a shorter step.
+            return np.full(len(self.kept), np.nan)
         return self.solver.GetSystemResidual()[self.kept] - self.target - values
 
     def _x_axis(self, marker: int) -> Array:

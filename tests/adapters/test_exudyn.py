@@ -347,6 +347,22 @@ def test_rod_of_another_length_than_at_design():
     assert np.abs(np.linalg.norm(end - ROD[1], axis=1) - 0.31).max() <= 1e-14
 
 
+def test_a_pose_that_exudyn_refuses_is_no_crash():
+    """A diverged iteration gives a rod no length in Exudyn's arithmetic, which then raises."""
+    joints = [
+        Spherical("a", "ground", "first", (0.0, 0.0, 0.0)),
+        Spherical("b", "ground", "second", (1.0, 0.0, 0.0)),
+        Distance("rod", "first", "second", ((0.0, 0.5, 0.0), (1.0, 0.5, 0.0))),
+    ]
+    driver = PointCoordinate("x", "tip", (1.0, 0.0, 0.0))
+    case = case_of(["first", "second"], joints, {"tip": ("first", (0, 0.5, 0))}, [driver], [0.0])
+    model = Exudyn().build(case)
+    model.move(np.full(model.unknowns, 1e25))
+    assert np.isnan(model.residual(np.zeros(1))).all()
+    model.reset()
+    assert np.abs(model.residual(np.zeros(1))).max() < TOL
+
+
 def test_nothing_is_printed_and_no_file_is_written(capfd, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     # the failure that Exudyn is loudest about
