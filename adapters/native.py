@@ -40,6 +40,7 @@ class Native:
     name = "native"
     mode = "projection"
     in_process = True
+    bounds_error = True
 
     @property
     def loop(self) -> str:

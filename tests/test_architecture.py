@@ -409,6 +409,17 @@ def test_no_layer_is_too_large():
     assert {name: n / whole for name, n in sizes.items() if n > LARGEST_SHARE * whole} == {}
 
 
+def test_the_harness_names_the_standard_in_one_place():
+    """Engines tell by attributes what the harness must know; none is asked for by its name."""
+    named = [
+        str(path.relative_to(ROOT))
+        for path in sorted((ROOT / "core" / "harness").rglob("*.py"))
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Constant) and node.value == "native"
+    ]
+    assert named == ["core/harness/standard.py"]
+
+
 def test_nothing_is_called_utils():
     assert [path for path in SOURCES + TESTS if "util" in path.stem or "helper" in path.stem] == []
 

@@ -37,10 +37,11 @@ def _doctor(options: argparse.Namespace, house: House) -> int:
 
     Exit status: 0 the tool can do its work, 2 something essential is missing or broken.
     """
+    from ..harness.standard import STANDARD
     from ..report.terminal import write_json
     from .installation import examine
 
-    found = examine(house.case(SAMPLE), house.engine("native"), TOL, house.engines)
+    found = examine(house.case(SAMPLE), house.engine(STANDARD), TOL, house.engines)
     write_json(found, options.json)
     _print(found, options.json)
     return Status.WITHIN if found.able else Status.FAILED

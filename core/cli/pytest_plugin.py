@@ -147,17 +147,18 @@ def _solved(case: Case, engine: Engine) -> Record:
     from ..harness.engine import may_run_here
     from ..harness.execution import here
     from ..harness.resource_limits import Limits
-    from ..harness.run import NATIVE, run
+    from ..harness.run import run
+    from ..harness.standard import STANDARD
     from ..harness.workers.pool import in_workers
     from .run_options import TOL
 
-    native = engine.name == NATIVE
+    native = engine.name == STANDARD
     solver = here if may_run_here(engine) else in_workers(1, Limits())
     (record,) = run(
         [case],
         [engine],
         tol=TOL,
-        baseline=None if native else _house().engine(NATIVE),
+        baseline=None if native else _house().engine(STANDARD),
         solver=solver,
     ).records
     return record

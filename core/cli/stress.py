@@ -93,6 +93,7 @@ def _stress(options: argparse.Namespace, house: House) -> int:
     could not do its work, or an engine supports none of the samples.
     """
     from ..case.io.atomic_files import write
+    from ..harness.standard import STANDARD
     from ..report.sections import deliver
     from ..studies.stress.families import Family
     from ..studies.stress.report import idle, markdown, report
@@ -109,7 +110,7 @@ def _stress(options: argparse.Namespace, house: House) -> int:
             print(f"{name:{width}}  {family.about}")
         return Status.WITHIN
     problems: list[str] = []
-    engines = house.find_engines(options.engine or ["native"], problems, options.mode)
+    engines = house.find_engines(options.engine or [STANDARD], problems, options.mode)
     if options.replay:
         if options.out or options.json:
             problems.append("--replay prints what it finds; leave out --out and --json")

@@ -218,6 +218,7 @@ def _solve(
 def _replay(options: argparse.Namespace, house: House, study: Study, engine: Engine | None) -> int:
     """Solve single variants as a run does: its table, its report, its status."""
     from ..harness import run as running
+    from ..harness.standard import STANDARD
     from . import destinations as delivery
 
     for index in options.replay:
@@ -226,8 +227,8 @@ def _replay(options: argparse.Namespace, house: House, study: Study, engine: Eng
                 f"--replay {index}: there are {study.samples} variants, 0 to {study.samples - 1};"
                 " give one of them"
             )
-    native = house.engine(running.NATIVE)
-    engines = [native] if engine is None or engine.name == running.NATIVE else [native, engine]
+    native = house.engine(STANDARD)
+    engines = [native] if engine is None or engine.name == STANDARD else [native, engine]
     cases = [study.of_variant(index) for index in dict.fromkeys(options.replay)]
     results = running.run(
         cases,

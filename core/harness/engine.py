@@ -24,8 +24,9 @@ class Engine(Protocol):
         loop: place of the loop over samples and iterations: "python", "simulator" or "compiled".
         settings: printed by the report, so that a reader can repeat the run.
 
-    An engine that loads no foreign code may say so by an attribute `in_process = True`
-    (`may_run_here`).
+    Two attributes are optional, False unless given. `in_process`: the engine loads no foreign code
+    (`may_run_here`). `bounds_error`: it bounds the effect of a residual on a pose by itself
+    (`bounds_error`).
     """
 
     @property
@@ -70,6 +71,13 @@ def may_run_here(engine: Engine) -> bool:
     attribute `in_process` is isolated in a process of its own.
     """
     return bool(getattr(engine, "in_process", False))
+
+
+def bounds_error(engine: Engine) -> bool:
+    """Return whether an engine itself bounds the effect of a residual on a pose; the residuals of
+    all others are held against the tolerance.
+    """
+    return bool(getattr(engine, "bounds_error", False))
 
 
 @dataclass(frozen=True)

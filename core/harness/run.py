@@ -19,7 +19,7 @@ from .evidence import Evidence, evidence
 from .execution import Answer, Attempt, Facts, Failure, Pair, Solver, here, said
 from .provenance import results, truth_of
 from .record import Deviations, Outcome, Record, Results, Seconds
-from .standard import NATIVE, Standard, has_everything, standard_of
+from .standard import STANDARD, Standard, has_everything, standard_of
 from .verdict import Verdict, judged, promised
 
 UNTOLD = {
@@ -93,7 +93,7 @@ def run(
     _distinct("cases", [case.name for case in cases])
     _distinct("engines", [f"{engine.name} ({engine.mode})" for engine in engines])
     records = {_key(record): record for record in made}
-    ordered = sorted(engines, key=_native_first)
+    ordered = sorted(engines, key=_standard_first)
     wanted = planned(cases, engines)
     judging = {
         case.name: _Judging(_standard_known(case, ordered, baseline, records)) for case in cases
@@ -114,7 +114,7 @@ def run(
     with closing(solver(pairs)) as attempts:
         for index, attempt in attempts:
             pair, case = pairs[index], judging[pairs[index].case.name]
-            if pair.engine.name == NATIVE:
+            if pair.engine.name == STANDARD:
                 case.standard = standard_of(judge(pair, attempt, Standard({})))
                 for each in case.waiting:
                     judge(*each, case.standard)
@@ -143,12 +143,12 @@ def planned(
     return [
         (name, engine.name, engine.mode)
         for name in names
-        for engine in sorted(engines, key=_native_first)
+        for engine in sorted(engines, key=_standard_first)
     ]
 
 
-def _native_first(engine: Engine) -> bool:
-    return engine.name != NATIVE
+def _standard_first(engine: Engine) -> bool:
+    return engine.name != STANDARD
 
 
 def _key(record: Record) -> tuple[str, str, str]:
@@ -182,7 +182,7 @@ def _standard_known(
     # third-party data must first be checked for equality with native's result
     if has_everything(case) and case.truth is not Truth.THIRD_PARTY_DATA:
         return Standard({})
-    native = next((engine for engine in engines if engine.name == NATIVE), None)
+    native = next((engine for engine in engines if engine.name == STANDARD), None)
     if native is not None:
         record = made.get((case.name, native.name, native.mode))
         return None if record is None else standard_of(record)
@@ -200,7 +200,7 @@ def _record(pair: Pair, attempt: Attempt, native: Standard, *, residuals: bool) 
         tol = promised(engine, pair.tol) if residuals else math.inf
         try:
             verdict = judged(case, result, native, tol)
-            found = result.outputs if engine.name == NATIVE else native.outputs
+            found = result.outputs if engine.name == STANDARD else native.outputs
             own = evidence(case, found)
             return _answered(
                 case, engine, facts, result, attempt.seconds or Seconds(), verdict, own

@@ -17,8 +17,8 @@ from ..kinematics.solver_selection import prepare
 from ..mechanism.mechanism import Vector
 from ..trajectory import Array, BodyMotion
 from .record import Record, Results
-from .run import NATIVE
 from .scene_record import Scene, SceneBody, SceneJoint, ScenePoint
+from .standard import STANDARD
 
 FRAMES = 61  # a few seconds of animation, and a few kilobytes a body
 POSES = 3000  # frames times bodies, at most: a quarter of a megabyte of results
@@ -37,7 +37,7 @@ def with_scenes(results: Results, cases: Sequence[Case]) -> Results:
     neither hang nor end this process.
     """
     answered = {record.case for record in results.records if _answers(record)}
-    asked = any(record.engine == NATIVE for record in results.records)
+    asked = any(record.engine == STANDARD for record in results.records)
     shown = [case for case in cases if len(case.mechanism.moving) <= LARGEST]
     return msgspec.structs.replace(
         results,
@@ -46,7 +46,7 @@ def with_scenes(results: Results, cases: Sequence[Case]) -> Results:
 
 
 def _answers(record: Record) -> bool:
-    return record.engine == NATIVE and bool(record.solved)
+    return record.engine == STANDARD and bool(record.solved)
 
 
 def scene(case: Case, *, poses: bool = True, asked: bool = True) -> Scene:

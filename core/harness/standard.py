@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from ..case.case import Case, Series
 from .record import OutputSeries, Record
 
-NATIVE = "native"
-"""Name of the engine used as standard without a reference."""
+STANDARD = "native"
+"""Name of the engine that is the standard without a reference: the one place that names it."""
 
 
 UNCERTAIN = "uncertain_samples"

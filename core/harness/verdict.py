@@ -13,10 +13,10 @@ import numpy as np
 from ..case.case import Case, Quantity
 from ..errors import shortened
 from .compare import NO_VALUE, describe, deviations, size
-from .engine import Engine
+from .engine import Engine, bounds_error
 from .execution import Answer
 from .record import Deviation, Deviations, Outcome
-from .standard import NATIVE, Standard, known
+from .standard import STANDARD, Standard, known
 
 ROUNDED = 2.0
 """Factor on the residual tolerance: engines measure in a unit near the mechanism's size, a power of
@@ -79,7 +79,7 @@ def judged(case: Case, answer: Answer, native: Standard, tol: float) -> Verdict:
     if outcome is Outcome.PASS and messages:
         messages[0] = f"{Outcome.UNJUDGED.shown}: {messages[0]}"
     if native.why and any(NO_VALUE in message for message in messages):
-        messages.append(f"{NATIVE}: {native.why}")
+        messages.append(f"{STANDARD}: {native.why}")
     return Verdict(outcome, messages, errors, perf_counter() - begin)
 
 
@@ -88,7 +88,7 @@ def _deviations(
 ) -> Deviations:
     name, found = output.name, answer.outputs[output.name]
     standards = [(str(case.truth), case.reference[name])] if name in case.reference else []
-    standards += [(NATIVE, native.outputs[name])] if name in native.outputs else []
+    standards += [(STANDARD, native.outputs[name])] if name in native.outputs else []
     refused = native.refuses(case)
     result = deviations(case, output, found, standards, complete=complete, refused=refused)
     if standards:
@@ -132,8 +132,8 @@ def _contradiction(case: Case, answer: Answer, native: Standard) -> str:
     ]
     where = f"sample {first} ({case.sweep.driver} = {case.sweep.values[first]:.9g})"
     return (
-        f"values at {at.sum()} of {samples} samples that {NATIVE} cannot reach, first at {where}:"
-        f" {shortened(values, NAMED)}; {NATIVE}: {native.why or 'gives no reason'}"
+        f"values at {at.sum()} of {samples} samples that {STANDARD} cannot reach, first at {where}:"
+        f" {shortened(values, NAMED)}; {STANDARD}: {native.why or 'gives no reason'}"
     )
 
 
@@ -143,7 +143,7 @@ def _reached_elsewhere(case: Case, answer: Answer, native: Standard) -> str:
     unsolved = ~known(answer.outputs.values(), samples)
     for name, series in (
         (str(case.truth), case.reference.values()),
-        (NATIVE, native.outputs.values()),
+        (STANDARD, native.outputs.values()),
     ):
         if count := int((unsolved & known(series, samples)).sum()):
             return f"; {name} has values at {count} of the others"
@@ -153,10 +153,9 @@ def _reached_elsewhere(case: Case, answer: Answer, native: Standard) -> str:
 def promised(engine: Engine, tol: float) -> float:
     """Return the largest residual promised for solved samples, relative to the size.
 
-    A simulation accepts according to its own settings, and only its outputs are judged. The native
-    engine itself bounds the effect of a residual on a pose.
+    A simulation accepts according to its own settings, and only its outputs are judged.
     """
-    return tol if engine.mode == "projection" and engine.name != NATIVE else math.inf
+    return tol if engine.mode == "projection" and not bounds_error(engine) else math.inf
 
 
 def excess(case: Case, residual: float, tol: float) -> str:

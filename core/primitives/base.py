@@ -36,6 +36,10 @@ from ..algebra import IDENTITY, UNIT, ZERO, Mat3, Quat, Scalar, Vec3, cross, rot
 from ..errors import SolveError
 
 
+class NoFormError(SolveError):
+    """A primitive has no rows in a row style."""
+
+
 @dataclass(frozen=True, slots=True)
 class Pose:
     """Pose of a body: displacement u of its origin, rotation q since design, D = A(q) - I."""
@@ -172,9 +176,9 @@ class Primitive(ABC):
         """Return the primitives that replace this one in the paper's row style.
 
         Raises:
-            SolveError: the primitive has none.
+            NoFormError: the primitive has none.
         """
-        raise SolveError(
+        raise NoFormError(
             f"{type(self).__name__} has no rows in the styles paper and conventional; use the style"
             " native, or write its paper_form"
         )
@@ -183,6 +187,6 @@ class Primitive(ABC):
         """Return the primitives that replace this one in the conventional row style.
 
         Raises:
-            SolveError: the primitive has none.
+            NoFormError: the primitive has none.
         """
         return self.paper_form()

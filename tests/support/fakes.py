@@ -80,6 +80,8 @@ class Fake:
         """As the native engine, for which a fake of that name stands in."""
         return self.name == "native"
 
+    bounds_error = in_process
+
     def version(self):
         return self.installed
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
+from ...harness.standard import STANDARD
 from ...report.figure_data import precision_figure, ticked_axis
 from ...report.figures import Figure, Style, plain
 from ...report.page_model import Plot
@@ -61,7 +62,7 @@ def size_diagram(family: str, sizes: Sequence[Size]) -> Diagram:
 
 def batch_diagram(found: Bench) -> Diagram:
     """Time against the size of the batch."""
-    timed = [("native", each.variants, each.us_per_sample.median) for each in found.batches]
+    timed = [(STANDARD, each.variants, each.us_per_sample.median) for each in found.batches]
     caption = "Variants of all hardpoints, solved together on one core; time by sample and variant."
     plot = Plot("batch", "time per sample against variants in a batch, both log axes", caption)
     return _against(plot, "variants in a batch", "time per sample and variant [µs]", timed)

@@ -14,7 +14,7 @@ from ...case.case import Case
 from ...errors import KincheckError
 from ...harness.engine import Engine
 from ...harness.provenance import THREADS, circumstances
-from ...harness.run import NATIVE
+from ...harness.standard import STANDARD
 from ...program.llvm import compiler
 from ...program.llvm.jit import compiled_at_once
 from ...report.figure_data import Effort
@@ -138,7 +138,7 @@ def measure(
     if "size" in parts:
         tell("chains and rings of loops")
         add("sizes", measure_sizes(projections, tol, rounds))
-        if any(engine.name == NATIVE for engine in engines):
+        if any(engine.name == STANDARD for engine in engines):
             tell("large mechanisms")
             add("scalings", scaling.measure(LARGE, LARGE, min(rounds, LARGE_ROUNDS)))
     if "processes" in parts:
@@ -183,7 +183,7 @@ def _measure_work(
     for engine in engines:
         for each in contestants(case, efforts_of(engine), tol):
             entering[f"{engine.name} {engine.mode}", each.entry.setting] = each
-    detailed = any(engine.name == NATIVE for engine in engines)
+    detailed = any(engine.name == STANDARD for engine in engines)
     if detailed:
         for each in contestants(case, native_breakdown.LEVELS, tol):
             entering["levels", each.entry.setting] = each

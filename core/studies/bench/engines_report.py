@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ...harness.labels import against, motion_unit, number
-from ...harness.run import NATIVE
+from ...harness.standard import STANDARD
 from ...report.sections import Report, Section
 from ...trajectory import QUANTITIES
 from ..paper.formulation import report as formulation_report
@@ -152,7 +152,7 @@ def _faster(mine: Sequence[Needed]) -> list[str]:
             for each in mine
             if each.required == required and each.us_per_sample is not None
         }
-        ours = times.pop(NATIVE, None)
+        ours = times.pop(STANDARD, None)
         if ours is None or not times:
             continue
         best = min(times, key=lambda name: times[name])
@@ -234,7 +234,7 @@ def _levels(found: Bench, case: str) -> Section:
         (e.us_per_sample, e)
         for e in found.needed
         if (e.case, e.mode, e.required) == (case, "projection", REQUIRED[-1])
-        and e.engine != NATIVE
+        and e.engine != STANDARD
         and e.us_per_sample is not None
     ]
     said: list[str] = []

@@ -42,6 +42,7 @@ class Level:
     name = "native"
     mode = "projection"
     in_process = True
+    bounds_error = True
 
     @property
     def loop(self) -> str:

@@ -18,7 +18,7 @@ from time import perf_counter
 import msgspec
 
 from ...case.case import Case
-from ...harness.engine import Engine
+from ...harness.engine import Engine, may_run_here
 from .cold_start import FIRST, STAGES
 from .rounds import Spread, spread
 
@@ -117,7 +117,7 @@ def measure_processes(
                     f"kincheck run {asked}",
                     _RUN,
                     arguments,
-                    rounds=rounds if engine.name == "native" else 1,
+                    rounds=rounds if may_run_here(engine) else 1,
                 )
             )
         # fills the cache, and the system's of files

@@ -21,7 +21,7 @@ import numpy as np
 from ...case.case import Case, Output, Series, Sweep, Truth
 from ...harness.engine import Engine
 from ...harness.record import Outcome
-from ...harness.run import NATIVE
+from ...harness.standard import STANDARD
 from ...joints import Revolute, Spherical, Universal
 from ...kinematics.by_components.block_solver import Cascade
 from ...kinematics.by_components.sweep import CascadeSweep
@@ -173,7 +173,7 @@ def measure_sizes(engines: Sequence[Engine], tol: float, rounds: int) -> list[Si
     chains, too, by components.
     """
     asked: list[tuple[str, Engine, Sequence[int]]] = [(CHAIN, engine, LOOPS) for engine in engines]
-    if any(engine.name == NATIVE for engine in engines):
+    if any(engine.name == STANDARD for engine in engines):
         asked.insert(1, (CHAIN, ByComponents(), MANY))
     asked += [(RING, engine, CRANKS) for engine in engines]
     found = [

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...kinematics.formulation.constraints import Style
+from ...primitives.base import NoFormError
 from ...trajectory import Array
 from .checks import ROUND_OFF, ROUND_OFF_WHY, Specimen
 from .findings import Finding, Verdict, judged
@@ -35,7 +36,7 @@ def cost(s: Specimen) -> Iterator[Finding]:
 def _conventional(s: Specimen) -> TracedJoint | None:
     try:
         return TracedJoint(s.joint, s.place, Style.CONVENTIONAL)
-    except KeyError:  # a user's primitive has no conventional form
+    except NoFormError:  # a user's primitive has no conventional form
         return None
 
 

@@ -15,7 +15,7 @@ from ...harness.compare import describe, deviations, output_series
 from ...harness.engine import Engine
 from ...harness.execution import check
 from ...harness.record import Deviation
-from ...harness.run import NATIVE
+from ...harness.standard import STANDARD
 from ...harness.verdict import excess
 from ...joints import Joint
 from ...kinematics.solve import solve
@@ -77,7 +77,7 @@ def loops(tested: Joint | type[Joint], engines: Sequence[Engine]) -> Iterator[Fi
     if not engines:
         yield Finding("loop: simulators", Verdict.SKIP, message="no engines were given")
     for engine in engines:
-        if engine.name != NATIVE:
+        if engine.name != STANDARD:
             yield _simulated(engine, case, other or without, reference)
 
 
@@ -189,7 +189,7 @@ def _compared(name: str, case: Case, found: Trajectory, reference: dict[str, Ser
         )
     worst: tuple[float, str, str, Deviation] | None = None
     for output in case.outputs:
-        standards = [(NATIVE, reference[output.name])]
+        standards = [(STANDARD, reference[output.name])]
         for quantity, deviation in deviations(
             case, output, output_series(case, output, found), standards
         ).items():

@@ -15,7 +15,7 @@ from ...harness.execution import Answer, Failure, Pair, bounded, check, said
 from ...harness.provenance import plain
 from ...harness.record import Outcome
 from ...harness.resource_limits import Limits
-from ...harness.run import NATIVE
+from ...harness.standard import STANDARD
 from ...kinematics.compiled.compiled_model import compile_model
 from ...kinematics.compiled.request import Request
 from ...kinematics.compiled.samples import Route
@@ -37,10 +37,11 @@ class Interpreted:
     is not compiled.
     """
 
-    name = NATIVE
+    name = STANDARD
     mode = "projection"
     loop = "python"
     in_process = True
+    bounds_error = True
     settings: Mapping[str, Any] = {"executor": "numpy, one call an operation over all lanes"}
 
     def __init__(self, native: Engine) -> None:
@@ -77,7 +78,7 @@ def suited(engine: Engine, case: Case, number: int) -> Engine:
         len(case.mechanism.moving) <= LARGEST_INTERPRETED
         and len(case.sweep.values) <= MOST_INTERPRETED
     )
-    return Interpreted(engine) if engine.name == NATIVE and number % 2 and small else engine
+    return Interpreted(engine) if engine.name == STANDARD and number % 2 and small else engine
 
 
 def solve_all(pairs: Sequence[Pair]) -> list[Answer | Failure]:

@@ -19,7 +19,7 @@ from ...harness.compare import describe, deviation, pace
 from ...harness.engine import Engine
 from ...harness.execution import Answer, Attempt, Pair, Solver
 from ...harness.record import Outcome
-from ...harness.standard import NATIVE, UNCERTAIN
+from ...harness.standard import STANDARD, UNCERTAIN
 from ...harness.verdict import excess, promised
 from ...kinematics.compiled.request import Request
 from ...kinematics.solver_selection import prepare
@@ -150,7 +150,7 @@ def judged(
                 f" {result.message or 'no reason given'}"
             )
         off = deviation(
-            theirs, values, row.output.atol * beat**row.derivative, row.output.rtol, "native"
+            theirs, values, row.output.atol * beat**row.derivative, row.output.rtol, STANDARD
         )
         if off is None:
             continue
@@ -202,6 +202,6 @@ def _contradicted(study: Study, case: Case, answer: Answer, ours: Array) -> str:
     if not refused.any():
         return ""
     return (
-        f"values at {refused.sum()} of {len(refused)} samples that {NATIVE} cannot reach; {NATIVE}:"
-        f" {alone.message}"
+        f"values at {refused.sum()} of {len(refused)} samples that {STANDARD} cannot reach;"
+        f" {STANDARD}: {alone.message}"
     )
