@@ -98,7 +98,8 @@ IMPORTS = {
     "studies/stress/families": ". joints mechanism case case/io studies/stress/truth",
     "studies": (". program joints kinematics/assembly kinematics/verified case case/io harness"),
     "studies/joint_check": (
-        ". program joints mechanism kinematics/formulation kinematics case harness report"
+        ". primitives program joints mechanism kinematics/formulation kinematics case harness "
+        "report"
     ),
     "studies/tolerance": (
         ". program program/llvm mechanism kinematics/formulation "
@@ -122,7 +123,7 @@ IMPORTS = {
         "studies studies/tolerance studies/paper"
     ),
     "cli": (
-        ". program program/llvm kinematics/structure kinematics/continuation case "
+        ". program program/llvm joints kinematics/structure kinematics/continuation case "
         "case/io case/variation case/models harness harness/workers history "
         "history/regression report studies/stress/families studies "
         "studies/joint_check studies/tolerance studies/stress studies/paper "

@@ -35,7 +35,7 @@ def _check_joint(options: argparse.Namespace, house: House) -> int:
     in every engine.
     """
     from ..studies.joint_check.check_joint import check_joint
-    from ..studies.joint_check.loading import load_joint
+    from .joint_loading import load_joint
 
     report = check_joint(
         load_joint(options.joint), seed=options.seed, engines=[*map(house.engine, house.engines)]

@@ -29,7 +29,7 @@ def keeping(
         return None, []
     from ..history.run_recorder import keep
     from ..history.store import HistoryError
-    from ..studies.joint_check.loading import sources
+    from .joint_loading import sources
 
     about: dict[str, Any] = {"tol": options.tol, "command": options.command, "settings": settings}
     about |= {"unread": unread, "resume": options.resume, "joints": sources(options.joint_type)}

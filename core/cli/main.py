@@ -58,7 +58,7 @@ def _done(argv: list[str]) -> int:
         return int(end.code or 0)
     try:
         if getattr(options, "joint_type", ()):
-            from ..studies.joint_check.loading import load_joint
+            from .joint_loading import load_joint
 
             for where in options.joint_type:
                 load_joint(where)

@@ -159,8 +159,8 @@ def _part(options: argparse.Namespace) -> Part:
 
     from ..harness.provenance import processor
     from ..program.llvm.compiler import available
-    from ..studies.joint_check.loading import sources
     from ..studies.tolerance.part_file import Part
+    from .joint_loading import sources
 
     facts = {
         "kincheck": VERSION,

@@ -16,12 +16,12 @@ import pytest
 from kincheck import adapters
 from kincheck.core import Body, Gear, InPlane, Joint, Revolute, Universal, check_joint
 from kincheck.core import primitives as p
+from kincheck.core.cli.joint_loading import load_joint
 from kincheck.core.cli.main import main
 from kincheck.core.errors import KincheckError, MechanismError
 from kincheck.core.harness.results_file import read_results
 from kincheck.core.joints import AxialJoint
 from kincheck.core.studies.joint_check.findings import Verdict
-from kincheck.core.studies.joint_check.loading import load_joint
 
 from ..support.fakes import Fake
 from .test_check_joint_mistakes import mistaken

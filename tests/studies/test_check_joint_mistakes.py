@@ -16,9 +16,9 @@ from kincheck.core import (
 )
 from kincheck.core import primitives as p
 from kincheck.core.algebra import ZERO, vec
+from kincheck.core.cli.joint_loading import load_joint
 from kincheck.core.joints.base import triad, unit
 from kincheck.core.primitives import Row
-from kincheck.core.studies.joint_check.loading import load_joint
 
 pytestmark = pytest.mark.usefixtures("own_joint_types")
 

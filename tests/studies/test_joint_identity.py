@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from kincheck.core.studies.joint_check.loading import sources
+from kincheck.core.cli.joint_loading import sources
 
 from .test_check_joint import SLOT
 

@@ -12,13 +12,13 @@ from collections.abc import Iterable
 from pathlib import Path
 from types import ModuleType
 
-from ...errors import KincheckError, similar
-from ...harness.execution import said
-from ...joints import Coupler, Joint
+from ..errors import KincheckError, similar
+from ..harness.execution import said
+from ..joints import Coupler, Joint
 
 # Files, also pseudo-files, whose lines do not explain a failed import; and the number of lines
 # shown of other files.
-_NOT_THEIRS, MOST_PLACES = (str(Path(__file__).parents[2]), importlib.__file__, "<"), 3
+_NOT_THEIRS, MOST_PLACES = (str(Path(__file__).parents[1]), importlib.__file__, "<"), 3
 
 INSTALLED = "site-packages"
 """Folder of installed modules: a module in it below the user's folder does not
