@@ -70,7 +70,7 @@ def readable_connection(path: Path) -> sqlite3.Connection:
 def _require_whole(path: Path) -> None:
     """Raise HistoryError if the latest records are only in the journal beside the file.
 
-    Reading them takes a folder that can be written.
+    Reading them takes a writable folder.
     """
     beside = path.with_name(f"{path.name}-wal")
     if beside.is_file() and beside.stat().st_size:

@@ -80,7 +80,7 @@ def _rows(
 
 
 def _leave_out(store: Store) -> None:
-    """Have the view without the runs that cannot be read: their texts would end the query."""
+    """Leave unreadable runs out of the view: their texts would end the query."""
     if store.passed_over:
         (view,) = store.connection.execute(
             "SELECT sql FROM sqlite_master WHERE name = 'measured'"

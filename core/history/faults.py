@@ -1,4 +1,4 @@
-"""What goes wrong with a history file, in words: what, where, and what to do."""
+"""Faults of history files in words: the fault, the file and the remedy."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ MOST_TOLD = 5
 
 
 class HistoryError(KincheckError):
-    """A history file cannot be read or written; the message names it and says what to do."""
+    """A history file cannot be read or written; the message names the file and the remedy."""
 
 
 class DamagedRunError(HistoryError):
@@ -36,12 +36,12 @@ class DamagedRunError(HistoryError):
 
 @contextmanager
 def explained(path: Path, what: str, run: int | None = None) -> Generator[None]:
-    """What goes wrong meanwhile is a HistoryError that names the file, and the run if it is one run
-    that is damaged.
+    """Turn faults of the database into a HistoryError with the file, and with the run if one run is
+    damaged.
 
     Args:
-        what: was to be done with the file, a participle.
-        run: what is read belongs to it alone.
+        what: the action on the file, as a participle.
+        run: the only run concerned.
     """
     try:
         yield
@@ -69,7 +69,7 @@ def explained(path: Path, what: str, run: int | None = None) -> Generator[None]:
 
 
 def told(path: Path, passed_over: Mapping[int, str]) -> list[str]:
-    """Return what is said of runs that cannot be read: a line for each, up to MOST_TOLD of them."""
+    """Return a line for each unreadable run, up to MOST_TOLD of them."""
     runs = sorted(passed_over, reverse=True)
     lines = [f"{passed_over[run]}; the other runs are used" for run in runs[:MOST_TOLD]]
     if left := runs[MOST_TOLD:]:
@@ -81,7 +81,7 @@ def told(path: Path, passed_over: Mapping[int, str]) -> list[str]:
 
 
 def _damaged(error: Exception) -> bool:
-    """Whether what is stored is at fault, and not the way to it."""
+    """Return whether the stored data are at fault, and not the access to them."""
     return (
         not isinstance(error, OSError | sqlite3.OperationalError)
         or "decode" in str(error)

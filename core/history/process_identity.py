@@ -15,8 +15,8 @@ def owner() -> str:
 
 
 def alive(owner: str) -> bool:
-    """Whether that process is still there. One of another host counts as gone: it cannot be seen
-    from here.
+    """Return whether a process still runs. A process of another host is invisible here and counts
+    as ended.
     """
     host, number, begun = owner.rsplit("|", 2)
     if host != readable(platform.node()):
@@ -31,8 +31,10 @@ def alive(owner: str) -> bool:
 
 
 def _begun(number: int) -> str:
-    """Clock ticks from the start of the system to that of the process; empty where there is no
-    /proc, or it has ended and nobody has asked how (in containers nobody may)."""
+    """Return the clock ticks from the start of the system to the start of the process.
+
+    Empty without /proc, and for an ended process whose exit status nobody has read.
+    """
     try:
         # the second field is the program's name in brackets, and may hold anything
         state, *fields = (

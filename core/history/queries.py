@@ -1,5 +1,5 @@
-"""What a history has of each pair of case and engine over its runs: what trends, thresholds and
-steps are made from.
+"""Series of each pair of case and engine over the runs of a history, for trends, thresholds and
+steps.
 """
 
 from __future__ import annotations
@@ -32,8 +32,7 @@ class Entry:
 
     Attributes:
         errors: by output.
-        seconds: of a warm solve, without those in which others had the processor; None where it was
-            not reached.
+        seconds: of a warm solve, without the time of other processes; None if it was not reached.
         us_per_step: as the record has it.
     """
 
@@ -47,9 +46,7 @@ class Entry:
 
 @dataclass(frozen=True)
 class History:
-    """Runs of a history that nobody is writing, oldest first, and the entries of their pairs,
-    likewise.
-    """
+    """Finished runs of a history and the entries of their pairs, the oldest first."""
 
     runs: Mapping[int, RunRow]
     pairs: Mapping[Pair, Sequence[Entry]]
@@ -67,11 +64,11 @@ def read(
     cases: Sequence[str] = (),
     engines: Sequence[str] = (),
 ) -> History:
-    """What a history has.
+    """Return the runs and entries of a history.
 
     Args:
         before: only runs with smaller numbers.
-        last: so many runs at most, the latest.
+        last: the largest number of runs; the latest are taken.
         cases, engines: only these; empty: all.
 
     Raises:
@@ -137,8 +134,8 @@ def _entries(store: Store, run: int) -> list[tuple[Pair, Entry]]:
 
 
 def own_seconds(warm: float | None, waited: float | None) -> float | None:
-    """Return the seconds of a warm solve in which it was not kept waiting by others; None where
-    there are none.
+    """Return the seconds of a warm solve without waiting for other processes; None if there are
+    none.
 
     Measured by 25 equal runs on two processors with five processes: the ratio of two runs reaches
     4.1 by the clock, and 1.9 so.
@@ -147,8 +144,7 @@ def own_seconds(warm: float | None, waited: float | None) -> float | None:
 
 
 def green(store: Store, *, before: int | None = None) -> list[RunRow]:
-    """The runs that have all the pairs they were to make, in which something passed and nothing
-    went wrong, the latest first.
+    """Return the complete runs with at least one pass and no fault, the latest first.
 
     Raises:
         HistoryError: the file cannot be read.
@@ -170,8 +166,7 @@ def green(store: Store, *, before: int | None = None) -> list[RunRow]:
 
 
 def compared(store: Store, run: int) -> dict[Pair, set[tuple[str, str]]]:
-    """Of the pairs of a run whose engine was there and able, the outputs and motions that were
-    compared.
+    """Return the compared outputs and motions of a run's pairs whose engine was installed and able.
 
     Raises:
         HistoryError: the file cannot be read.
@@ -186,14 +181,14 @@ def compared(store: Store, run: int) -> dict[Pair, set[tuple[str, str]]]:
 
 
 def calibration(run: RunRow | Mapping[str, Any]) -> float | None:
-    """Seconds of the fixed piece of work in that run; None where it was not measured."""
+    """Return the seconds of the calibration loop in a run; None if it was not measured."""
     facts = run.circumstances if isinstance(run, RunRow) else run
     seconds = facts.get("calibration_seconds")
     return seconds if isinstance(seconds, float) and seconds > 0 else None
 
 
 def unit_of(row: RunRow, case: str, output: str) -> str:
-    """Return the unit of an output in that run; metres where the run does not say."""
+    """Return the unit of an output in a run; metres if the run names none."""
     outputs: Mapping[str, Mapping[str, Any]] = (
         row.circumstances.get("cases", {}).get(case, {}).get("outputs", {})
     )

@@ -1,5 +1,5 @@
-"""The axis of what is swept: a driver or time, its values at the samples, and which way it is
-drawn.
+"""The axis of the sweep: a driver or time, its values at the samples, and its direction on the
+page.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ ALONG = 1 - 1e-5
 
 @dataclass(frozen=True)
 class Moved:
-    """A driver, or time, at the samples: in SI, and what makes display units of that."""
+    """A driver, or time, at the samples in SI, with the factor to display units."""
 
     name: str
     unit: str
@@ -43,7 +43,7 @@ class Moved:
 
     @classmethod
     def of(cls, name: str, driver: Mapping[str, Any], values: list[float]) -> Moved:
-        """What is known of a driver, its type above all, and its values."""
+        """Return a driver with its known facts, its type above all, and its values."""
         unit, scale = DISPLAY.get(_DRIVER_UNITS.get(driver.get("type", ""), ""), ("", 1.0))
         return cls(name.replace("_", " "), unit, scale, values)
 
@@ -61,14 +61,14 @@ class Moved:
 
 @dataclass(frozen=True)
 class Axis(Moved):
-    """The axis of what is swept: its kept samples and their values as displayed.
+    """The axis of the sweep: its kept samples and their values in display units.
 
     Attributes:
         title: as written beside the outputs' figures, with the sense of the motion.
         kept: indices of the samples drawn.
-        up: 1 where it is drawn upwards against the outputs, as wheel travel is, -1 where downwards,
-            0 where to the right.
-        further: the drivers that move besides, or while time is swept, and how, in words.
+        up: 1 for an axis drawn upwards against the outputs, as wheel travel is, -1 for downwards, 0
+            for an axis to the right.
+        further: the other moving drivers and their motions, in words.
     """
 
     title: str
@@ -84,7 +84,7 @@ class Axis(Moved):
 
     @property
     def besides(self) -> str:
-        """A sentence that names the drivers in `further`; empty where there are none."""
+        """Return a sentence on the drivers in `further`; empty without any."""
         named = [f"{moved.name} ({how})" if how else moved.name for moved, how in self.further]
         return (
             f"{'Driven' if self.unit == 's' else 'Also driven'}: {', '.join(named)}."
@@ -104,13 +104,13 @@ class Axis(Moved):
 
 
 def driver_axis(facts: Mapping[str, Any], records: Sequence[Record], worst: Iterable[int]) -> Axis:
-    """The axis of what is swept.
+    """Return the axis of the sweep.
 
     Args:
-        facts: what is known of the case: its "driver" (name, type, point and direction), its
-            "motions" by name; may be empty.
+        facts: of the case: its "driver" (name, type, point and direction), its "motions" by name;
+            may be empty.
         records: the records of one case.
-        worst: samples that thinning must keep.
+        worst: samples kept by thinning.
     """
     series = next((record.driver for record in records if record.driver), dict[str, list[float]]())
     driver, motions = facts.get("driver", {}), facts.get("motions", {})
@@ -140,7 +140,7 @@ def driver_axis(facts: Mapping[str, Any], records: Sequence[Record], worst: Iter
 
 
 def _upwards(driver: Mapping[str, Any]) -> int:
-    """1 where the driver moves a point along the global z axis, -1 where against it, else 0."""
+    """Return 1 if the driver moves a point along the global z axis, -1 if against it, else 0."""
     if driver.get("type") != "point_coordinate":
         return 0
     direction = driver.get("direction", (0.0, 0.0, 0.0))

@@ -1,4 +1,4 @@
-"""What a run does not prove, read off the facts of its records."""
+"""The limits of a run's evidence, by the facts of its records."""
 
 from __future__ import annotations
 

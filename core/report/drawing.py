@@ -1,8 +1,6 @@
-"""Drawings: what the page draws of a scene. Hardpoints by body, links between those of one body,
-rods between bodies.
+"""Drawings of a scene for the page: hardpoints by body, links within a body, rods between bodies.
 
-A body is where its frame is: hardpoints are in body coordinates, and the page puts them where the
-poses say.
+Hardpoints are in body coordinates; the page places them by the poses of the body frames.
 """
 
 from __future__ import annotations
@@ -40,23 +38,23 @@ SAME = 1e-6
 
 @dataclass
 class Drawing:
-    """What is drawn, as the page's script reads it; places are indices of `nodes`, bodies indices
-    of `bodies`.
+    """A drawing as the page's script reads it; places are indices of `nodes`, bodies indices of
+    `bodies`.
 
     Attributes:
-        bodies: name, whether fixed, where the axes are drawn (body frame), and poses: origins r [m]
-            and Euler parameters p, one for each frame of the scene or one only.
+        bodies: name, whether fixed, place of the axes (body frame), and poses: origins r [m] and
+            Euler parameters p, one for each frame of the scene or one only.
         nodes: body, and x, y, z in its frame [m].
         links: two nodes of one body.
         rods: two nodes of two bodies.
         marks: node, kind of mark, axis in the body's frame or null, whether the joint is on
             something fixed.
-        labels: two nodes, between which the text stands.
-        paths: nodes whose way over the frames is drawn.
-        steps: what is said of each frame.
+        labels: two nodes, with the text between them.
+        paths: nodes with a path over the frames.
+        steps: the caption of each frame.
         start: the frame closest to the design position, shown first.
         joints: name, type and bodies of every joint, in words.
-        caption: whence the poses are, or why there are none.
+        caption: the source of the poses, or the reason for none.
     """
 
     bodies: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
@@ -155,7 +153,7 @@ class _Draughtsman:
         )
 
     def _label(self, a: int, b: int, text: str) -> None:
-        """A label; what has the same place shares one."""
+        """Add a label; texts at the same place share one."""
         for k, (*place, said) in enumerate(self.drawn.labels):
             if place == [a, b]:
                 if text not in said.split(" · "):
@@ -164,8 +162,8 @@ class _Draughtsman:
         self.drawn.labels.append((a, b, text))
 
     def _body(self, number: int) -> dict[str, Any]:
-        """A body for the page; joins its hardpoints if it moves, a single one with its origin, if
-        that was chosen.
+        """Return a body for the page; join the hardpoints of a moving body, a single one with a
+        chosen origin.
         """
         body = self.bodies[number]
         if not body.fixed:
@@ -186,8 +184,8 @@ class _Draughtsman:
         self.drawn.links += [(k, len(self.drawn.nodes) - 1) for k in nodes]
 
     def _frame(self, hardpoints: Sequence[Vec3]) -> list[float]:
-        """Where a body's axes are drawn: at its origin, or amid its hardpoints if the origin is far
-        from them.
+        """Return the place of a body's axes: its origin, or the middle of its hardpoints if the
+        origin is far from them.
         """
         if not hardpoints:
             return [0.0, 0.0, 0.0]

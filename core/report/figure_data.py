@@ -1,5 +1,5 @@
-"""Figures of what a single run cannot tell: errors and times over earlier runs, and error against
-time at several efforts.
+"""Figures from several runs: errors and times over earlier runs, and error against time at several
+efforts.
 """
 
 from __future__ import annotations
@@ -16,15 +16,14 @@ TIMES = "time per sample [µs]"
 
 @dataclass(frozen=True)
 class Past:
-    """What one engine made of a case in one run.
+    """The result of one engine for a case in one run.
 
     Attributes:
-        run: what the run is called on the axis, its date for one; runs are in the order given,
-            oldest first.
-        engine: as the report names it; one that is not in the report's own run is drawn in a style
-            of its own.
-        max_error: largest position error over all outputs [m]; None where nothing was compared.
-        us_per_step: warm time of a sample [us]; None where not all samples were reached.
+        run: label of the run on the axis, such as its date; runs are in the order given, oldest
+            first.
+        engine: as the report names it; an engine outside the report's own run has its own style.
+        max_error: largest position error over all outputs [m]; None if nothing was compared.
+        us_per_step: warm time of a sample [us]; None unless all samples were reached.
     """
 
     run: str
@@ -35,7 +34,7 @@ class Past:
 
 @dataclass(frozen=True)
 class Effort:
-    """What one engine reached at one effort setting.
+    """The result of one engine at one effort setting.
 
     Attributes:
         engine: as the report names it.
@@ -53,8 +52,8 @@ class Effort:
 
 
 def trend_figures(history: Sequence[Past], styles: Mapping[str, Style]) -> dict[str, Figure]:
-    """Error and time of each engine over the runs, on log axes; what has no value in any run is
-    left out.
+    """Return figures of error and time of each engine over the runs, on log axes, without series
+    that have no value.
 
     An error of zero has no place on the axis: the page draws it on a labelled floor, as in the
     error figures.
@@ -104,8 +103,8 @@ def ticked_axis(title: str, values: Sequence[float]) -> Figure:
 
 
 def _decade(values: Sequence[float]) -> Figure:
-    """The range of a log axis, where values are closer than a decade: drawn as large as the page a
-    tenth would look like a step.
+    """Return the range of a log axis for values closer than a decade: a tenth drawn over the whole
+    page would look like a step.
     """
     low, high = (math.log10(end(values, default=1.0)) for end in (min, max))
     middle = 0.5 * (low + high)

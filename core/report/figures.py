@@ -58,7 +58,7 @@ class Style:
 
 
 def plain(text: str) -> str:
-    """Text that Plotly shows as it is; it would take tags in it, links too, for mark-up."""
+    """Return text for Plotly to show unchanged; it takes tags and links for mark-up."""
     return html.escape(text, quote=False)
 
 
@@ -74,8 +74,7 @@ def output_figure(
     Args:
         curves: the engines and their outputs; at least one.
         truth: the reference.
-        band: what the engines were compared with, and the tolerance; drawn where it is wide enough
-            to be seen.
+        band: the values compared with, and the tolerance; drawn if it is wide enough to be seen.
     """
     unit, scale = DISPLAY.get(curves[0][1].unit, (curves[0][1].unit, 1.0))
     traces: list[Figure] = []
@@ -181,8 +180,8 @@ def error_figure(
 
     Args:
         unit: of the errors.
-        curves: the engines that were judged, and their deviations; at least one.
-        standard: what they were judged against.
+        curves: the judged engines and their deviations; at least one.
+        standard: the values compared with.
     """
     traces: list[Figure] = []
     for style, values, _ in curves:
@@ -278,7 +277,7 @@ def log_axis(title: str, low: float, high: float) -> tuple[Figure, float]:
 
 
 def absolute_errors(values: Values, standard: Values) -> list[float | None]:
-    """Distance from what was compared with at each sample; None where either is not known."""
+    """Return the distance from the standard at each sample; None if either is unknown."""
     return [
         None if a is None or b is None else abs(a - b)
         for a, b in zip(values, standard, strict=True)

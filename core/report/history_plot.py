@@ -1,4 +1,4 @@
-"""The trends of a history as one HTML page that opens offline."""
+"""The trends of a history as one HTML page for offline use."""
 
 from __future__ import annotations
 

@@ -18,10 +18,10 @@ SUSPECTED = "suspect the reference rather than the engine: see the suite's outpu
 def to_junit(results: Results) -> bytes:
     """Return the results as JUnit XML.
 
-    A missing engine or feature, and an output that was not judged, is a skip with its reason. A
-    pair that was never made is an error.
+    A missing engine or feature, and an output without a verdict, is a skip with its reason. A pair
+    without a record is an error.
 
-    What is to be known of a case's geometry is the output of its suite.
+    Notes on a case's geometry are the output of its suite.
     """
     root = ElementTree.Element("testsuites", name="kincheck")
     for case in dict.fromkeys(
@@ -91,7 +91,7 @@ def _test(
 
 
 def _verdict(record: Record, output: str, deviations: Deviations) -> tuple[str, str]:
-    """Return the element a test case needs, none where it passed, and its message."""
+    """Return the element of a test case, none if it passed, and its message."""
     if record.outcome in (Outcome.UNJUDGED, Outcome.UNAVAILABLE, Outcome.UNSUPPORTED):
         return "skipped", f"{record.outcome.shown}: {record.message}"
     if record.outcome is Outcome.FAIL:

@@ -9,8 +9,8 @@ from ..case.io.escape import visible
 
 
 def escaped(text: str) -> str:
-    """Text that Markdown shows as it is, on one line or in a cell: no mark-up, no links, no HTML,
-    nobody notified.
+    """Return text for Markdown to show unchanged, on a line or in a cell: no mark-up, no links, no
+    HTML, nobody notified.
     """
     plain = (
         visible(" ".join(text.split()))

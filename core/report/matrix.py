@@ -21,8 +21,8 @@ NOT_ASKED = "–"
 
 
 def print_matrix(results: Results, file: TextIO) -> None:
-    """Print the signs of outputs that have a convention, a row per case and a column per engine,
-    every message, and a count of outcomes.
+    """Print the conventions of signs, a row per case and a column per engine, every message, and a
+    count of outcomes.
     """
     console = terminal.console(file)
     print_signs(results.run, console)
@@ -47,8 +47,8 @@ def print_matrix(results: Results, file: TextIO) -> None:
 
 
 def to_markdown(results: Results) -> str:
-    """The same in Markdown: the engines with their versions, and a line for every message but those
-    of what passed.
+    """Return the same in Markdown: the engines with their versions, and a line for every message
+    without those of passed pairs.
     """
     engines, rows = _laid_out(results)
     versions = {record.engine: record.version for record in results.records if record.version}
@@ -73,7 +73,7 @@ def to_markdown(results: Results) -> str:
 
 
 def cell(record: Record) -> str:
-    """What an engine made of a case, in a few signs."""
+    """Return the result of an engine for a case, in a few signs."""
     errors = [each for quantity in QUANTITIES if (each := worst(record, quantity)) is not None]
     if errors:
         verdict = "" if record.outcome is Outcome.PASS else f"{record.outcome.shown}: "

@@ -1,4 +1,4 @@
-"""The cases of a report as its page shows them: what is said of each, and which figures it has."""
+"""The cases of a report as its page shows them: the text and the figures of each."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .figures import Figure, Style, Values, band_is_thin, error_figure, output_f
 
 @dataclass(frozen=True)
 class Judged:
-    """One deviation and what it belongs to."""
+    """One deviation with its record and output."""
 
     record: Record
     output: str
@@ -58,7 +58,7 @@ def worst(deviations: Sequence[Judged]) -> Judged | None:
 
 @dataclass(frozen=True)
 class Plot:
-    """A figure of the page: its key, a title to read aloud, and what is said under it."""
+    """A figure of the page: its key, a title to read aloud, and its caption."""
 
     figure: str
     title: str
@@ -80,13 +80,12 @@ class CaseView:
     """One case of the page.
 
     Attributes:
-        evidence: of the reference; None where there is none.
+        evidence: of the reference; None without a reference.
         worst: the deviation closest to its tolerance, or beyond it most.
         account: the degrees of freedom, counted as in the paper and by rank.
-        scene: the mechanism to be drawn; None where the results have none.
-        trends: error and time over earlier runs; empty where there is no history.
-        precision: error against time at several effort settings, by mode; empty where that was not
-            measured.
+        scene: the mechanism to be drawn; None if the results have none.
+        trends: error and time over earlier runs; empty without a history.
+        precision: error against time at several effort settings, by mode; empty if not measured.
     """
 
     name: str
@@ -104,14 +103,14 @@ class CaseView:
     precision: list[Plot]
 
     def by_engine(self, name: str) -> list[Record]:
-        """The records of the engine of that name."""
+        """Return the records of an engine."""
         return [record for record in self.records if engine_name(record) == name]
 
 
 @dataclass(frozen=True)
 class Material:
-    """What a report is made from: a run, what is known from elsewhere, by case, and further limits,
-    each a title and a sentence.
+    """The material of a report: a run, further knowledge by case, and further limits, each a title
+    and a sentence.
     """
 
     results: Results
@@ -230,7 +229,7 @@ def _precision(
 def _standard(
     deviations: Sequence[Judged], records: Sequence[Record], references: Mapping[str, OutputSeries]
 ) -> OutputSeries | None:
-    """What one motion of one output was judged against: the reference, or the output of the engine
+    """Return the standard of one motion of one output: the reference, or the output of the engine
     named instead.
     """
     if not deviations:

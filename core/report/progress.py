@@ -1,4 +1,4 @@
-"""What the command line says while it runs, and of engines that are not there."""
+"""Progress of the command line, and its messages on missing engines."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from ..harness.record import Outcome, Record, Results
 
 
 def complain(lines: Iterable[str]) -> None:
-    """Say what is wrong on standard error, a line each, as the tool."""
+    """Print problems on standard error, a line each, with the name of the tool."""
     for line in lines:
         print(f"kincheck: {visible(line)}", file=sys.stderr)
 
 
 def progress(records: list[Record]) -> Callable[[Record, int, int], None]:
-    """Collects records, and tells of them on standard error: one line that changes on a terminal,
-    plain lines elsewhere.
+    """Collects records and shows them on standard error: one changing line on a terminal, plain
+    lines elsewhere.
     """
     terminal = sys.stderr.isatty()
 
@@ -35,9 +35,7 @@ def progress(records: list[Record]) -> Callable[[Record, int, int], None]:
 
 
 def lacking(results: Results, required: Sequence[str], named: Sequence[str] = ()) -> list[str]:
-    """Return what a required engine could not do, and which of the engines that were named are
-    missing.
-    """
+    """Return the failures of required engines and the named engines that are missing."""
     lines = [
         (
             f"required engine {record.engine!r}: {record.message}"
@@ -64,9 +62,7 @@ def lacking(results: Results, required: Sequence[str], named: Sequence[str] = ()
 
 
 def uncompared(results: Results) -> list[str]:
-    """Return that a run has compared nothing, and why: then no result deviates, and none is
-    right.
-    """
+    """Return why a run has compared nothing: then no result deviates, and none is right."""
     counts = Counter(record.outcome for record in results.records)
     if any(outcome.judged for outcome in counts):
         return []
@@ -89,8 +85,8 @@ def uncompared(results: Results) -> list[str]:
 
 
 def how_to_install(engine: str) -> str:
-    """The command that installs an engine's simulator, whose name is its own up to a hyphen, from
-    kincheck's own metadata.
+    """Return the command to install an engine's simulator, from kincheck's own metadata. The
+    simulator's name is the engine's up to a hyphen.
     """
     import importlib.metadata  # rarely needed, and slow
 

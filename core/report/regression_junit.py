@@ -1,5 +1,5 @@
-"""The report as JUnit XML: one test case per case, engine and output, failed where the run has
-failed or something regressed.
+"""The report as JUnit XML: one test case per case, engine and output, failed for a failure of the
+run or a regression.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ from .junit import FORBIDDEN, to_junit
 
 
 def to_regression_junit(results: Results, found: Regressions) -> bytes:
-    """Write what `to_junit` writes, with a failure for every regression of what had passed.
+    """Return the XML of `to_junit`, with a failure for every regression of a passed pair.
 
-    What is about a pair and not about one of its outputs (a phase lost, a time) is a test case of
-    its own, named by its kind.
+    A finding on a pair and not on one of its outputs (a phase lost, a time) is a test case of its
+    own, named by its kind.
     """
     root = ElementTree.fromstring(to_junit(results))
     tests = {(test.get("classname"), test.get("name")): test for test in root.iter("testcase")}

@@ -1,5 +1,5 @@
-"""What a report says: its headline, its findings in groups, and the versions that changed, the same
-in every format.
+"""Texts of a report, the same in every format: its headline, its findings in groups, and the
+changed versions.
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ COUNTED: Mapping[Kind, str] = {
 
 @dataclass(frozen=True)
 class Row:
-    """One or several findings that say the same.
+    """One finding, or several with the same text.
 
     Attributes:
         engine: the engine, or the engines.
-        more: how many further findings the pair has of that kind.
+        more: number of further findings of the kind for the pair.
     """
 
     engine: str
@@ -98,7 +98,7 @@ def headline(found: Regressions) -> str:
 
 
 def versions(found: Regressions) -> list[str]:
-    """The versions that changed, those of the machine and the settings aside."""
+    """Return the changed versions, without those of the machine and the settings."""
     return [
         str(change)
         for change in found.changes
@@ -107,14 +107,12 @@ def versions(found: Regressions) -> list[str]:
 
 
 def pairs(found: Regressions, kind: Kind) -> set[tuple[str, str, str]]:
-    """The pairs that findings of a kind are about."""
+    """Return the pairs with findings of a kind."""
     return {(each.case, each.engine, each.mode) for each in found.findings if each.kind is kind}
 
 
 def _counted(found: Regressions, kind: Kind) -> int:
-    """How many pairs findings of a kind are about; without those of a case that could not be read,
-    which is one fault.
-    """
+    """Return the number of pairs with findings of a kind; an unreadable case is one fault."""
     return sum(case not in found.unread for case, _, _ in pairs(found, kind))
 
 
@@ -125,8 +123,8 @@ def _plural(kind: Kind, found: Regressions) -> str:
 
 
 def rows(findings: Iterable[Finding]) -> list[Row]:
-    """Findings of one kind: a pair once, with the worst of its ratios; cases, then engines, that
-    say the same together.
+    """Return rows of one kind: a pair once, with the worst of its ratios; cases, then engines, of
+    the same text together.
     """
     by_pair: dict[tuple[str, str, str], list[Finding]] = {}
     for finding in findings:
@@ -144,7 +142,7 @@ def rows(findings: Iterable[Finding]) -> list[Row]:
 
 
 def step_says(step: Step) -> str:
-    """A step, its first run and what changed there."""
+    """Return the text of a step, its first run and the changes in it."""
     name = f"{step.output} {step.quantity} error" if step.output else step.quantity
     if step.before is None or step.now is None:
         what = "bad" if step.worse else "good again"
@@ -160,7 +158,7 @@ def step_says(step: Step) -> str:
 
 
 def loose_says(loose: Sequence[Loose]) -> list[str]:
-    """The tolerances that could be tightened, a line a case: by its output that allows least."""
+    """Return the tolerances to tighten, a line a case: by its output with the least reduction."""
     by_case: dict[str, list[Loose]] = {}
     for each in loose:
         by_case.setdefault(each.case, []).append(each)

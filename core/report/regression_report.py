@@ -1,4 +1,4 @@
-"""What changed since another run, from the two runs and the history around them."""
+"""Changes since another run, from the two runs and the history around them."""
 
 from __future__ import annotations
 
@@ -30,12 +30,11 @@ def regressions(
     *,
     missing_is_failure: bool = False,
 ) -> Regressions:
-    """All that changed.
+    """Return all changes.
 
     Args:
-        reason: why there is nothing to compare with, where there is not.
-        missing_is_failure: whether a pair that an earlier run had and this one does not is a
-            regression.
+        reason: the reason without a run to compare with.
+        missing_is_failure: whether a pair of an earlier run, missing in this one, is a regression.
 
     Raises:
         HistoryError: the history cannot be read.
@@ -79,7 +78,7 @@ def regressions(
 
 
 def _around(subject: Subject, store: Store | None) -> History:
-    """The runs up to the subject, itself among them where it is of the history."""
+    """Return the runs up to the subject, with the subject if the history has it."""
     if store is None:
         return NOTHING
     cases = list(dict.fromkeys(record.case for record in subject.results.records))
@@ -88,7 +87,7 @@ def _around(subject: Subject, store: Store | None) -> History:
 
 
 def _alike(subject: Subject, around: History, *, before: int | None) -> History:
-    """The latest runs before that number on the subject's machine."""
+    """Return the latest runs before a number on the subject's machine."""
     runs = {
         number: row
         for number, row in around.runs.items()
@@ -103,7 +102,7 @@ def _alike(subject: Subject, around: History, *, before: int | None) -> History:
 
 
 def _since(finding: Finding, standing: list[Step]) -> Finding:
-    """With the first run that has it, where a step says so."""
+    """Return the finding with its first run, if a step gives one."""
     quantity = {Kind.SLOWER: TIME, Kind.FAILURE: OUTCOME, Kind.DRIFTED: finding.motion}.get(
         finding.kind
     )

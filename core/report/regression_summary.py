@@ -17,7 +17,7 @@ from .regression_labels import LONGEST, headline, loose_says, pairs, rows, step_
 
 
 def to_markdown(found: Regressions) -> str:
-    """What changed, the worst first; what is long is folded away."""
+    """Return the changes in Markdown, the worst first; long parts are folded."""
     return "\n".join([f"## {escaped(headline(found))}", "", *_lines(found)]).rstrip() + "\n"
 
 

@@ -1,6 +1,4 @@
-"""The report of a run: one HTML file that opens offline, the worst engine and its worst sample
-first.
-"""
+"""The report of a run: one HTML file for offline use, the worst engine and sample first."""
 
 from __future__ import annotations
 
@@ -71,11 +69,10 @@ def write_report(
         results: a run. Of `results.run`, "cases" may give each case's "source", "driver" (its name,
             type, point and direction) and "motions" of further drivers by case name; everything
             else is printed as it is.
-        path: the file to write, in a folder that exists.
-        history: what the engines made of each case in earlier runs and this one, oldest first, by
-            case name.
+        path: the file to write, in an existing folder.
+        history: results of the engines in earlier runs and this one, oldest first, by case name.
         precision: error against time at several efforts, by case name.
-        changes: a section to come first: what changed since another run.
+        changes: the first section: changes since another run.
         limits: further limits of the report, each a title and a sentence.
 
     Raises:
@@ -182,8 +179,8 @@ def _source(name: str) -> str:
 
 
 def packed(text: str) -> str:
-    """Text as base64 of its zlib stream: a third of the size, and nothing in it can end the script
-    element that holds it.
+    """Return text as base64 of its zlib stream: a third of the size, and nothing in it can end its
+    script element.
     """
     return base64.b64encode(zlib.compress(text.encode())).decode("ascii")
 
@@ -221,9 +218,7 @@ def headline(results: Results) -> str:
 
 
 def _fault(record: Record, tol: float) -> str:
-    """Return what is wrong with a record that fails, one of `FAULTS`; where several are, the
-    first.
-    """
+    """Return the fault of a failing record, one of `FAULTS`; of several, the first."""
     errors = record.errors.values()
     holds = (
         any(not each.within for each in errors),
@@ -236,14 +231,14 @@ def _fault(record: Record, tol: float) -> str:
 
 
 def _worst_of(record: Record, motion: str | None = None) -> Judged | None:
-    """The deviation of a record, of one motion or any, that is closest to its tolerance or beyond
-    it most.
+    """Return the deviation of a record, of one motion or any, closest to its tolerance or farthest
+    beyond it.
     """
     return worst([each for each in judged([record]) if motion in (None, each.motion)])
 
 
 def severity(case: CaseView) -> float:
-    """What the overview sorts by: what could not be completed first, then errors in tolerances."""
+    """Return the sort key of the overview: incomplete pairs first, then errors in tolerances."""
     broken = any(record.outcome in BROKEN for record in case.records)
     return 1e300 if broken else min(case.worst.ratio, 1e299) if case.worst else -1.0
 
@@ -260,7 +255,7 @@ def searched(case: CaseView) -> str:
 
 
 def _model(record: Record) -> dict[str, Any]:
-    """What an engine tells of the model it made, beyond what has a table of its own."""
+    """Return an engine's facts on its model, without those in tables of their own."""
     return {
         key: value for key, value in record.details.items() if key not in ("dof_account", "program")
     }

@@ -29,7 +29,7 @@ from .report import packed
 
 @dataclass(frozen=True)
 class Diagram:
-    """A figure, what is said of it, and the styles of its curves."""
+    """A figure, its caption, and the styles of its curves."""
 
     plot: Plot
     figure: Figure
@@ -38,11 +38,11 @@ class Diagram:
 
 @dataclass(frozen=True)
 class Section:
-    """One table of a benchmark, and what follows from it.
+    """One table of a benchmark, with its conclusions.
 
     Attributes:
-        verdict: what the figures say, in sentences.
-        notes: how the figures were made.
+        verdict: the conclusions, in sentences.
+        notes: the method of measurement.
         columns: headings; the first `labels` of them are over words, the others over numbers.
         diagrams: drawn above the table, on the page only.
     """
@@ -58,7 +58,7 @@ class Section:
 
 @dataclass(frozen=True)
 class Report:
-    """A benchmark's results for people. `name` is also that of its files."""
+    """A benchmark's results for people. `name` is also the name of its files."""
 
     name: str
     headline: str
@@ -67,7 +67,7 @@ class Report:
 
 
 def deliver(report: Report, results: msgspec.Struct, *, out: Path | None, json: str | None) -> None:
-    """Print the tables and write what was asked for.
+    """Print the tables and write the requested files.
 
     Args:
         out: folder for NAME.json and NAME.html.

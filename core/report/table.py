@@ -26,9 +26,7 @@ LENGTH = "m"
 
 
 def print_table(results: Results, file: TextIO) -> None:
-    """Print the signs of outputs that have a convention, one line per record, every message, and a
-    count of outcomes.
-    """
+    """Print the conventions of signs, a line per record, every message, and the outcomes' counts."""
     console = terminal.console(file)
     print_signs(results.run, console)
     table = Table(box=None, pad_edge=False, header_style="bold")
@@ -54,7 +52,7 @@ def print_table(results: Results, file: TextIO) -> None:
 
 
 def print_signs(run: Mapping[str, Any], console: Console) -> None:
-    """Print what heads every table of outputs that have a convention of signs."""
+    """Print the heading of every table of outputs with a convention of signs."""
     for line in signs(run):
         console.print(Text(visible(line)), soft_wrap=True)
 
@@ -82,8 +80,8 @@ def print_messages(results: Results, console: Console) -> None:
 
 
 def truth(record: Record) -> str:
-    """What a record was judged by; the word for more than agreement is kept for truths from
-    elsewhere that were met.
+    """Return the standard of a record; "validated" is kept for agreement with truths from
+    elsewhere.
     """
     said = "validated" if record.validated else unsound(record)
     return against(record.truth) + (f" ({said})" if said else "")
@@ -100,11 +98,11 @@ def _error(record: Record, quantity: str) -> Text:
 
 
 def worst(record: Record, quantity: str) -> tuple[Deviation, str] | None:
-    """The largest error of a quantity over the outputs, and its output's unit, empty for the metre
-    of the heads.
+    """Return the largest error of a quantity over the outputs, and its output's unit, empty for the
+    metre of the heads.
 
     Out of tolerance comes first, then lengths: errors in different units are not to be compared.
-    None where nothing was compared.
+    None if nothing was compared.
     """
     found: list[tuple[Deviation, str]] = []
     for output, errors in record.errors.items():

@@ -23,8 +23,8 @@ LOG_WIDTH = 200
 
 
 class _Console(Console):
-    """One whose reader may go: what is left goes nowhere, and the command on, whose status is that
-    of its results.
+    """A console whose reader may end early: further output is dropped, and the command goes on to
+    the status of its results.
     """
 
     def on_broken_pipe(self) -> None:
@@ -33,14 +33,12 @@ class _Console(Console):
 
 
 def print_no_more(file: IO[str]) -> None:
-    """Let what is left for a stream go to nowhere: the interpreter would complain of it at its
-    end.
-    """
+    """Drop further output of a stream: the interpreter would complain of it at its end."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), file.fileno())
 
 
 def console(file: TextIO) -> Console:
-    """Where to print text as it is: names may have square brackets or colons, which rich takes for
+    """Return a console for unchanged text: rich takes square brackets and colons in names for
     colours and pictures.
     """
     return _Console(
@@ -53,7 +51,7 @@ def console(file: TextIO) -> Console:
 
 
 def page(json: str | None) -> Console:
-    """Where to print: standard output, unless the JSON has it."""
+    """Return the console for tables: standard output, unless the JSON has it."""
     return console(sys.stderr if json == "-" else sys.stdout)
 
 
@@ -79,8 +77,8 @@ def columns(*heads: str, title: str | None = None) -> Table:
 
 
 def write_json(found: msgspec.Struct | Mapping[str, Any], json: str | None) -> None:
-    """Write the answer as JSON to a file, or for "-" to standard output. Before it is printed: who
-    reads that may have gone.
+    """Write the answer as JSON to a file, or for "-" to standard output. Call it before printing:
+    the reader of the tables may end early.
 
     Raises:
         KincheckError: the file cannot be written.

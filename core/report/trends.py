@@ -11,7 +11,7 @@ from .figure_data import Past
 
 
 def trends(history: History) -> dict[str, list[Past]]:
-    """What each engine made of each case, by case, in the order of the runs."""
+    """Return the results of each engine by case, in the order of the runs."""
     found: dict[str, list[Past]] = {}
     place = {run: k for k, run in enumerate(history.runs)}
     for (case, engine, mode), entries in history.pairs.items():
@@ -31,9 +31,7 @@ def run_name(row: RunRow) -> str:
 
 
 def largest_length(entry: Entry, case: str, row: RunRow) -> float | None:
-    """The largest position error of the outputs that are lengths [m]; None where none was
-    compared.
-    """
+    """Return the largest position error of the outputs in metres [m]; None if none was compared."""
     lengths = [
         deviations.position.max_abs
         for name, deviations in entry.errors.items()

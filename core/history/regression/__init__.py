@@ -1,1 +1,1 @@
-"""Regression: what changed between two runs, since when, and whether it is worse."""
+"""Regression: changes between two runs, their first run, and whether they are for the worse."""

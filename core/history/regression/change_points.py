@@ -1,5 +1,5 @@
-"""Steps: where a level changed in the history of a pair, the first run that has the new one, and
-what else changed there.
+"""Steps: changes of level in the history of a pair, with the first run of the new level and the
+other changes in that run.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ class _Found:
     the levels.
 
     Attributes:
-        repaired: index of the first value of a later level that is as low as the one before; None
-            where there is none.
+        repaired: index of the first value of a later level as low as the level before; None without
+            such a level.
     """
 
     earlier: range
@@ -52,11 +52,11 @@ class _Found:
 
 
 def steps(history: History, *, standing: bool = False) -> list[Step]:
-    """The steps of all pairs, the latest first.
+    """Return the steps of all pairs, the latest first.
 
     Args:
-        standing: only the last step for the worse of a series, if no later run has repaired it:
-            what still holds today.
+        standing: only the last step for the worse of each series, unless a later run has repaired
+            it.
     """
     found: list[Step] = []
     for pair, entries in history.pairs.items():
@@ -72,8 +72,8 @@ def steps(history: History, *, standing: bool = False) -> list[Step]:
 
 
 def _outcomes(pair: Pair, entries: Sequence[Entry], history: History) -> list[Step]:
-    """Return where a pair became bad, or good again. Runs that did not judge it say nothing about
-    it.
+    """Return the runs in which a pair became bad, or good again. Runs without a verdict do not
+    count.
     """
     able = [entry for entry in entries if entry.outcome not in (*IDLE, Outcome.UNJUDGED)]
     turns = [(a, b) for a, b in pairwise(able) if a.outcome.bad is not b.outcome.bad]
@@ -85,9 +85,7 @@ def _outcomes(pair: Pair, entries: Sequence[Entry], history: History) -> list[St
 
 
 def _times(pair: Pair, entries: Sequence[Entry], history: History) -> list[Step]:
-    """Where the time in calibration loops has changed; runs without a calibration have no place in
-    it.
-    """
+    """Return the changes of the time in calibration loops, of the runs with a calibration."""
     series: list[tuple[Entry, float]] = []
     for entry in entries:
         loop = calibration(history.runs[entry.run])
@@ -103,9 +101,7 @@ def _times(pair: Pair, entries: Sequence[Entry], history: History) -> list[Step]
 
 
 def _errors(pair: Pair, entries: Sequence[Entry], history: History, motion: str) -> list[Step]:
-    """Where the error of an output has changed; of several outputs that changed in the same run,
-    the one that did most.
-    """
+    """Return the changes of an output's error; of several outputs in a run, the largest."""
     largest: dict[tuple[int, bool, int | None], tuple[float, Step]] = {}
     for output in dict.fromkeys(output for entry in entries for output in entry.errors):
         errors = errors_of(entries, output, motion)
@@ -126,9 +122,7 @@ def _errors(pair: Pair, entries: Sequence[Entry], history: History, motion: str)
 
 
 def errors_of(entries: Sequence[Entry], output: str, motion: str) -> list[tuple[Entry, Deviation]]:
-    """The errors of an output where they were found, but for those of nothing that is held to
-    nothing.
-    """
+    """Return the known errors of an output, without zero errors with a zero tolerance."""
     found = [(entry, getattr(entry.errors.get(output), motion, None)) for entry in entries]
     return [
         (entry, each)
@@ -222,7 +216,7 @@ def _step(
 
 
 def _between(engine: str, a: Entry, b: Entry, history: History) -> list[Change]:
-    """What else is not the same in two runs: the engine by what its own records say."""
+    """Return the other differences of two runs; the engine's by its own records."""
     versions = (
         [Change(what=engine, before=a.version, now=b.version)] if a.version != b.version else []
     )

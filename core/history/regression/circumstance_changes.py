@@ -11,8 +11,8 @@ CIRCUMSTANCES = ("kincheck", "python", "numpy", "tol", "host", "processor", "pla
 
 
 def changes(now: Mapping[str, Any], before: Mapping[str, Any]) -> list[Change]:
-    """Versions, machine and settings of two runs that differ: engines first, then ours and what it
-    stands on.
+    """Return the differences in versions, machine and settings: engines first, then kincheck and
+    its dependencies.
     """
     old: dict[str, Any] = before.get("engines") or {}
     new: dict[str, Any] = now.get("engines") or {}
@@ -32,7 +32,7 @@ def _git(facts: Mapping[str, Any], what: str) -> Any:
 
 
 def _edits(facts: Mapping[str, Any]) -> str | None:
-    """What tells edits apart: a digest, or where none was kept that there are some."""
+    """Return the mark of uncommitted edits: a digest, or without one the fact of edits."""
     return _git(facts, "edits") or ("some" if _git(facts, "changed") else None)
 
 

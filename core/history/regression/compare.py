@@ -1,5 +1,5 @@
-"""Two runs, pair by pair: what failed, what is fixed, what is no longer reached, what drifted, what
-became slower.
+"""Comparison of two runs, pair by pair: new failures, repairs, samples no longer reached, drifts
+and slower solves.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ References = Mapping[str, Mapping[str, OutputSeries]]
 
 
 def compare(now: Subject, before: Subject, history: History, slowest: float) -> list[Finding]:
-    """What differs, in the order of the records.
+    """Return the differences, in the order of the records.
 
     Args:
-        history: runs up to the one compared with, and on the same machine: what times were then.
-        slowest: the ratio of times up to which a pair is not called slower.
+        history: runs on the same machine up to the run compared with, for the usual times.
+        slowest: the largest ratio of times of a pair not called slower.
     """
     earlier = by_pair(before.results.records)
     findings: list[Finding] = []
@@ -64,9 +64,7 @@ def compare(now: Subject, before: Subject, history: History, slowest: float) -> 
 
 
 def unmade(now: Subject) -> list[Finding]:
-    """The pairs that the run was to make and did not: whatever it is compared with, nothing checks
-    them.
-    """
+    """Return the planned pairs without a record; nothing checks them in any comparison."""
     pairs, why = now.results.missing, now.results.unread
     return [
         Finding(kind=Kind.LOST, case=case, engine=engine, mode=mode, message=why.get(case, UNMADE))
@@ -134,8 +132,8 @@ def _lost(now: Record, before: Record) -> Iterator[Finding]:
 
 
 def _moved(now: Record, before: Record) -> Iterator[Finding]:
-    """Outputs whose values are others than they were, or samples: where there is no reference
-    nothing else would show it.
+    """Return the outputs with changed values or samples; without a reference nothing else shows
+    them.
     """
     if not (now.driver and before.driver):
         return
@@ -177,12 +175,12 @@ def same_samples(now: Record, before: Record) -> bool:
 
 
 def values_of(series: OutputSeries | None, motion: str) -> Sequence[float | None]:
-    """Return the values of a motion over the samples; none where there is no such series."""
+    """Return the values of a motion over the samples; none without such a series."""
     return getattr(series, motion, None) or ()
 
 
 def _apart(a: Sequence[float | None], b: Sequence[float | None]) -> float:
-    """The largest difference, over the samples that both have."""
+    """Return the largest difference over the common samples."""
     return max(
         (abs(x - y) for x, y in zip(a, b, strict=False) if x is not None and y is not None),
         default=0.0,
@@ -233,7 +231,7 @@ def _errors(now: Record, before: Record) -> Iterator[Finding]:
 
 
 def _references(record: Record, now: References, before: References) -> Iterator[Finding]:
-    """True values that are not what they were; those that came or went show in what is compared."""
+    """Return the changed reference values; new and missing ones show in the comparison."""
     for output, old in before.get(record.case, {}).items():
         new = now.get(record.case, {}).get(output)
         for motion in QUANTITIES:

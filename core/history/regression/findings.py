@@ -1,4 +1,4 @@
-"""What a comparison of two runs finds, as data: the JSON schema kincheck-regression/1."""
+"""Findings of the comparison of two runs as data: the JSON schema kincheck-regression/1."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ...harness.record import Record
 
 
 class Kind(StrEnum):
-    """What a finding says."""
+    """The kind of a finding."""
 
     FAILURE = "new failure"
     LOST = "lost"
@@ -94,13 +94,13 @@ class Finding(msgspec.Struct, frozen=True, kw_only=True):
     """One difference between the runs.
 
     Attributes:
-        output, motion: what it is about; null where it is about the pair.
+        output, motion: the subject; null for a finding on the whole pair.
         before, now: errors [SI], residuals, seconds, tolerances, dof or rank, by the kind; null
-            where there is no number to it.
-        ratio: of now to before, for a time with the pace of the machine taken out; null where there
-            is none.
-        limit: the ratio from which on it is a finding.
-        since: the first run that has it, where the history knows it.
+            without a number.
+        ratio: of now to before, for a time corrected for the pace of the machine; null
+            without one.
+        limit: the smallest ratio of a finding.
+        since: the first run with it, if the history knows it.
     """
 
     kind: Kind
@@ -118,7 +118,7 @@ class Finding(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Change(msgspec.Struct, frozen=True, kw_only=True):
-    """A version, a machine or a setting that is not what it was; null where it was not there."""
+    """A changed version, machine or setting; null if it was absent."""
 
     what: str
     before: Any
@@ -140,13 +140,13 @@ class Step(msgspec.Struct, frozen=True, kw_only=True):
     Attributes:
         quantity: position, velocity or acceleration (errors), time, or outcome.
         output: of the error with the largest step; null for time and outcome.
-        unit: of that output; empty for an error that has none, for time and outcome.
+        unit: of the output; empty for an error without a unit, for time and outcome.
         first: number of the first run of the new level; `started` is when it began.
         last: number of the last run of the level before.
         before, now: the levels: errors [SI], seconds; null for an outcome.
-        repaired: number of the first later run that is as good as before; null for a change to the
-            better, and while it stands.
-        changes: what else was not the same in these two runs.
+        repaired: number of the first later run as good as before; null for a change to the better,
+            and while the step stands.
+        changes: other differences of these two runs.
     """
 
     case: str
@@ -166,12 +166,12 @@ class Step(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Loose(msgspec.Struct, frozen=True, kw_only=True):
-    """A tolerance that no engine has needed.
+    """A tolerance not needed by any engine.
 
     Attributes:
         largest: the largest error in tolerances over all engines, motions and runs.
-        factor: by which the tolerance could be smaller; null where all errors are exactly zero.
-        why: the reason that the case gives for its tolerance; it may be the better one.
+        factor: the possible reduction of the tolerance; null if all errors are exactly zero.
+        why: the case's reason for its tolerance; it may be the better one.
     """
 
     case: str
@@ -183,8 +183,8 @@ class Loose(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class RunName(msgspec.Struct, frozen=True, kw_only=True):
-    """Which run: its name for people, its number in the history where it is from one, and when it
-    began.
+    """The name of a run for people, its number in the history if it has one, and the time of its
+    start.
     """
 
     name: str
@@ -195,18 +195,16 @@ class RunName(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Regressions(msgspec.Struct, frozen=True, kw_only=True):
-    """What changed.
+    """Changes between two runs.
 
     Attributes:
-        against: the run compared with; null, and `reason` says why, where there is none.
-        pairs: how many records the run has.
-        failing: case, engine and mode of all that is not within tolerance or broken, new or not.
-        unjudged: the same of all that was solved and compared with nothing, new or not.
-        unread: cases that were asked for and make no sense; their pairs are among the findings,
-            lost.
-        time_limit: the ratio from which on a time was called slower.
-        missing_is_failure: whether a pair that an earlier run had and this one does not is a
-            regression.
+        against: the run compared with; null without one, and `reason` says why.
+        pairs: number of records of the run.
+        failing: case, engine and mode of all pairs out of tolerance or broken, new or not.
+        unjudged: the same of all pairs solved and compared with nothing, new or not.
+        unread: requested cases without a meaning; their pairs are among the findings, as lost.
+        time_limit: the smallest ratio of a time called slower.
+        missing_is_failure: whether a pair of an earlier run, missing in this one, is a regression.
     """
 
     schema: Literal["kincheck-regression/1"] = "kincheck-regression/1"
@@ -230,7 +228,7 @@ class Regressions(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def regressions(self) -> list[Finding]:
-        """The findings that are one."""
+        """Return the findings of regressions."""
         return [finding for finding in self.findings if self.fails(finding.kind)]
 
     @property

@@ -1,4 +1,4 @@
-"""Tolerances that could be tightened: what no engine has come near in any run."""
+"""Tolerances to tighten: no engine has come near them in any run."""
 
 from __future__ import annotations
 
@@ -11,11 +11,10 @@ from .thresholds import HEADROOM, LOOSE, SEEN
 
 
 def loose(history: History, cases: Mapping[str, Any]) -> list[Loose]:
-    """Outputs whose errors stayed far below their tolerances in all runs, by case.
+    """Return the outputs whose errors stayed far below their tolerances in all runs, by case.
 
     Args:
-        cases: the facts of each case, as a run's circumstances have them, for the reasons that it
-            gives.
+        cases: the facts of each case from a run's circumstances, for the reasons of its tolerances.
     """
     largest: dict[tuple[str, str], float] = {}
     runs: dict[tuple[str, str], set[int]] = {}

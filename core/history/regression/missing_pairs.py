@@ -1,5 +1,5 @@
-"""Pairs that the last run of the same command had, and a run has not: a case or an engine that went
-without a word.
+"""Pairs of the last run of the same command without a record in a run: a case or an engine left
+out in silence.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from .run_selection import Subject, pairs_of
 
 
 def missing(subject: Subject, store: Store | None, told: Sequence[Finding]) -> Iterator[Finding]:
-    """Yield the pairs, whatever the subject is compared with: the last run may have had more than
+    """Yield the missing pairs in every kind of comparison: the last run may have more pairs than
     the last green one.
 
-    A run of another command was asked for something else, and says nothing.
+    A run of another command had another task and does not count.
 
     Args:
-        told: what is said of the subject already.
+        told: the findings on the subject so far.
     """
     last = _last(subject, store) if store else None
     if last is None:
@@ -38,7 +38,7 @@ def missing(subject: Subject, store: Store | None, told: Sequence[Finding]) -> I
 
 
 def _last(subject: Subject, store: Store) -> RunRow | None:
-    """Return the last earlier run of the subject's command that nobody is writing now."""
+    """Return the last earlier finished run of the subject's command."""
     query = "SELECT id FROM runs WHERE command = ? AND (? IS NULL OR id < ?) ORDER BY id DESC"
     with store.explained("read"):
         numbers = store.connection.execute(

@@ -1,6 +1,4 @@
-"""The run that a report is about, and the one it is compared with: by number, by file, by a
-rule.
-"""
+"""The run of a report and the run compared with: by number, by file, by a rule."""
 
 from __future__ import annotations
 
@@ -25,8 +23,8 @@ class Subject:
     """A run to be compared.
 
     Attributes:
-        number: in the history; None for one that it does not have.
-        before: runs of smaller numbers are earlier; None: all are.
+        number: in the history; None for a run outside it.
+        before: runs with smaller numbers are earlier; None: all runs.
     """
 
     name: str
@@ -48,11 +46,10 @@ class Subject:
 
 
 def find(name: str | None, store: Store | None) -> Subject:
-    """The run of that number, or in that results.json; None: the latest of the history that nobody
-    is writing now.
+    """Return the run of a number or of a results.json; None: the latest run of the history without
+    a writer.
 
-    That may be one without an end, which was killed: to judge the one before it would be to say
-    that all is well.
+    A killed run without an end counts too: judging the run before it would hide the fault.
 
     Raises:
         KincheckError: there is none, or it cannot be read.
@@ -81,8 +78,8 @@ def find(name: str | None, store: Store | None) -> Subject:
 
 
 def find_against(name: str, subject: Subject, store: Store | None) -> tuple[Subject | None, str]:
-    """The run to compare with, or why there is none. One that is named must be there; one by a rule
-    need not yet.
+    """Return the run to compare with, or the reason without one. A named run must exist; a run by a
+    rule need not exist yet.
 
     Raises:
         KincheckError: the one named is not there, or it is the subject itself.
@@ -179,15 +176,15 @@ def _of_branch(store: Store, branch: str, subject: Subject) -> list[RunRow]:
 
 
 def pairs_of(subject: Subject) -> set[Pair]:
-    """Return the pairs that a run was to make."""
+    """Return the planned pairs of a run."""
     return {(record.case, record.engine, record.mode) for record in subject.results.records} | {
         *subject.results.missing
     }
 
 
 def _compared(store: Store, row: RunRow, subject: Subject) -> int:
-    """How much of what the subject was to compare was compared in a run: outputs that a case has no
-    more do not count.
+    """Return the number of the subject's planned comparisons made in a run; outputs removed from a
+    case do not count.
     """
     outputs = {
         (record.case, record.engine, record.mode): {*record.errors}
@@ -202,7 +199,7 @@ def _compared(store: Store, row: RunRow, subject: Subject) -> int:
 
 
 def _most(rows: list[RunRow], shared: Callable[[RunRow], int]) -> RunRow | None:
-    """The run that shares most, the latest of several; None where none shares anything."""
+    """Return the run with the most common pairs, the latest of several; None without any."""
     amounts = {row.id: shared(row) for row in rows}
     best = max(rows, key=lambda row: (amounts[row.id], row.id), default=None)
     return best if best is not None and amounts[best.id] else None

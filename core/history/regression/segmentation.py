@@ -1,6 +1,6 @@
 """Levels of a series: the exact division into parts of steady level, under L1 cost.
 
-`ruptures` divides exactly too. It cannot demand that each change is sure, and its wheels end at
+`ruptures` divides exactly too. It cannot demand certainty of each change, and its wheels end at
 Python 3.13.
 """
 
@@ -37,8 +37,8 @@ def change_points(values: Array, *, least: float, lasting: int) -> list[int]:
 
     Args:
         values: shape (n,).
-        least: the smallest distance of two levels that matters.
-        lasting: the fewest values that make a level.
+        least: the smallest significant distance of two levels.
+        lasting: the fewest values of a level.
     """
     count = len(values)
     if count < 2 * lasting or np.ptp(values) < least:
@@ -82,8 +82,8 @@ def _deviation(values: Array) -> float:
     """Return the standard deviation by the mean difference of successive values, without the
     largest two.
 
-    A level that comes and goes makes two large differences. Single outliers make more: where there
-    are many, three in a row are chance, and a median would not know of them.
+    A passing level makes two large differences. Single outliers make more: with many of them, three
+    in a row are chance, and a median would not know of them.
     """
     differences = np.sort(np.abs(np.diff(values)))
     calm = differences[: -2 if len(differences) > 3 else -1]
@@ -95,7 +95,7 @@ def _parts(values: Array, ends: list[int], lasting: int) -> Array:
     from one end to another.
 
     The quartiles are values of the part, the outer ones; their distance is interpolated. A part
-    that is too short costs infinity.
+    below the shortest length costs infinity.
     """
     table = np.zeros((5, len(ends), len(ends)))
     table[0] = math.inf

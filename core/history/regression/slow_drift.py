@@ -20,11 +20,11 @@ from .thresholds import DRIFT, drifted
 
 
 def crept(subject: Subject, around: History, told: Sequence[Finding]) -> Iterator[Finding]:
-    """Errors of the subject that are a digit above the least since their last step, of the same
+    """Return the subject's errors a digit above the least since their last step, with the same
     tolerance and standard.
 
     Args:
-        told: what is said of the subject already.
+        told: the findings on the subject so far.
     """
     known = {
         (each.case, each.engine, each.mode, each.output, each.motion)

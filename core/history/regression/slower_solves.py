@@ -19,9 +19,9 @@ def usual_times(
 ) -> tuple[float | None, float | None]:
     """Return the usual time of a warm solve [s] and in calibration loops of its run.
 
-    Both are None for machines that cannot be compared. The time is the median of the latest runs up
-    to the one compared with; with few runs it is the time of that one alone, because the noise of
-    one run would be in every comparison with it.
+    Both are None for machines without a common measure. The time is the median of the latest runs
+    up to the run compared with: the noise of one run would be in every comparison with it. With few
+    runs it is the time of this run alone.
     """
     latest = [entry for entry in entries if entry.seconds][-ENOUGH:]
     if len(latest) < ENOUGH:
