@@ -26,7 +26,7 @@ LENGTH = "m"
 
 
 def print_table(results: Results, file: TextIO) -> None:
-    """Print the conventions of signs, a line per record, every message, and the outcomes' counts."""
+    """Print the conventions of signs, a line per record, every message, and outcome counts."""
     console = terminal.console(file)
     print_signs(results.run, console)
     table = Table(box=None, pad_edge=False, header_style="bold")
