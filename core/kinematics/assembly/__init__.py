@@ -1,3 +1,3 @@
-"""Poses that close, without a motion that leads to them: from estimates, from many starts, told
-apart by their branch.
+"""Closed poses without a motion to them: from estimates and from many starts, distinguished by
+their branch.
 """

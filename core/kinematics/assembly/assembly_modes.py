@@ -1,4 +1,4 @@
-"""All assemblies of a mechanism that many starts lead to, told apart by their poses and named by
+"""All assemblies of a mechanism found from many starts, distinguished by their poses and named by
 their branch.
 """
 
@@ -44,14 +44,13 @@ class Assembly:
             (4,).
         distance: from the estimate: rms over its bodies of turn [rad] and displacement [mechanism
             sizes].
-        starts: how many of the starts led there.
+        starts: number of starts with this result.
         residual: largest constraint residual, relative to the mechanism's size.
-        smallest: smallest singular value of all rows, lengths in mechanism sizes; zero where
-            assemblies meet.
-        orientation: sign of the determinant of the rows, against that at design; 0 where it is
-            singular.
-        signs: by joint, the sign of a triple product of its neighbours against that at design; see
-            `Branches`.
+        smallest: smallest singular value of all rows, lengths in mechanism sizes; zero at a
+            meeting of assemblies.
+        orientation: sign of the determinant of the rows, against the sign at design; 0 if singular.
+        signs: by joint, the sign of a triple product of its neighbours against the sign at design;
+            see `Branches`.
     """
 
     poses: Mapping[str, tuple[Array, Array]]
@@ -65,14 +64,14 @@ class Assembly:
 
 @dataclass(frozen=True, eq=False)
 class Assemblies:
-    """What became of the starts.
+    """Results of many starts.
 
     Attributes:
         found: the assemblies, nearest to the estimate first.
-        starts: how many starts there were.
-        lost: how many of them did not close.
-        spurious: how many ended where the rows vanish and yet no assembly is: axes turned over,
-            redundant rows contradicted.
+        starts: number of starts.
+        lost: number of starts without closure.
+        spurious: number of starts that ended at a zero of the rows without an assembly: axes turned
+            over, redundant rows contradicted.
     """
 
     found: tuple[Assembly, ...]
@@ -91,12 +90,12 @@ def find_assemblies(
     spread: tuple[float, float] | None = SPREAD,
     tol: float = 1e-12,
 ) -> Assemblies:
-    """Close a mechanism from many starts, and tell the assemblies apart. There may be more than are
-    found.
+    """Close a mechanism from many starts, and return the different assemblies. More may exist than
+    are found.
 
     Args:
         estimate: by body, origin r [m], shape (3,), and Euler parameters p [-], shape (4,): the
-            first start, and what assemblies are ranked by (the design, where it is empty). Bodies
+            first start, and the origin of the ranking (the design, if it is empty). Bodies
             left out may be anywhere.
         values: of the drivers, from their design values [m or rad]; those left out hold theirs.
         samples: number of starts.
@@ -165,7 +164,7 @@ def _lane(pose: Pose, k: int) -> Pose:
 
 
 def _groups(poses: Mapping[str, Pose], n: int) -> list[NDArray[np.intp]]:
-    """Lanes that ended in the same assembly."""
+    """Return the lanes of each assembly."""
     groups: list[NDArray[np.intp]] = []
     left = np.arange(n)
     while len(left):
@@ -184,11 +183,11 @@ def _starts(
     spread: tuple[float, float] | None,
     rng: np.random.Generator,
 ) -> dict[str, Pose]:
-    """Poses to start from, scalars of shape (n,); the first is the estimate.
+    """Return the poses of the starts, scalars of shape (n,); the first is the estimate.
 
-    A body without an estimate has any attitude, and is near where the spanning tree's joint with
-    its parent wants it. Moving it as that joint lets it, so that only the loops are open, was
-    tried: 200 such starts find 8 assemblies of the delta robot, these 16.
+    A body without an estimate has any attitude, near its place by the spanning tree's joint with
+    its parent. Rejected: motions of this joint only, so only the loops are open; 200 such starts
+    find 8 assemblies of the delta robot, these 16.
     """
     first = np.arange(n) == 0
     found: dict[str, Pose] = {}

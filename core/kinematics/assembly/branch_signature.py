@@ -1,9 +1,9 @@
-"""Which branch of its motion a configuration is on, as signs against the design position.
+"""The branch of a configuration, as signs against the design position.
 
-The sign of the determinant of the rows changes only where the mechanism is singular. It is one sign
-for the whole mechanism; where it does not tell two assemblies apart, a triple product at every
-joint does: of the direction to the far joints of its two bodies and its axis (an elbow that bends
-one way or the other, a rod that winds around its neighbours one way or the other).
+The sign of the determinant of the rows changes only at singular poses. It is one sign for the whole
+mechanism. A triple product at every joint distinguishes further: of the directions to the far
+joints of its two bodies and its axis (the two bends of an elbow, the two windings of a rod around
+its neighbours).
 """
 
 from __future__ import annotations
@@ -65,11 +65,10 @@ class Triple:
 
 @dataclass(frozen=True, eq=False)
 class Branches:
-    """What the branch of a configuration is told by.
+    """The signs of the branch of a configuration.
 
     Attributes:
-        triples: by joint; joints whose neighbours lie in one line or plane with it at design have
-            none.
+        triples: by joint; a joint in one line or plane with its neighbours at design has none.
     """
 
     mechanism: Mechanism
@@ -108,13 +107,13 @@ class Branches:
 
 
 def _orientation(matrix: np.ndarray) -> float:
-    """The sign of the determinant; 0 where it is not known."""
+    """Return the sign of the determinant; 0 if unknown."""
     values = np.linalg.svd(matrix, compute_uv=False)
     return float(np.linalg.slogdet(matrix)[0]) if values.min() > SINGULAR * values.max() else 0.0
 
 
 def _triple(mechanism: Mechanism, frame: Frames, joint: Joint) -> Triple | None:
-    """The triple product at a joint that is farthest from zero at design."""
+    """Return the triple product at a joint farthest from zero at design."""
     ends = joint.points_on()
     if not ends:
         return None

@@ -1,3 +1,3 @@
-"""What people are told of a mechanism: which rows say the same, how well the motion is determined,
-what moves, in words.
+"""Diagnosis of a mechanism for people: redundant rows, conditioning of the motion, and free
+motions, in words.
 """

@@ -1,15 +1,15 @@
-"""How well the equations determine the motion, sample by sample, and how what is read from it
-depends on them and on hardpoints.
+"""Conditioning of the motion, sample by sample, and the dependence of points on residuals and on
+hardpoints.
 
 With J the solved rows and phi their residuals at a pose that closes, q the unknowns and g the
 numbers of the geometry,
 
-    dq = J^-1 d(residual)          what residuals left over by a solver shift the pose by
-    dq = -J^-1 (d phi / dg) dg     what a hardpoint placed elsewhere shifts it by, drivers held
+    dq = J^-1 d(residual)          shift of the pose by a solver's residuals
+    dq = -J^-1 (d phi / dg) dg     shift of the pose by a moved hardpoint, drivers held
 
 so both are one factorisation and no neighbouring design is solved; d phi / dg is exact (see
-`slope`). A redundant row that is left out of J need not hold for the changed geometry: its residual
-then says how much that geometry would contradict itself.
+`dual_numbers`). A redundant row, left out of J, need not hold for the changed geometry: its
+residual is the contradiction in this geometry.
 """
 
 from __future__ import annotations
@@ -38,18 +38,18 @@ from .position_gradients import Dependence, Geometry, Gradient
 
 @dataclass(frozen=True, eq=False)
 class PoseConditioning:
-    """How well the pose at a sample is determined.
+    """Conditioning of the pose at a sample.
 
     Attributes:
         value: of the swept driver or time, as the sweep has it.
-        owners: joint or driver and primitive of each solved row: where those chosen at design are
-            worse than need be, others are.
+        owners: joint or driver and primitive of each solved row: other rows than at design if those
+            are needlessly ill-conditioned.
         smallest, largest: singular values of the solved rows, lengths in mechanism sizes.
         orientation: sign of their determinant, against that at design; of all rows if there are
             more, followed from pose to pose.
-        direction: the motion that the rows determine least.
+        direction: the motion least determined by the rows.
         points: gradients by point.
-        contradicted: by how much each redundant row would not hold, by the numbers of the places,
+        contradicted: derivative of each redundant row's residual by the numbers of the places,
             shape (redundant rows, numbers).
     """
 
@@ -73,8 +73,8 @@ class Conditioning:
     """A sweep, sample by sample.
 
     Attributes:
-        trajectory: of the whole sweep, with its message where it cannot be followed.
-        poses: at the samples that were looked at; those not reached are left out.
+        trajectory: of the whole sweep, with its message if it cannot be followed.
+        poses: at the examined samples, without those not reached.
         numbers: place and component of each number of the geometry, and the length of its vector
             for a direction, else 1.
     """
@@ -93,11 +93,11 @@ def conditioning(
     samples: int,
     tol: float,
 ) -> Conditioning:
-    """Look at up to so many samples of a path, both ends and the one nearest to design among them.
+    """Examine a number of samples of a path, with both ends and the one nearest to design.
 
     Args:
-        values: what the sweep is reported by at each sample.
-        points: names of the points that are read.
+        values: reported value of the sweep at each sample.
+        points: names of the observed points.
         varied: places of the geometry to vary; see `places`.
 
     Raises:
@@ -170,8 +170,8 @@ def conditioning(
 def _held(
     mechanism: Mechanism, elsewhere: Mechanism, drives: Mapping[str, Drive], frame: Frames
 ) -> dict[str, Drive]:
-    """Drives whose values stay where the geometry changes: from the design, which goes elsewhere,
-    an absolute one is another.
+    """Return the drives with constant values under a change of geometry: an absolute one changes
+    against the moving design.
     """
     shift = {
         name: (elsewhere.design_value(name) - mechanism.design_value(name)) * (1.0 / frame.unit)
@@ -181,12 +181,11 @@ def _held(
 
 
 def _orientations(matrices: Sequence[Array], design: Array, nearest: int) -> list[float]:
-    """Signs of determinants against that at design, from pose to pose, beginning at the one nearest
-    to design.
+    """Return the signs of determinants against the sign at design, from pose to pose, beginning at
+    the pose nearest to design.
 
-    Of a tall matrix there is none, but of the product A^T B of two that are near each other: it is
-    the sum over all choices of rows of the products of their determinants, and of square ones the
-    product itself.
+    A tall matrix has none, but the product A^T B of two neighbours has one: the sum over all
+    choices of rows of the products of their determinants; for square matrices the product itself.
     """
     found, n = np.ones(len(matrices)), len(matrices)
     for way in (range(nearest, n), range(nearest, -1, -1)):
@@ -198,7 +197,7 @@ def _orientations(matrices: Sequence[Array], design: Array, nearest: int) -> lis
 
 
 def _is_length(formulation: Cartesian, rows: Array) -> Array:
-    """Which rows are equations of lengths: those that a shift changes."""
+    """Return the mask of the rows of lengths: a shift changes them."""
     first = formulation.columns.values()
     slides = [k for name, k in formulation.coordinates.items() if name.endswith(".translation")]
     shifts = [k + axis for k in first for axis in range(3)] + slides

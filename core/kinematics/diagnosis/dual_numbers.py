@@ -1,8 +1,8 @@
-"""Slopes: a number with its derivatives by many parameters at once, for geometry that is varied.
+"""Slopes: a number with its derivatives by many parameters at once, for varied geometry.
 
 A joint chooses its auxiliary axes by comparing components; here the value decides, as it does for
 the plain number, so the rows keep the axes they have and their derivatives are exact. Differences
-between neighbouring designs would jump where the choice changes.
+between neighbouring designs would jump with the choice.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ class Slope:
 
     @staticmethod
     def where_larger(a: Scalar, b: Scalar, p: Scalar, q: Scalar) -> Scalar:
-        """p where |a| > |b|, else q; the values decide."""
+        """Return p if |a| > |b|, else q; the values decide."""
         return p if abs(value(a)) > abs(value(b)) else q
 
 
@@ -85,5 +85,5 @@ def value(a: Any) -> float:
 
 
 def derivatives(a: Any) -> Array | float:
-    """The derivatives of a number; of one that knows none, zero."""
+    """Return the derivatives of a number; zero for a plain number."""
     return a.d if isinstance(a, Slope) else 0.0

@@ -28,11 +28,11 @@ ROUND_OFF = 1e-9
 
 @dataclass(frozen=True)
 class Screw:
-    """How a body moves, relative to the fastest body.
+    """The motion of a body, relative to the fastest body.
 
     Attributes:
-        turn: about the axis [rad], 0 where it only shifts.
-        axis: unit vector, global, of the turn, or of the shift where it does not turn.
+        turn: about the axis [rad], 0 for a pure shift.
+        axis: unit vector, global, of the turn, or of the shift without a turn.
         through: a point of the axis, global [m].
         shift: along the axis [m].
     """
@@ -53,11 +53,10 @@ class Screw:
 
 
 def screws(formulation: Formulation, at: Configuration, frame: Frames, rates: Array) -> list[Screw]:
-    """The motion of each body that moves at the rates of the unknowns, shape (unknowns,), the
+    """Return the motion of each moving body at the rates of the unknowns, shape (unknowns,), the
     fastest first.
 
-    Rates may be taken either way: the fastest body's axis points along x, y or z rather than
-    against it.
+    Rates have either sign: the fastest body's axis points along x, y or z rather than against it.
     """
     twists = formulation.twists(at, rates.tolist())
     speeds = {name: max(_size(twist.v), _size(twist.w)) for name, twist in twists.items()}
@@ -74,11 +73,11 @@ def screws(formulation: Formulation, at: Configuration, frame: Frames, rates: Ar
 
 
 def free_motions(matrix: Array) -> Array:
-    """A basis of the null space of a matrix, shape (motions, columns), in which each motion has as
-    few bodies as can be.
+    """Return a basis of the null space of a matrix, shape (motions, columns), with the fewest
+    bodies in each motion.
 
-    The orthonormal basis mixes motions that have nothing to do with each other; reduced to echelon
-    form, each has a column of its own, and a rod that spins is seen to spin alone.
+    The orthonormal basis mixes independent motions; reduced to echelon form, each has a column of
+    its own, and a spinning rod spins alone.
     """
     from ..structure.redundancy import RANK_TOLERANCE
 

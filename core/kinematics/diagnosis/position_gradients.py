@@ -25,10 +25,10 @@ class Gradient:
     """Derivatives of a point's position [m] at a sample, by components x, y, z.
 
     Attributes:
-        position: where it is, and where it is at design, global [m], shape (3,).
+        position: at the sample and at design, global [m], shape (3,).
         by_residuals: by the residuals of the solved rows [m or rad], shape (3, rows).
         by_geometry: by the numbers of the places, shape (3, numbers).
-        design_by_geometry: of where it is at design, shape (3, numbers).
+        design_by_geometry: of the position at design, shape (3, numbers).
     """
 
     position: Array
@@ -39,7 +39,7 @@ class Gradient:
 
 
 class Geometry:
-    """The places that are varied.
+    """The varied places.
 
     Attributes:
         slopes: their values by place, each number with its derivatives by all of them.
@@ -67,14 +67,14 @@ class Geometry:
 
     def derivatives_of(self, x: Any) -> Array:
         """Return the derivatives of a number by all numbers of the places, shape (numbers,); zero
-        where it depends on none.
+        for an independent number.
         """
         return np.broadcast_to(derivatives(x), (len(self.numbers),))
 
 
 @dataclass(frozen=True, eq=False)
 class Dependence:
-    """What the unknowns at a sample owe to residuals and to geometry.
+    """Dependence of the unknowns at a sample on residuals and geometry.
 
     Attributes:
         by_residuals: derivatives of the unknowns by the residuals of the solved rows [m or rad],

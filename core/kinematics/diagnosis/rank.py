@@ -2,7 +2,7 @@
 
 The rows are those of the native formulation, joints first, then drivers. Lengths are in mechanism
 sizes, so that rows of lengths and of angles compare. Contradictions are found by exact rows:
-simplified rows have another fixed point where the residual is not zero (formulation section 3).
+with a residual, simplified rows have another fixed point (formulation section 3).
 """
 
 from __future__ import annotations
@@ -42,9 +42,9 @@ class NamedRow:
 
     Attributes:
         owner: joint or driver.
-        primitive: the condition it is one equation of.
-        holds: what it prevents at the design, on the owner's second body: a shift along, or a turn
-            about, a direction.
+        primitive: the condition of the row.
+        holds: the prevented motion at the design, on the owner's second body: a shift along, or a
+            turn about, a direction.
     """
 
     owner: str
@@ -57,7 +57,7 @@ class NamedRow:
 
 @dataclass(frozen=True)
 class Dependency:
-    """A row that others say already: the sum of the others times their weights."""
+    """A redundant row: the sum of the others times their weights."""
 
     row: NamedRow
     repeats: tuple[tuple[float, NamedRow], ...]
@@ -81,7 +81,7 @@ class ComponentCount:
 
 @dataclass(frozen=True)
 class Violation:
-    """A row that cannot be met: residual [m or rad], or its rate by the driver's."""
+    """A violated row: residual [m or rad], or its rate by the driver's."""
 
     row: NamedRow
     amount: float
@@ -89,7 +89,7 @@ class Violation:
 
 @dataclass(frozen=True)
 class Blocked:
-    """A driver that cannot move, and the least violation of other rows per unit of the driver."""
+    """A blocked driver, and the least violation of other rows per unit of the driver."""
 
     driver: str
     rows: tuple[Violation, ...]
@@ -128,7 +128,7 @@ class Ranks:
         return found
 
     def _holds(self, k: int, body: str) -> str:
-        """What a row prevents: read from its entries on a body that moves."""
+        """Return the motion prevented by a row, from its entries on a moving body."""
         names = (
             [body, *self.formulation.bodies]
             if body in self.formulation.columns
@@ -147,7 +147,7 @@ class Ranks:
 
     @cached_property
     def dependencies(self) -> list[Dependency]:
-        """The joint rows that are redundant, each in terms of rows that are kept."""
+        """Return the redundant joint rows, each in terms of kept rows."""
         joints = self.matrix[: self.joint_rows]
         kept = independent_joint_rows(self.formulation, joints)
         found: list[Dependency] = []
@@ -183,7 +183,7 @@ class Ranks:
 
     @cached_property
     def components(self) -> list[ComponentCount]:
-        """The parts of the mechanism that nothing ties together."""
+        """Return the unconnected parts of the mechanism."""
         groups: list[set[int]] = []  # of columns
         for row in self.matrix:
             columns = set(np.flatnonzero(row).tolist())
@@ -211,7 +211,7 @@ class Ranks:
 
     @cached_property
     def free(self) -> list[list[Screw]]:
-        """The motions that are left with all drivers held, each by the bodies that take part."""
+        """Return the motions left with all drivers held, each by its bodies."""
         return [
             screws(self.formulation, self.at, self.frame, rates)
             for rates in free_motions(self.matrix)
@@ -219,7 +219,7 @@ class Ranks:
 
     @cached_property
     def blocked(self) -> list[Blocked]:
-        """The drivers that cannot move at a rate of their own."""
+        """Return the drivers without a rate of their own."""
         joints, drives = self.matrix[: self.joint_rows], self.matrix[self.joint_rows :]
         found: list[Blocked] = []
         for k, driver in enumerate(self.mechanism.drivers):
@@ -255,8 +255,8 @@ class Ranks:
 
     @cached_property
     def contradictions(self) -> list[Violation]:
-        """Rows violated in the pose nearest to an assembly, drivers at design; empty where it
-        closes.
+        """Return the rows violated in the pose nearest to an assembly, drivers at design; empty if
+        it closes.
         """
         exact = Cartesian.of(self.mechanism, self.frame, style=Style.CONVENTIONAL)
         state = exact.design

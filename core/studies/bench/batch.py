@@ -32,16 +32,15 @@ SEED = 943745
 
 
 class Batch(msgspec.Struct, frozen=True, kw_only=True):
-    """So many variants solved together.
+    """A number of variants solved together.
 
     Attributes:
-        solved: part of all samples that were reached; retried: variants that were solved again
-            alone.
+        solved: share of samples reached; retried: variants solved again alone.
         error: of the first variant, which is the case itself: largest position error of the outputs
-            that are lengths [m].
+            in metres [m].
         us_per_sample: by sample and variant.
         flops_per_sample, gflops: of the programs, for accepted samples; and by nanosecond.
-        of_peak: part of the measured peak of a core; null where that is not known.
+        of_peak: share of the measured peak of a core; null if the peak is unknown.
     """
 
     case: str
@@ -58,7 +57,7 @@ class Batch(msgspec.Struct, frozen=True, kw_only=True):
 
 @dataclass
 class _Batch:
-    """A batch to be timed, and what its last solution was."""
+    """A batch to be timed, with its last solution."""
 
     route: Route
     geometry: Array

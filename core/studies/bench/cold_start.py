@@ -1,4 +1,4 @@
-"""What a process of its own does to time the first use of the native engine, stage by stage."""
+"""The first use of the native engine in a process of its own, timed stage by stage."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ def first_use(clock: Sequence[float]) -> None:
     """Build and solve the pickled case on standard input; print the seconds of all stages as a line
     of JSON.
 
-    Solved anew is what was solved before, asked for again as of `solve`.
+    The last stage solves the case again by `solve`.
 
     Args:
-        clock: when the process began, had imported numpy and then what it takes to solve.
+        clock: times of the start of the process, the import of numpy and the import of the solver.
     """
     case, tol = pickle.load(sys.stdin.buffer)
     begin = perf_counter()

@@ -1,4 +1,4 @@
-"""What the benchmark of engines found of costs, for people: by batch, by size, and of a process."""
+"""The costs found by the benchmark of engines, for people: by batch, by size, and of a process."""
 
 from __future__ import annotations
 

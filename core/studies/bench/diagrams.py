@@ -98,7 +98,7 @@ def stage_diagram(found: Bench) -> Diagram:
 
 
 def entries_of(found: Bench) -> list[tuple[str, str, list[Entry]]]:
-    """Case and mode, and their entries: what may be compared with each other."""
+    """Return the comparable entries, by case and mode."""
     keys = dict.fromkeys((entry.case, entry.mode) for entry in found.entries)
     return [
         (*key, [entry for entry in found.entries if (entry.case, entry.mode) == key])

@@ -1,4 +1,4 @@
-"""The benchmark of run time against error, and of what else time and memory depend on."""
+"""The benchmark of run time against error, and of other influences on time and memory."""
 
 from __future__ import annotations
 
@@ -68,11 +68,10 @@ class Rate(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Bench(msgspec.Struct, frozen=True, kw_only=True):
-    """The results of this benchmark; a part that was not asked for is empty.
+    """The results of this benchmark; a part not requested is empty.
 
     Attributes:
-        run: circumstances; load: of the machine, as it tells them for the last minute, before and
-            after.
+        run: circumstances; load: of the machine over the last minute, before and after.
         vector_width: doubles in a vector of the compiled code; null without a compiler.
         entries: engines at their efforts, on each case; levels: the native engine in detail.
     """
@@ -105,13 +104,13 @@ def measure(
     command: str,
     tell: Callable[[str], object],
 ) -> Bench:
-    """Measure the parts asked for. Batches, studies and processes are of the first case.
+    """Measure the requested parts. Batches, studies and processes are of the first case.
 
     Args:
         cases: by name as on the command line; at least one.
         engines: in both modes.
         tol: largest accepted constraint residual, as for `Engine.solve`.
-        tell: told what is being measured.
+        tell: called with the name of each measurement.
 
     Raises:
         KincheckError: a case has no reference and cannot be given one.
@@ -249,7 +248,7 @@ def _rates(case: Case, native: Mapping[str, Entry], peak: Peak, seconds: Spread)
 
 
 def _load() -> float | None:
-    """Processes that want to run, over the last minute; None where the system does not tell."""
+    """Return the number of runnable processes over the last minute; None if the system hides it."""
     return os.getloadavg()[0] if hasattr(os, "getloadavg") else None
 
 
@@ -258,11 +257,11 @@ def _threads() -> str:
 
 
 def efforts_in(file: Path) -> dict[str, list[Effort]]:
-    """What a file of this benchmark has for the diagrams of a run's report: error and time of each
-    engine's efforts, by case.
+    """Return the diagrams' data in a file of this benchmark: error and time of each engine's
+    efforts, by case.
 
     Raises:
-        KincheckError: it cannot be read or is none.
+        KincheckError: the file cannot be read, or is not of this benchmark.
     """
     try:
         found = msgspec.json.decode(file.read_bytes(), type=Bench)
@@ -277,7 +276,7 @@ def efforts_in(file: Path) -> dict[str, list[Effort]]:
 
 
 def effort(entry: Entry) -> list[Effort]:
-    """The entry's point in a diagram of error against time; none where it has no time or no
+    """Return the entry's point in a diagram of error against time; none without a time or an
     error.
     """
     if entry.us_per_sample is None or entry.errors.position is None:

@@ -1,6 +1,4 @@
-"""The benchmark of engines for people: tables, what follows from them, and diagrams. Modes never
-share a table.
-"""
+"""The benchmark of engines for people: tables, conclusions, diagrams. Modes never share a table."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""The native engine in detail: by what is asked of it, by executor, and with and without the Python
-around its loops.
+"""The native engine in detail: by request, by executor, and with and without the Python around its
+loops.
 """
 
 from __future__ import annotations
@@ -46,12 +46,12 @@ class Level:
 
     @property
     def loop(self) -> str:
-        """Where the loop over samples and iterations runs."""
+        """The place of the loop over samples and iterations."""
         return "compiled" if self.compiled and available() else "python"
 
     @property
     def settings(self) -> Mapping[str, Any]:
-        """What is asked for, and the executor."""
+        """The request and the executor."""
         return {
             "order": self.order,
             "every_body": self.bodies,
@@ -67,14 +67,14 @@ class Level:
         return None
 
     def request(self, case: Case) -> Request:
-        """What is asked."""
+        """Return the request for a case."""
         bodies = tuple(body.name for body in case.mechanism.moving) if self.bodies else ()
         return Request(
             tuple(case.sweep.path.motions), case.points, bodies, self.order, compiled=self.compiled
         )
 
     def build(self, case: Case) -> Route:
-        """The programs for what is asked, and the samples laid out."""
+        """Return the programs of the request, with the samples laid out."""
         return Route(compile_model(case.mechanism, self.request(case)), case.sweep.path)
 
     def solve(self, model: Route, case: Case, tol: float) -> Trajectory:
@@ -99,10 +99,10 @@ SAMPLES, MOTIONS = ("extrapolate", *acceptance.JOINED), ("extend", *acceptance.A
 
 
 def loops_alone(case: Case, tol: float) -> Callable[[], Array]:
-    """The executor's loops over all samples, everything asked for: no Python but two calls, no
-    result made of the numbers.
+    """Return a call of the executor's loops over all samples, everything requested: no Python but
+    two calls, no result built.
 
-    It is to the native engine what a floor is to a simulator, tests and copying included.
+    It is the native engine's floor, tests and copying included.
 
     Raises:
         SolveError: a step has to be divided, which needs Python.
@@ -124,15 +124,14 @@ def loops_alone(case: Case, tol: float) -> Callable[[], Array]:
 
 
 def flops_of(model: Model, iterations: float, lanes: Sequence[str] = SAMPLES) -> float:
-    """Floating-point operations of a sample: predictor, Newton's iterations, rates, outputs and the
-    test of a solution.
+    """Return the floating-point operations of a sample: predictor, Newton's iterations, rates,
+    outputs and the test of a solution.
 
-    Those of lanes that were computed and not accepted, or iterated on because a neighbour did, do
-    not count.
+    Operations of rejected lanes, and further iterations for a neighbour's sake, do not count.
 
     Args:
-        lanes: what predicts and tests lanes that are `SAMPLES` of a motion, or `MOTIONS`; of the
-            first few other programs do.
+        lanes: the programs to predict and test lanes of `SAMPLES` of a motion, or of `MOTIONS`;
+            the first few samples use other programs.
     """
     sizes = {name: each["flops"] for name, each in model.sizes.items()}
     return iterations * sizes["newton"] + sum(sizes[name] for name in ("outputs", *lanes))

@@ -1,8 +1,8 @@
-"""The most arithmetic one core can do: independent multiplications and additions of vectors, fused
-where the processor can.
+"""The peak arithmetic of one core: independent multiplications and additions of vectors, fused if
+the processor can.
 
-The code is made as that of the programs is, for the same width, by the same compiler; it loads and
-stores nothing in its loop.
+The same compiler makes the code as for the programs, for the same width; its loop loads and stores
+nothing.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class Peak:
     owner: Any
 
     def rate(self, seconds: Spread) -> float:
-        """Flops a second: by the fastest of its turns, a peak being what nothing has held up."""
+        """Return flops a second, by the fastest of the turns: nothing has delayed it."""
         return self.flops / seconds.least
 
     def __call__(self) -> None:
@@ -49,7 +49,7 @@ class Peak:
 
 
 def prepare() -> Peak:
-    """Compile the kernel. Raises ImportError where llvmlite is missing."""
+    """Compile the kernel. Raises ImportError without llvmlite."""
     width = compiler.vector_width()
     text = _text(width)
     code = code_cache.load(text, lambda: text, {"peak": 2})

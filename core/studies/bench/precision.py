@@ -1,5 +1,5 @@
-"""Work and precision: what each engine reaches on a case at each of its efforts, judged as a run
-judges, and by how much work.
+"""Work and precision: error and work of each engine on a case at each of its efforts, judged as in
+a run.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ REQUIRED = (1e-3, 1e-6, 1e-9, 1e-12)
 
 
 class Errors(msgspec.Struct, frozen=True, kw_only=True):
-    """Largest errors over all samples and all outputs that are lengths [m, m/s, m/s^2]; null where
-    nothing was compared.
+    """Largest errors over all samples and all outputs in metres [m, m/s, m/s^2]; null if nothing
+    was compared.
     """
 
     position: float | None = None
@@ -38,16 +38,16 @@ class Errors(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Entry(msgspec.Struct, frozen=True, kw_only=True):
-    """What an engine made of a case at one effort.
+    """The result of an engine for a case at one effort.
 
     Attributes:
-        setting: the effort, in words; settings: all that the engine says of itself.
+        setting: the effort, in words; settings: all settings of the engine.
         outcome, message: as in a run, by the tolerances of the case: a coarse effort is expected to
             fail them.
-        against: what the errors are of.
+        against: the standard of the errors.
         residual: the engine's own largest constraint residual [m or -].
         iterations: by sample: Newton's; in simulate mode, steps.
-        us_per_sample: warm; null where not all samples were reached.
+        us_per_sample: warm; null unless all samples were reached.
     """
 
     case: str
@@ -69,7 +69,7 @@ class Entry(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Needed(msgspec.Struct, frozen=True, kw_only=True):
-    """The least time in which an engine meets a required error; null, and why, where it does not.
+    """The least time of an engine for a required error; null with the reason if it is not met.
 
     Attributes:
         required: largest position error allowed [m].
@@ -98,9 +98,7 @@ class FloorOf(msgspec.Struct, frozen=True, kw_only=True):
 
 @dataclass(frozen=True)
 class Contestant:
-    """An entry, and its work: one warm solve of all samples. None where there is nothing to be
-    timed.
-    """
+    """An entry and its work: one warm solve of all samples; None without anything to time."""
 
     entry: Entry
     work: Callable[[], Trajectory] | None
@@ -115,10 +113,10 @@ class Contestant:
 
 
 def with_truth(case: Case, tol: float) -> Case:
-    """The case with a reference for its positions: its own, or one that is proved here.
+    """Return the case with a reference for its positions: its own, or one proved here.
 
     Raises:
-        KincheckError: there is none, and python-flint, which proves one, is not installed.
+        KincheckError: there is none, and python-flint is missing to prove one.
     """
     if all(output.name in case.reference for output in case.outputs):
         return case
@@ -128,12 +126,13 @@ def with_truth(case: Case, tol: float) -> Case:
 
 
 def efforts_of(engine: Engine) -> Mapping[str, Engine]:
-    """The engine at all its efforts; one that has none to choose is taken as it comes."""
+    """Return the engine at all its efforts; an engine without efforts alone."""
     return engine.efforts() if isinstance(engine, Measurable) else {"as it comes": engine}
 
 
 def contestants(case: Case, engines: Mapping[str, Engine], tol: float) -> list[Contestant]:
-    """An engine at several efforts, each having solved the case; one alone where it cannot.
+    """Return an engine at several efforts, each after a solve of the case; one alone if it cannot
+    solve it.
 
     Args:
         case: with its truth.
@@ -185,7 +184,7 @@ def _entry(case: Case, record: Record, setting: str) -> Entry:
 
 
 def needed(entries: Sequence[Entry]) -> list[Needed]:
-    """The fastest effort of each engine that meets each required error, on each case."""
+    """Return the fastest sufficient effort of each engine for each required error, on each case."""
     found: list[Needed] = []
     for key in dict.fromkeys((e.case, e.engine, e.mode) for e in entries):
         mine = [e for e in entries if (e.case, e.engine, e.mode) == key]
@@ -223,7 +222,7 @@ def _fastest(mine: Sequence[Entry], required: float) -> Needed:
 
 
 def floors(case: Case, engines: Iterable[Engine]) -> list[FloorOf]:
-    """The floors of those engines that have one on the case."""
+    """Return the floors of the engines on the case."""
     found: list[FloorOf] = []
     for engine in engines:
         if (

@@ -1,5 +1,5 @@
-"""What the first use costs, and memory: each figure is that of a fresh process, the kinds of
-processes taking turns.
+"""Cost of the first use, and memory: each figure is of a fresh process, and the kinds of processes
+take turns.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class Process(msgspec.Struct, frozen=True, kw_only=True):
         seconds: from its start to its end.
         status: exit status of the last: of a run, 1 is a deviation.
         stages: seconds of its parts, for the first use of the native engine.
-        peak_mb: the most memory held [MB]; null where the system does not tell.
+        peak_mb: the largest memory held [MB]; null if the system hides it.
     """
 
     what: str
@@ -76,7 +76,7 @@ class Process(msgspec.Struct, frozen=True, kw_only=True):
 
 @dataclass
 class _Kind:
-    """How to start it, and what was found so far."""
+    """The command of a kind of process, and its findings so far."""
 
     what: str
     code: str

@@ -1,4 +1,4 @@
-"""A ring of loops that cannot be solved one after the other, of any size, whose motion is known."""
+"""A ring of coupled loops of any size with a known motion: no loop can be solved by itself."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ UP: Vector = (0.0, 0.0, 1.0)
 
 
 def pivot(k: int, cranks: int) -> float:
-    """Where the pivot of a crank is along x [m]: out in steps of two, and back between them, so
-    that the last is near the first.
+    """Return the pivot of a crank along x [m]: out in steps of two, and back between them, so the
+    last is near the first.
     """
     return 2.0 * k if 2 * k < cranks else 2.0 * (cranks - k) - 1.0
 
 
 def tip(k: int, cranks: int, turn: float = 0.0) -> Vector:
-    """Where the tip of a crank is when the driver has turned [m]: all turn alike."""
+    """Return the tip of a crank at a turn of the driver [m]: all turn alike."""
     return pivot(k, cranks) + math.sin(LEAN - turn), math.cos(LEAN - turn), 0.0
 
 
@@ -35,7 +35,7 @@ def ring(cranks: int) -> Mechanism:
 
     A plate holds a ball of its crank, and by two pins in grooves along the tips of the cranks
     before and after it. Ball and pins leave one equation between three angles, BEFORE d_k+1 =
-    -AFTER d_k between their differences at design, so that none of the 2 N - 2 loops can be solved
+    -AFTER d_k between their differences at design, so none of the 2 N - 2 loops can be solved
     before the others. There are 12 N - 6 unknowns and as many rows. As the chain of IFToMM's
     benchmark A02, made of parallelograms, it moves in a known way: every crank turns as the first,
     every plate goes round without turning.

@@ -1,5 +1,5 @@
-"""Times that can be compared: contestants take turns in one process, so that what else the machine
-does meets all of them.
+"""Comparable times: contestants take turns in one process, so other load of the machine meets all
+of them.
 """
 
 from __future__ import annotations
@@ -50,10 +50,10 @@ def spread(values: Sequence[float]) -> Spread:
 
 
 def take_turns(contestants: Mapping[Key, Work], rounds: int) -> dict[Key, Spread]:
-    """Seconds of one call of each contestant, over rounds in which every one has its turn.
+    """Return the seconds of one call of each contestant, over rounds with a turn of each.
 
     Each is called before all rounds. Quick work is called once more before each of its turns,
-    untimed: what the contestant before it drove out of the caches is back then, for all alike.
+    untimed: this fills the caches after the contestant before it, for all alike.
     Python's garbage is collected between rounds only.
     """
     calls = {key: _calls(work) for key, work in contestants.items()}

@@ -1,6 +1,4 @@
-"""Cost against the size of large mechanisms: a chain of loops, and a ring where no loop can be
-solved before the others.
-"""
+"""Cost against the size of large mechanisms: a chain of loops, and a ring of coupled loops."""
 
 from __future__ import annotations
 
@@ -62,7 +60,7 @@ def measure(chains: Sequence[int], rings: Sequence[int], rounds: int) -> list[Sc
 
 
 def _far(name: str, n: int) -> str:
-    """The point that is looked at."""
+    """Return the observed point."""
     return "end" if name == "chain" else f"tip{n // 2}"
 
 

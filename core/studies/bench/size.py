@@ -2,7 +2,7 @@
 projection mode.
 
 The loops of the chain are those of IFToMM's benchmark A02, unit cranks and couplers, with a ball
-and a cross at each coupler in place of revolutes, so that no row is redundant. In the ring (see
+and a cross at each coupler in place of revolutes, so no row is redundant. In the ring (see
 `ring`) none can be solved before the others. Every crank turns as the first one does: the truth is
 a closed form.
 """
@@ -50,13 +50,13 @@ CHAIN, RING = "chain of four-bar loops", "ring of cranks"
 
 
 class Size(msgspec.Struct, frozen=True, kw_only=True):
-    """A mechanism of so many loops, or cranks, solved by an engine.
+    """A mechanism of a number of loops, or cranks, solved by an engine.
 
     Attributes:
-        outcome: null where it was not tried, and the message says why.
+        outcome: null if it was not tried, and the message says why.
         error: largest position error of the last crank's end [m]; residual: the engine's own; null
-            where it was not solved.
-        us_per_sample: null where not all samples were reached.
+            if it was not solved.
+        us_per_sample: null unless all samples were reached.
     """
 
     mechanism: str
@@ -73,7 +73,7 @@ class Size(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def chain(loops: int) -> Case:
-    """Cranks at (k, 0) that lean alike, tied by couplers; the first one turns to both sides."""
+    """Return parallel cranks at (k, 0), tied by couplers; the first one turns to both sides."""
     s, c, n, z = math.sin(LEAN), math.cos(LEAN), range(loops), (0.0, 0.0, 1.0)
     cranks = [
         Revolute(f"pivot{k}", "ground", f"crank{k}", (float(k), 0.0, 0.0), z)
@@ -108,7 +108,7 @@ def circle(cranks: int) -> Case:
 
 
 def _turned(mechanism: Mechanism, tip: str, at: float, source: str) -> Case:
-    """The driver turns to both sides; the tip is that of a crank at `at` [m]."""
+    """Return the case of a driver to both sides; the tip is of a crank at `at` [m]."""
     turn = np.linspace(-TURN, TURN, SAMPLES)
     x, y = np.sin(LEAN - turn), np.cos(LEAN - turn)
     why = "a thousand round-offs of a loop, by the number of loops they add up over"
@@ -131,8 +131,8 @@ def _turned(mechanism: Mechanism, tip: str, at: float, source: str) -> Case:
 
 @dataclass(frozen=True)
 class ByComponents:
-    """The native engine, a component of the mechanism after the other, those that are alike by the
-    same code; see `Engine`.
+    """The native engine, a component of the mechanism after the other, similar ones by the same
+    code; see `Engine`.
     """
 
     name = "native, by components"
@@ -140,7 +140,7 @@ class ByComponents:
 
     @property
     def loop(self) -> str:
-        """Where the loop over components and iterations runs."""
+        """The place of the loop over components and iterations."""
         return "compiled" if available() else "python"
 
     @property

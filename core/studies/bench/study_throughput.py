@@ -31,13 +31,13 @@ CALLS = 1000
 
 
 class StudyRate(msgspec.Struct, frozen=True, kw_only=True):
-    """A study on so many threads.
+    """A study on a number of threads.
 
     Attributes:
         us_per_sample: of the whole machine, by sample and variant.
         times: as fast as on one thread, by round; that of one thread is one.
-        peak_times: the same of the peak kernel, which needs no memory: what the machine gives; null
-            where that is not known.
+        peak_times: the same of the peak kernel, which needs no memory: the machine's share; null if
+            unknown.
         unsolved: variants without a solution somewhere.
     """
 
@@ -51,7 +51,7 @@ class StudyRate(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def measure_studies(case: Case, tol: float, rounds: int, peak: Peak | None) -> list[StudyRate]:
-    """Sweep over designs on one thread and on two, in turns; on one only where there is no second
+    """Sweep over designs on one thread and on two, in turns; on one only without a second
     processor.
     """
     variation, jobs = _every_hardpoint(case), range(1, 1 + min(2, os.cpu_count() or 1))
