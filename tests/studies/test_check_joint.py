@@ -83,6 +83,22 @@ def test_an_engine_whose_residual_is_above_the_tolerance_has_not_solved_the_loop
     )
 
 
+def test_an_engine_without_derivatives_passes_with_a_note():
+    native = adapters.engine("native")
+
+    def answer(case):
+        found = native.solve(native.build(case), case, 1e-12)
+        bare = {
+            name: dataclasses.replace(each, velocity=None, acceleration=None)
+            for name, each in found.points.items()
+        }
+        return dataclasses.replace(found, points=bare)
+
+    found = check_joint(Revolute, engines=[Fake("bare", answer=answer)])["loop: bare"]
+    assert found.verdict is Verdict.PASS
+    assert "not judged: velocity: the engine gives none" in found.message
+
+
 # Specimens
 
 

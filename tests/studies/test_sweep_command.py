@@ -317,6 +317,38 @@ def test_a_variant_that_native_passes_by_itself_is_no_contradiction(tmp_path):
     assert (record.outcome, record.message) == ("pass", "")
 
 
+def test_rows_that_the_engine_does_not_give_are_named(tmp_path):
+    """A row of a derivative passes in no engine that has only positions."""
+    case = load("rssr")
+    name = next(iter(case.mechanism.points)).name
+    study = Study(
+        case,
+        vary(tmp_path, case, "one_at_a_time", end={"at": name, "values": [1.0]}),
+        2,
+        0,
+        2,
+        1e-12,
+    )
+    (_, found), *_ = here(
+        [Pair(study.of_variant(0), adapters.engine("native"), 1e-12, timed=False)]
+    )
+    values = [
+        getattr(found.result.outputs[row.output.name], QUANTITIES[row.derivative])
+        for row in study.rows
+    ]
+    bare = {
+        key: replace(each, velocity=None, acceleration=None)
+        for key, each in found.result.outputs.items()
+    }
+    found = replace(found, result=replace(found.result, outputs=bare))
+    derived = [row.name for row in study.rows if row.derivative]
+    record = judged(study, 0, found, np.array(values))
+    assert record.outcome == "pass"
+    assert ("the engine gives none" in record.message) == bool(derived)
+    assert all(each in record.message for each in derived[:3])
+    assert derived
+
+
 WRONG = [
     (["--samples", "0"], "'0' is not a whole number of 1 or more"),
     ([], "monte_carlo draws as many variants as it is told; give --samples"),

@@ -14,7 +14,7 @@ from ...case.joint_probe import alternatives
 from ...harness.compare import describe, deviations, output_series
 from ...harness.engine import Engine
 from ...harness.execution import check
-from ...harness.record import Deviation
+from ...harness.record import Deviation, Outcome
 from ...harness.standard import STANDARD
 from ...harness.verdict import excess
 from ...joints import Joint
@@ -188,11 +188,13 @@ def _compared(name: str, case: Case, found: Trajectory, reference: dict[str, Ser
             message=f"{found.solved.sum()} of {len(found.solved)} samples solved: {found.message}",
         )
     worst: tuple[float, str, str, Deviation] | None = None
+    lacking = ""
     for output in case.outputs:
         standards = [(STANDARD, reference[output.name])]
-        for quantity, deviation in deviations(
-            case, output, output_series(case, output, found), standards
-        ).items():
+        result = deviations(case, output, output_series(case, output, found), standards)
+        if len(result.items()) < output.orders:
+            lacking = f"{Outcome.UNJUDGED.shown}: {result.reason}"
+        for quantity, deviation in result.items():
             figure = deviation.max_abs / deviation.tolerance
             if worst is None or figure > worst[0]:
                 worst = figure, output.name, quantity, deviation
@@ -201,7 +203,7 @@ def _compared(name: str, case: Case, found: Trajectory, reference: dict[str, Ser
         return Finding(name, Verdict.FAIL, message=above)
     figure, output_name, quantity, deviation = worst
     message = (
-        ""
+        lacking
         if figure <= 1.0
         else describe(
             output_name, quantity, deviation, case.sweep.driver, case.sweep.values.tolist()

@@ -14,13 +14,13 @@ import msgspec
 import numpy as np
 
 from ...case.case import Case, Series
-from ...errors import KincheckError, SolveError
+from ...errors import KincheckError, SolveError, shortened
 from ...harness.compare import describe, deviation, pace
 from ...harness.engine import Engine
 from ...harness.execution import Answer, Attempt, Pair, Solver
 from ...harness.record import Outcome
 from ...harness.standard import STANDARD, UNCERTAIN
-from ...harness.verdict import excess, promised
+from ...harness.verdict import NAMED, excess, promised
 from ...kinematics.compiled.request import Request
 from ...kinematics.solver_selection import prepare
 from ...trajectory import QUANTITIES, Array
@@ -31,7 +31,8 @@ class Checked(msgspec.Struct, frozen=True, kw_only=True):
     """A cross-checked variant, with the quantity of the largest deviation in tolerances.
 
     Attributes:
-        message: the deviation, or the reason for no answer; empty where it passes.
+        message: the deviation, the reason for no answer, or the rows without values of the engine;
+            empty if all rows pass.
         ratio: the largest deviation by its tolerance; null where nothing was compared.
     """
 
@@ -130,7 +131,7 @@ def judged(
         return Checked(variant=variant, outcome=result.outcome, message=result.message)
     case = study.of_variant(variant)
     beat = pace(case)
-    lost = ""
+    lost, absent = "", list[str]()
     worst = Checked(
         variant=variant, outcome=Outcome.UNJUDGED, message="no row has values from both"
     )
@@ -142,6 +143,7 @@ def judged(
         series: Series = result.outputs[row.output.name]
         theirs: Array | None = getattr(series, QUANTITIES[row.derivative])
         if theirs is None:
+            absent.append(row.name)
             continue
         # without a value of the sweep nothing is lost: the variant already counts as unsolved
         if count := int((np.isfinite(values) & ~np.isfinite(theirs)).sum()):
@@ -176,6 +178,11 @@ def judged(
     if lost:
         return msgspec.structs.replace(
             worst, outcome=Outcome.FAIL, message="; ".join(filter(None, (lost, worst.message)))
+        )
+    if absent:
+        lack = f"{Outcome.UNJUDGED.shown}: {shortened(absent, NAMED)}: the engine gives none"
+        return msgspec.structs.replace(
+            worst, message="; ".join(filter(None, (worst.message, lack)))
         )
     return worst
 

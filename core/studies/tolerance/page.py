@@ -123,6 +123,7 @@ def headline(results: SweepResults) -> str:
             f"{off} deviate" if off else "none deviates"
         )
         said += f", {results.unjudged} not judged" if results.unjudged else ""
+        said += f"; {results.partly_judged}" if results.partly_judged else ""
     return said
 
 

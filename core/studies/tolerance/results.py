@@ -166,6 +166,12 @@ class SweepResults(msgspec.Struct, frozen=True, kw_only=True):
         """
         return sum(each.outcome is Outcome.UNJUDGED for each in self.checked)
 
+    @property
+    def partly_judged(self) -> str:
+        """The rows not compared in the first passing variant, with the reason; else empty."""
+        passed = (each.message for each in self.checked if each.outcome is Outcome.PASS)
+        return next(filter(None, passed), "")
+
 
 def numbers(values: Array) -> Numbers:
     """Numbers, null for NaN."""
