@@ -1,0 +1,167 @@
+"""kincheck sweep --check: deviations, contradictions, and rows that an engine does not give."""
+
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+from kincheck import adapters
+from kincheck.cases import load
+from kincheck.core.cli.main import main
+from kincheck.core.harness.execution import Pair, here
+from kincheck.core.studies.tolerance.cross_check import judged
+from kincheck.core.studies.tolerance.study import Study
+from kincheck.core.trajectory import QUANTITIES
+
+from ..case.test_vary import HEAD, vary
+from ..support.fakes import Fake
+from .test_sweep_command import POINTS
+
+
+def test_a_deviating_check_makes_status_1_and_its_variant_is_made_again(
+    tmp_path, capsys, monkeypatch
+):
+    file = tmp_path / "hardpoints.json"
+    file.write_text(json.dumps({**HEAD, "mode": "monte_carlo", "hardpoints": POINTS}))
+    native = adapters.engine("native")
+
+    def answer(case):
+        found = native.solve(native.build(case), case, 1e-12)
+        if case.name.endswith(" variant 4 of seed 8"):
+            found.points["wheel_center"].position[7, 1] += 1e-6
+        return found
+
+    liar, known = Fake("native", answer=answer), adapters.engine
+    monkeypatch.setattr(
+        adapters, "engine", lambda name, *mode: liar if name == "native" else known(name, *mode)
+    )
+    command = [
+        "sweep",
+        "mcpherson_strut",
+        "--vary",
+        str(file),
+        "--seed",
+        "8",
+        "--check",
+        "native:1.0",
+    ]
+    assert main([*command, "--samples", "6"]) == 1
+    told = capsys.readouterr().out
+    assert "6 checked with native, 1 deviate" in told
+    assert (
+        "fail: variant 4 (--seed 8 --replay 4): half_track_change: position is off by 1e-06 m at"
+        " sample 7 (stroke = -0.073)" in told
+    )
+    monkeypatch.undo()
+    out = tmp_path / "again"
+    assert main([*command[:-2], "--replay", "4", "--out", str(out)]) == 0
+    (record,) = json.loads((out / "results.json").read_text())["records"]
+    assert (record["case"], record["engine"], record["outcome"]) == (
+        "mcpherson_strut variant 4 of seed 8",
+        "native",
+        "unjudged",
+    )
+    assert (out / "report.html").exists()
+
+
+def test_a_check_contradicts_variants_that_the_sweep_cannot_solve(tmp_path, capsys, monkeypatch):
+    """An engine with values where the motion ends, and one that has not converged."""
+    path = tmp_path / "vary.json"
+    rod = {"at": "joints.rod.length", "half_width": 3500.0}
+    path.write_text(json.dumps({**HEAD, "mode": "monte_carlo", "hardpoints": {"rod": rod}}))
+    native, known = adapters.engine("native"), adapters.engine
+    command = ["sweep", "rssr", "--vary", str(path), "--samples", "30", "--check", "mujoco:1.0"]
+
+    def checked(change):
+        liar = Fake(
+            "mujoco", answer=lambda case: change(native.solve(native.build(case), case, 1e-12))
+        )
+        monkeypatch.setattr(
+            adapters, "engine", lambda name, *mode: liar if name == "mujoco" else known(name, *mode)
+        )
+        monkeypatch.setattr("kincheck.core.cli.sweep._solver", lambda options, engine: here)
+        assert main(command) == 1
+        return capsys.readouterr().out
+
+    def everywhere(found):
+        kept = {
+            name: {each: np.nan_to_num(getattr(m, each)) for each in QUANTITIES}
+            for name, m in found.points.items()
+        }
+        points = {name: replace(m, **kept[name]) for name, m in found.points.items()}
+        return replace(
+            found,
+            points=points,
+            solved=np.ones_like(found.solved),
+            residual=np.nan_to_num(found.residual),
+        )
+
+    assert "fail: variant" not in (told := checked(lambda found: found)), told
+    told = checked(everywhere)
+    ends = (
+        r"values at 132 of 181 samples that native cannot reach; native: cannot be followed beyond"
+        r" crank = 1\.6998182"
+    )
+    assert re.search(r"fail: variant 11 \(.*\): " + ends, told), told
+    told = checked(lambda found: replace(found, residual=1e-3))
+    assert "the residual of samples that the engine calls solved is 0.001" in told
+
+
+def test_a_variant_that_native_passes_by_itself_is_no_contradiction(tmp_path):
+    """Many variants at once do not pass a singular pose that one alone does: the engine has values
+    there, and native too.
+    """
+    case = load("iftomm_n_four_bar")
+    case = replace(
+        case,
+        sweep=replace(case.sweep, values=np.deg2rad(np.array([0.0, 60.0, 90.0, 110.0]))),
+        reference={},
+    )
+    end = {"at": case.mechanism.points[0].name, "values": [1.0]}
+    # the first is the nominal design
+    study = Study(case, vary(tmp_path, case, "one_at_a_time", end=end), 2, 0, 2, 1e-12)
+    (_, found), *_ = here(
+        [Pair(study.of_variant(0), adapters.engine("native"), 1e-12, timed=False)]
+    )
+    assert found.result.solved == 4
+    rows = np.array(
+        [
+            getattr(found.result.outputs[row.output.name], QUANTITIES[row.derivative])
+            for row in study.rows
+        ]
+    )
+    rows[:, 2:] = np.nan  # as many at once leave them
+    record = judged(study, 0, found, rows)
+    assert (record.outcome, record.message) == ("pass", "")
+
+
+def test_rows_that_the_engine_does_not_give_are_named(tmp_path):
+    """A row of a derivative passes in no engine that has only positions."""
+    case = load("rssr")
+    name = next(iter(case.mechanism.points)).name
+    study = Study(
+        case,
+        vary(tmp_path, case, "one_at_a_time", end={"at": name, "values": [1.0]}),
+        2,
+        0,
+        2,
+        1e-12,
+    )
+    (_, found), *_ = here(
+        [Pair(study.of_variant(0), adapters.engine("native"), 1e-12, timed=False)]
+    )
+    values = [
+        getattr(found.result.outputs[row.output.name], QUANTITIES[row.derivative])
+        for row in study.rows
+    ]
+    bare = {
+        key: replace(each, velocity=None, acceleration=None)
+        for key, each in found.result.outputs.items()
+    }
+    found = replace(found, result=replace(found.result, outputs=bare))
+    derived = [row.name for row in study.rows if row.derivative]
+    record = judged(study, 0, found, np.array(values))
+    assert record.outcome == "pass"
+    assert ("the engine gives none" in record.message) == bool(derived)
+    assert all(each in record.message for each in derived[:3])
+    assert derived
