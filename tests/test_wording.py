@@ -1,0 +1,54 @@
+"""Docstrings in plain English: few sentences around "what", "that" and "where"."""
+
+import ast
+import re
+from collections import Counter
+
+from .test_architecture import ROOT, SOURCES
+
+MOST = 12.0
+"""In 1,000 words of docstrings; asv, QCEngine, Optimistix and scikit-fem have 4 to 10."""
+HEAVY = re.compile(r"\b(what|that|where)\b", re.IGNORECASE)
+WORD = re.compile(r"[A-Za-z]+")
+
+PLAIN = (
+    "core/case",
+    "core/harness",
+    "core/joints",
+    "core/kinematics/assembly",
+    "core/kinematics/diagnosis",
+    "core/kinematics/formulation",
+    "core/kinematics/structure",
+    "core/kinematics/verified",
+    "core/mechanism",
+    "core/primitives",
+    "core/program",
+    "core/report",
+    "core/studies/bench",
+    "core/studies/joint_check",
+)
+"""Folders in plain English; the others are to follow, and none may drop out."""
+
+DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+
+
+def shares():
+    """Occurrences in 1,000 words, by folder of core."""
+    words, heavy = Counter(), Counter()
+    for path in SOURCES:
+        tree = ast.parse((ROOT / path).read_text(encoding="utf-8"))
+        for node in ast.walk(tree):
+            text = ast.get_docstring(node) if isinstance(node, DOCUMENTED) else None
+            for folder in {str(each) for each in path.parents} if text else ():
+                words[folder] += len(WORD.findall(text))
+                heavy[folder] += len(HEAVY.findall(text))
+    return {folder: 1000.0 * heavy[folder] / words[folder] for folder in words}
+
+
+def test_heavy_words_are_counted():
+    assert HEAVY.findall("What is told of that, where it is; whatever") == ["What", "that", "where"]
+
+
+def test_docstrings_are_plain():
+    found = shares()
+    assert {folder: found[folder] for folder in PLAIN if found[folder] > MOST} == {}
