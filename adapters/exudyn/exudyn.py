@@ -145,7 +145,6 @@ class ExudynModel:
         self.ground = rows.ground
         kinds = exu.OutputVariableType
         self.rotation = kinds.RotationMatrix
-        self.refusal: type[Exception] = exu.exudynCPP.InternalError
         self.output_types = kinds.Position, kinds.Velocity, kinds.Acceleration
         self.details = {"rows": len(self.target)}
         self.reset()
@@ -184,9 +183,12 @@ class ExudynModel:
             values[row] = 0.0 if self._x_axis(first) @ self._x_axis(second) > 0.0 else np.nan
         try:
             self.solver.ComputeAlgebraicEquations(self.mbs)
-        except self.refusal:
-            # Exudyn stops at a pose that it cannot evaluate, such as a rod without length (a
-            # diverged iteration has one): no residual there either, and a shorter step.
+        except RuntimeError:
+            # Exudyn raises at a pose that it cannot evaluate, such as a rod without length in a
+            # diverged iteration: the walk takes a shorter step. At the design position it is a
+            # fault of the model.
+            if not self.x.any():
+                raise
             return np.full(len(self.kept), np.nan)
         return self.solver.GetSystemResidual()[self.kept] - self.target - values
 
