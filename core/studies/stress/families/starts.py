@@ -4,7 +4,6 @@ or typed digits.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 
@@ -20,26 +19,13 @@ from .loops import Builder
 from .planar import any_plane, flat_plane
 
 LARGEST, DRIVERS = 5, 3
-# The drivers stay within this part of the reach, so that most motions end before a fold.
+# The drivers move by about this part of the reach in a second, so that few motions reach a fold.
 EXCURSION = 0.3
-# Beside a turning point of its sine, a driver's rate at the design says little of its excursion.
+# Below this slope at the design [-], the excursion grows with the square of time.
 TURNING = 0.1
 
-
-def _doubles(x: float) -> float:
-    return x
-
-
-def _typed(x: float) -> float:
-    return float(f"{x:.6g}")
-
-
-DIGITS: Mapping[str, Callable[[float], float]] = {
-    "exact": _doubles,
-    "rounded": _doubles,
-    "typed": _typed,
-}
-"""Digits of the motions' numbers: "exact" motions pass the design value to the last bit."""
+DIGITS = ("exact", "rounded", "typed")
+"""Ways to pass the design value: to the last bit, up to rounding, with numbers of six digits."""
 
 
 class Starts(Family):
@@ -47,17 +33,17 @@ class Starts(Family):
 
     name = "starts"
     about = (
-        "hands whose tip goes round the base, a rack that counts the turns, and random closed"
-        f" mechanisms of 1 to {LARGEST} bodies, 1 to {DRIVERS} drivers; all absolute, on"
-        " sines that pass the design values at time zero: exactly, up to rounding, or as typed with"
-        " six digits; times around zero, after it or before it"
+        "two-link arms whose tip goes round the base, with a rack that counts the turns, and random"
+        f" closed mechanisms of 1 to {LARGEST} bodies; 1 to {DRIVERS} absolute drivers on sines"
+        " that pass the design values at time zero: exactly, up to rounding, or as typed with six"
+        " digits; times around zero, after it or before it"
     )
     samples = 41
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
-        """Return a hand or a closed mechanism, swept over time."""
-        digits = str(rng.choice(list(DIGITS)))
-        make = _hand if rng.random() < 0.5 else _closed
+        """Return an arm or a closed mechanism, swept over time."""
+        digits = str(rng.choice(DIGITS))
+        make = _arm if rng.random() < 0.5 else _closed
         mechanism, motions = make(rng, digits)
         first, last = ((-1.0, 1.0), (0.2, 1.0), (-1.0, -0.2))[int(rng.integers(3))]
         times = np.linspace(first, last, samples)
@@ -84,7 +70,7 @@ def _closed(rng: Rng, digits: str) -> tuple[Mechanism, dict[str, Motion]]:
     }
 
 
-def _hand(rng: Rng, digits: str) -> tuple[Mechanism, dict[str, Motion]]:
+def _arm(rng: Rng, digits: str) -> tuple[Mechanism, dict[str, Motion]]:
     """Return two links whose tip goes round the base once in a second.
 
     A straight way of the drivers from the design to a later sample passes near the base: it ends in
@@ -102,7 +88,7 @@ def _hand(rng: Rng, digits: str) -> tuple[Mechanism, dict[str, Motion]]:
     tip = plane.point((radius * np.cos(angle), radius * np.sin(angle)))
     side = triple(plane.normal)
     mechanism = Mechanism(
-        "hand",
+        "two-link arm",
         [Body("upper"), Body("lower"), Body("rack")],
         [
             Revolute("base", GROUND, "upper", point=plane.point((0.0, 0.0)), axis=side),
@@ -116,10 +102,9 @@ def _hand(rng: Rng, digits: str) -> tuple[Mechanism, dict[str, Motion]]:
         ],
         [RackPinion("turns", ("base", "guide"), 0.1)],
     )
-    keep = DIGITS[digits]
     phases = {"x": angle + np.pi / 2.0, "y": angle}
     return mechanism, {
-        name: _from(mechanism.design_value(name), Sine(keep(radius), 1.0, keep(phase)))
+        name: _motion(mechanism.design_value(name), radius, 1.0, phase, digits)
         for name, phase in phases.items()
     }
 
@@ -139,10 +124,11 @@ def _sine(rng: Rng, design: float, excursion: float, digits: str) -> Motion:
     slope, part = abs(float(np.cos(phase))), excursion / abs(amplitude)
     turn = part / slope if slope > TURNING else np.sqrt(2.0 * part)
     frequency = min(float(turn), 1.0) * float(rng.uniform(0.3, 1.0)) / (2.0 * np.pi)
-    keep = DIGITS[digits]
-    return _from(design, Sine(keep(float(amplitude)), keep(frequency), keep(phase)))
+    return _motion(design, float(amplitude), frequency, phase, digits)
 
 
-def _from(design: float, motion: Motion) -> Motion:
-    """Return a motion of absolute values, as a case file reads it."""
-    return Absolute(motion, design) if design else motion
+def _motion(design: float, amplitude: float, frequency: float, phase: float, digits: str) -> Motion:
+    """Return a sine of absolute values, as a case file reads it."""
+    numbers = amplitude, frequency, phase
+    sine = Sine(*(float(f"{x:.6g}") for x in numbers) if digits == "typed" else numbers)
+    return Absolute(sine, design) if design else sine
