@@ -140,7 +140,7 @@ class Primitive(ABC):
     """
 
     def __init_subclass__(cls) -> None:
-        """Inherit no forms in other styles: those of a base class are not those of other rows."""
+        """Reset the forms in other styles: a base class's do not fit a subclass's own rows."""
         super().__init_subclass__()
         for form in ("paper_form", "conventional_form"):
             if form not in vars(cls):

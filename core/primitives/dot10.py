@@ -80,13 +80,8 @@ class PaperDot10(Dot10):
         return (self.a @ (cross(cross(vi.w, Om), b) - cross(Om, cross(Om, b))),)
 
 
-class ConventionalDot10(Dot10):
-    """a . A_ij b = c by full products."""
-
-    body_axes = True
-
-    def phi(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
-        return (self.a @ (relative(i, j) @ self.b) - self.a @ self.b,)
+class ConventionalDot10(PaperDot10):
+    """The paper's residual (8), with rows by full products."""
 
     def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
         A_ij = relative(i, j)
