@@ -79,7 +79,7 @@ class ThreadCache(local):
         """Return what this thread made under the key, or make it now."""
         found = self._found
         value = found.pop(key) if key in found else make()
-        found[key] = value  # # last in order: used most recently
+        found[key] = value  # the last one in order is the one used most recently
         if len(found) > KEYS:
             del found[next(iter(found))]
         return value

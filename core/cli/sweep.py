@@ -136,8 +136,9 @@ def _only(case: Case, names: list[str], problems: list[str]) -> Case:
 
 
 def _solver(options: argparse.Namespace, engine: Engine) -> Solver:
-    """Return the solver of checked variants: worker processes, except for an engine
-    that may run here."""
+    """Return the solver of checked variants: this process for an engine without foreign code, else
+    worker processes.
+    """
     from ..harness.engine import may_run_here
     from ..harness.execution import here
     from ..harness.resource_limits import Limits, default_jobs

@@ -24,9 +24,8 @@ class Engine(Protocol):
         loop: place of the loop over samples and iterations: "python", "simulator" or "compiled".
         settings: printed by the report, so that a reader can repeat the run.
 
-    Two attributes are optional, False unless given. `in_process`: the engine loads no foreign code
-    (`may_run_here`). `bounds_error`: it bounds the effect of a residual on a pose by itself
-    (`bounds_error`).
+    Two attributes are optional, and False unless given: `in_process` states that the engine loads
+    no foreign code; `bounds_error` states that it bounds the error of each pose by itself.
     """
 
     @property
@@ -67,15 +66,15 @@ class Engine(Protocol):
 
 
 def may_run_here(engine: Engine) -> bool:
-    """Return whether an engine may run in this process; an engine that does not say so by its
-    attribute `in_process` is isolated in a process of its own.
+    """Return whether an engine may run in this process, by its attribute `in_process`; all others
+    run in processes of their own.
     """
     return bool(getattr(engine, "in_process", False))
 
 
 def bounds_error(engine: Engine) -> bool:
-    """Return whether an engine itself bounds the effect of a residual on a pose; the residuals of
-    all others are held against the tolerance.
+    """Return whether an engine bounds the error of each pose by itself, by its attribute
+    `bounds_error`; the residuals of all others are held against the tolerance.
     """
     return bool(getattr(engine, "bounds_error", False))
 

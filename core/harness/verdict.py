@@ -153,7 +153,8 @@ def _reached_elsewhere(case: Case, answer: Answer, native: Standard) -> str:
 def promised(engine: Engine, tol: float) -> float:
     """Return the largest residual promised for solved samples, relative to the size.
 
-    A simulation accepts according to its own settings, and only its outputs are judged.
+    Infinite for two kinds of engines, whose outputs alone are judged: a simulation accepts by its
+    own settings, and an engine that bounds the error of a pose needs no bound of the residual.
     """
     return tol if engine.mode == "projection" and not bounds_error(engine) else math.inf
 

@@ -31,8 +31,8 @@ From a plan to machine code:
 - `llvm.jit`: choose cached code, interpretation or compilation for a plan.
 
 A mechanism's program is described once, in `core.kinematics.compiled`: `Tracing` names the slots of
-its lanes, `Model` makes its `Plan`, and an executor binds the plan to lanes. `core.caches` keeps
-recent models for the process, and bound lanes for each thread.
+its lanes and holds its `Plan`, `Model` makes code of the plan, and an executor binds it to lanes.
+`core.caches` keeps recent models for the process, and bound lanes for each thread.
 
 Beside these, `static_lu` and `linker` write a sparse LU factorisation and many copies of a program
 as one interpreter table. `memory` aligns arrays to cache lines.

@@ -43,7 +43,7 @@ class Moved:
 
     @classmethod
     def of(cls, name: str, driver: Mapping[str, Any], values: list[float]) -> Moved:
-        """Return a driver with its known facts, its type above all, and its values."""
+        """Return a driver in the display unit of its type, with its values."""
         unit, scale = DISPLAY.get(_DRIVER_UNITS.get(driver.get("type", ""), ""), ("", 1.0))
         return cls(name.replace("_", " "), unit, scale, values)
 

@@ -170,8 +170,8 @@ def conditioning(
 def _held(
     mechanism: Mechanism, elsewhere: Mechanism, drives: Mapping[str, Drive], frame: Frames
 ) -> dict[str, Drive]:
-    """Return the drives with constant values under a change of geometry: an absolute one changes
-    against the moving design.
+    """Return drives that hold the drivers' values in another geometry. Drives count from the
+    design, so an absolute driver's drive changes by the move of its design value.
     """
     shift = {
         name: (elsewhere.design_value(name) - mechanism.design_value(name)) * (1.0 / frame.unit)

@@ -29,7 +29,7 @@ def first_use(clock: Sequence[float]) -> None:
     """Build and solve the pickled case on standard input; print the seconds of all stages as a line
     of JSON.
 
-    The last stage solves the case again by `solve`.
+    The last stage asks for the same case again, as repeated calls of `solve` do.
 
     Args:
         clock: times of the start of the process, the import of numpy and the import of the solver.

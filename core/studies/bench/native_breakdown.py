@@ -10,6 +10,7 @@ from typing import Any
 
 from ...case.case import Case
 from ...errors import SolveError
+from ...harness.standard import STANDARD
 from ...kinematics.compiled import acceptance
 from ...kinematics.compiled.compiled_model import Model, compile_model
 from ...kinematics.compiled.request import Request
@@ -39,7 +40,7 @@ class Level:
     order: int = 2
     bodies: bool = True
     compiled: bool = True
-    name = "native"
+    name = STANDARD
     mode = "projection"
     in_process = True
     bounds_error = True

@@ -108,7 +108,7 @@ def circle(cranks: int) -> Case:
 
 
 def _turned(mechanism: Mechanism, tip: str, at: float, source: str) -> Case:
-    """Return the case of a driver to both sides; the tip is of a crank at `at` [m]."""
+    """Return a case whose driver turns to both sides; the tip's crank has its pivot at `at` [m]."""
     turn = np.linspace(-TURN, TURN, SAMPLES)
     x, y = np.sin(LEAN - turn), np.cos(LEAN - turn)
     why = "a thousand round-offs of a loop, by the number of loops they add up over"
