@@ -91,6 +91,7 @@ class MuJoCoModel:
     """
 
     def __init__(self, mj: Any, case: Case) -> None:
+        self.case = case
         mechanism, sketch = case.mechanism, Sketch(mj, case.mechanism)
         sites = {
             point.name: sketch.site(sketch.bodies[point.body], point.position)

@@ -100,6 +100,7 @@ class PinocchioModel:
     """
 
     def __init__(self, pin: Any, case: Case) -> None:
+        self.case = case
         mechanism, tree = case.mechanism, spanning_tree(case.mechanism)
         self.pin, self.model, self.axes = pin, pin.Model(), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         self.carrier = {

@@ -9,11 +9,12 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 from ...core.case.case import Case
+from ...core.errors import SolveError
 from ...core.harness.engine import Floor
 from ...core.joints import Joint
 from ...core.mechanism.drivers import JointAngle, JointDisplacement, PointCoordinate
 from ...core.trajectory import Trajectory
-from .length_scaling import own_frame
+from .length_scaling import in_own_frame, own_frame
 from .projection import EFFORTS, solve_by_projection, without_counterpart
 from .projection_model import ProjectionModel
 
@@ -76,7 +77,20 @@ class ProjectionEngine(ABC):
         """Return the simulator's model of the case in its own frame, at the design position."""
 
     def solve(self, model: ProjectionModel, case: Case, tol: float) -> Trajectory:
-        """Solve all samples; see `Engine.solve`."""
+        """Solve all samples; see `Engine.solve`.
+
+        Raises:
+            SolveError: the model was made of another mechanism, of other points, or of a sweep so
+                much longer or shorter that its unit of length differs.
+        """
+        own = in_own_frame(case)
+        # The model has no names: numbers of another mechanism would be taken for those of this one.
+        if (own.mechanism, own.points) != (model.case.mechanism, model.case.points):
+            raise SolveError(
+                f"case {case.name!r}: this model of {self.title} was built for another mechanism,"
+                f" other points or another length of the sweep (case {model.case.name!r}); build a"
+                " model for this case"
+            )
         return solve_by_projection(
             model, case, tol, model.details, self.corrections, own_frame(case)
         )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
+from ...core.case.case import Case
 from ...core.trajectory import Array
 
 
@@ -16,8 +17,12 @@ class ProjectionModel(Protocol):
     the current configuration. `residual` updates the data of the other methods.
 
     Attributes:
+        case: the case that the model was made of, in the frame of the model.
         details: facts for the record.
     """
+
+    @property
+    def case(self) -> Case: ...
 
     @property
     def details(self) -> Mapping[str, Any]: ...

@@ -19,8 +19,8 @@ pytest.importorskip("exudyn")
 
 TOL = 1e-12
 # Positions are held to 1e-14: round-off 1e-16 times the condition of these mechanisms, about 25.
-# Velocities have ten times that; accelerations rest on differences of the Jacobian (see DIFFERENCE)
-# and have 1e-12 times the speed squared.
+# Velocities have ten times that; accelerations rest on differences of the Jacobian (see
+# DIFFERENCES) and have 1e-12 times the speed squared.
 FULL_TURN = np.linspace(0.0, 2.0 * np.pi, 73)
 
 
@@ -345,6 +345,25 @@ def test_fixed_joint_and_a_driver_that_holds(reverse, point):
 def test_rod_of_another_length_than_at_design():
     end = solved(strut([-0.01, 0.0, 0.01], rod_length=0.31))["rod_end"].position
     assert np.abs(np.linalg.norm(end - ROD[1], axis=1) - 0.31).max() <= 1e-14
+
+
+def test_a_short_rod_takes_shorter_differences():
+    """A slide x drives a slide y by a rod of 4 mm: y y = L L - x x, in a mechanism of one metre.
+
+    The rod turns by a quarter while the slides go 3 mm, so differences over 1 mm are off by 1e-6.
+    """
+    length, x = 0.004, np.linspace(0.0, 0.0035, 8)
+    joints = [
+        Translational("a", "ground", "first", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
+        Translational("b", "ground", "second", (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
+        Distance("rod", "first", "second", ((0.0, 0.0, 0.0), (0.0, length, 0.0))),
+    ]
+    driver = PointCoordinate("x", "start", (1.0, 0.0, 0.0))
+    points = {"start": ("first", (0.0, 0.0, 0.0)), "end": ("second", (0.0, length, 0.0))}
+    end = solved(case_of(["first", "second"], joints, points, [driver], x))["end"]
+    y = np.sqrt(length**2 - x**2)
+    expected = -1.0 / y - x**2 / y**3
+    assert np.abs(end.acceleration[:, 1] / expected - 1.0).max() <= 1e-10
 
 
 def test_a_pose_that_exudyn_refuses_is_no_crash():

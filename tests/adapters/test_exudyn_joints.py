@@ -61,7 +61,7 @@ def compare(mechanism, driver, values, motions=None):
     """Exudyn against the native engine: both hold their residuals to 1e-12, and the smallest pivot
     of these loops is 0.06.
 
-    Accelerations rest on differences of the Jacobian besides (see DIFFERENCE of the adapter), of
+    Accelerations rest on differences of the Jacobian besides (see DIFFERENCES of the adapter), of
     the same size at these speeds.
     """
     truth = solve(mechanism, driver, values, motions=motions)

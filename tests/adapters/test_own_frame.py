@@ -20,6 +20,7 @@ from kincheck.core import (
     Screw,
     Translational,
 )
+from kincheck.core.errors import SolveError
 from kincheck.core.joints import Kind
 
 from ..kinematics.test_equivalence import case_of, motion
@@ -131,3 +132,22 @@ def test_a_mechanism_in_its_own_frame_is_as_large_as_one_and_there():
     np.testing.assert_array_equal(
         frame.back(np.array(frame.there((1.0, 2.0, 3.0)))), (1.0, 2.0, 3.0)
     )
+
+
+@pytest.mark.parametrize("engine", ["mujoco", "pinocchio", "exudyn"])
+def test_a_model_of_another_mechanism_is_refused(engine):
+    """The numbers of a model have no names: those of another length of the sweep were wrong."""
+    chosen = adapters.engine(engine)
+    if not chosen.version():
+        pytest.skip(f"{engine} is not installed")
+    case = case_of(moved(mcpherson(), 1.0), STROKES)
+    model = chosen.build(case)
+    shorter = case_of(moved(mcpherson(), 1.0), STROKES[::2])
+    assert chosen.solve(model, shorter, 1e-12).solved.all()
+    for other in (
+        case_of(moved(mcpherson(), 1.0), 1e3 * STROKES),
+        case_of(moved(mcpherson(), 3.0), STROKES),
+        case_of(moved(jack(), 1.0), TURNS),
+    ):
+        with pytest.raises(SolveError, match="build a model for this case"):
+            chosen.solve(model, other, 1e-12)
