@@ -7,61 +7,26 @@ hardpoints.
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, TypeAlias
+from typing import Any
 
 from ..errors import MechanismError, Phrase, unknown
-from ..input_checks import held, require_finite, triple
+from ..input_checks import require_finite, triple
 from ..joints.base import Joint, Kind, unit
 from ..joints.coupler import Coupler
 from ..joints.gap import gap
+from .body import Body, Vector
 from .drivers import Driver, JointDriver, PointCoordinate
+from .loads import ForceElement, TorsionSpringDamper
 
 GROUND = "ground"
 """The name of the global frame; it can be used like a body and needs no declaration."""
 
-Vector: TypeAlias = tuple[float, float, float]
 # # Largest gap of a joint between fixed bodies [m]: the tightest default tolerance of any output.
 HOLDS = 1e-9
-FOUR_NUMBERS = "four numbers, e0 first"
-
-
-@dataclass(frozen=True, slots=True)
-class Body:
-    """A rigid body and its reference frame at the design position.
-
-    Attributes:
-        origin: reference point, global [m].
-        euler_parameters: e0..e3 of the rotation body -> global [-]; normalised to length one.
-        fixed: the body is part of the ground; it costs nothing and can carry joints.
-    """
-
-    name: str
-    origin: Vector = (0.0, 0.0, 0.0)
-    euler_parameters: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
-    fixed: bool = False
-
-    def __post_init__(self) -> None:
-        who = f"body {self.name!r}: origin"
-        object.__setattr__(self, "origin", triple(who, self.origin, Kind.POSITION.value))
-        require_finite(who, self.origin, Kind.POSITION.value)
-        p = held(
-            who := f"body {self.name!r}: euler_parameters", self.euler_parameters, 4, FOUR_NUMBERS
-        )
-        require_finite(who, p, FOUR_NUMBERS)
-        length = math.sqrt(sum(e * e for e in p))
-        # Tables print Euler parameters to about four digits: a longer defect is a mistake, a
-        # shorter one rounding.
-        if not abs(length - 1.0) < 1e-3:
-            raise MechanismError(
-                f"body {self.name!r}: euler_parameters {[*p]} have length {length:.6g}, expected"
-                " four numbers of length 1; e0 = sqrt(1 - e1^2 - e2^2 - e3^2)"
-            )
-        object.__setattr__(self, "euler_parameters", tuple(e / length for e in p))
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,11 +45,13 @@ class Point:
 
 @dataclass(frozen=True)
 class Mechanism:
-    """A named set of bodies, joints, points and drivers.
+    """A named set of bodies, joints, points, drivers and loads.
 
     Attributes:
         grounded: joints between two fixed bodies, as in CAD exports. They are removed from
             `joints`: they hold in any motion, and no engine has rows for them.
+        gravity: acceleration of free fall, global axes [m/s^2].
+        forces: force elements.
 
     Raises:
         MechanismError: a name is used twice or does not exist, or a joint between fixed bodies does
@@ -98,10 +65,12 @@ class Mechanism:
     drivers: Sequence[Driver] = field(default=())
     couplers: Sequence[Coupler] = field(default=())
     grounded: Sequence[Joint] = field(default=())
+    gravity: Vector = (0.0, 0.0, 0.0)
+    forces: Sequence[ForceElement] = field(default=())
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "joints", (*self.joints, *self.grounded))
-        for what in ("bodies", "joints", "points", "drivers", "couplers"):
+        for what in ("bodies", "joints", "points", "drivers", "couplers", "forces"):
             object.__setattr__(self, what, tuple(getattr(self, what)))
             _unique(what, [each.name for each in getattr(self, what)])
         if any(body.name == GROUND for body in self.bodies):
@@ -152,6 +121,20 @@ class Mechanism:
                 key = f"drivers.{driver.name}.joint"
                 _known(f"driver {driver.name!r}", "joint", driver.joint, self._named["joints"], key)
                 driver.check(self.joint(driver.joint))
+        self._check_loads(known)
+
+    def _check_loads(self, bodies: Mapping[str, None]) -> None:
+        what = "gravity"
+        object.__setattr__(self, what, triple(what, self.gravity, "three numbers [m/s^2]"))
+        require_finite(what, self.gravity, "three numbers [m/s^2]")
+        for force in self.forces:
+            key = f"forces.{force.name}"
+            if isinstance(force, TorsionSpringDamper):
+                _known(str(force), "joint", force.joint, self._named["joints"], f"{key}.joint")
+                force.check(self.joint(force.joint))
+                continue
+            for name in force.bodies:
+                _known(str(force), "body", name, bodies, key)
 
     def _leave_out_grounded(self) -> None:
         """Separate the joints between fixed bodies from all others."""
@@ -210,6 +193,15 @@ class Mechanism:
         """Return the driver of this name."""
         return self._named["drivers"][name]
 
+    def force(self, name: str) -> ForceElement:
+        """Return the force element of this name."""
+        return self._named["forces"][name]
+
+    @property
+    def has_loads(self) -> bool:
+        """Whether a body has mass or a force element acts: otherwise all forces are zero."""
+        return bool(self.forces) or any(body.mass > 0.0 for body in self.moving)
+
     def design_value(self, name: str) -> float:
         """Return the value of a driver at the design position: the coordinate of its point [m] if
         absolute, else zero.
@@ -235,6 +227,7 @@ class Mechanism:
             "joints": (*self.joints, *self.grounded),
             "points": self.points,
             "drivers": self.drivers,
+            "forces": self.forces,
         }
         return {what: {each.name: each for each in found} for what, found in all_of.items()}
 

@@ -1,0 +1,128 @@
+"""Bodies: a frame at the design position, mass and inertia, as data."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from ..errors import MechanismError
+from ..input_checks import finite, held, plain, require_finite, triple
+from ..joints.base import Kind
+from ..trajectory import Array
+
+Vector: TypeAlias = tuple[float, float, float]
+FOUR_NUMBERS = "four numbers, e0 first"
+Inertia: TypeAlias = tuple[float, float, float, float, float, float]
+"""Ixx, Iyy, Izz, Ixy, Iyz, Ixz about the centre of mass: entries of the matrix [kg m^2]."""
+SIX_NUMBERS = "six numbers [Ixx, Iyy, Izz, Ixy, Iyz, Ixz]"
+# Tables print inertia with about six digits: principal moments may break a rule by that much.
+DIGITS = 1e-6
+
+
+def inertia_matrix(inertia: Inertia) -> Array:
+    """Return the matrix of six entries, shape (3, 3)."""
+    xx, yy, zz, xy, yz, xz = inertia
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], dtype=np.float64)
+
+
+def checked_mass(who: str, mass: Any) -> float:
+    """Return a mass [kg].
+
+    Raises:
+        MechanismError: it is negative or not finite.
+    """
+    mass = plain(mass)
+    if not finite(mass) or mass < 0.0:
+        raise MechanismError(f"{who}: mass is {mass!r}, expected a number of kg, zero or more")
+    return float(mass)
+
+
+def checked_inertia(who: str, inertia: Any) -> Inertia:
+    """Return the inertia about the centre of mass [kg m^2].
+
+    Raises:
+        MechanismError: no rigid body has it: a principal moment is not positive, or larger than the
+            sum of the two others.
+    """
+    what = f"{who}: inertia"
+    numbers = held(what, inertia, 6, SIX_NUMBERS)
+    require_finite(what, numbers, SIX_NUMBERS)
+    found: Inertia = tuple(float(x) for x in numbers)  # pyright: ignore[reportAssignmentType]
+    least, middle, most = (float(x) for x in np.linalg.eigvalsh(inertia_matrix(found)))
+    principal = f"its principal moments are {least:.6g}, {middle:.6g} and {most:.6g} kg m^2"
+    if not least > 0.0:
+        raise MechanismError(
+            f"{what} {[*found]} is not positive definite: {principal}, expected positive ones;"
+            " check signs and the order [Ixx, Iyy, Izz, Ixy, Iyz, Ixz], or leave inertia out for a"
+            " point mass"
+        )
+    if most > (least + middle) * (1.0 + DIGITS):
+        raise MechanismError(
+            f"{what} {[*found]} breaks the triangle inequality: {principal}, and no rigid body has"
+            " one larger than the sum of the two others; check the entries and their unit"
+        )
+    return found
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """A rigid body and its reference frame at the design position.
+
+    Attributes:
+        origin: reference point, global [m].
+        euler_parameters: e0..e3 of the rotation body -> global [-]; normalised to length one.
+        fixed: the body is part of the ground; it costs nothing and can carry joints.
+        mass: [kg]; forces need it, motion does not.
+        center_of_mass: global [m]; the origin unless given.
+        inertia: about the centre of mass, global axes [kg m^2]; that of a point mass unless given.
+
+    Raises:
+        MechanismError: a shape is wrong, a number is not finite, or no rigid body has that mass or
+            inertia.
+    """
+
+    name: str
+    origin: Vector = (0.0, 0.0, 0.0)
+    euler_parameters: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+    fixed: bool = False
+    mass: float = 0.0
+    center_of_mass: Vector | None = None
+    inertia: Inertia | None = None
+
+    def __post_init__(self) -> None:
+        who = f"body {self.name!r}: origin"
+        object.__setattr__(self, "origin", triple(who, self.origin, Kind.POSITION.value))
+        require_finite(who, self.origin, Kind.POSITION.value)
+        p = held(
+            who := f"body {self.name!r}: euler_parameters", self.euler_parameters, 4, FOUR_NUMBERS
+        )
+        require_finite(who, p, FOUR_NUMBERS)
+        length = math.sqrt(sum(e * e for e in p))
+        # Tables print Euler parameters to about four digits: a longer defect is a mistake, a
+        # shorter one rounding.
+        if not abs(length - 1.0) < 1e-3:
+            raise MechanismError(
+                f"body {self.name!r}: euler_parameters {[*p]} have length {length:.6g}, expected"
+                " four numbers of length 1; e0 = sqrt(1 - e1^2 - e2^2 - e3^2)"
+            )
+        object.__setattr__(self, "euler_parameters", tuple(e / length for e in p))
+        if self.mass != 0.0 or self.center_of_mass is not None or self.inertia is not None:
+            self._check_mass()
+
+    def _check_mass(self) -> None:
+        who = f"body {self.name!r}"
+        object.__setattr__(self, "mass", checked_mass(who, self.mass))
+        center = self.origin if self.center_of_mass is None else self.center_of_mass
+        what = f"{who}: center_of_mass"
+        object.__setattr__(self, "center_of_mass", triple(what, center, Kind.POSITION.value))
+        require_finite(what, self.center_of_mass or (), Kind.POSITION.value)
+        if self.inertia is None:
+            return
+        object.__setattr__(self, "inertia", checked_inertia(who, self.inertia))
+        if self.mass == 0.0:
+            raise MechanismError(
+                f"{who}: has an inertia, but no mass; give mass, or leave inertia out"
+            )

@@ -1,0 +1,131 @@
+"""Masses, inertia and force elements as descriptions: what is refused, and with which words."""
+
+import numpy as np
+import pytest
+from kincheck.core.errors import MechanismError
+from kincheck.core.joints import Revolute, Spherical
+from kincheck.core.mechanism.body import Body, inertia_matrix
+from kincheck.core.mechanism.loads import (
+    ELEMENTS,
+    Axes,
+    Force,
+    SpringDamper,
+    Torque,
+    TorsionSpringDamper,
+)
+from kincheck.core.mechanism.mechanism import Mechanism
+
+BALL = (2.0, 2.0, 2.0, 0.0, 0.0, 0.0)
+APART = ((0.0, 0.0, 0.0), (0.0, 3.0, 4.0))
+
+
+def test_a_body_without_mass_is_as_before():
+    assert Body("a") == Body("a", (0.0, 0.0, 0.0), mass=0.0)
+    assert Body("a").center_of_mass is None
+    assert not Mechanism("m", [Body("a")], []).has_loads
+
+
+def test_a_mass_stands_at_the_origin_unless_told_otherwise():
+    body = Body("a", origin=(1.0, 2.0, 3.0), mass=2)
+    assert (body.mass, body.center_of_mass, body.inertia) == (2.0, (1.0, 2.0, 3.0), None)
+    assert Mechanism("m", [body], []).has_loads
+
+
+def test_the_six_numbers_are_entries_of_the_matrix():
+    matrix = inertia_matrix((4.0, 5.0, 6.0, 0.1, 0.2, 0.3))
+    np.testing.assert_array_equal(matrix, [[4.0, 0.1, 0.3], [0.1, 5.0, 0.2], [0.3, 0.2, 6.0]])
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"mass": -1.0}, "mass is -1.0, expected a number of kg, zero or more"),
+        ({"mass": float("nan")}, "mass is nan"),
+        ({"mass": "1"}, "mass is '1'"),
+        ({"mass": 1.0, "center_of_mass": (0.0, 0.0)}, "center_of_mass"),
+        ({"mass": 1.0, "center_of_mass": (0.0, 0.0, float("inf"))}, "is not finite"),
+        ({"mass": 1.0, "inertia": (1.0, 1.0, 1.0)}, "Ixx, Iyy, Izz, Ixy, Iyz, Ixz"),
+        ({"mass": 1.0, "inertia": (1.0, 1.0, -1.0, 0.0, 0.0, 0.0)}, "not positive definite"),
+        # each diagonal entry is positive; the matrix is not
+        ({"mass": 1.0, "inertia": (1.0, 1.0, 1.0, 1.2, 0.0, 0.0)}, "not positive definite"),
+        ({"mass": 1.0, "inertia": (1.0, 1.0, 0.0, 0.0, 0.0, 0.0)}, "leave inertia out for a point"),
+        ({"mass": 1.0, "inertia": (1.0, 1.0, 2.1, 0.0, 0.0, 0.0)}, "triangle inequality"),
+        ({"inertia": BALL}, "has an inertia, but no mass"),
+    ],
+)
+def test_impossible_masses_are_refused(values, message):
+    with pytest.raises(MechanismError, match="body 'a'.*") as caught:
+        Body("a", **values)
+    assert message in str(caught.value)
+
+
+def test_a_flat_plate_printed_with_six_digits_is_accepted():
+    assert Body("plate", mass=1.0, inertia=(0.333333, 0.333333, 0.666667, 0.0, 0.0, 0.0)).inertia
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (
+            lambda: SpringDamper("s", "a", "b", ((1.0, 0.0, 0.0), (1.0, 0.0, 0.0)), 1.0),
+            "its points coincide at [1.0, 0.0, 0.0]",
+        ),
+        (lambda: SpringDamper("s", "a", "a", APART, 1.0), "needs two different bodies"),
+        (lambda: SpringDamper("s", "a", "b", APART, -1.0), "stiffness is -1.0"),
+        (lambda: SpringDamper("s", "a", "b", APART, 1.0, damping=-2.0), "damping is -2.0"),
+        (lambda: SpringDamper("s", "a", "b", APART, 1.0, 0.0, -1.0), "free_length is -1.0"),
+        (lambda: TorsionSpringDamper("s", "hinge", float("inf")), "stiffness is inf"),
+        (lambda: Force("s", "a", (0.0, 0.0, 0.0), (1.0, 0.0)), "a force [x, y, z]"),
+        (lambda: Force("s", "a", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), "local"), "frame is 'local'"),
+        (lambda: Torque("s", "a", (float("nan"), 0.0, 0.0)), "is not finite"),
+    ],
+)
+def test_impossible_elements_are_refused(make, message):
+    with pytest.raises(MechanismError, match="force 's'") as caught:
+        make()
+    assert message in str(caught.value)
+
+
+def test_a_spring_is_free_at_design_unless_told_otherwise():
+    assert SpringDamper("s", "a", "b", APART, 1.0).free_length == 5.0
+    assert SpringDamper("s", "a", "b", APART, 1.0, free_length=0.0).free_length == 0.0
+
+
+def test_names_of_elements_are_checked_in_the_mechanism():
+    hinge = Revolute("hinge", "ground", "a", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    ball = Spherical("ball", "ground", "b", (0.0, 0.0, 0.0))
+    bodies = [Body("a"), Body("b")]
+
+    def with_force(*forces):
+        return Mechanism("m", bodies, [hinge, ball], forces=forces)
+
+    good = with_force(
+        SpringDamper("spring", "ground", "a", APART, 1.0),
+        TorsionSpringDamper("torsion", "hinge", 1.0),
+        Force("push", "a", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), "body"),
+    )
+    assert good.has_loads
+    assert good.force("push").frame is Axes.BODY
+    for force, message in (
+        (SpringDamper("s", "ground", "c", APART, 1.0), "there is no body 'c'"),
+        (Torque("s", "c", (1.0, 0.0, 0.0)), "there is no body 'c'"),
+        (TorsionSpringDamper("s", "hing", 1.0), "did you mean 'hinge'"),
+        (TorsionSpringDamper("s", "ball", 1.0), "has no rotation"),
+    ):
+        with pytest.raises(MechanismError) as caught:
+            with_force(force)
+        assert message in str(caught.value)
+        assert caught.value.key.startswith("forces.s")
+    with pytest.raises(MechanismError, match="used more than once"):
+        with_force(Torque("s", "a", (1.0, 0.0, 0.0)), Torque("s", "a", (1.0, 0.0, 0.0)))
+
+
+def test_gravity_is_three_finite_numbers():
+    assert Mechanism("m", [Body("a")], [], gravity=[0, 0, -9.81]).gravity == (0, 0, -9.81)
+    for bad in ((0.0, -9.81), (0.0, 0.0, float("nan"))):
+        with pytest.raises(MechanismError, match="gravity"):
+            Mechanism("m", [Body("a")], [], gravity=bad)
+
+
+def test_elements_have_the_names_of_case_files():
+    assert sorted(ELEMENTS) == ["force", "spring_damper", "torque", "torsion_spring_damper"]
