@@ -54,7 +54,7 @@ def test_the_six_numbers_are_entries_of_the_matrix():
     ],
 )
 def test_impossible_masses_are_refused(values, message):
-    with pytest.raises(MechanismError, match="body 'a'.*") as caught:
+    with pytest.raises(MechanismError, match="body 'a'") as caught:
         Body("a", **values)
     assert message in str(caught.value)
 
