@@ -284,7 +284,11 @@ OFFENDERS = [
     (imports_against_the_table, "core/history/new.py", "from ..report import table"),
     (imports_against_the_table, "core/extra/new.py", "from ..algebra import Vec3"),
     (imports_against_the_table, "core/mechanism/new.py", "from kincheck.core.joints import Joint"),
-    (imports_against_the_table, "adapters/mujoco/new.py", "from ..pinocchio.rows import Rows"),
+    (
+        imports_against_the_table,
+        "adapters/mujoco/new.py",
+        "from ..pinocchio.dynamics import Dynamics",
+    ),
     (imports_against_the_table, "adapters/shared/new.py", "from ..mujoco.spec import Sketch"),
     (imports_against_the_table, "adapters/mujoco/new.py", "from ...cases import load"),
     (imports_against_the_table, "cases/rssr.py", "from ..adapters import engine"),
