@@ -29,11 +29,7 @@ if TYPE_CHECKING:
         Translational,
         Universal,
     )
-    from .kinematics.assembly.assemble import assemble
-    from .kinematics.assembly.assembly_modes import find_assemblies
-    from .kinematics.continuation.trace import trace
-    from .kinematics.design_sweep import solve_designs
-    from .kinematics.solve import solve
+    from .kinematics import assemble, find_assemblies, solve, solve_designs, trace
     from .mechanism.drivers import JointAngle, JointDisplacement, PointCoordinate
     from .mechanism.mechanism import GROUND, Body, Mechanism, Point
     from .mechanism.motions import Ramp, Sine, Table
@@ -86,24 +82,13 @@ __all__ = [
 ]
 
 _ROOMS = (
-    *(
-        ".errors",
-        ".caches",
-        ".mechanism.mechanism",
-        ".mechanism.drivers",
-        ".mechanism.motions",
-        ".joints",
-    ),
-    *(
-        f".kinematics.{name}"
-        for name in (
-            "solve",
-            "design_sweep",
-            "assembly.assemble",
-            "assembly.assembly_modes",
-            "continuation.trace",
-        )
-    ),
+    ".errors",
+    ".caches",
+    ".mechanism.mechanism",
+    ".mechanism.drivers",
+    ".mechanism.motions",
+    ".joints",
+    ".kinematics",
     ".studies.joint_check.check_joint",
 )
 

@@ -57,7 +57,7 @@ IMPORTS = {
         ". program mechanism kinematics/formulation kinematics/structure kinematics/compiled"
     ),
     "kinematics/verified": (
-        ". primitives program mechanism kinematics/formulation "
+        ". primitives program mechanism kinematics/formulation kinematics/structure "
         "kinematics/compiled kinematics/continuation"
     ),
     "kinematics/by_components": (
@@ -74,16 +74,17 @@ IMPORTS = {
     ),
     "kinematics": (
         ". program mechanism kinematics/formulation kinematics/structure "
-        "kinematics/compiled kinematics/continuation kinematics/by_components "
-        "kinematics/sparse"
+        "kinematics/compiled kinematics/assembly kinematics/continuation "
+        "kinematics/verified kinematics/by_components kinematics/sparse "
+        "kinematics/diagnosis"
     ),
     "case/models/hardpoints/templates": "joints mechanism",
     "case": ". joints mechanism",
     "case/suspension": ". mechanism case",
     "case/io": ". joints mechanism kinematics/compiled kinematics case case/suspension",
     "case/models/hardpoints": ". mechanism case/models/hardpoints/templates case case/io",
-    "case/variation": ". joints mechanism kinematics/formulation case case/io",
-    "case/models/mjcf": ". joints mechanism kinematics/structure case case/io",
+    "case/variation": ". joints mechanism kinematics case case/io",
+    "case/models/mjcf": ". joints mechanism kinematics case case/io",
     "case/models": "case case/io case/models/hardpoints case/models/mjcf",
     "harness": ". joints mechanism kinematics/compiled kinematics case case/io",
     "harness/reporting": "",
@@ -93,46 +94,34 @@ IMPORTS = {
     "report": ". joints mechanism case case/io harness history history/regression",
     "studies/stress/truth": (
         ". program joints mechanism kinematics/formulation kinematics/structure "
-        "kinematics/continuation kinematics/verified case"
+        "kinematics/continuation kinematics/verified kinematics case"
     ),
     "studies/stress/families": ". joints mechanism case case/io studies/stress/truth",
-    "studies": (". program joints kinematics/assembly kinematics/verified case case/io harness"),
-    "studies/joint_check": (
-        ". primitives program joints mechanism kinematics/formulation kinematics case harness "
-        "report"
-    ),
+    "studies": ". program joints kinematics case case/io harness",
+    "studies/joint_check": ". primitives program joints mechanism kinematics case harness report",
     "studies/tolerance": (
-        ". program program/llvm mechanism kinematics/formulation "
-        "kinematics/compiled kinematics case case/io case/variation harness "
-        "harness/workers history report"
+        ". program program/llvm mechanism kinematics/compiled kinematics case case/io "
+        "case/variation harness harness/workers history report"
     ),
     "studies/stress": (
-        ". joints mechanism kinematics/structure kinematics/compiled "
-        "kinematics/continuation kinematics/verified case case/io harness "
-        "harness/workers report studies/stress/truth studies/stress/families"
+        ". joints mechanism kinematics/compiled kinematics/continuation kinematics case "
+        "case/io harness harness/workers report studies/stress/truth "
+        "studies/stress/families"
     ),
-    "studies/paper": (
-        ". primitives program joints mechanism kinematics/formulation kinematics "
-        "case harness report"
-    ),
-    "studies/diagnosis": ". joints kinematics/formulation kinematics/diagnosis case harness report",
+    "studies/paper": ". primitives program joints mechanism kinematics case harness report",
+    "studies/diagnosis": ". joints kinematics case harness report",
     "studies/bench": (
-        ". program/llvm joints mechanism kinematics/formulation "
-        "kinematics/compiled kinematics/continuation kinematics/by_components "
-        "kinematics/sparse kinematics case case/io case/variation harness report "
-        "studies studies/tolerance studies/paper"
+        ". program/llvm joints mechanism kinematics/compiled kinematics/continuation "
+        "kinematics/by_components kinematics/sparse kinematics case case/io case/variation "
+        "harness report studies studies/tolerance studies/paper"
     ),
     "cli": (
-        ". program program/llvm joints kinematics/structure kinematics/continuation case "
-        "case/io case/variation case/models harness harness/workers history "
-        "history/regression report studies/stress/families studies "
-        "studies/joint_check studies/tolerance studies/stress studies/paper "
+        ". program program/llvm joints kinematics case case/io case/variation case/models "
+        "harness harness/workers history history/regression report studies/stress/families "
+        "studies studies/joint_check studies/tolerance studies/stress studies/paper "
         "studies/diagnosis studies/bench"
     ),
-    "__init__": (
-        ". joints mechanism kinematics/assembly kinematics/continuation "
-        "kinematics studies/joint_check"
-    ),
+    "__init__": ". joints mechanism kinematics studies/joint_check",
 }
 """Folder of core: the folders it imports besides itself, whenever the import runs."""
 

@@ -9,7 +9,7 @@ import numpy as np
 from ...core import joints
 from ...core.case.case import Case
 from ...core.joints.base import unit
-from ...core.kinematics.compiled.motion_start import start_of
+from ...core.kinematics import start_of
 
 # Exudyn's objects keep products at zero only; a smaller value is round-off, below any residual.
 NOTHING = 1e-12

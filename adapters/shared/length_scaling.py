@@ -15,7 +15,7 @@ import numpy as np
 
 from ...core.case.case import Case, size
 from ...core.joints import Kind
-from ...core.kinematics.formulation.constraints import unit_near
+from ...core.kinematics import unit_near
 from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...core.case.case import Case, size
 from ...core.errors import SolveError
-from ...core.kinematics.formulation.acceptance_criteria import ROUNDING
+from ...core.kinematics import ROUNDING
 from ...core.mechanism.motions import Path
 from ...core.trajectory import Array
 from .length_scaling import GLOBAL, OwnFrame

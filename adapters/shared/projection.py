@@ -16,12 +16,14 @@ import numpy as np
 
 from ...core.case.case import Case
 from ...core.joints import Joint
-from ...core.kinematics.compiled.motion_start import Start, by_ways, start_of
-from ...core.kinematics.formulation.acceptance_criteria import (
+from ...core.kinematics import (
     LONGEST_TURN,
+    Start,
     continued,
     continuous,
     regular_between,
+    solve_from_start,
+    start_of,
 )
 from ...core.mechanism.drivers import Driver
 from ...core.mechanism.motions import Path, outwards
@@ -92,7 +94,7 @@ def solve_by_projection(
         case.sweep.path,
     )
     start, exact = start_of(mechanism, path), corrections is None
-    return by_ways(
+    return solve_from_start(
         start, mechanism, path, lambda each: walk.trajectory(details or {}, each), compare=exact
     )
 

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from ...core.case.case import Case
 from ...core.errors import KincheckError, SolveError
-from ...core.kinematics.compiled.motion_start import assumed
-from ...core.kinematics.compiled.motion_start import start_of as where_from
+from ...core.kinematics import notes_on_start
+from ...core.kinematics import start_of as where_from
 from ...core.mechanism.motions import outwards
 from ...core.trajectory import Array, PointMotion, Trajectory, largest_found
 from .projection import Walk
@@ -132,7 +132,7 @@ def start_of(model: ProjectionModel, case: Case) -> Start:
         origin, _ = walk.start(path, begin)
     if origin is None:
         raise SolveError(f"case {case.name!r}: {message}")
-    notes += assumed(begin, path)
+    notes += notes_on_start(begin, path)
     facts = {"start": begin.facts, **({"notes": notes} if notes else {})}
     nearest = [int(side[0]) for side in outwards(path.times, origin.t) if len(side)]
     for k in sorted(nearest, key=lambda k: abs(float(path.times[k]) - origin.t)):

@@ -67,7 +67,7 @@ class House:
                 its degrees of freedom.
         """
         from ..case.models.files import SUFFIXES, load
-        from ..kinematics.structure.driver_count import require_driven
+        from ..kinematics import require_driven
 
         known = self.cases()
         if name in known:

@@ -12,7 +12,7 @@ from .registry import House, Status
 from .run_options import positive
 
 if TYPE_CHECKING:
-    from ..kinematics.continuation.trace import Curve, Event
+    from ..kinematics import Curve, Event
 
 LENGTH = 5.0
 """Default length in each direction: a few whole turns of the bodies together."""
@@ -59,7 +59,7 @@ def _trace(options: argparse.Namespace, house: House) -> int:
     or a closed curve; 1 the curve ends before; 2 the tool could not do its work.
     """
     from ..case.io.atomic_files import unwritable
-    from ..kinematics.continuation.trace import trace
+    from ..kinematics import trace
     from ..report.terminal import write_json
 
     case = house.find_case(options.case, import_options.supplied(options))

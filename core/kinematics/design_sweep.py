@@ -17,7 +17,7 @@ from ..trajectory import QUANTITIES, Array, PointMotion
 from .compiled.samples import recent_route
 from .design_batch import solve_variants
 from .formulation.parameters import places
-from .solve import asked
+from .one_design import asked
 from .solver_selection import start_notes
 
 # Variants solved at once: their lanes stay in the second-level cache. Fewer where the table of

@@ -15,7 +15,7 @@ from ..case.case import Case
 from ..case.io.model_writer import LARGEST_TURN, TOL, Writer, way_to
 from ..errors import KincheckError, SolveError
 from ..joints import AxialJoint
-from ..kinematics.assembly.assembly_modes import Assemblies, Assembly, find_assemblies
+from ..kinematics import Assemblies, Assembly, find_assemblies
 from ..trajectory import BodyMotion
 
 SCHEMA = "kincheck-assemblies/1"

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..case.case import Case
 from ..harness.compare import output_series
-from ..kinematics.verified.verified_sweep import Proofs
+from ..kinematics import Proofs
 from ..program.ball_executor import Ball, flint
 
 Column = Sequence[Ball | None]

@@ -18,9 +18,17 @@ from ..algebra import Vec3
 from ..case.case import Case, Quantity
 from ..case.io.reference_file import ProvedSeries, Reference, Sample
 from ..jet import Jet
-from ..kinematics.verified.exact import Exact, Reading, as_decimal, as_double
-from ..kinematics.verified.krawczyk import Enclosure, UnprovedError
-from ..kinematics.verified.verified_sweep import Drives, Proofs, prove
+from ..kinematics import (
+    Drives,
+    Enclosure,
+    Exact,
+    Proofs,
+    Reading,
+    UnprovedError,
+    as_decimal,
+    as_double,
+    prove,
+)
 from ..program.ball_executor import Ball, flint, precision
 from ..trajectory import Array
 from ..version import VERSION

@@ -20,7 +20,7 @@ from kincheck.core.joints import (
     Screw,
     Translational,
 )
-from kincheck.core.kinematics.solve import solve
+from kincheck.core.kinematics import solve
 from kincheck.core.mechanism.drivers import JointAngle, JointDisplacement, PointCoordinate
 from kincheck.core.mechanism.mechanism import Body, Mechanism, Point
 from kincheck.core.mechanism.motions import Sine

@@ -6,11 +6,7 @@ import numpy as np
 import pytest
 from kincheck import adapters
 from kincheck.core.case.io.case_file import load_case
-from kincheck.core.kinematics.formulation.acceptance_criteria import (
-    continued,
-    continuous,
-    regular_between,
-)
+from kincheck.core.kinematics import continued, continuous, regular_between
 from kincheck.core.studies.stress.families import Family
 from kincheck.core.studies.stress.families.base import as_case
 from kincheck.core.studies.stress.families.folds import Folds

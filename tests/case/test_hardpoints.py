@@ -12,7 +12,7 @@ from kincheck.core.case.case import Truth
 from kincheck.core.case.io.reader_options import LEFT_OUT, Supplied
 from kincheck.core.case.models.files import load
 from kincheck.core.case.models.hardpoints.templates import TEMPLATES
-from kincheck.core.kinematics.solve import solve
+from kincheck.core.kinematics import solve
 from scipy.optimize import fsolve
 
 DATA = Path(__file__).parents[1] / "data" / "hardpoints"

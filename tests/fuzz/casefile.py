@@ -7,7 +7,7 @@ from kincheck.core.case.io.driving import DRIVERS
 from kincheck.core.case.suspension import SuspensionOutput
 from kincheck.core.errors import KincheckError
 from kincheck.core.joints import Coupler, Joint
-from kincheck.core.kinematics.structure.driver_count import require_driven
+from kincheck.core.kinematics import require_driven
 from kincheck.core.mechanism.motions import Motion
 
 from ..support.case_texts import BASE, INLINE

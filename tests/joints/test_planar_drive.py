@@ -24,7 +24,7 @@ from kincheck.core import (
 from kincheck.core.case.case import Case, Output, Series, Sweep, Truth
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.run import run
-from kincheck.core.kinematics.formulation.constraints import Style
+from kincheck.core.kinematics import Style
 
 TILT, RATIO, RATE = 0.3, -1.5, 2.0
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)

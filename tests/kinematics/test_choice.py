@@ -20,7 +20,7 @@ from kincheck.core.kinematics.continuation.side_follower import Marcher
 from kincheck.core.kinematics.continuation.sweep import follow
 from kincheck.core.kinematics.continuation.walk import march
 from kincheck.core.kinematics.diagnosis.conditioning import conditioning
-from kincheck.core.kinematics.solve import solve
+from kincheck.core.kinematics.one_design import solve
 from kincheck.core.mechanism.motions import Path, Ramp, Sine
 
 from .test_chain import chain

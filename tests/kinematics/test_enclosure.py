@@ -25,7 +25,7 @@ from kincheck.core.algebra import root
 from kincheck.core.case.joint_probe import probes
 from kincheck.core.kinematics.formulation.cartesian import Cartesian
 from kincheck.core.kinematics.formulation.constraints import constraints, frames
-from kincheck.core.kinematics.solve import solve
+from kincheck.core.kinematics.one_design import solve
 from kincheck.core.kinematics.structure.degrees_of_freedom import select_rows
 from kincheck.core.kinematics.verified import krawczyk
 from kincheck.core.kinematics.verified.exact import (

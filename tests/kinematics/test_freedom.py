@@ -23,7 +23,7 @@ from kincheck.core import (
 )
 from kincheck.core.kinematics.formulation.cartesian import Cartesian
 from kincheck.core.kinematics.formulation.constraints import Constraint, constraints, frames
-from kincheck.core.kinematics.solve import solve
+from kincheck.core.kinematics.one_design import solve
 from kincheck.core.kinematics.structure.degrees_of_freedom import account
 from kincheck.core.kinematics.structure.redundancy import independent_rows
 from kincheck.core.mechanism.mechanism import GROUND

@@ -12,7 +12,7 @@ from kincheck.core.joints import AxialJoint, Joint, ParallelAxes, Screw
 from kincheck.core.joints.base import position
 from kincheck.core.kinematics.formulation.constraints import frames
 from kincheck.core.kinematics.formulation.parameters import places
-from kincheck.core.kinematics.solve import solve
+from kincheck.core.kinematics.one_design import solve
 
 from ..support.mechanisms import mcpherson, placed, slider_crank, swapped, without_fixed_bodies
 

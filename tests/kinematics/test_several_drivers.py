@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from kincheck.core import JointDisplacement, Translational
-from kincheck.core.kinematics.solve import solve
+from kincheck.core.kinematics.one_design import solve
 
 from ..oracles import naive
 from ..support.mechanisms import mcpherson

@@ -21,7 +21,7 @@ from kincheck.core.kinematics.continuation.step_halving import longest
 from kincheck.core.kinematics.continuation.sweep import follow
 from kincheck.core.kinematics.continuation.walk import march
 from kincheck.core.kinematics.formulation.acceptance_criteria import doubtful
-from kincheck.core.kinematics.solve import solve
+from kincheck.core.kinematics.one_design import solve
 from kincheck.core.program import Elimination, Tape, program
 from kincheck.core.program.dense_core import COMPARED
 from mpmath import mp, mpf

@@ -25,7 +25,7 @@ from kincheck.core.joints import Cylindrical, Screw
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.request import RATE, RATE_T, Request
 from kincheck.core.kinematics.formulation.constraints import Style
-from kincheck.core.kinematics.solve import solve
+from kincheck.core.kinematics.one_design import solve
 from kincheck.core.mechanism.motions import Ramp
 from kincheck.core.trajectory import Motions, PointMotion
 

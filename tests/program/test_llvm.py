@@ -14,11 +14,11 @@ import pytest
 from kincheck.core import Revolute, solve, solve_designs
 from kincheck.core.algebra import root
 from kincheck.core.caches import clear_caches
+from kincheck.core.kinematics import Style
 from kincheck.core.kinematics.compiled import program_cache
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.continuation.sweep import sweep
-from kincheck.core.kinematics.formulation.constraints import Style
 from kincheck.core.mechanism.motions import Path, Ramp
 from kincheck.core.program import (
     NODES,

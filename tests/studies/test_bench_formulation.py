@@ -6,7 +6,7 @@ import kincheck.cases
 import numpy as np
 import pytest
 from kincheck.core.algebra import Mat3, Vec3, cross
-from kincheck.core.kinematics.solve import solve
+from kincheck.core.kinematics import solve
 from kincheck.core.studies.paper import formulation as bench_formulation
 from kincheck.core.studies.paper import formulation_runtime as bench_whole
 from kincheck.core.studies.paper import roundoff as bench_roundoff

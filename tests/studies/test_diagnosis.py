@@ -25,13 +25,12 @@ from kincheck.core import (
 from kincheck.core.case.case import Case, Output, Sweep, Truth
 from kincheck.core.cli.main import main
 from kincheck.core.joints import Kind
+from kincheck.core.kinematics import Ranks, kinds, places
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.compiled.samples import Route
 from kincheck.core.kinematics.design_batch import solve_variants
 from kincheck.core.kinematics.diagnosis.instantaneous_screws import free_motions
-from kincheck.core.kinematics.diagnosis.rank import Ranks
-from kincheck.core.kinematics.formulation.parameters import kinds, places
 from kincheck.core.studies.diagnosis import diagnose
 
 from ..support.mechanisms import four_bar, mcpherson, slider_crank

@@ -18,13 +18,13 @@ from kincheck.core import (
     Spherical,
     Translational,
 )
+from kincheck.core.kinematics import solve
 from kincheck.core.kinematics.by_components.block_solver import Cascade
 from kincheck.core.kinematics.by_components.sweep import CascadeSweep
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.compiled.samples import Route
 from kincheck.core.kinematics.continuation.sweep import follow
-from kincheck.core.kinematics.solve import solve
 from kincheck.core.kinematics.sparse.sweep import solve_sparse
 from kincheck.core.mechanism.motions import Path, Ramp
 

@@ -4,7 +4,7 @@ residuals, places of bodies.
 
 import numpy as np
 from kincheck.core.algebra import Quat, vec
-from kincheck.core.kinematics.solve import solve
+from kincheck.core.kinematics import solve
 
 
 def solution(case):

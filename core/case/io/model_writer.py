@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from ...errors import SolveError
-from ...kinematics.compiled.motion_start import start_of
+from ...kinematics import start_of
 from ...kinematics.compiled.request import Request
 from ...kinematics.solver_selection import prepare
 from ...mechanism.mechanism import Mechanism

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 from ...errors import remedy
 from ...joints import Kind
-from ...kinematics.formulation.parameters import kinds, places
+from ...kinematics import kinds, places
 from ...mechanism.mechanism import Mechanism
 from ..case import MARKER
 

@@ -15,7 +15,7 @@ from ...mechanism.motions import Path, outwards
 from ...program import ITERATIONS
 from ...trajectory import QUANTITIES, Array, BodyMotion, PointMotion, Trajectory, largest_found
 from ..compiled.compiled_model import CLOSED
-from ..compiled.motion_start import Start, by_ways, start_of
+from ..compiled.motion_start import Start, solve_from_start, start_of
 from ..compiled.request import SIGMA, accept_by
 from ..continuation.singularity import CONTINUED, listed
 from ..continuation.step_halving import MOST_PARTS, TOO_MANY, part_of_step
@@ -92,14 +92,16 @@ class CascadeSweep:
         return found, still
 
     def solve(self, tol: float) -> Trajectory:
-        """The motion at all samples; see `solve.solve`."""
+        """The motion at all samples; see `solve`."""
 
         def by(start: Start) -> Trajectory:
             return (
                 self if start is self.start else CascadeSweep(self.cascade, self.path, start)
             )._solve(tol)
 
-        return by_ways(self.start, self.cascade.mechanism, self.path, by, compare=np.isfinite(tol))
+        return solve_from_start(
+            self.start, self.cascade.mechanism, self.path, by, compare=np.isfinite(tol)
+        )
 
     def _solve(self, tol: float) -> Trajectory:
         path, lanes = self.path, self._lanes

@@ -141,7 +141,7 @@ def _start(path: Path, time: float, off: float) -> Start:
     return Start(time, name, None if off <= CLOSED else path.lead_in(time), off <= TYPED)
 
 
-def by_ways(
+def solve_from_start(
     start: Start,
     mechanism: Mechanism,
     path: Path,
@@ -168,7 +168,7 @@ def by_ways(
     notes = [
         *found.details.get("notes", ()),
         *notes,
-        *(assumed(taken, path) if found.solved.any() else ()),
+        *(notes_on_start(taken, path) if found.solved.any() else ()),
     ]
     return replace(
         found,
@@ -176,7 +176,7 @@ def by_ways(
     )
 
 
-def assumed(start: Start, path: Path) -> list[str]:
+def notes_on_start(start: Start, path: Path) -> list[str]:
     """Say what way was assumed from the design position to the path; empty where the design
     position is on it.
     """

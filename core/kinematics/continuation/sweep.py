@@ -14,7 +14,7 @@ from ...mechanism.motions import Path
 from ...program import ITERATIONS
 from ...trajectory import Array, BodyMotion, Motions, PointMotion, Trajectory
 from ..compiled.compiled_model import Model
-from ..compiled.motion_start import by_ways
+from ..compiled.motion_start import solve_from_start
 from ..compiled.request import SIGMA
 from ..compiled.samples import Route
 from ..formulation.acceptance_criteria import LOW, in_question
@@ -31,7 +31,7 @@ def follow(route: Route, tol: float) -> Trajectory:
     if route.single:
         return _follow(route, tol)
     compare = math.isfinite(tol)  # else nothing is asked of the samples
-    return by_ways(
+    return solve_from_start(
         route.begin,
         route.model.mechanism,
         route.path,

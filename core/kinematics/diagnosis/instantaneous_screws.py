@@ -94,7 +94,7 @@ def free_motions(matrix: Array) -> Array:
     return left
 
 
-def described(found: Sequence[Screw], most: int = 4) -> str:
+def describe_screws(found: Sequence[Screw], most: int = 4) -> str:
     """The motions of the fastest bodies, in words."""
     return shortened([*map(str, found)], most)
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path, outwards
 from ...trajectory import Array, BodyMotion, PointMotion, Trajectory, largest_found
-from ..compiled.motion_start import Start, by_ways, start_of
+from ..compiled.motion_start import Start, solve_from_start, start_of
 from ..continuation.step_halving import HALVINGS, MOST_PARTS, TOO_MANY
 from ..formulation.acceptance_criteria import AMPLIFIED, EPSILON, LOW, WORSE_BY_PIVOTS
 from .batched_newton import REMEMBERED
@@ -55,7 +55,7 @@ def solve_sparse(
         partial(_Sweep, model, path, tol, *wanted, order),
         start_of(model.mechanism, path),
     )
-    return by_ways(
+    return solve_from_start(
         start, model.mechanism, path, lambda each: sweep(each).solve(), compare=np.isfinite(tol)
     )
 

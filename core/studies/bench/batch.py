@@ -13,11 +13,11 @@ import numpy as np
 from ...case.case import Case, size
 from ...harness.compare import output_series
 from ...joints import Kind
+from ...kinematics import kinds, places
 from ...kinematics.compiled.compiled_model import Model, compile_model
 from ...kinematics.compiled.request import Request
 from ...kinematics.compiled.samples import Route
 from ...kinematics.design_batch import Variants, solve_variants
-from ...kinematics.formulation.parameters import kinds, places
 from ...program.llvm.compiler import available
 from ...trajectory import QUANTITIES, Array, PointMotion, Trajectory
 from .native_breakdown import MOTIONS, flops_of

@@ -15,7 +15,7 @@ import numpy as np
 from ...case.case import Case, size
 from ...case.variation.variation import Coordinate, Law, Mode, Variation
 from ...joints import Kind
-from ...kinematics.formulation.parameters import kinds, places
+from ...kinematics import kinds, places
 from ..tolerance.sweep import sweep_designs
 from .batch import SCATTER, SEED
 from .peak import Peak

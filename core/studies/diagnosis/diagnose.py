@@ -11,17 +11,19 @@ from ...case.case import MARKER, ORDERS, Case
 from ...case.notes import notes
 from ...errors import SolveError, shortened
 from ...harness.program_account import explain
-from ...kinematics.diagnosis.conditioning import Conditioning, conditioning
-from ...kinematics.diagnosis.instantaneous_screws import Screw, described
-from ...kinematics.diagnosis.rank import (
+from ...kinematics import (
     Blocked,
     ComponentCount,
+    Conditioning,
     Dependency,
     NamedRow,
     Ranks,
+    Screw,
     Violation,
+    conditioning,
+    describe_screws,
+    places,
 )
-from ...kinematics.formulation.parameters import places
 from .outputs import Budget, Sensitivity, binding, budgets, read_points, sensitivities
 
 SCHEMA = "kincheck-explain/1"
@@ -198,7 +200,7 @@ def _findings(ranks: Ranks) -> list[str]:
             f" would have to give way, at the least {_violations(each.rows)}; {_remedy(ranks)}"
         )
     if ranks.free and count > drivers:
-        motions = "; ".join(described(motion) for motion in ranks.free)
+        motions = "; ".join(describe_screws(motion) for motion in ranks.free)
         found.append(
             f"{len(ranks.free)} motion{'s are' if len(ranks.free) > 1 else ' is'} left free with"
             f" the drivers held: {motions}; add a driver for each, or join what spins freely (a rod"
@@ -207,7 +209,7 @@ def _findings(ranks: Ranks) -> list[str]:
     elif ranks.free:
         found.append(
             "at the design the drivers do not determine the motion (lock-up or dead centre), it"
-            f" can still move: {'; '.join(described(motion) for motion in ranks.free)}; drive"
+            f" can still move: {'; '.join(describe_screws(motion) for motion in ranks.free)}; drive"
             " another coordinate or shift the design"
         )
     return found

@@ -13,9 +13,7 @@ from ...algebra import Vec3, vec
 from ...case.case import ORDERS, Case, Quantity
 from ...jet import Jet
 from ...joints import Kind
-from ...kinematics.diagnosis.conditioning import Conditioning, PoseConditioning
-from ...kinematics.diagnosis.position_gradients import Gradient
-from ...kinematics.formulation.parameters import kinds
+from ...kinematics import Conditioning, Gradient, PoseConditioning, kinds
 from ...trajectory import Array
 
 # The house formula for tolerances: 10 for engines that scale their rows otherwise, 10 for

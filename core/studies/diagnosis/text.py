@@ -9,8 +9,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from ...kinematics.diagnosis.instantaneous_screws import described
-from ...kinematics.diagnosis.rank import NamedRow
+from ...kinematics import NamedRow, describe_screws
 from ...report.terminal import columns, listed
 from .diagnose import Diagnosis, Sample
 
@@ -94,7 +93,7 @@ def _conditioning(found: Diagnosis) -> Iterator[Text | Table]:
         if k in shown or each is worst:
             condition = "singular" if each.condition is None else f"{each.condition:.3g}"
             sign = "+" if each.orientation > 0 else "-" if each.orientation < 0 else "0"
-            moving = described(each.direction, 1)
+            moving = describe_screws(each.direction, 1)
             table.add_row(
                 f"{each.value:.6g}",
                 f"{each.smallest:.4g}",
@@ -105,7 +104,9 @@ def _conditioning(found: Diagnosis) -> Iterator[Text | Table]:
             )
     yield table
     if worst is not None:
-        yield Text(f"worst at {found.swept} = {worst.value:.9g}: {described(worst.direction)}")
+        yield Text(
+            f"worst at {found.swept} = {worst.value:.9g}: {describe_screws(worst.direction)}"
+        )
     yield from _changes(found.samples, found.swept)
 
 

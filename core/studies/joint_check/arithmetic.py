@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...kinematics.formulation.constraints import Style
+from ...kinematics import Style
 from ...primitives.base import NoFormError
 from ...trajectory import Array
 from .checks import ROUND_OFF, ROUND_OFF_WHY, Specimen

@@ -18,7 +18,7 @@ from ...harness.record import Deviation, Outcome
 from ...harness.standard import STANDARD
 from ...harness.verdict import excess
 from ...joints import Joint
-from ...kinematics.solve import solve
+from ...kinematics import solve
 from ...trajectory import Array, Trajectory
 from .checks import ROUND_OFF
 from .findings import Finding, Verdict, judged

@@ -21,8 +21,7 @@ import numpy as np
 from ...algebra import Quat, quat, vec
 from ...errors import MechanismError
 from ...joints import Joint
-from ...kinematics.formulation.cartesian import COLUMNS, Cartesian
-from ...kinematics.formulation.constraints import Frames, Relation, Style, constraints
+from ...kinematics import COLUMNS, Cartesian, Frames, Relation, Style, constraints
 from ...mechanism.mechanism import Body, Mechanism
 from ...program import Tape, program
 from ...trajectory import Array

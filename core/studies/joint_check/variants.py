@@ -15,7 +15,7 @@ import numpy as np
 
 from ...algebra import quat, rotation_less_identity
 from ...joints import AxialJoint
-from ...kinematics.formulation.constraints import Style
+from ...kinematics import Style
 from ...trajectory import Array
 from .checks import AMPLIFIED, AMPLIFIED_WHY, ROUND_OFF, ROUND_OFF_WHY, Specimen, defects, times
 from .findings import Finding, Verdict, judged

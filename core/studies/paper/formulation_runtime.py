@@ -15,8 +15,7 @@ from ...errors import SolveError
 from ...harness.compare import output_series
 from ...harness.labels import motion_unit
 from ...joints import Kind
-from ...kinematics.formulation.constraints import Style
-from ...kinematics.solve import solve
+from ...kinematics import Style, solve
 from ...mechanism.mechanism import Mechanism, Vector
 from ...trajectory import QUANTITIES, Array, Trajectory
 

@@ -15,7 +15,7 @@ from ...harness.engine import Engine
 from ...harness.execution import Failure, Pair
 from ...harness.provenance import plain
 from ...harness.record import Outcome
-from ...kinematics.verified.krawczyk import UnprovedError
+from ...kinematics import UnprovedError
 from ...version import VERSION
 from .families import Family, Specimen
 from .results import Acceptance, Cell, Finding, Proofs, Stress

@@ -12,7 +12,7 @@ import numpy as np
 from ...case.case import Case, Output
 from ...errors import KincheckError
 from ...joints import Joint, Kind
-from ...kinematics.structure.driver_count import require_driven
+from ...kinematics import require_driven
 from ...mechanism.mechanism import Mechanism
 
 Bad = Callable[[Case], bool]

@@ -15,11 +15,11 @@ from ...algebra import Vec3
 from ...case.case import Case, Quantity
 from ...case.variation.variation import Mode, Stream, Variation, generator
 from ...jet import Jet
+from ...kinematics import placed
 from ...kinematics.compiled.compiled_model import Model, compile_model
 from ...kinematics.compiled.request import Request
 from ...kinematics.compiled.samples import Route
 from ...kinematics.design_batch import RECYCLED, solve_variants
-from ...kinematics.formulation.parameters import placed
 from ...mechanism.motions import Path
 from ...trajectory import PER_TIME, QUANTITIES, Array
 from .reduce import Summary

@@ -9,7 +9,7 @@ from pathlib import Path
 from ....algebra import Quat
 from ....errors import remedy
 from ....joints import Fixed, Revolute
-from ....kinematics.structure.driver_count import degrees_of_freedom
+from ....kinematics import degrees_of_freedom
 from ....mechanism.drivers import JointAngle, JointDisplacement, JointDriver
 from ....mechanism.mechanism import Body, Mechanism, Point
 from ...case import Case, Sweep, Truth

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from ....algebra import Vec3
+from ....kinematics import Cartesian
 from ....kinematics.continuation.row_exchange import chosen_at
-from ....kinematics.formulation.cartesian import Cartesian
 from ....kinematics.formulation.constraints import frames
 from ....kinematics.structure.degrees_of_freedom import select_rows
 from ....kinematics.verified.exact import as_double, equations, exact_mechanism

@@ -1,0 +1,77 @@
+"""Many designs of one mechanism along one path: geometry is an input of its programs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ..mechanism.motions import Path
+from ..program import ITERATIONS
+from ..trajectory import QUANTITIES, Array
+from .compiled.motion_start import Start
+from .compiled.samples import Route
+from .design_batch import RECYCLED, Variants, solve_variants
+from .program_size import ProgramSize
+from .solver_selection import start_notes
+
+# Designs solved at once at least: with fewer, the calls around them would be felt.
+LEAST = 8
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedDesigns:
+    """A mechanism of varied geometry, made ready for a path.
+
+    Attributes:
+        route: the path made ready for the compiled model.
+    """
+
+    route: Route
+
+    def along(self, path: Path) -> PreparedDesigns:
+        """Return the same programs on another path of the same drivers."""
+        return PreparedDesigns(Route(self.route.model, path))
+
+    @property
+    def start(self) -> Start:
+        """The start of the nominal design."""
+        return self.route.begin
+
+    @property
+    def size(self) -> ProgramSize:
+        """The size of the programs."""
+        return ProgramSize.of(self.route.model)
+
+    def at_once(self, most: int) -> int:
+        """Return the number of designs to solve together, at most the given one: the table of their
+        motions fits in recycled memory.
+        """
+        of_a_design = 8 * self.route.model.kept * len(self.route.path.times)
+        return max(LEAST, min(most, RECYCLED // of_a_design))
+
+    def solve(self, geometry: Array, tol: float) -> Variants:
+        """Solve designs at all samples.
+
+        Args:
+            geometry: numbers of the varied places in their order, shape (numbers, V).
+            tol: as for `solve`.
+        """
+        return solve_variants(self.route, geometry, tol)
+
+    def motion(self, found: Variants, point: str) -> Sequence[Array]:
+        """Return position [m], velocity and acceleration of a point, as far as they were asked for,
+        each of shape (3, n, V).
+        """
+        rows, orders = self.route.model.rows, self.route.model.orders
+        return [found.kept[rows[f"{label} {point}"]] for label in QUANTITIES[:orders]]
+
+    def iterations(self, found: Variants) -> Array:
+        """Return Newton's iterations of each sample, shape (n, V)."""
+        return found.kept[self.route.model.rows[ITERATIONS].start]
+
+    def start_notes(self, tol: float) -> list[str]:
+        """Return notes on the assumed start of the nominal design; empty where the design decides
+        it.
+        """
+        model = self.route.model
+        return start_notes(model.mechanism, model.request, self.route.path, tol)
