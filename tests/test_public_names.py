@@ -14,7 +14,6 @@ from .test_architecture import ROOT
 ONLY_NAMES = """
 import sys
 import kincheck
-import kincheck.adapters
 assert kincheck.__version__ and "Mechanism" in dir(kincheck)
 print(*sorted({name.split(".")[0] for name in sys.modules} & {"numpy", "scipy", "msgspec", "rich"}))
 print(*sorted(name for name in sys.modules if name.startswith("kincheck")))
