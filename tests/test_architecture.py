@@ -80,7 +80,10 @@ IMPORTS = {
     "case/models/hardpoints/templates": "joints mechanism",
     "case": ". joints mechanism",
     "case/suspension": ". mechanism case",
-    "case/io": ". joints mechanism kinematics/compiled kinematics case case/suspension",
+    "case/measures": ". joints mechanism case",
+    "case/io": (
+        ". joints mechanism kinematics/compiled kinematics case case/measures case/suspension"
+    ),
     "case/models/hardpoints": ". mechanism case/models/hardpoints/templates case case/io",
     "case/variation": ". joints mechanism kinematics/formulation case case/io",
     "case/models/mjcf": ". joints mechanism kinematics/structure case case/io",
@@ -96,7 +99,9 @@ IMPORTS = {
         "kinematics/continuation kinematics/verified case"
     ),
     "studies/stress/families": ". joints mechanism case case/io studies/stress/truth",
-    "studies": (". program joints kinematics/assembly kinematics/verified case case/io harness"),
+    "studies": (
+        ". program joints mechanism kinematics/assembly kinematics/verified case case/io harness"
+    ),
     "studies/joint_check": (
         ". primitives program joints mechanism kinematics/formulation kinematics case harness "
         "report"
