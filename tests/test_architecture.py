@@ -85,7 +85,10 @@ IMPORTS = {
     "case/models/hardpoints/templates": "joints mechanism",
     "case": ". joints mechanism",
     "case/suspension": ". mechanism case",
-    "case/io": ". joints mechanism kinematics/compiled kinematics case case/suspension",
+    "case/measures": ". joints mechanism case",
+    "case/io": (
+        ". joints mechanism kinematics/compiled kinematics case case/measures case/suspension"
+    ),
     "case/models/hardpoints": ". mechanism case/models/hardpoints/templates case case/io",
     "case/variation": ". joints mechanism kinematics case case/io",
     "case/models/mjcf": ". joints mechanism kinematics case case/io",
