@@ -49,6 +49,7 @@ IMPORTS = {
     "joints": ". primitives",
     "mechanism": ". joints",
     "kinematics/formulation": ". primitives program joints mechanism",
+    "kinematics/forces": ". primitives joints mechanism kinematics/formulation",
     "kinematics/structure": ". joints mechanism kinematics/formulation",
     "kinematics/compiled": (
         ". primitives program program/llvm mechanism kinematics/formulation kinematics/structure"
@@ -73,21 +74,21 @@ IMPORTS = {
         "kinematics/structure kinematics/compiled kinematics/continuation"
     ),
     "kinematics/diagnosis": (
-        ". primitives joints mechanism kinematics/formulation "
-        "kinematics/structure kinematics/compiled kinematics/continuation"
+        ". primitives joints mechanism kinematics/formulation kinematics/structure "
+        "kinematics/compiled kinematics/continuation"
     ),
     "kinematics": (
-        ". program mechanism kinematics/formulation kinematics/structure "
-        "kinematics/compiled kinematics/assembly kinematics/continuation "
-        "kinematics/verified kinematics/by_components kinematics/sparse "
-        "kinematics/diagnosis"
+        ". program mechanism kinematics/formulation kinematics/forces "
+        "kinematics/structure kinematics/compiled kinematics/assembly "
+        "kinematics/continuation kinematics/verified kinematics/by_components "
+        "kinematics/sparse kinematics/diagnosis"
     ),
     "case/models/hardpoints/templates": "joints mechanism",
     "case": ". joints mechanism",
     "case/suspension": ". mechanism case",
     "case/measures": ". joints mechanism case",
     "case/io": (
-        ". joints mechanism kinematics/compiled kinematics case case/measures case/suspension"
+        ". joints mechanism kinematics/compiled kinematics case case/suspension case/measures"
     ),
     "case/models/hardpoints": ". mechanism case/models/hardpoints/templates case case/io",
     "case/variation": ". joints mechanism kinematics case case/io",
@@ -104,7 +105,7 @@ IMPORTS = {
         "kinematics/continuation kinematics/verified kinematics case"
     ),
     "studies/stress/families": ". joints mechanism case case/io studies/stress/truth",
-    "studies": ". program joints kinematics case case/io harness",
+    "studies": ". program joints mechanism kinematics case case/io harness",
     "studies/joint_check": ". primitives program joints mechanism kinematics case harness report",
     "studies/tolerance": (
         ". program program/llvm mechanism kinematics/compiled kinematics case case/io "
@@ -119,14 +120,14 @@ IMPORTS = {
     "studies/diagnosis": ". joints kinematics case harness report",
     "studies/bench": (
         ". program/llvm joints mechanism kinematics/compiled kinematics/continuation "
-        "kinematics/by_components kinematics/sparse kinematics case case/io case/variation "
-        "harness report studies studies/tolerance studies/paper"
+        "kinematics/by_components kinematics/sparse kinematics case case/io "
+        "case/variation harness report studies studies/tolerance studies/paper"
     ),
     "cli": (
         ". program program/llvm joints kinematics case case/io case/variation case/models "
-        "harness harness/workers history history/regression report studies/stress/families "
-        "studies studies/joint_check studies/tolerance studies/stress studies/paper "
-        "studies/diagnosis studies/bench"
+        "harness harness/workers history history/regression report "
+        "studies/stress/families studies studies/joint_check studies/tolerance "
+        "studies/stress studies/paper studies/diagnosis studies/bench"
     ),
     "__init__": ". joints mechanism kinematics case case/io harness studies/joint_check",
     "kincheck": "case case/io harness harness/workers cli __init__",
