@@ -6,6 +6,7 @@ Solve:
 
     solve              one design over a sweep
     solve_designs      many designs over a sweep, each with its own geometry
+    forces_of          reactions of joints and efforts of drivers of a solved motion
     trace              a motion by its arc length, beyond lock-ups of a driver
     assemble           a closed pose from an estimate
     find_assemblies    all closed poses
@@ -29,6 +30,7 @@ The folders:
     compiled         one mechanism as compiled programs: request, programs, model, samples
     continuation     the walk along a path, step halving, singular poses, curves by arc length
     by_components    large mechanisms, component by component
+    forces           reactions and efforts from a solved motion
     sparse           large mechanisms without small components, as a sparse system
     assembly         closed poses from estimates and random starts
     diagnosis        rank, conditioning and screws at a pose
@@ -67,6 +69,8 @@ if TYPE_CHECKING:
     from .diagnosis.rank import NamedRow as NamedRow
     from .diagnosis.rank import Ranks as Ranks
     from .diagnosis.rank import Violation as Violation
+    from .forces.reactions import forces_of as forces_of
+    from .forces.reactions import with_forces as with_forces
     from .formulation.acceptance_criteria import LONGEST_TURN as LONGEST_TURN
     from .formulation.acceptance_criteria import ROUNDING as ROUNDING
     from .formulation.acceptance_criteria import continued as continued
@@ -114,6 +118,7 @@ _NAMES = {
     "diagnosis.instantaneous_screws": "Screw describe_screws",
     "diagnosis.position_gradients": "Gradient",
     "diagnosis.rank": "Blocked ComponentCount Dependency NamedRow Ranks Violation",
+    "forces.reactions": "forces_of with_forces",
     "formulation.acceptance_criteria": "LONGEST_TURN ROUNDING continued continuous regular_between",
     "formulation.cartesian": "COLUMNS Cartesian",
     "formulation.constraints": "Frames Relation Style constraints unit_near",
