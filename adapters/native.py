@@ -10,8 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..core.case.case import Case
-from ..core.kinematics.compiled.request import LAST_ITERATION, Request
-from ..core.kinematics.solver_selection import Solver, prepare
+from ..core.kinematics import LAST_ITERATION, NativeSolver, Solver
 from ..core.program.llvm.compiler import available
 from ..core.trajectory import Trajectory
 from ..core.version import VERSION
@@ -76,12 +75,8 @@ class Native:
         """Select the rows, trace the programs for the points that the outputs read, and lay out the
         samples.
         """
-        path = case.sweep.path
-        return prepare(
-            case.mechanism,
-            Request(tuple(path.motions), case.points, last_iteration=self.last_iteration),
-            path,
-        )
+        solver = NativeSolver(last_iteration=self.last_iteration)
+        return solver.prepare(case.mechanism, case.sweep.path, case.points, forces=case.forces)
 
     def solve(self, model: Solver, case: Case, tol: float) -> Trajectory:
         """March all samples; tol is relative to the mechanism's size."""

@@ -94,7 +94,7 @@ IMPORTS = {
     "case/variation": ". joints mechanism kinematics case case/io",
     "case/models/mjcf": ". joints mechanism kinematics case case/io",
     "case/models": "case case/io case/models/hardpoints case/models/mjcf",
-    "harness": ". joints mechanism kinematics/compiled kinematics case case/io",
+    "harness": ". joints mechanism kinematics/compiled kinematics case case/measures case/io",
     "harness/reporting": "",
     "harness/workers": ". harness",
     "history": ". case case/io harness",

@@ -84,7 +84,8 @@ def _output(case: Case, output: Any) -> Iterator[tuple[str, Any]]:
     if isinstance(output, Measure):
         yield "type", output.type
         for each in own_keys(type(output)):
-            yield key_of(each), getattr(output, each.name)
+            if (value := getattr(output, each.name)) is not None:
+                yield key_of(each), value
     elif isinstance(output, Output):
         component = next((name for name, axis in AXES.items() if axis == output.direction), None)
         yield "point", output.point

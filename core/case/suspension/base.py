@@ -91,6 +91,11 @@ class SuspensionOutput(ABC):
         return f"positive: {self.positive}"
 
     @property
+    def forces(self) -> tuple[str, ...]:
+        """None: it is a motion."""
+        return ()
+
+    @property
     def period(self) -> float:
         """Zero: each value is a pose of its own."""
         return 0.0
@@ -191,6 +196,11 @@ class PerTravel:
     def orders(self) -> int:
         """One less than those of the output."""
         return self.of_output.orders - 1
+
+    @property
+    def forces(self) -> tuple[str, ...]:
+        """None: it is a motion."""
+        return ()
 
     @property
     def period(self) -> float:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,17 +37,37 @@ def with_forces(
     names: Collection[str] | None = None,
     bodies: Collection[str] = (),
 ) -> Trajectory:
-    """Return a solved motion with its forces, of the bodies only those named; see `forces_of`."""
+    """Return a solved motion with its forces, of the bodies only those named; see `forces_of`.
+
+    Its details tell the balance of power, and the joints whose reaction is not wholly determined.
+    """
+    found = forces_of(mechanism, path, motion, names)
     return Trajectory(
         motion.points,
         motion.solved,
         motion.iterations,
         motion.residual,
-        motion.message,
-        motion.details,
+        "; ".join(filter(None, (motion.message, found.message))),
+        {**motion.details, "forces": _account(found)},
         {name: motion.bodies[name] for name in bodies},
-        forces_of(mechanism, path, motion, names),
+        found,
     )
+
+
+def _account(found: Forces) -> dict[str, Any]:
+    """Return the facts of the forces for the record."""
+    known = np.isfinite(found.power)
+    largest = float(found.largest_power[known].max(initial=0.0))
+    missing = float(np.abs(found.power[known]).max(initial=0.0))
+    counts = {name: each.determined() for name, each in found.joints.items()}
+    return {
+        "power_missing": missing / largest if largest else 0.0,
+        "determined_directions": {
+            name: {"force": force, "moment": moment, "wrench": wrench}
+            for name, (force, moment, wrench) in counts.items()
+            if wrench < 6
+        },
+    }
 
 
 def forces_of(
