@@ -35,7 +35,7 @@ from kincheck.core.trajectory import Trajectory
 
 pytest.importorskip("pinocchio")
 
-from .test_pinocchio import ENGINE, TOL, adapter, case_of, rotation, solved
+from .test_pinocchio import ENGINE, TOL, case_of, rotation, solved
 
 Q, AXIS = (0.2, -0.1, 0.3), (0.4, 1.0, -0.7)
 P = (0.5, 0.6, 0.1)
