@@ -81,12 +81,12 @@ IMPORTS = {
     "case/models/hardpoints/templates": "joints mechanism",
     "case": ". joints mechanism",
     "case/suspension": ". mechanism case",
-    "case/io": ". joints mechanism kinematics/compiled kinematics case case/suspension",
+    "case/io": ". joints mechanism kinematics case case/suspension",
     "case/models/hardpoints": ". mechanism case/models/hardpoints/templates case case/io",
     "case/variation": ". joints mechanism kinematics case case/io",
     "case/models/mjcf": ". joints mechanism kinematics case case/io",
     "case/models": "case case/io case/models/hardpoints case/models/mjcf",
-    "harness": ". joints mechanism kinematics/compiled kinematics case case/io",
+    "harness": ". program/llvm joints mechanism kinematics case case/io",
     "harness/reporting": "",
     "harness/workers": ". harness",
     "history": ". case case/io harness",
@@ -104,9 +104,8 @@ IMPORTS = {
         "case/variation harness harness/workers history report"
     ),
     "studies/stress": (
-        ". joints mechanism kinematics/compiled kinematics/continuation kinematics case "
-        "case/io harness harness/workers report studies/stress/truth "
-        "studies/stress/families"
+        ". joints mechanism kinematics case case/io harness harness/workers report "
+        "studies/stress/truth studies/stress/families"
     ),
     "studies/paper": ". primitives program joints mechanism kinematics case harness report",
     "studies/diagnosis": ". joints kinematics case harness report",
