@@ -16,18 +16,28 @@ test: .venv/ready
 	$(BIN)/pyright
 	$(BIN)/pytest --numprocesses auto
 
-.venv/ready: pyproject.toml requirements.lock core/version.py
+# Type checkers see an editable installation only if it is strict: a folder of links, build/, which
+# is made again when a file comes or goes.
+EDITABLE := --no-deps --config-settings editable_mode=strict --editable .
+FILES := $(shell find core adapters cases -type f ! -name '*.py[co]' | sort | cksum | tr -d ' ')
+
+.venv/files-$(FILES):
+	mkdir -p .venv
+	rm -rf .venv/files-* build
+	touch $@
+
+.venv/ready: pyproject.toml requirements.lock core/version.py .venv/files-$(FILES)
 ifdef UV
 	uv venv --quiet --allow-existing --python $(PYTHON) .venv
 	uv pip install --quiet --compile-bytecode --python $(BIN)/python --requirement requirements.lock
-	uv pip install --quiet --python $(BIN)/python --no-deps --editable .
+	uv pip install --quiet --python $(BIN)/python $(EDITABLE)
 else
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --requirement requirements.lock
-	$(BIN)/python -m pip install --quiet --no-deps --editable .
+	$(BIN)/python -m pip install --quiet $(EDITABLE)
 endif
 	# what is installed as editable is not compiled, and where Python may not write bytecode every process would do it again
-	$(BIN)/python -m compileall -q core adapters cases
+	$(BIN)/python -m compileall -q build
 	touch $@
 
 # Pin the newest versions that pyproject.toml allows.

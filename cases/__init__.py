@@ -20,7 +20,7 @@ from ..core.case.io.case_file import load_case
 from ..core.errors import CaseError, remedy
 from .jet import Jet, Motion
 
-FOLDER = Path(__file__).parent
+FOLDER = Path(__file__).resolve().parent  # in an editable installation, files are links
 
 
 def names() -> tuple[str, ...]:

@@ -7,7 +7,11 @@ from .version import VERSION
 
 if TYPE_CHECKING:
     from .caches import clear_caches
+    from .case.case import Case
+    from .case.io.reader_options import Supplied
     from .errors import CaseError, KincheckError, MechanismError, SolveError
+    from .harness.engine import Engine
+    from .harness.record import Outcome, Record, Results
     from .joints import (
         ConstantVelocity,
         Cylindrical,
@@ -29,21 +33,43 @@ if TYPE_CHECKING:
         Translational,
         Universal,
     )
-    from .kinematics import assemble, find_assemblies, solve, solve_designs, trace
+    from .kinematics import (
+        Assembled,
+        Assemblies,
+        Assembly,
+        Curve,
+        Designs,
+        Event,
+        assemble,
+        find_assemblies,
+        solve,
+        solve_designs,
+        trace,
+    )
     from .mechanism.drivers import JointAngle, JointDisplacement, PointCoordinate
     from .mechanism.mechanism import GROUND, Body, Mechanism, Point
     from .mechanism.motions import Ramp, Sine, Table
     from .studies.joint_check.check_joint import check_joint
+    from .trajectory import BodyMotion, PointMotion, Trajectory
 
 __version__ = VERSION
 
 __all__ = [
     "GROUND",
+    "Assembled",
+    "Assemblies",
+    "Assembly",
     "Body",
+    "BodyMotion",
+    "Case",
     "CaseError",
     "ConstantVelocity",
+    "Curve",
     "Cylindrical",
+    "Designs",
     "Distance",
+    "Engine",
+    "Event",
     "Fixed",
     "Gear",
     "InPlane",
@@ -55,20 +81,26 @@ __all__ = [
     "Mechanism",
     "MechanismError",
     "OrientationLock",
+    "Outcome",
     "ParallelAxes",
     "PerpendicularAxes",
     "Planar",
     "Point",
     "PointCoordinate",
+    "PointMotion",
     "RackPinion",
     "Ramp",
+    "Record",
+    "Results",
     "Revolute",
     "RevoluteSpherical",
     "Screw",
     "Sine",
     "SolveError",
     "Spherical",
+    "Supplied",
     "Table",
+    "Trajectory",
     "Translational",
     "Universal",
     "__version__",
@@ -81,26 +113,42 @@ __all__ = [
     "trace",
 ]
 
-_ROOMS = (
-    ".errors",
-    ".caches",
-    ".mechanism.mechanism",
-    ".mechanism.drivers",
-    ".mechanism.motions",
-    ".joints",
-    ".kinematics",
-    ".studies.joint_check.check_joint",
-)
+_NAMES = {
+    "caches": "clear_caches",
+    "errors": "CaseError KincheckError MechanismError SolveError",
+    "trajectory": "BodyMotion PointMotion Trajectory",
+    "mechanism.mechanism": "GROUND Body Mechanism Point",
+    "mechanism.drivers": "JointAngle JointDisplacement PointCoordinate",
+    "mechanism.motions": "Ramp Sine Table",
+    "joints": (
+        "ConstantVelocity Cylindrical Distance Fixed Gear Inline InPlane "
+        "Joint OrientationLock ParallelAxes PerpendicularAxes Planar RackPinion Revolute "
+        "RevoluteSpherical Screw Spherical Translational Universal"
+    ),
+    "case.case": "Case",
+    "case.io.reader_options": "Supplied",
+    "kinematics": (
+        "Assembled Assemblies Assembly Curve Designs Event "
+        "assemble find_assemblies solve solve_designs trace"
+    ),
+    "harness.engine": "Engine",
+    "harness.record": "Outcome Record Results",
+    "studies.joint_check.check_joint": "check_joint",
+}
+"""Public names by the module that defines them, as for type checkers above."""
+_MODULES = {name: module for module, names in _NAMES.items() for name in names.split()}
 
 
 def __getattr__(name: str) -> Any:
     """Import a name on first use: pytest loads its plugins at every start and must not wait for
     numpy.
     """
-    if name in __all__:
-        for room in _ROOMS:  # # fastest imports first
-            found = getattr(import_module(room, __name__), name, None)
-            if found is not None:
-                globals()[name] = found
-                return found
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    if name not in _MODULES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    found = globals()[name] = getattr(import_module(f".{_MODULES[name]}", __name__), name)
+    return found
+
+
+def __dir__() -> list[str]:
+    """Return the public names, also those that are not loaded yet."""
+    return sorted({*globals(), *__all__})

@@ -10,7 +10,7 @@ masses, and are set to their values, rates and forces at every step.
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -129,8 +129,9 @@ class _Model(PinocchioModel):
         joints = [driver for driver in case.mechanism.drivers if isinstance(driver, JointDriver)]
         driven = [self.coordinates[each.joint, each.freedom] for each in joints]
         self.sign = np.array([float(sign) for _, sign in driven])
-        self.driven_q = [int(self.model.joints[at].idx_q) for at, _ in driven]
-        self.driven_v = [int(self.model.joints[at].idx_v) for at, _ in driven]
+        self.driven_q, self.driven_v = map(
+            list, zip(*(self.coordinate(at) for at, _ in driven), strict=True)
+        )
         armature = np.array(self.model.armature)
         armature[self.driven_v] = ARMATURE
         self.model.armature = armature
@@ -154,30 +155,15 @@ class _Model(PinocchioModel):
             self.found.append(constraint.createData())
         pin.initConstraintDynamics(self.model, self.dynamics, self.constraints, self.found)
 
-    def _add_joint(self, parent: int, joint: Any, at: Vector) -> int:
-        number = super()._add_joint(parent, joint, at)
+    def add_link(self, parent: int, link: Link, offset: Array) -> None:
+        super().add_link(parent, link, offset)
         self.model.appendBodyToJoint(
-            number, self.pin.Inertia(1.0, np.zeros(3), np.eye(3)), self.pin.SE3.Identity()
+            self.model.njoints - 1,
+            self.pin.Inertia(1.0, np.zeros(3), np.eye(3)),
+            self.pin.SE3.Identity(),
         )
-        return number
 
-    def _add_chain(self, at: int, joint: Joint, P: Vector, sign: int) -> int:
-        return self._add_links(at, joint, CHAINS[type(joint)](joint, P), sign)
-
-    def _add_links(self, at: int, joint: Joint, links: Sequence[Link], sign: int) -> int:
-        for link in links[::sign]:
-            axis = np.array(link.axis)
-            makers: Mapping[str, Callable[[], Any]] = {
-                "slide": lambda axis=axis: self.pin.JointModelPrismaticUnaligned(axis),
-                "hinge": lambda axis=axis: self.pin.JointModelRevoluteUnaligned(axis),
-                "ball": lambda: self.pin.JointModelSpherical(),
-            }
-            at = self._add_joint(at, makers[link.move](), link.point)
-            if link.name:
-                self.coordinates[joint.name, link.name] = at, sign
-        return at
-
-    def _branches(self, mechanism: Mechanism, tree: SpanningTree) -> Iterator[Branch]:
+    def branches(self, mechanism: Mechanism, tree: SpanningTree) -> Iterator[Branch]:
         # Depth first, and what a closure adds right after the body that it hangs on: Pinocchio's
         # algorithms of inertia take the joints of a subtree to be numbered without a gap. In any
         # other order constraintDynamics is wrong, without a word.
@@ -197,21 +183,16 @@ class _Model(PinocchioModel):
         to the constraint.
         """
         links, point, turns = end_of_loop(CHAINS[type(joint)](joint, P), P)
-        self.hung[joint.name] = (
-            self._add_links(i, joint, links, 1),
-            point,
-            Spherical if turns else Fixed,
-        )
+        tied = Spherical if turns else Fixed
+        self.hung[joint.name] = self.add_links(i, links, joint.name), point, tied
 
-    def _close(
-        self, joint: Joint, i: int, j: int, ends: tuple[Vector, Vector], named: bool
-    ) -> None:
-        i, point, tied = self.hung[joint.name]
+    def close(self, joint: Joint, ends: tuple[Vector, Vector], named: bool) -> None:
+        (i, point, tied), j = self.hung[joint.name], self.carrier[joint.j]
         kinds = self.pin.ContactType
         self.loops.append((kinds.CONTACT_6D if tied is Fixed else kinds.CONTACT_3D, i, j, point))
         self.closures[joint.name] = f"rigid constraint, {CLOSURES[tied].text}"
         self.conditions += CLOSURES[tied].conditions(
-            joint, self._add_frame(i, point), self._add_frame(j, point)
+            joint, self.add_frame(i, point), self.add_frame(j, point)
         )
 
     def run(self, leg: Leg) -> Iterator[SimulatedPose]:

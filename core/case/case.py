@@ -3,26 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from enum import StrEnum
-from functools import reduce
-from operator import add
-from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..algebra import Vec3
-from ..jet import Jet
-from ..mechanism.mechanism import Mechanism, Vector
+from ..mechanism.mechanism import Mechanism
 from ..mechanism.motions import Absolute, Motion, Path, Ramp
 from ..trajectory import Array
+from .quantity import MARKER as MARKER
+from .quantity import ORDERS as ORDERS
+from .quantity import Output as Output
+from .quantity import Quantity
 
 TIME = "time"
 """Name of the driver in a sweep of time."""
-
-MARKER = "~"
-"""Prefix of the points that the case reader adds to measure a body's rotation; no hardpoints."""
 
 PER_TRAVEL = ".per_travel"
 """Suffix of derivatives by wheel travel, which the case reader adds to the outputs."""
@@ -98,108 +94,6 @@ class Sweep:
         return {self.driver: self.values, **further}
 
 
-ORDERS = 3
-"""Orders of an output of the pose alone: value, velocity and acceleration."""
-
-
-class Quantity(Protocol):
-    """An output to compare: a function of the motion of points.
-
-    Attributes:
-        points: names of the points it reads.
-        unit: SI unit of its value: m, rad, 1, or one of these per m.
-        orders: number of orders (value, first and second time derivative) computable from results.
-        atol, rtol: an error is accepted up to atol [unit, unit/s, unit/s^2] + rtol * the range of
-            the reference.
-        why: reason for the tolerance.
-        sense: meaning of a positive value; empty if name and unit state it.
-        signs: convention of signs and axes; empty if only the case's own axes apply.
-        facts: properties for readers of results.
-    """
-
-    @property
-    def name(self) -> str: ...
-    @property
-    def points(self) -> tuple[str, ...]: ...
-    @property
-    def unit(self) -> str: ...
-    @property
-    def orders(self) -> int: ...
-    @property
-    def atol(self) -> float: ...
-    @property
-    def rtol(self) -> float: ...
-    @property
-    def why(self) -> str: ...
-    @property
-    def sense(self) -> str: ...
-    @property
-    def signs(self) -> str: ...
-    @property
-    def facts(self) -> Mapping[str, Any]: ...
-
-    def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
-        """Return the quantity over the samples; unknown values are NaN.
-
-        Args:
-            at: global positions of its points as jets [m].
-            design: the same at the design position, at rest.
-        """
-        ...
-
-
-@dataclass(frozen=True)
-class Output:
-    """A plain output: a point's coordinate along a direction.
-
-    Attributes:
-        direction: global unit vector [-].
-        relative: whether the coordinate is measured from the design position.
-    """
-
-    name: str
-    point: str
-    direction: Vector
-    relative: bool
-    atol: float
-    rtol: float
-    why: str
-    unit: str = "m"
-
-    @property
-    def orders(self) -> int:
-        """Position, velocity and acceleration."""
-        return 3
-
-    @property
-    def sense(self) -> str:
-        """Empty: the direction states it."""
-        return ""
-
-    @property
-    def signs(self) -> str:
-        """Empty: only the case's own axes apply."""
-        return ""
-
-    @property
-    def points(self) -> tuple[str, ...]:
-        """The point."""
-        return (self.point,)
-
-    @property
-    def facts(self) -> Mapping[str, Any]:
-        """All fields."""
-        return asdict(self)
-
-    def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
-        """Return the coordinate [m]; components of zero weight are skipped, because there may be
-        very many samples.
-        """
-        each = zip(self.direction, at[self.point], design[self.point], strict=True)
-        moved = [(along, x - start if self.relative else x) for along, x, start in each if along]
-        return reduce(add, [x if along == 1.0 else along * x for along, x in moved])
-
-
 @dataclass(frozen=True, eq=False)
 class Series:
     """One output over the samples: value [unit], and time derivatives if known, each of shape (n,).
@@ -273,10 +167,9 @@ def size(case: Case) -> float:
     """
     path = case.sweep.path
     values, _, _ = path.drive(list(path.motions), path.times)
-    compared = case.points or [point.name for point in case.mechanism.points]
-    points = [
-        case.mechanism.point(name).position for name in compared if not name.startswith(MARKER)
-    ]
+    named = [p.name for p in case.mechanism.points if not p.name.startswith(MARKER)]
+    compared = [name for name in case.points if not name.startswith(MARKER)] or named
+    points = [case.mechanism.point(name).position for name in compared]
     points += [position for joint in case.mechanism.joints for position in joint.points_on()]
     shift = float(np.ptp(values[~turning(case)], axis=1).max(initial=0.0))
     extent = max(float(np.ptp(np.array(points), axis=0).max()), shift)

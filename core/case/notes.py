@@ -4,18 +4,29 @@ from __future__ import annotations
 
 from ..errors import Phrase
 from .case import Case
+from .closures import no_output_depends_on_a_closure
 from .sizes import size_notes
 from .units import LENGTHS
 
 
 def notes(case: Case) -> list[str]:
-    """Return the notes on rod lengths, sizes and the source of the reference, in the units of the
-    case's file.
+    """Return the notes on rod lengths, sizes, outputs and the source of the reference.
+
+    Numbers are in the units of the case's file.
     """
     written = LENGTHS[case.length_unit].written
     joints = [note for joint in case.mechanism.joints for note in joint.notes]
     said = [note.within(written) if isinstance(note, Phrase) else note for note in joints]
-    return [*said, *size_notes(case), *_reference_notes(case)]
+    return [*said, *size_notes(case), *_closure_notes(case), *_reference_notes(case)]
+
+
+def _closure_notes(case: Case) -> list[str]:
+    if not no_output_depends_on_a_closure(case):
+        return []
+    return [
+        "no output depends on a closure: all of them follow from the drivers alone, so that"
+        " agreement says nothing of the loops; add outputs of the other bodies or joints"
+    ]
 
 
 def _reference_notes(case: Case) -> list[str]:

@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from ..harness.resource_limits import MEMORY, MOST, TIMEOUT, Limits, default_jobs
+from ..harness.resource_limits import MEMORY, MOST, TIMEOUT, Limits
 from .registry import whole
 
 if TYPE_CHECKING:
@@ -95,20 +95,13 @@ def unreachable(options: argparse.Namespace) -> list[str]:
 
 def solver(options: argparse.Namespace, engines: Sequence[Engine]) -> tuple[Solver, dict[str, Any]]:
     """Return the solver of the pairs, and its settings for the results."""
-    from ..harness.engine import may_run_here
-    from ..harness.execution import here
     from ..harness.workers.distributed import on_cluster
-    from ..harness.workers.pool import in_workers
+    from ..harness.workers.pool import solver_for
 
     limits = Limits(options.timeout or TIMEOUT, options.memory or MEMORY)
     limited = {"timeout": limits.timeout, "memory_gb": limits.memory}
     if options.scheduler is not None:
         return on_cluster(options.scheduler, limits), {"scheduler": options.scheduler, **limited}
-    jobs: int | None = options.jobs
-    if jobs is None:
-        # A process would cost more time than most cases take natively.
-        ours = all(may_run_here(engine) for engine in engines) and not (
-            options.timeout or options.memory
-        )
-        jobs = 0 if ours else default_jobs()
-    return (in_workers(jobs, limits), {"jobs": jobs, **limited}) if jobs else (here, {"jobs": 0})
+    wanted = limits if options.timeout or options.memory else None
+    found, jobs = solver_for(engines, options.jobs, wanted)
+    return found, {"jobs": jobs, **(limited if jobs else {})}

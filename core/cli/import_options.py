@@ -42,6 +42,12 @@ def add_options(command: argparse.ArgumentParser) -> None:
         ),
     )
     points.add_argument(
+        "--names",
+        type=Path,
+        metavar="FILE",
+        help='the file\'s own names of the points: TOML, a line ROLE = "NAME" each',
+    )
+    points.add_argument(
         "--travel", metavar="M[:SAMPLES]", help="of the wheel, up and down [m]; default 0.05:41"
     )
     model = command.add_argument_group(
@@ -82,6 +88,7 @@ def supplied(options: argparse.Namespace) -> Supplied:
         options.travel,
         (*options.drive,),
         (*options.hold,),
+        options.names,
     )
 
 

@@ -150,6 +150,12 @@ class House:
                 engines.append(self._loaded(name, mode or modes[0]))
         return engines
 
+    def baseline(self, engines: Sequence[Engine]) -> Engine | None:
+        """Return the native engine to compare with; None if it is among the engines."""
+        from ..harness.standard import STANDARD
+
+        return None if STANDARD in (each.name for each in engines) else self.engine(STANDARD)
+
     def _loaded(self, name: str, mode: str) -> Engine:
         """Return the engine, or a stand-in if it fails to load: one broken adapter must not end a
         run of all engines.

@@ -239,8 +239,6 @@ def _engines(
     options: argparse.Namespace, house: House, problems: list[str]
 ) -> tuple[list[Engine], Engine | None]:
     """Return the requested engines, and the native engine as baseline if it is not among them."""
-    from ..harness.standard import STANDARD
-
     named = [*options.engine, *options.require]
     every = house.simulations if options.mode == "simulate" else house.engines
     engines = house.find_engines(
@@ -248,4 +246,4 @@ def _engines(
     )
     if not engines and not problems:
         problems.append(f"no engine has the mode {options.mode!r}; leave out --mode")
-    return engines, None if STANDARD in (each.name for each in engines) else house.engine(STANDARD)
+    return engines, house.baseline(engines)

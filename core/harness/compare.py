@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 
 from ..algebra import Vec3
 from ..case.case import ORDERS, Case, Quantity, Series, size, turning
+from ..case.rotation import counted
 from ..errors import CaseError
 from ..jet import Jet
 from ..mechanism.mechanism import Vector
@@ -62,6 +63,7 @@ def output_series(case: Case, output: Quantity, trajectory: Trajectory) -> Serie
         jet = output.of(
             at, {name: _standing(case.mechanism.point(name).position) for name in output.points}
         )
+        jet = counted(jet, output.period, case.sweep.path)
     solved = trajectory.solved
     position, *rates = (
         np.where(solved & np.isfinite(values), values, np.nan) for values in (jet.x, jet.v, jet.a)

@@ -39,6 +39,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .assembly.assemble import Assembled as Assembled
     from .assembly.assemble import assemble as assemble
     from .assembly.assembly_modes import Assemblies as Assemblies
     from .assembly.assembly_modes import Assembly as Assembly
@@ -102,7 +103,7 @@ if TYPE_CHECKING:
     from .verified.verified_sweep import prove as prove
 
 _NAMES = {
-    "assembly.assemble": "assemble",
+    "assembly.assemble": "Assembled assemble",
     "assembly.assembly_modes": "Assemblies Assembly find_assemblies",
     "compiled.motion_start": "Start notes_on_start solve_from_start start_of",
     "compiled.request": "LAST_ITERATION",

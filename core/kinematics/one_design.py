@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -29,6 +30,7 @@ def solve(
     tol: float = 1e-12,
     style: str = "native",
     motions: Mapping[str, Motion] | None = None,
+    forces: bool | Sequence[str] = False,
 ) -> Trajectory:
     """Sweep one driver over values.
 
@@ -56,6 +58,9 @@ def solve(
             swept one goes from its design value at the rate; the others hold. They are asked at the
             samples, and between them where a step is divided: what goes away and comes back between
             two samples is not seen.
+        forces: joints, drivers and force elements whose forces are wanted; True for all of them.
+            They need masses, and the motion of all bodies with accelerations, whatever is asked for
+            besides.
 
     Returns:
         The motion; NaN where a sample cannot be reached, and the reason in its message.
@@ -77,7 +82,14 @@ def solve(
         tol=tol,
         style=style,
     )
-    return prepare(mechanism, request, path)(tol)
+    if forces is False:
+        return prepare(mechanism, request, path)(tol)
+    # most motions are asked for without forces: they need not wait for the import
+    from .forces.reactions import with_forces
+
+    moving = tuple(body.name for body in mechanism.moving)
+    motion = prepare(mechanism, replace(request, bodies=moving, order=2), path)(tol)
+    return with_forces(mechanism, path, motion, None if forces is True else forces, request.bodies)
 
 
 def asked(

@@ -18,7 +18,7 @@ FOUR_NUMBERS = "four numbers, e0 first"
 Inertia: TypeAlias = tuple[float, float, float, float, float, float]
 """Ixx, Iyy, Izz, Ixy, Iyz, Ixz about the centre of mass: entries of the matrix [kg m^2]."""
 SIX_NUMBERS = "six numbers [Ixx, Iyy, Izz, Ixy, Iyz, Ixz]"
-# Tables print inertia with about six digits: the three roundings together break a rule by a few 1e-6.
+# Tables print about six digits: the roundings of three moments break the rule by a few 1e-6.
 DIGITS = 1e-5
 
 

@@ -11,6 +11,8 @@ import math
 from collections.abc import Callable
 from typing import TypeAlias, cast
 
+import numpy as np
+
 from ..algebra import Scalar
 
 Node: TypeAlias = tuple[str, *tuple[float, ...]]
@@ -182,13 +184,13 @@ def _unary(op: str, a: Scalar, value: Callable[[float], float]) -> Scalar:
 
 
 def sin(a: Scalar) -> Scalar:
-    """Return the sine of a float or traced scalar [rad]."""
-    return _unary("sin", a, math.sin)
+    """Return the sine of a float, of lanes, or of a traced scalar [rad]."""
+    return _unary("sin", a, np.sin if isinstance(a, np.ndarray) else math.sin)
 
 
 def cos(a: Scalar) -> Scalar:
-    """Return the cosine of a float or traced scalar [rad]."""
-    return _unary("cos", a, math.cos)
+    """Return the cosine of a float, of lanes, or of a traced scalar [rad]."""
+    return _unary("cos", a, np.cos if isinstance(a, np.ndarray) else math.cos)
 
 
 def absolute(a: Scalar) -> Scalar:

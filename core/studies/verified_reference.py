@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -17,6 +18,7 @@ import numpy as np
 from ..algebra import Vec3
 from ..case.case import Case, Quantity
 from ..case.io.reference_file import ProvedSeries, Reference, Sample
+from ..case.rotation import turns
 from ..jet import Jet
 from ..kinematics import (
     Drives,
@@ -29,6 +31,7 @@ from ..kinematics import (
     as_double,
     prove,
 )
+from ..mechanism.motions import Path
 from ..program.ball_executor import Ball, flint, precision
 from ..trajectory import Array
 from ..version import VERSION
@@ -167,7 +170,7 @@ def _values(case: Case, output: Quantity, found: Proofs, numbers: str) -> Sequen
         design[name] = Vec3(*(_jet([x], [still], [still]) for x in position))
     columns: list[list[Ball | None]] = [[None] * len(found.samples) for _ in range(3)]
     if proved:
-        jet = output.of(at, design)
+        jet = _counted(output, output.of(at, design), case.sweep.path, proved)
         for column, values in zip(columns, (jet.x, jet.v, jet.a), strict=True):
             for k, value in zip(
                 proved,
@@ -219,6 +222,16 @@ def _sample(
         contradicted=sum(not each.contains(0) for each in found.left_out),
         left_out=None if others is None else list(others),
     )
+
+
+def _counted(output: Quantity, jet: Jet, path: Path, proved: Sequence[int]) -> Jet:
+    """Return an angle with its turns along the path."""
+    if not output.period:
+        return jet
+    x, v = (np.asarray(each).astype(np.float64) for each in (jet.x, jet.v))
+    count = turns(x, v, output.period, replace(path, times=path.times[proved]))
+    whole = 2 * flint().arb.pi()  # of a period, which is a whole turn
+    return jet + np.array([Exact(int(n) * whole) for n in count], dtype=object)
 
 
 def _series(

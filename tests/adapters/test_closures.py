@@ -147,15 +147,15 @@ def test_every_joint_moves_as_in_the_native_engine(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     mechanism, turn = on_crank(kind, *bodies), np.linspace(-0.4, 0.4, 81)
-    monkeypatch.setattr(adapter, "spanning_tree", tree)
+    monkeypatch.setattr("kincheck.adapters.shared.tree_model.spanning_tree", tree)
     found, native = solved(mechanism, turn, 2.0), solve(mechanism, "turn", turn, rate=2.0)
     assert native.solved.all()
     if tree is crank_only or kind in TOO_LOOSE:
         assert "tested" in found.details["closures"]
         assert found.details["rank"] == found.details["unknowns"] == 7
     else:
-        # a screw is a slide and a turn tied by a row, a constant-velocity joint a ball and a row
-        spare = 1 if kind in ("screw", "constant_velocity") else 0
+        # a screw is a slide and a turn tied by a row, a constant-velocity joint four by two
+        spare = {"screw": 1, "constant_velocity": 2}.get(kind, 0)
         assert (
             found.details["rank"]
             == found.details["unknowns"]
@@ -194,7 +194,7 @@ def test_cardan_joint(
     With the bearing cut, a body that turns about two moving axes carries a closure: the only place
     where a direction has a bias from the angular acceleration.
     """
-    monkeypatch.setattr(adapter, "spanning_tree", tree)
+    monkeypatch.setattr("kincheck.adapters.shared.tree_model.spanning_tree", tree)
     a, u, center = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]), np.array([0.1, 0.2, 0.3])
     b = rotation(u, 0.6) @ a
     turn, rate = 0.02 * np.arange(-4, 320), 2.0

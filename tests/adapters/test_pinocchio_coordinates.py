@@ -35,7 +35,7 @@ from kincheck.core.trajectory import Trajectory
 
 pytest.importorskip("pinocchio")
 
-from .test_pinocchio import ENGINE, TOL, adapter, case_of, rotation, solved
+from .test_pinocchio import ENGINE, TOL, case_of, rotation, solved
 
 Q, AXIS = (0.2, -0.1, 0.3), (0.4, 1.0, -0.7)
 P = (0.5, 0.6, 0.1)
@@ -290,7 +290,7 @@ def test_spindle_lifts_a_lever(
     With the thread cut, bodies that turn about several moving axes carry it: the only place where
     its angle has a bias.
     """
-    monkeypatch.setattr(adapter, "spanning_tree", tree)
+    monkeypatch.setattr("kincheck.adapters.shared.tree_model.spanning_tree", tree)
     along, eye = (0.1, 0.2, 1.0), (0.05, 0.1, 0.5)
     joints = [
         Universal("base", GROUND, "housing", (0.0, 0.0, 0.0), ((1.0, 0.0, -0.1), (0.02, 1.0, 0.2))),

@@ -155,6 +155,7 @@ class Angle:
     unit: str = "rad"
     signs: str = ""
     orders: int = ORDERS
+    period: float = 0.0
 
     def of(self, at, design):
         tip = at["tip"]

@@ -12,7 +12,8 @@ import pytest
 from kincheck import cases
 from kincheck.adapters.native import Native
 from kincheck.core.case.case import Case, Output, Sweep, Truth
-from kincheck.core.case.io.suspension import with_markers, with_slopes
+from kincheck.core.case.io.suspension import with_slopes
+from kincheck.core.case.markers import with_markers
 from kincheck.core.case.suspension import (
     Axle,
     Convention,

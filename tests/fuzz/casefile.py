@@ -4,6 +4,7 @@ import kincheck.cases
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.io.document import fault
 from kincheck.core.case.io.driving import DRIVERS
+from kincheck.core.case.measures import Measure
 from kincheck.core.case.suspension import SuspensionOutput
 from kincheck.core.errors import KincheckError
 from kincheck.core.joints import Coupler, Joint
@@ -22,7 +23,14 @@ ratio lead body position drivers direction relative joint motion rate amplitude 
 steps outputs component atol rtol why suspension convention side forward up wheel_center center_plane kingpin wheel_radius axle
 wheelbase cg_height brakes drive per_travel reference file columns rows ground time closed_form x y z mm deg left iso8855 sae_j670
 front outboard inboard"""  # noqa: E501
-TYPES = [*Joint.registry, *Coupler.registry, *DRIVERS, *Motion.registry, *SuspensionOutput.registry]
+TYPES = [
+    *Joint.registry,
+    *Coupler.registry,
+    *DRIVERS,
+    *Motion.registry,
+    *Measure.registry,
+    *SuspensionOutput.registry,
+]
 WORDS = (*KEYS.split(), *TYPES)
 
 

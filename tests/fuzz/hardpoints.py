@@ -20,7 +20,8 @@ ROLES = [
     for name in (role.name, *role.also)
 ]
 KEYS = """name x y z mm cm inch [HARDPOINT] [UNITS] {hardpoint_name symmetry x_value y_value z_value} left/right single right LENGTH
-= Type Template Suspension Spindle COM Location // /* */ $ # units: axes: rearward,right,up"""  # noqa: E501
+= Type Template Suspension Spindle COM Location // /* */ $ # units: axes: rearward,right,up
+sep=; (VARIANTS) 1,5 -1.234,5 1,234 "2,5" point;"""  # noqa: E501
 WORDS = (
     *KEYS.split(),
     *ROLES,
@@ -66,9 +67,17 @@ def seeds() -> list[bytes]:
     ]
     table = "name,x,y,z\n" + "\n".join(",".join([row[0], *row[-3:]]) for row in rows)
     other = "# units: mm\n# axes: rearward,right,up\n" + table.replace(",", "\t")
+    german = "Car\nsep=;\nname;x [mm];y [mm];z [mm];mass;\n" + "\n".join(
+        ";".join([row[0], *row[-3:], "1;"]).replace(".", ",") for row in rows
+    )
+    variants = adams.replace(
+        "[PARAMETER]", "(VARIANTS)\n 'lca_outer' 'left/right' 1 2 3\n[PARAMETER]"
+    )
     return [
         *(file.read_bytes() for file in sorted(DATA.glob("*.json"))),
-        *(text.encode() for text in (adams, table, other)),
+        *(text.encode() for text in (adams, table, other, variants)),
+        german.removeprefix("Car\n").encode("utf-16"),
+        german.replace("sep=;\n", "").encode(),
     ]
 
 

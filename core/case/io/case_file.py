@@ -12,10 +12,13 @@ from ...errors import remedy
 from ...joints import Coupler, Joint, Kind
 from ...mechanism.mechanism import Body, Mechanism, Point, Vector
 from ..case import PER_TRAVEL, Case, Output, Quantity, Truth, size
+from ..markers import with_markers
+from ..measures import Measure
 from ..units import ANGLES, LENGTHS, Unit
 from .coordinates import AXES, with_all_coordinates
 from .document import explained, fault, join, parse, read_text, shown
 from .driving import read_drivers, read_sweep
+from .measures import read_measure
 from .reference import Convert, is_derivative, read_origin, read_reference
 from .reference_samples import ReferenceKeys
 from .schema import (
@@ -174,20 +177,23 @@ def _with_outputs(
 ) -> Case:
     """Return the case with its outputs, and with the points they need beyond those of the file."""
     mechanism = case.mechanism
-    if not keys.points:
+    if not (keys.points or keys.outputs):
         raise fault(
             file,
             "points",
-            "found no point, expected one whose motion is compared; add [points.NAME]",
+            "found no point, expected one whose motion is compared; add [points.NAME], or an output"
+            " of a joint or body, [outputs.NAME]",
         )
     if keys.suspension is None:
         outputs = _outputs(file, keys, None, case, units)
-        return replace(case, outputs=outputs) if outputs else with_all_coordinates(case)
+        if not outputs:
+            return with_all_coordinates(case)
+        return replace(case, mechanism=with_markers(mechanism, outputs), outputs=outputs)
     from . import suspension  # many classes, and few cases have a wheel
 
     table = suspension.read_suspension(file, keys.suspension, mechanism, length, units["rad"])
     outputs = _outputs(file, keys, table, case, units) or with_all_coordinates(case).outputs
-    case = replace(case, mechanism=suspension.with_markers(mechanism, outputs), outputs=outputs)
+    case = replace(case, mechanism=with_markers(mechanism, outputs), outputs=outputs)
     return (
         replace(case, outputs=suspension.with_slopes(outputs, size(case)))
         if table.per_travel
@@ -228,9 +234,10 @@ def _output(
     if as_table(file, key, value).get("type", COORDINATE) != COORDINATE:
         from .suspension import SuspensionOutput, read_output
 
-        cls = class_of(
-            file, key, "output", value, {COORDINATE: Output, **SuspensionOutput.registry}
-        )
+        known = {COORDINATE: Output, **Measure.registry, **SuspensionOutput.registry}
+        cls = class_of(file, key, "output", value, known)
+        if issubclass(cls, Measure):
+            return read_measure(file, key, cls, name, value, case, units)
         if issubclass(cls, SuspensionOutput):
             return read_output(file, key, cls, name, value, table, case, units)
     return _coordinate(file, key, name, value, keys, case, units["m"])

@@ -15,6 +15,7 @@ from ...errors import CaseError
 from ...joints import Coupler
 from ...mechanism.motions import Absolute
 from ..case import MARKER, TIME, Case, Output
+from ..measures import Measure, key_of, own_keys
 from .coordinates import AXES
 from .schema import SCHEMA, own_fields
 
@@ -80,17 +81,21 @@ def _sweep(case: Case) -> Mapping[str, Any]:
 
 
 def _output(case: Case, output: Any) -> Iterator[tuple[str, Any]]:
-    if not isinstance(output, Output):
-        raise CaseError(
-            f"case {case.name!r}: output {output.name!r} is not a coordinate of a point; leave"
-            " it out"
+    if isinstance(output, Measure):
+        yield "type", output.type
+        for each in own_keys(type(output)):
+            yield key_of(each), getattr(output, each.name)
+    elif isinstance(output, Output):
+        component = next((name for name, axis in AXES.items() if axis == output.direction), None)
+        yield "point", output.point
+        yield from (
+            [("direction", output.direction)] if component is None else [("component", component)]
         )
-    component = next((name for name, axis in AXES.items() if axis == output.direction), None)
-    yield "point", output.point
-    yield from (
-        [("direction", output.direction)] if component is None else [("component", component)]
-    )
-    yield "relative", output.relative
+        yield "relative", output.relative
+    else:
+        raise CaseError(
+            f"case {case.name!r}: output {output.name!r} is one of a suspension; leave it out"
+        )
     yield from (("atol", output.atol), ("rtol", output.rtol), ("why", output.why))
 
 

@@ -10,6 +10,8 @@ from ...errors import MechanismError
 from ...joints import Coupler, Joint, Kind
 from ...mechanism.drivers import Driver
 from ...mechanism.motions import Motion
+from .. import measures
+from ..measures import Measure
 from ..suspension import SuspensionOutput, own_keys
 from .driving import DRIVERS
 from .schema import kind_of, own_fields
@@ -62,6 +64,13 @@ def catalogue() -> Iterator[str]:
 def output_catalogue() -> Iterator[str]:
     """Yield lines of the output types: unit, keys, needs from [suspension], and signs."""
     yield "outputs: (type) = coordinate, point, component or direction, (relative); or a type, and"
+    yield from _columns(
+        [
+            (name, ", ".join(_measure_keys(cls)), _meaning(cls))
+            for name, cls in sorted(Measure.registry.items())
+        ]
+    )
+    yield "outputs of a wheel: type, and"
     rows: list[tuple[str, ...]] = []
     for name, cls in sorted(SuspensionOutput.registry.items()):
         keys = [
@@ -105,7 +114,13 @@ def _keys(cls: type[Joint] | type[Coupler] | type[Driver] | type[Motion]) -> str
     return ", ".join(names) or "nothing else"
 
 
-def _meaning(cls: type[Joint] | type[Coupler] | type[Driver] | type[Motion]) -> str:
+def _measure_keys(cls: type[Measure]) -> Iterator[str]:
+    for each in measures.own_keys(cls):
+        key = measures.key_of(each)
+        yield key if each.default is MISSING else f"({key})"
+
+
+def _meaning(cls: type[Joint | Coupler | Driver | Motion | Measure]) -> str:
     """The first line of what a class says of itself; a dataclass that says nothing has its
     signature there.
     """

@@ -1,4 +1,4 @@
-"""Coordinates of points as outputs, compared by default."""
+"""Outputs that are compared by default: coordinates of points, and of models all that moves."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from ...mechanism.mechanism import Vector
-from ..case import Case, Output, size
+from ..case import Case, Output, Quantity, size
+from ..markers import with_markers
+from ..measures import Component, JointAngle, JointDisplacement, Orientation
 from .tolerance import default
 
 AXES: Mapping[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
@@ -26,3 +28,23 @@ def with_all_coordinates(case: Case, points: Iterable[str] | None = None) -> Cas
         for axis, along in AXES.items()
     ]
     return replace(case, outputs=tuple(outputs))
+
+
+def with_all_motions(case: Case) -> Case:
+    """Return the case with the coordinates of all points, the coordinate of every joint that has
+    one, and the Euler parameters of every moving body as outputs, with default tolerances.
+    """
+    mechanism, extent = case.mechanism, size(case)
+    outputs: list[Quantity] = [*with_all_coordinates(case).outputs]
+    for joint in mechanism.joints:
+        for what, cls in (("angle", JointAngle), ("displacement", JointDisplacement)):
+            if cls.freedom in joint.freedoms:
+                given = default(extent, cls.measure)
+                outputs.append(cls(f"{joint.name}.{what}", *given, joint=joint.name))
+    outputs += [
+        Orientation(f"{body.name}.{each}", *default(extent, "1"), body=body.name, component=each)
+        for body in mechanism.moving
+        for each in Component
+        if each.startswith("e")
+    ]
+    return replace(case, mechanism=with_markers(mechanism, outputs), outputs=tuple(outputs))

@@ -6,6 +6,7 @@ remedy.
 
 from __future__ import annotations
 
+import codecs
 import hashlib
 import json
 import math
@@ -115,8 +116,11 @@ def decimal(text: str) -> float:
     return float(text)
 
 
-def read_text(file: Path, limit: int, why_limit: str) -> str:
+def read_text(file: Path, limit: int, why_limit: str, *, utf_16: bool = False) -> str:
     """Return the text of a file of at most `limit` bytes.
+
+    Args:
+        utf_16: accept UTF-16 with its mark, which spreadsheets write.
 
     Raises:
         CaseError: not there, not a regular file, not readable, too large, or not UTF-8.
@@ -132,9 +136,14 @@ def read_text(file: Path, limit: int, why_limit: str) -> str:
         raise fault(file, "", f"cannot be read ({error.strerror}); check path and rights") from None
     if len(data) > limit:
         raise fault(file, "", f"larger than {limit} bytes, expected less; {why_limit}")
+    marked = utf_16 and data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
     try:
-        return data.decode("utf-8-sig")
+        return data.decode("utf-16" if marked else "utf-8-sig")
     except UnicodeDecodeError as error:
+        if marked:
+            raise fault(
+                file, "", f"byte {error.start} is not UTF-16; save the file as UTF-8"
+            ) from None
         raise fault(file, "", f"byte {error.start} is not UTF-8; save the file as UTF-8") from None
 
 

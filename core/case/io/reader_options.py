@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from pathlib import Path
 
 
 @dataclass(frozen=True)
@@ -14,6 +15,7 @@ class Supplied:
         units: unit of the coordinates in a file of hardpoints: "mm", "m", ...
         axes: directions of x, y and z in a file of hardpoints: "forward,left,up", ...
         travel: wheel travel of a suspension, up and down: "METRES" or "METRES:SAMPLES".
+        names: file of the user's own names of hardpoints, by role of the template.
         drive: driven joint of a model: "JOINT:START:STOP" or "JOINT:START:STOP:SAMPLES", in its
             coordinate [rad, m].
         hold: joints or free bodies of a model that are held in place.
@@ -25,6 +27,7 @@ class Supplied:
     travel: str | None = None
     drive: tuple[str, ...] = ()
     hold: tuple[str, ...] = ()
+    names: Path | None = None
 
     @property
     def given(self) -> tuple[str, ...]:

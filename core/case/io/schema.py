@@ -51,11 +51,17 @@ left out. `kincheck list --joints` prints all types with their keys.
                          time zero if the sweep has it, else at the first sample, and the result
                          says so
     [outputs.NAME]       (type) = "coordinate": point, component = "x", "y" or "z", or direction
+                         type = "distance": points = [A, B]
+                         type = "joint_angle" or "joint_displacement": joint
+                         type = "orientation": body, component of its rotation since design, global
+                         axes: "x", "y" or "z" of the rotation vector, or Euler parameter "e0" to
+                         "e3"
+                         type = "angle": bodies = [first, second], directions, one on each
                          type = "toe", "camber", ...: of the wheel in [suspension]; `kincheck list
                          --outputs` prints them with their keys, signs and needs; each has its
                          derivative by wheel travel, NAME.per_travel
                          (relative) = false: measured from the design; not for quotients of
-                         velocities, such as motion_ratio
+                         velocities, such as motion_ratio, nor for measures that are zero there
                          (atol), in the output's unit, (rtol), of the range of the true values:
                          with either, (why), the reason
                          no outputs: x, y and z of every point

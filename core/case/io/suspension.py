@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, dataclass, replace
+from dataclasses import MISSING, dataclass
 from enum import StrEnum
 from functools import cache
 from pathlib import Path
@@ -17,7 +17,7 @@ from msgspec import Meta
 
 from ...algebra import vec
 from ...errors import remedy
-from ...mechanism.mechanism import Mechanism, Point, Vector
+from ...mechanism.mechanism import Mechanism, Vector
 from ..case import Case, Quantity, size
 from ..suspension import (
     Axle,
@@ -274,19 +274,3 @@ def with_slopes(outputs: Sequence[Quantity], size: float) -> tuple[Quantity, ...
         if isinstance(output, SuspensionOutput):
             both.append(PerTravel(output, output.atol / size))
     return tuple(both)
-
-
-def with_markers(mechanism: Mechanism, outputs: Sequence[Quantity]) -> Mechanism:
-    """Return the mechanism with the points on wheel carriers by which outputs measure rotation."""
-    read = {name for output in outputs for name in output.points}
-    added: dict[str, Point] = {}
-    for output in outputs:
-        if isinstance(output, SuspensionOutput):
-            center = mechanism.point(output.vehicle.wheel_center)
-            places = output.vehicle.marker_positions(center.position)
-            added |= {
-                name: Point(name, center.body, place)
-                for name, place in places.items()
-                if name in read
-            }
-    return replace(mechanism, points=[*mechanism.points, *added.values()]) if added else mechanism

@@ -27,7 +27,7 @@ HARDPOINTS = (CHRONO, ADAMS, TABLE)
 _OPTIONS = {
     CASE: (),
     MODEL: ("drive", "hold"),
-    **dict.fromkeys(HARDPOINTS, ("template", "units", "axes", "travel")),
+    **dict.fromkeys(HARDPOINTS, ("template", "units", "axes", "travel", "names")),
 }
 
 
@@ -50,7 +50,7 @@ def load(file: Path, supplied: Supplied = NOTHING) -> Case:
             )
     if kind == CASE:
         return load_case(file)
-    text = _text(file)
+    text = _text(file, utf_16=kind in (TABLE, ADAMS))
     if not file.stem.isprintable():  # it becomes the name of the case
         raise fault(
             file,
@@ -92,7 +92,7 @@ def kind_of(file: Path, supplied: Supplied = NOTHING) -> str:
     for kind, suffixes in ((TABLE, TABLES), (ADAMS, ADAMS_FILES), (MODEL, MODELS)):
         if suffix in suffixes:
             return kind
-    text = _text(file)
+    text = _text(file, utf_16=True)
     if "[HARDPOINT]" in text:
         return ADAMS
     if text.lstrip().startswith("<"):
@@ -100,7 +100,10 @@ def kind_of(file: Path, supplied: Supplied = NOTHING) -> str:
     return TABLE if supplied.template else CASE
 
 
-def _text(file: Path) -> str:
+def _text(file: Path, *, utf_16: bool = False) -> str:
     return read_text(
-        file, LARGEST_FILE, "hardpoints and mechanisms need far less; take out what is not geometry"
+        file,
+        LARGEST_FILE,
+        "hardpoints and mechanisms need far less; take out what is not geometry",
+        utf_16=utf_16,
     )

@@ -16,6 +16,7 @@ import numpy as np
 
 from ...algebra import Vec3
 from ...jet import Jet
+from ...mechanism.mechanism import Mechanism, Point
 from ...trajectory import Array
 from ..case import PER_TRAVEL
 from .corner import Corner
@@ -88,6 +89,19 @@ class SuspensionOutput(ABC):
     def sense(self) -> str:
         """Meaning of a positive value for this wheel, in words."""
         return f"positive: {self.positive}"
+
+    @property
+    def period(self) -> float:
+        """Zero: each value is a pose of its own."""
+        return 0.0
+
+    def markers(self, mechanism: Mechanism) -> Sequence[Point]:
+        """Return the points on the wheel carrier that it reads beyond those of the case."""
+        center = mechanism.point(self.vehicle.wheel_center)
+        places = self.vehicle.marker_positions(center.position)
+        return [
+            Point(name, center.body, place) for name, place in places.items() if name in self.points
+        ]
 
     @property
     def problem(self) -> str:
@@ -177,6 +191,15 @@ class PerTravel:
     def orders(self) -> int:
         """One less than those of the output."""
         return self.of_output.orders - 1
+
+    @property
+    def period(self) -> float:
+        """Zero: each value is a pose of its own."""
+        return 0.0
+
+    def markers(self, mechanism: Mechanism) -> Sequence[Point]:
+        """Return the markers of the output."""
+        return self.of_output.markers(mechanism)
 
     @property
     def unit(self) -> str:

@@ -7,11 +7,27 @@ from collections.abc import Sequence
 from queue import SimpleQueue
 from threading import Lock, Thread
 
-from ..execution import Attempt, Attempts, Failure, Pair, Solver, said
+from ..engine import Engine, may_run_here
+from ..execution import Attempt, Attempts, Failure, Pair, Solver, here, said
 from ..record import Outcome
-from ..resource_limits import Limits
+from ..resource_limits import Limits, default_jobs
 from .messages import pack
 from .worker import Seat
+
+
+def solver_for(
+    engines: Sequence[Engine], jobs: int | None = None, limits: Limits | None = None
+) -> tuple[Solver, int]:
+    """Return the solver of pairs of these engines, and its number of worker processes.
+
+    Args:
+        jobs: number of worker processes; 0 solves in this process, without limits. By default half
+            the processors, and 0 if every engine may run in this process and no limit is given: a
+            process would cost more time than most cases take natively.
+    """
+    if jobs is None:
+        jobs = 0 if limits is None and all(map(may_run_here, engines)) else default_jobs()
+    return (in_workers(jobs, limits or Limits()), jobs) if jobs else (here, 0)
 
 
 def in_workers(jobs: int, limits: Limits) -> Solver:

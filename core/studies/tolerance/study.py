@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ...algebra import Vec3
 from ...case.case import Case, Quantity
+from ...case.rotation import counted
 from ...case.variation.variation import Mode, Stream, Variation, generator
 from ...jet import Jet
 from ...kinematics import placed
@@ -210,7 +211,9 @@ class Ready:
         values = np.empty((len(self.study.rows), *kept.shape[1:]))
         # what is not known is NaN, and what is made of it becomes NaN
         with np.errstate(all="ignore"):
-            jets = {output.name: output.of(at, design) for output in self.study.case.outputs}
+            case = self.study.case
+            path = case.sweep.path
+            jets = {o.name: counted(o.of(at, design), o.period, path) for o in case.outputs}
             for k, row in enumerate(self.study.rows):
                 jet = jets[row.output.name]
                 values[k] = (jet.x, jet.v, jet.a)[row.derivative]

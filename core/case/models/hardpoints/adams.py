@@ -2,8 +2,9 @@
 (TeimOrbit format).
 
 A block has the columns {hardpoint_name symmetry x_value y_value z_value}; of a 'left/right' pair it
-holds the left one. Adams/Car has x rearward, y to the right and z up. The unit is in the block
-[UNITS]; a block that was cut out of its file has none.
+holds the left one. Rows below a line (VARIANTS) are of other designs; the nominal ones above it
+are read. Adams/Car has x rearward, y to the right and z up. The unit is in the block [UNITS]; a
+block that was cut out of its file has none.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from ....errors import remedy
+from ....errors import MOST_NAMED, remedy, shortened
 from ...io.document import fault, shown
 from .table import Hardpoint, HardpointTable, number
 
@@ -20,6 +21,7 @@ COLUMNS = ("hardpoint_name", "symmetry", "x_value", "y_value", "z_value")
 LEFT, RIGHT = ("left/right", "left", "single"), "right"
 
 _SECTION = re.compile(r"\[\s*([A-Za-z_]+)\s*\]")
+_SUBSECTION = re.compile(r"\(\s*([A-Za-z_]+)\s*\)")
 _FIELD = re.compile(r"'([^']*)'|(\S+)")
 
 
@@ -32,15 +34,19 @@ def read_adams(file: Path, text: str) -> HardpointTable:
     points: dict[str, Hardpoint] = {}
     unit: str | None = None
     section, sections, right = "", dict[str, int](), 0
+    inner, variants = "", dict[str, list[str]]()
     columns = COLUMNS
     for k, line in enumerate(text.splitlines(), 1):
         row, where = line.strip(), f"line {k}"
         if not row or row.startswith(("$", "!")):
             continue
         if head := _SECTION.fullmatch(row):
-            section = head.group(1).upper()
+            section, inner = head.group(1).upper(), ""
             sections.setdefault(section, 0)
             columns = COLUMNS
+            continue
+        if section == "HARDPOINT" and (found := _SUBSECTION.fullmatch(row)):
+            inner = found.group(1).upper()
             continue
         sections[section] = sections.get(section, 0) + 1
         if section == "UNITS" and (found := re.fullmatch(r"LENGTH\s*=(.*)", row, re.IGNORECASE)):
@@ -56,7 +62,9 @@ def read_adams(file: Path, text: str) -> HardpointTable:
                 )
         elif section == "HARDPOINT":
             name, symmetry, point = _row(file, where, row, columns)
-            if symmetry == RIGHT:
+            if inner:
+                variants.setdefault(inner, []).append(f"{name} in {where}")
+            elif symmetry == RIGHT:
                 right += 1
             elif name in points:
                 raise fault(
@@ -79,6 +87,7 @@ def read_adams(file: Path, text: str) -> HardpointTable:
         for name, rows in sections.items()
         if name not in ("HARDPOINT", "UNITS", "") and rows
     ]
+    left_out += [f"({name}): {shortened(rows, MOST_NAMED)}" for name, rows in variants.items()]
     left_out += [f"{right} points of the right side"] * bool(right)
     return HardpointTable(file, "Adams/Car", points, unit, "rearward,right,up", None, left_out)
 

@@ -18,8 +18,10 @@ from ....trajectory import Array
 from ...case import Case, Sweep, Truth
 from ...io.coordinates import AXES, with_all_coordinates
 from ...io.document import decimal, explained, fault, shown
+from ...io.escape import visible
 from ...io.reader_options import LEFT_OUT, Supplied
 from ...io.schema import MOST_SAMPLES
+from .own_names import read_own_names
 from .table import HardpointTable, coordinate, placed, require_size, unit_of
 from .templates import TEMPLATES, Template
 from .templates.base import KNUCKLE, normal
@@ -53,7 +55,7 @@ def read_hardpoints(file: Path, text: str, reader: Reader, supplied: Supplied) -
         )
     template = _template(table, supplied.template)
     points = placed(table, supplied.units, supplied.axes)
-    named = _filled(table, template)
+    named = _filled(table, template, supplied.names)
     at = {role: points[name] for role, name in named.items()}
     require_size(table, at, supplied.units)
     travel = _travel(file, supplied.travel)
@@ -108,13 +110,21 @@ def _template(table: HardpointTable, said: str | None) -> Template:
     return written
 
 
-def _filled(table: HardpointTable, template: Template) -> dict[str, str]:
-    """Which point of the file fills each role of the template."""
+def _filled(table: HardpointTable, template: Template, own: Path | None) -> dict[str, str]:
+    """Return the name of the point that fills each role of the template.
+
+    Args:
+        own: file of the user's own names.
+    """
     by_normal_name: dict[str, list[str]] = {}
     for name in table.points:
         by_normal_name.setdefault(normal(name), []).append(name)
     filled: dict[str, str] = {}
+    if own is not None:
+        filled |= read_own_names(own, [role.name for role in template.roles], table.points)
     for role in template.roles:
+        if role.name in filled:
+            continue
         found = [
             name for each in dict.fromkeys(role.names) for name in by_normal_name.get(each, ())
         ]
@@ -144,13 +154,14 @@ def _filled(table: HardpointTable, template: Template) -> dict[str, str]:
     raise fault(
         table.file,
         "",
-        f"{problem}; found beside: {_listed([*unused.values()])}; rename or add them",
+        f"{problem}; found beside: {_listed([*unused.values()])}; rename or add them, or say with"
+        " --names FILE which point is which",
     )
 
 
 def _listed(names: Sequence[str]) -> str:
     """Names to read: all of those that a file of a suspension has."""
-    return shortened([*map(brief, names)], MOST_NAMED) or "nothing"
+    return shortened([brief(visible(name)) for name in names], MOST_NAMED) or "nothing"
 
 
 def _require_left_and_upright(

@@ -15,7 +15,18 @@ from ...io.document import decimal, fault, shown, usable
 from ...sizes import SUSPENSIONS
 from ...units import LENGTHS, Unit, plain
 
-_UNIT_NAMES: Mapping[str, str] = {"meter": "m", "metre": "m", "in": "inch", "ft": "foot"}
+_UNIT_NAMES: Mapping[str, str] = {
+    "meter": "m",
+    "metre": "m",
+    "millimeter": "mm",
+    "millimetre": "mm",
+    "centimeter": "cm",
+    "centimetre": "cm",
+    "in": "inch",
+    "inches": "inch",
+    "ft": "foot",
+    "feet": "foot",
+}
 
 _DIRECTIONS: Mapping[str, tuple[int, float]] = {
     "forward": (0, 1.0),
@@ -62,8 +73,11 @@ class HardpointTable:
     left_out: Sequence[str] = ()
 
 
-def number(file: Path, where: str, text: object) -> float:
+def number(file: Path, where: str, text: object, sign: str = ".") -> float:
     """Return a coordinate.
+
+    Args:
+        sign: decimal sign of texts.
 
     Raises:
         CaseError: not a usable number.
@@ -71,7 +85,7 @@ def number(file: Path, where: str, text: object) -> float:
     found = math.nan
     if isinstance(text, str | int | float) and not isinstance(text, bool):
         try:
-            found = decimal(text) if isinstance(text, str) else float(text)
+            found = decimal(text.replace(sign, ".")) if isinstance(text, str) else float(text)
         except (ValueError, OverflowError):
             found = math.nan
     if not usable(found):
@@ -128,7 +142,7 @@ def unit_of(table: HardpointTable, said: str | None) -> Unit:
 
 
 def _unit(table: HardpointTable, said: str | None) -> str:
-    written = None if table.unit is None else _unit_name(table.unit)
+    written = None if table.unit is None else length_name(table.unit)
     if written is not None and written not in LENGTHS:
         raise fault(
             table.file,
@@ -141,10 +155,10 @@ def _unit(table: HardpointTable, said: str | None) -> str:
                 table.file,
                 "",
                 "does not say in which unit its coordinates are, expected it from you; add --units"
-                " mm or --units m",
+                " mm or --units m, or else cm, inch or foot",
             )
         return written
-    name = _unit_name(said)
+    name = length_name(said)
     if name not in LENGTHS:
         raise fault(
             table.file,
@@ -160,7 +174,8 @@ def _unit(table: HardpointTable, said: str | None) -> str:
     return name
 
 
-def _unit_name(text: str) -> str:
+def length_name(text: str) -> str:
+    """Return the name in `LENGTHS` of a unit, or of what else the text is, in small letters."""
     name = text.strip().lower()
     return _UNIT_NAMES.get(name, name)
 

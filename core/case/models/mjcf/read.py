@@ -13,7 +13,7 @@ from ....kinematics import degrees_of_freedom
 from ....mechanism.drivers import JointAngle, JointDisplacement, JointDriver
 from ....mechanism.mechanism import Body, Mechanism, Point
 from ...case import Case, Sweep, Truth
-from ...io.coordinates import with_all_coordinates
+from ...io.coordinates import with_all_motions
 from ...io.document import explained, fault
 from ...io.reader_options import LEFT_OUT, Supplied
 from .attributes import MAKE_BODIES, ROOT, WRITE_OUT
@@ -41,8 +41,8 @@ _LEFT_OUT = (
 
 
 def read_mjcf(file: Path, text: str, supplied: Supplied) -> Case:
-    """The case of a model; outputs are the coordinates of the origins of bodies and of sites; it is
-    consensus_only.
+    """The case of a model; outputs are the coordinates of the origins of bodies and of sites, those
+    of joints, and the rotations of bodies.
 
     Raises:
         CaseError: not a model that can be read, or the options do not say how it moves.
@@ -87,7 +87,7 @@ def read_mjcf(file: Path, text: str, supplied: Supplied) -> Case:
         f" qpos0{LEFT_OUT}{', '.join(others) or 'nothing'}"
     )
     sweep = Sweep(driving.joint, driving.values, design=tree.joints[driving.joint].ref)
-    return with_all_coordinates(Case(file.stem, source, Truth.CONSENSUS_ONLY, mechanism, sweep, ()))
+    return with_all_motions(Case(file.stem, source, Truth.CONSENSUS_ONLY, mechanism, sweep, ()))
 
 
 def _require_model(root: Element) -> None:

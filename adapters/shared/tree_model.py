@@ -1,0 +1,270 @@
+"""A mechanism as one tree of slides, hinges and balls, for simulators of generalized coordinates.
+
+The base owns the spanning tree, the joints as chains of links (`joint_chains`), the conditions that
+close loops (`loop_closures`), relations, couplers and drivers. A simulator adds links and frames
+and reports how they move. It knows a body by the number of the link that carries it; the ground is
+body 0. The axes of every body are global at design, and its origin is the point of its link there.
+
+A constructor prepares the simulator's empty model and then calls that of the base, which calls
+`add_link` for every link, parents first, `make_frame` for every frame, and `finish` at last. After
+that the model is solved: `design` and `moved` give configurations q, `place` and `rate` update the
+simulator's data, which `placement`, `slope` and `motion` read, frame by frame.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ...core.case.case import Case
+from ...core.joints import Fixed, Joint
+from ...core.joints.base import unit
+from ...core.mechanism.drivers import JointDriver, PointCoordinate
+from ...core.mechanism.mechanism import GROUND, Mechanism, Vector
+from ...core.mechanism.topology import Branch, SpanningTree, spanning_tree
+from ...core.trajectory import Array
+from .frame_constraints import Condition
+from .joint_chains import CHAINS, Link, free, relations
+from .loop_closures import CLOSURES, ends_of
+from .poses import middle
+from .tree_rows import BodyFrame, DrivenPoint, Linear
+
+
+class TreeModel(ABC):
+    """The mechanism in a simulator; a `ProjectionModel`. Rows: those of joints, then of couplers,
+    then one a driver.
+
+    Attributes:
+        q: the configuration, never changed in place.
+        origin: of each body, global at design [m].
+        carrier: name of a body of the mechanism -> number of its body here.
+        coordinates: joint and freedom -> body that moves by this coordinate, and its sign.
+        conditions: all rows, the drivers' last.
+        closures: name of a cut joint -> its rows, in words.
+    """
+
+    q: Array
+
+    def __init__(self, case: Case) -> None:
+        self.case = case
+        mechanism, tree = case.mechanism, spanning_tree(case.mechanism)
+        fixed = (GROUND, *(body.name for body in mechanism.bodies if body.fixed))
+        self.carrier = dict.fromkeys(fixed, 0)
+        self.origin = [np.zeros(3)]
+        self.coordinates: dict[tuple[str, str], tuple[int, int]] = {}
+        self.conditions: list[Condition] = []
+        self.closures: dict[str, str] = {}
+        self.frames: list[BodyFrame] = []
+        for branch in self.branches(mechanism, tree):
+            self.carry(mechanism, branch)
+        named = {name for coupler in mechanism.couplers for name in coupler.joints}
+        named |= {driver.joint for driver in mechanism.drivers if isinstance(driver, JointDriver)}
+        for joint in tree.cut:
+            self.close(joint, ends_of(mechanism, joint), joint.name in named)
+        for coupler in mechanism.couplers:
+            self.relate(coupler.terms)
+        for driver in mechanism.drivers:
+            if isinstance(driver, PointCoordinate):
+                point, k = mechanism.point(driver.point), np.array([*unit(driver.direction)])
+                frame = self.add_frame(self.carrier[point.body], point.position)
+                self.conditions.append(DrivenPoint(frame, k, np.array(point.position)))
+            elif isinstance(driver, JointDriver):
+                self.relate([(driver.joint, driver.freedom, 1.0)])
+        conditioned = len(self.frames)
+        wanted = [mechanism.point(name) for name in case.points]
+        self.wanted = [self.add_frame(self.carrier[each.body], each.position) for each in wanted]
+        self.finish()
+        for frame in self.frames:
+            frame.jacobian = np.zeros((6, self.unknowns))
+        self.moving = [each for each in self.frames[:conditioned] if each.handle is not None]
+        ends = np.cumsum([each.n for each in self.conditions])
+        self.slices = [
+            slice(end - each.n, end) for end, each in zip(ends, self.conditions, strict=True)
+        ]
+        self.J = np.zeros((ends[-1], self.unknowns))
+        self.columns = np.eye(ends[-1])[:, ends[-1] - len(mechanism.drivers) :]
+        self.reset()
+
+    # what a simulator gives
+
+    @abstractmethod
+    def add_link(self, parent: int, link: Link, offset: Array) -> None:
+        """Add a body that moves by a link against its parent, at an offset from its origin [m]."""
+
+    @abstractmethod
+    def make_frame(self, body: int, offset: Array) -> Any:
+        """Return a handle of a frame of a body other than the ground, at an offset from its origin
+        [m].
+        """
+
+    @abstractmethod
+    def finish(self) -> None:
+        """Make the model ready to be solved: no link and no frame follows."""
+
+    @property
+    @abstractmethod
+    def unknowns(self) -> int:
+        """The number of velocities."""
+
+    @abstractmethod
+    def coordinate(self, body: int) -> tuple[int, int]:
+        """Return the places of a slide's or hinge's coordinate in q and in v."""
+
+    @abstractmethod
+    def design(self) -> Array:
+        """Return the configuration at design: of slides and hinges, zero."""
+
+    @abstractmethod
+    def moved(self, dx: Array) -> Array:
+        """Return the configuration q advanced by dx, shape (unknowns,)."""
+
+    @abstractmethod
+    def place(self) -> None:
+        """Update the simulator's poses and Jacobians to q."""
+
+    @abstractmethod
+    def rate(self, v: Array, a: Array) -> None:
+        """Update the simulator's velocities and accelerations to v and a, at the q last placed."""
+
+    @abstractmethod
+    def placement(self, handle: Any) -> tuple[Array, Array]:
+        """Return the position of a frame [m], shape (3,), and the rotation since design, shape
+        (3, 3).
+        """
+
+    @abstractmethod
+    def slope(self, handle: Any) -> Array:
+        """Return the Jacobian of a frame's point over that of its rotation, global axes, shape
+        (6, unknowns).
+        """
+
+    @abstractmethod
+    def motion(self, handle: Any) -> tuple[Array, Array]:
+        """Return velocity and acceleration of a frame's point, over the angular ones, global axes,
+        each of shape (6,).
+
+        With no accelerations of the coordinates, the acceleration is Jdot v.
+        """
+
+    # what a simulator may do in another way
+
+    def branches(self, mechanism: Mechanism, tree: SpanningTree) -> Iterable[Branch]:
+        """Return the branches in an order of parents before children."""
+        return tree.branches
+
+    def close(self, joint: Joint, ends: tuple[Vector, Vector], named: bool) -> None:
+        """Add the conditions of a cut joint, by its points on both bodies.
+
+        Args:
+            named: whether a driver or coupler names it. Its coordinates, which count the turns,
+                then move a copy of the second body.
+        """
+        (i, j), closure, copied = self.bodies_of(joint), CLOSURES[type(joint)], ""
+        if named:
+            i, closure = self.add_joint(i, joint, ends[0], 1), CLOSURES[Fixed]
+            copied = f"on a copy of {joint.j!r}: "
+        self.closures[joint.name] = copied + closure.text
+        self.conditions += closure.conditions(joint, *map(self.add_frame, (i, j), ends))
+
+    # the base's own
+
+    def bodies_of(self, joint: Joint) -> tuple[int, int]:
+        """Return the numbers of a joint's first and second body."""
+        return self.carrier[joint.i], self.carrier[joint.j]
+
+    def carry(self, mechanism: Mechanism, branch: Branch) -> None:
+        """Add the links of a branch."""
+        at, joint = self.carrier[branch.parent], branch.joint
+        if joint is None:
+            # a body that turns about its middle is predicted best by a tangent
+            x, y, z = middle(mechanism, mechanism.body(branch.child)).tolist()
+            self.carrier[branch.child] = self.add_links(at, free((x, y, z)))
+        else:
+            sign = 1 if joint.j == branch.child else -1
+            P = ends_of(mechanism, joint)[0]
+            self.carrier[branch.child] = self.add_joint(at, joint, P, sign)
+
+    def add_joint(self, at: int, joint: Joint, P: Vector, sign: int) -> int:
+        """Add the links and the relations of a joint on a body; return the number of the last body.
+
+        The chain begins at the joint's first body, or with sign -1 at its second.
+        """
+        at = self.add_links(at, CHAINS[type(joint)](joint, P), joint.name, sign)
+        for relation in relations(joint):
+            self.relate(relation)
+        return at
+
+    def add_links(self, at: int, links: Sequence[Link], joint: str = "", sign: int = 1) -> int:
+        """Add links in the order of the sign; return the number of the last body."""
+        for link in links[::sign]:
+            self.add_link(at, link, np.array(link.point) - self.origin[at])
+            at = len(self.origin)
+            self.origin.append(np.array(link.point))
+            if link.name:
+                self.coordinates[joint, link.name] = at, sign
+        return at
+
+    def add_frame(self, body: int, at: Vector) -> BodyFrame:
+        """Add a frame to a body, at a point, global at design [m]."""
+        handle = self.make_frame(body, np.array(at) - self.origin[body]) if body else None
+        self.frames.append(BodyFrame(handle, np.array(at)))
+        return self.frames[-1]
+
+    def relate(self, terms: Iterable[tuple[str, str, float]]) -> None:
+        """Add the row of a weighted sum of coordinates: joint, freedom and weight of its terms."""
+        moved = [(*self.coordinates[joint, freedom], weight) for joint, freedom, weight in terms]
+        weights = np.array([sign * weight for _, sign, weight in moved])
+        self.conditions.append(Linear(self, [body for body, _, _ in moved], weights))
+
+    @property
+    def details(self) -> Mapping[str, Any]:
+        return {"closures": self.closures}
+
+    def reset(self) -> None:
+        self.q = self.design()
+
+    def save(self) -> Array:
+        return self.q
+
+    def restore(self, saved: Array) -> None:
+        self.q = saved
+
+    def move(self, dx: Array) -> None:
+        self.q = self.moved(dx)
+
+    def residual(self, c: Array) -> Array:
+        self.place()
+        for frame in self.moving:
+            frame.position, frame.rotation = self.placement(frame.handle)
+            frame.jacobian = self.slope(frame.handle)
+        r = -(self.columns @ c)
+        for rows, condition in zip(self.slices, self.conditions, strict=True):
+            phi, self.J[rows] = condition.rows()
+            r[rows] += phi
+        return r
+
+    def jacobian(self) -> Array:
+        return self.J
+
+    def driver_columns(self) -> Array:
+        return self.columns
+
+    def bias(self, v: Array) -> Array:
+        self.rate(v, np.zeros_like(v))
+        for frame in self.moving:
+            frame.velocity, frame.acceleration = self.motion(frame.handle)
+        bias = np.empty(len(self.J))
+        for rows, condition in zip(self.slices, self.conditions, strict=True):
+            bias[rows] = condition.bias()
+        return bias
+
+    def points(self, v: Array, a: Array) -> list[tuple[Array, Array, Array]]:
+        self.rate(v, a)
+        for frame in self.wanted:
+            if frame.handle is not None:
+                frame.position, frame.rotation = self.placement(frame.handle)
+                frame.velocity, frame.acceleration = self.motion(frame.handle)
+        return [(each.position, each.velocity[:3], each.acceleration[:3]) for each in self.wanted]

@@ -1,0 +1,84 @@
+"""Frames and rows of a tree of links; see `tree_model`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+
+from ...core.trajectory import Array
+from .frame_constraints import Frame
+
+
+class Coordinates(Protocol):
+    """A tree in its configuration q; see `tree_model.TreeModel`."""
+
+    q: Array
+
+    @property
+    def unknowns(self) -> int: ...
+
+    def coordinate(self, body: int) -> tuple[int, int]: ...
+
+
+@dataclass(eq=False)
+class BodyFrame:
+    """A frame of a body as the simulator last reported it; see `frame_constraints.Frame`.
+
+    Attributes:
+        handle: of the simulator; None for a frame of the ground, which never moves.
+    """
+
+    handle: Any
+    position: Array
+    rotation: Array = field(default_factory=lambda: np.eye(3))
+    jacobian: Array = field(default_factory=lambda: np.zeros((6, 0)))
+    velocity: Array = field(default_factory=lambda: np.zeros(6))
+    acceleration: Array = field(default_factory=lambda: np.zeros(6))
+
+
+@dataclass(frozen=True, eq=False)
+class Linear:
+    """A weighted sum of coordinates [m or rad]: a driver's, or zero by a coupler or a joint's own
+    relation.
+    """
+
+    of: Coordinates
+    bodies: list[int]
+    weights: Array
+    n = 1
+
+    @cached_property
+    def _q(self) -> list[int]:
+        return [self.of.coordinate(body)[0] for body in self.bodies]
+
+    @cached_property
+    def _row(self) -> Array:
+        row = np.zeros(self.of.unknowns)
+        for body, weight in zip(self.bodies, self.weights, strict=True):
+            row[self.of.coordinate(body)[1]] += weight
+        return row
+
+    def rows(self) -> tuple[Any, Array]:
+        return self.weights @ self.of.q[self._q], self._row
+
+    def bias(self) -> Any:
+        return 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class DrivenPoint:
+    """The displacement since design of a point along the fixed direction k [m]."""
+
+    frame: Frame
+    k: Array
+    design: Array
+    n = 1
+
+    def rows(self) -> tuple[Any, Array]:
+        return self.k @ (self.frame.position - self.design), self.k @ self.frame.jacobian[:3]
+
+    def bias(self) -> Any:
+        return self.k @ self.frame.acceleration[:3]

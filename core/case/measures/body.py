@@ -1,0 +1,66 @@
+"""Measure of bodies: their rotation since design."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+from ...algebra import Vec3, X, Y
+from ...jet import Jet
+from ...mechanism.mechanism import Mechanism, Point
+from ..quantity import MARKER
+from ..rotation import euler_parameters, rotation_vector
+from .base import Measure, coordinates, length, place_on, reach_of
+
+
+class Component(StrEnum):
+    """A component of the rotation vector [rad], or an Euler parameter [-]."""
+
+    X = "x"
+    Y = "y"
+    Z = "z"
+    E0 = "e0"
+    E1 = "e1"
+    E2 = "e2"
+    E3 = "e3"
+
+
+@dataclass(frozen=True)
+class Orientation(Measure):
+    """Rotation of a body since design, global axes: a component of its rotation vector (axis times
+    angle, up to a whole turn), or one of its Euler parameters e0..e3.
+    """
+
+    type = "orientation"
+    measure = "rad"
+    positive = "about the global axis, by the right-hand rule"
+
+    body: str
+    component: Component
+
+    @property
+    def unit(self) -> str:
+        """Radians, or 1 for an Euler parameter."""
+        return "rad" if self.component in ("x", "y", "z") else "1"
+
+    @property
+    def points(self) -> tuple[str, ...]:
+        """A place on the body, and two directions from there."""
+        return tuple(f"{MARKER}body {self.body}: {what}" for what in ("place", "x", "y"))
+
+    def markers(self, mechanism: Mechanism) -> Sequence[Point]:
+        """Return the place and the directions of the global axes at design."""
+        place, reach = place_on(mechanism, self.body), reach_of(mechanism)
+        tips = (place, place + reach * X, place + reach * Y)
+        marked = zip(self.points, tips, strict=True)
+        return [Point(name, self.body, coordinates(tip)) for name, tip in marked]
+
+    def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
+        """Return the component, [rad] or [-]."""
+        place, *tips = self.points
+        x, y = ((1.0 / length(design, place, tip)) * (at[tip] - at[place]) for tip in tips)
+        e = euler_parameters(x, y)
+        if self.unit == "1":
+            return e[int(self.component[1])]
+        return rotation_vector(e)["xyz".index(self.component)]

@@ -1,0 +1,42 @@
+"""A file of one's own names of hardpoints: TOML or JSON, `role = "own name"`, roles as in the
+template.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from ....errors import remedy
+from ...io.document import fault, parse, read_text, shown
+
+LARGEST_NAMES = 100_000
+
+
+def read_own_names(file: Path, roles: Iterable[str], points: Iterable[str]) -> Mapping[str, str]:
+    """Return the name of a point by role, for the roles in the file.
+
+    Args:
+        roles: roles of the template.
+        points: names of the points of the table.
+
+    Raises:
+        CaseError: the file cannot be read, or a role or point is unknown.
+    """
+    text = read_text(file, LARGEST_NAMES, "it holds a name for each role of a template")
+    known, found = [*points], dict[str, str]()
+    for role, name in parse(file, text).items():
+        if role not in roles:
+            raise fault(file, role, f"found {shown(role)}, expected a role; {remedy(role, roles)}")
+        if not isinstance(name, str):
+            raise fault(
+                file, role, f"found {shown(name)}, expected the name of a point; write it in quotes"
+            )
+        if name not in known:
+            raise fault(
+                file,
+                role,
+                f"found {shown(name)}, expected a point of the table; {remedy(name, known)}",
+            )
+        found[role] = name
+    return found

@@ -1,0 +1,153 @@
+"""Rotations of bodies by the directions of their markers: Euler parameters, rotation vectors, and
+the turns of an angle along a sweep.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..algebra import Vec3, cross
+from ..jet import Jet, arctan2, sqrt
+from ..mechanism.motions import Path
+from ..trajectory import Array
+
+# Samples whose |e0| differs by less are as near to the design as each other.
+_AS_NEAR = 1e-6
+# Below this square of |e| = sin(angle / 2) a series is exact in double precision, and a quotient by
+# |e| loses digits.
+_SMALL, _TERMS = 1e-3, 7
+# Closer than |e| = 0.01 to a whole turn, a degree, accelerations of the rotation vector keep less
+# than nine digits.
+_WHOLE = 1e-4
+
+
+def euler_parameters(x: Vec3, y: Vec3) -> list[Jet]:
+    """Return e0..e3 of the rotation from the global x and y axes to the unit vectors x and y.
+
+    The largest of e0..e3 is found by a root and the others by division by it, so that none is
+    singular. The parameters and their negatives are the same rotation: the sign is continuous from
+    sample to sample, along the first axis, and e0 is positive at the first of the samples nearest
+    to the design attitude.
+    """
+    z = cross(x, y)
+    products: list[list[Jet]] = [  # 4 e_i e_j
+        [1.0 + x.x + y.y + z.z, y.z - z.y, z.x - x.z, x.y - y.x],
+        [y.z - z.y, 1.0 + x.x - y.y - z.z, x.y + y.x, z.x + x.z],
+        [z.x - x.z, x.y + y.x, 1.0 - x.x + y.y - z.z, y.z + z.y],
+        [x.y - y.x, z.x + x.z, y.z + z.y, 1.0 - x.x - y.y + z.z],
+    ]
+    largest = np.argmax([_floats(products[k][k]) for k in range(4)], axis=0)
+    own = sqrt(_select(largest, [products[k][k] for k in range(4)]))
+    found = [_select(largest, products[i]) / (2.0 * own) for i in range(4)]
+    sign = _signs(np.array([_floats(each) for each in found]))
+    return [sign * each for each in found]
+
+
+def rotation_vector(e: Sequence[Jet]) -> list[Jet]:
+    """Return axis times angle [rad] of Euler parameters, for angles of -2 pi to 2 pi.
+
+    Within a degree of a whole turn, where the axis is hardly known, it is NaN.
+    """
+    e0, *along = e
+    square = along[0] * along[0] + along[1] * along[1] + along[2] * along[2]
+    # exact numbers, which are objects, have digits enough for the quotient
+    doubles = np.asarray(square.x).dtype != object
+    small = (_floats(square) < _SMALL) & (_floats(e0) > 0.0) & doubles
+    root = sqrt(_select(small.astype(int), [square, e0 * e0]))  # any number where it is small
+    quotient = 2.0 * arctan2(root, e0) / root
+    series, coefficient = 0.0 * square, 2.0
+    power = 0.0 * square + 1.0
+    for k in range(_TERMS):  # of 2 arcsin(r) / r
+        series = series + coefficient * power
+        power = power * square
+        coefficient *= (2 * k + 1) ** 2 / ((2 * k + 2) * (2 * k + 3))
+    whole = (_floats(square) < _WHOLE) & (_floats(e0) < 0.0)
+    which = np.where(whole, 2, small.astype(int))
+    unknown = np.full((), np.nan)
+    factor = _select(which, [quotient, series, Jet(unknown, unknown, unknown)])
+    return [factor * each for each in along]
+
+
+def counted(angle: Jet, period: float, path: Path) -> Jet:
+    """Return an angle known but for multiples of the period with its turns along the path.
+
+    It stays as it is if the period is zero.
+    """
+    if not period:
+        return angle
+    return Jet(angle.x + period * turns(angle.x, angle.v, period, path), angle.v, angle.a)
+
+
+def turns(x: Array, v: Array, period: float, path: Path) -> Array:
+    """Return the whole number of periods to add to values known but for a multiple of the period.
+
+    From sample to sample in time the change is the one nearest to what the velocities tell; without
+    velocities, the smallest. Time zero is the design and has the value zero, unless the path starts
+    elsewhere: then the sample nearest to it has the smallest value.
+
+    Args:
+        x, v: values and velocities, samples along the first axis; NaN if unknown.
+    """
+    order = np.argsort(path.times, kind="stable")
+    t, x, v = path.times[order], x[order], v[order]
+    t = t.reshape(-1, *(1,) * (x.ndim - 1))
+    before = _known_before(np.isfinite(x))
+    change = x - np.take_along_axis(x, before, 0)
+    speed = 0.5 * (v + np.take_along_axis(v, before, 0))
+    gone = speed * (t - np.take_along_axis(np.broadcast_to(t, x.shape), before, 0))
+    count = np.cumsum(_whole((np.nan_to_num(gone) - change) / period), axis=0)
+    nearest = np.argsort(np.abs(t).ravel(), kind="stable")
+    first = nearest[np.argmax(np.isfinite(x)[nearest], axis=0)][None]
+    x0, v0, n0 = (np.take_along_axis(each, first, 0) for each in (x, v, count))
+    expected = np.nan_to_num(v0 * t.ravel()[first]) * float(_through_design(path))
+    count = count - n0 + _whole((expected - x0) / period)
+    found = np.empty_like(x)
+    found[order] = count
+    return found
+
+
+def _through_design(path: Path) -> bool:
+    """Return whether all drivers have their design values at time zero."""
+    return path.covers(0.0) and bool(np.allclose(path.values(np.zeros(1)), 0.0, atol=1e-9))
+
+
+def _whole(x: Array) -> Array:
+    return np.nan_to_num(np.rint(x))
+
+
+def _known_before(known: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Return the index of the last known sample before each sample, along the first axis."""
+    indices = np.arange(len(known)).reshape(-1, *(1,) * (known.ndim - 1))
+    last = np.maximum.accumulate(np.where(known, indices, 0), axis=0)
+    return np.concatenate([last[:1], last[:-1]])
+
+
+def _signs(e: Array) -> Array:
+    """Return the signs, shape (n, ...), that make e0..e3, shape (4, n, ...), continuous."""
+    if e.ndim < 2:
+        return np.where(e[0] < 0.0, -1.0, 1.0)
+    before = _known_before(np.isfinite(e.sum(axis=0)))
+    product = (e * np.take_along_axis(e, before[None], 1)).sum(axis=0)
+    sign = np.cumprod(np.where(product < 0.0, -1.0, 1.0), axis=0)
+    near = np.nan_to_num(np.abs(e[0]), nan=-1.0)
+    first = np.argmax(near >= near.max(axis=0) - _AS_NEAR, axis=0)[None]
+    own = np.where(np.take_along_axis(sign * e[0], first, 0) < 0.0, -1.0, 1.0)
+    return np.asarray(sign * own, dtype=np.float64)
+
+
+def _floats(jet: Jet) -> Array:
+    """Return the value of a jet as doubles, whatever its numbers are."""
+    return np.asarray(jet.x).astype(np.float64)
+
+
+def _select(which: NDArray[Any], jets: Sequence[Jet]) -> Jet:
+    """Return the jet that is chosen in each lane, by its index."""
+
+    def chosen(order: str) -> Any:
+        return np.choose(which, [getattr(jet, order) for jet in jets])
+
+    return Jet(*(chosen(order) for order in ("x", "v", "a")))

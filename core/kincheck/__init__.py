@@ -1,0 +1,39 @@
+"""Cross-validation of the kinematics of constrained multibody systems.
+
+    import kincheck
+
+    case = kincheck.load("rssr")
+    results = kincheck.run(case, engines=["native", "mujoco"])
+
+All names of `kincheck.core` are here too. Each is imported on first use, so that the command line
+and pytest start without numpy.
+
+This folder is the package kincheck itself; its parts lie in folders of their own. They are named
+in full here: in the sources, a relative import would look for them in this folder.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from kincheck import core
+
+if TYPE_CHECKING:
+    from kincheck.by_name import load, run
+    from kincheck.core import *  # noqa: F403  # pyright: ignore[reportWildcardImportFromLibrary]
+
+__all__ = ["load", "run"]
+__all__ += core.__all__
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name on first use."""
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    module = import_module("kincheck.by_name") if name in ("load", "run") else core
+    found = globals()[name] = getattr(module, name)
+    return found
+
+
+def __dir__() -> list[str]:
+    """Return the public names, also those that are not loaded yet."""
+    return sorted({*globals(), *__all__})

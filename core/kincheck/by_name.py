@@ -1,0 +1,74 @@
+"""Cases and engines by name: the command line's `run` as a function."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TypeVar, cast
+
+from kincheck.core import KincheckError
+from kincheck.core.case.case import Case
+from kincheck.core.case.io.reader_options import NOTHING, Supplied
+from kincheck.core.cli.main import house
+from kincheck.core.cli.run_options import TOL
+from kincheck.core.harness import run as running
+from kincheck.core.harness.engine import Engine
+from kincheck.core.harness.record import Results
+from kincheck.core.harness.scene import with_scenes
+from kincheck.core.harness.workers.pool import solver_for
+
+_One = TypeVar("_One")
+
+
+def load(name: str | Path, supplied: Supplied = NOTHING) -> Case:
+    """Return a built-in case by its name, or the case in a file.
+
+    Args:
+        name: name, or path of a case file, hardpoint table or model.
+        supplied: facts that a file of another tool lacks.
+
+    Raises:
+        KincheckError: there is no such case, or its file is invalid.
+    """
+    return house().find_case(str(name), supplied, driven=False)
+
+
+def run(
+    cases: str | Path | Case | Sequence[str | Path | Case] | None = None,
+    engines: str | Engine | Sequence[str | Engine] | None = None,
+    *,
+    mode: str | None = None,
+    tol: float = TOL,
+    jobs: int | None = None,
+) -> Results:
+    """Solve cases with engines and judge the results, as the command `kincheck run` does.
+
+    A missing engine is a record with the outcome `unavailable`.
+
+    Args:
+        cases: names, paths or cases; all built-in cases by default.
+        engines: names or engines; all by default.
+        mode: "projection" or "simulate"; by default the first mode of each engine.
+        tol: largest accepted constraint residual, relative to the mechanism's size.
+        jobs: number of worker processes; 0 solves in this process. By default half the processors,
+            and 0 if every engine may run in this process.
+
+    Raises:
+        KincheckError: a case cannot be read, or there is no engine of a name.
+    """
+    known, problems = house(), list[str]()
+    named = known.cases() if cases is None else _several(cases)
+    found = [each if isinstance(each, Case) else known.find_case(str(each)) for each in named]
+    every = known.simulations if mode == "simulate" else known.engines
+    team = list[Engine]()
+    for each in every if engines is None else _several(engines):
+        team += known.find_engines([each], problems, mode) if isinstance(each, str) else [each]
+    if problems:
+        raise KincheckError("\n".join(problems))
+    solver, _ = solver_for(team, jobs)
+    results = running.run(found, team, tol=tol, baseline=known.baseline(team), solver=solver)
+    return with_scenes(results, found)
+
+
+def _several(named: _One | Sequence[_One]) -> Sequence[_One]:
+    """Return a sequence as it is, and anything else as a sequence of one."""
+    several = isinstance(named, Sequence) and not isinstance(named, str)
+    return cast("Sequence[_One]", named if several else [named])

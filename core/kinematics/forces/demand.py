@@ -1,0 +1,157 @@
+"""Newton-Euler: the wrench that each body's motion demands of joints and drivers, over any scalar.
+
+M a + h - Q   for one body: force, and torque about the body's internal origin, in SI units.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ...algebra import ZERO, Mat3, Scalar, Vec3, cross, root, vec
+from ...joints.base import unit
+from ...mechanism.body import Body
+from ...mechanism.loads import Axes, Force, SpringDamper, Torque, TorsionSpringDamper
+from ...mechanism.mechanism import Mechanism
+from ...primitives.base import GROUND_POSE, GROUND_TWIST, Pose, Twist
+from ..formulation.constraints import Frames
+from ..formulation.formulation import Acceleration
+
+
+@dataclass(frozen=True, slots=True)
+class Wrench:
+    """A force [N] and a torque about a body's internal origin [N m], global axes."""
+
+    force: Vec3
+    torque: Vec3
+
+    def __add__(self, b: Wrench) -> Wrench:
+        return Wrench(self.force + b.force, self.torque + b.torque)
+
+    def __neg__(self) -> Wrench:
+        return Wrench(-self.force, -self.torque)
+
+
+NO_WRENCH = Wrench(ZERO, ZERO)
+
+
+@dataclass(frozen=True, eq=False)
+class BodyStates:
+    """Poses, twists and accelerations of the moving bodies by name, in the units of the frames."""
+
+    frame: Frames
+    poses: Mapping[str, Pose]
+    twists: Mapping[str, Twist]
+    accelerations: Mapping[str, Acceleration]
+
+    def arm(self, body: str, position: Sequence[float]) -> Vec3:
+        """Return the arm from a body's internal origin to a point of it, turned [m]."""
+        return self.frame.unit * self._pose(body).turn(self.frame.arm(body, position))
+
+    def place(self, body: str, position: Sequence[float]) -> Vec3:
+        """Return the displacement of a point of a body since design [m]."""
+        pose = self._pose(body)
+        return self.frame.unit * (pose.u + pose.swing(self.frame.arm(body, position)))
+
+    def velocity(self, body: str, position: Sequence[float]) -> Vec3:
+        """Return the velocity of a point of a body [m/s]."""
+        arm = self._pose(body).turn(self.frame.arm(body, position))
+        return self.frame.unit * self.twists.get(body, GROUND_TWIST).of(arm)
+
+    def spin(self, body: str) -> Vec3:
+        """Return the angular velocity of a body [rad/s]."""
+        return self.twists.get(body, GROUND_TWIST).w
+
+    def turned(self, body: str, vector: Sequence[float]) -> Vec3:
+        """Return a vector that turns with a body; given at design."""
+        return self._pose(body).turn(vec(vector))
+
+    def _pose(self, body: str) -> Pose:
+        return self.poses.get(body, GROUND_POSE)
+
+
+def inertial(body: Body, at: BodyStates, gravity: Vec3) -> Wrench:
+    """Return the wrench that a body with mass demands: m (a - g), and I wdot + w x I w at C."""
+    C, twist = body.center_of_mass or body.origin, at.twists[body.name]
+    acceleration = at.accelerations[body.name]
+    arm = at.poses[body.name].turn(at.frame.arm(body.name, C))
+    force = body.mass * (at.frame.unit * acceleration.of(arm, twist) - gravity)
+    return Wrench(force, cross(at.frame.unit * arm, force) + spin_change(body, at))
+
+
+def spin_change(body: Body, at: BodyStates) -> Vec3:
+    """Return the change of a body's angular momentum about its centre of mass [N m]."""
+    I = inertia_now(body, at.poses[body.name])  # noqa: E741 - the field's letter
+    w, w_t = at.twists[body.name].w, at.accelerations[body.name].w_t
+    return ZERO if I is None else I @ w_t + cross(w, I @ w)
+
+
+def inertia_now(body: Body, pose: Pose) -> Mat3 | None:
+    """Return A I A^T, the inertia about the centre of mass in global axes; None for a point mass.
+
+    The inertia at design is in global axes, so A is the rotation since design.
+    """
+    if body.inertia is None:
+        return None
+    xx, yy, zz, xy, yz, xz = body.inertia
+    at_design = Mat3(Vec3(xx, xy, xz), Vec3(xy, yy, yz), Vec3(xz, yz, zz))
+    return pose.A.times(at_design).times(pose.A.T)
+
+
+@dataclass(frozen=True, slots=True)
+class Applied:
+    """A force element at work.
+
+    Attributes:
+        amount: tension of a spring [N], torque on the joint's second body [N m], or the amount of a
+            constant force [N] or torque [N m].
+        wrenches: on each of its bodies.
+        stored: rate of the energy stored in it [W].
+        lost: power that it dissipates, less the power of a constant force or torque [W].
+    """
+
+    amount: Scalar
+    wrenches: Mapping[str, Wrench]
+    stored: Scalar
+    lost: Scalar
+
+
+def spring(each: SpringDamper, at: BodyStates) -> Applied:
+    """Return a spring-damper at work: its tension draws the ends together."""
+    (i, P), (j, Q) = zip((each.i, each.j), each.points, strict=True)
+    d = (vec(Q) - vec(P)) + (at.place(j, Q) - at.place(i, P))
+    length = root(d @ d)
+    along = (1.0 / length) * d
+    rate = along @ (at.velocity(j, Q) - at.velocity(i, P))
+    elastic = each.stiffness * (length - (each.free_length or 0.0))
+    tension = elastic + each.damping * rate
+    pull = tension * along
+    on_i = Wrench(pull, cross(at.arm(i, P), pull))
+    on_j = Wrench(-pull, cross(at.arm(j, Q), -pull))
+    return Applied(tension, {i: on_i, j: on_j}, elastic * rate, each.damping * rate * rate)
+
+
+def torsion(
+    each: TorsionSpringDamper, mechanism: Mechanism, at: BodyStates, angle: Scalar
+) -> Applied:
+    """Return a torsional spring-damper at work at its joint's angle."""
+    joint: Any = mechanism.joint(each.joint)
+    axis = at.turned(joint.i, [*unit(joint.axis)])
+    rate = axis @ (at.spin(joint.j) - at.spin(joint.i))
+    elastic = each.stiffness * (angle - each.free_angle)
+    amount = -(elastic + each.damping * rate)
+    torque = amount * axis
+    wrenches = {joint.i: Wrench(ZERO, -torque), joint.j: Wrench(ZERO, torque)}
+    return Applied(amount, wrenches, elastic * rate, each.damping * rate * rate)
+
+
+def constant(each: Force | Torque, at: BodyStates) -> Applied:
+    """Return a constant force or torque at work."""
+    body = each.body
+    vector = vec(each.vector) if each.frame is Axes.GLOBAL else at.turned(body, each.vector)
+    amount = root(sum(x * x for x in each.vector))
+    if isinstance(each, Torque):
+        return Applied(amount, {body: Wrench(ZERO, vector)}, 0.0, -(vector @ at.spin(body)))
+    on_body = Wrench(vector, cross(at.arm(body, each.point), vector))
+    return Applied(amount, {body: on_body}, 0.0, -(vector @ at.velocity(body, each.point)))

@@ -1,0 +1,105 @@
+"""A solved motion as lanes of samples, in the variables of the equations."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ...algebra import ZERO, angle_about, cross, quat, vec
+from ...errors import SolveError
+from ...joints.base import unit
+from ...mechanism.loads import Force, SpringDamper, Torque, TorsionSpringDamper
+from ...mechanism.mechanism import Mechanism
+from ...mechanism.motions import Path
+from ...primitives.base import GROUND_POSE, Pose, Twist
+from ...trajectory import Array, Trajectory
+from ..formulation.constraints import frames
+from ..formulation.formulation import Acceleration
+from ..formulation.state_vectors import displaced
+from .demand import Applied, BodyStates, constant, spring, torsion
+
+
+class MotionLanes:
+    """The motion at the solved samples: states of the bodies and of force elements, as lanes.
+
+    Attributes:
+        frame, times, n: frames of the mechanism, times of the solved samples [s], and their number.
+        poses: of the moving bodies.
+        at: poses, twists and accelerations.
+        drive: value from design, velocity and acceleration of every driver [SI], shape
+            (3, drivers, n).
+        values, rates: the first two by driver.
+        applied: force elements at work, by name.
+
+    Raises:
+        SolveError: the motion lacks a body or its accelerations.
+    """
+
+    def __init__(self, mechanism: Mechanism, path: Path, motion: Trajectory) -> None:
+        self.mechanism, self.frame = mechanism, frames(mechanism)
+        solved = motion.solved
+        self.times: Array = path.times[solved]
+        self.n = len(self.times)
+        self.poses = self._poses(motion)
+        self.at = self._states(motion)
+        names = [driver.name for driver in mechanism.drivers]
+        self.drive = path.drive(names, self.times) if names else np.empty((3, 0, self.n))
+        self.rates = dict(zip(names, self.drive[1], strict=True))
+        self.values = dict(zip(names, self.drive[0], strict=True))
+        self.applied: Mapping[str, Applied] = {
+            each.name: self._applied(each) for each in mechanism.forces
+        }
+
+    def _poses(self, motion: Trajectory) -> dict[str, Pose]:
+        missing = [body.name for body in self.mechanism.moving if body.name not in motion.bodies]
+        if missing:
+            raise SolveError(f"forces: the motion of body {missing[0]!r} is missing")
+        placed = {
+            name: (each.r[motion.solved], each.p[motion.solved])
+            for name, each in motion.bodies.items()
+        }
+        return displaced(self.mechanism, self.frame, placed)
+
+    def _states(self, motion: Trajectory) -> BodyStates:
+        solved = motion.solved
+        twists, accelerations = dict[str, Twist](), dict[str, Acceleration]()
+        for body in self.mechanism.moving:
+            moved = motion.bodies[body.name]
+            if moved.v is None or moved.a is None:
+                raise SolveError(f"forces: body {body.name!r} has no accelerations; give order 2")
+            frame = Pose.of(ZERO, quat(moved.p[solved].T))
+            v, a = moved.v[solved].T, moved.a[solved].T
+            w, w_t = frame.turn(vec([*v[3:]])), frame.turn(vec([*a[3:]]))
+            arm = self.poses[body.name].turn(self.frame.arm(body.name, body.origin))
+            per_unit = 1.0 / self.frame.unit
+            twists[body.name] = Twist(per_unit * vec([*v[:3]]) - cross(w, arm), w)
+            # that of the origin, less what the arm from the internal origin adds
+            added = Acceleration(ZERO, w_t).of(arm, twists[body.name])
+            accelerations[body.name] = Acceleration(per_unit * vec([*a[:3]]) - added, w_t)
+        return BodyStates(self.frame, self.poses, twists, accelerations)
+
+    def _applied(self, each: Any) -> Applied:
+        if isinstance(each, SpringDamper):
+            return spring(each, self.at)
+        if isinstance(each, TorsionSpringDamper):
+            return torsion(each, self.mechanism, self.at, self.angle(each.joint))
+        if isinstance(each, Force | Torque):
+            return constant(each, self.at)
+        raise SolveError(f"{each}: the native engine knows no force element of this kind")
+
+    def angle(self, name: str) -> Array:
+        """Return the angle of a joint over the samples [rad], continuous, zero at design."""
+        joint: Any = self.mechanism.joint(name)
+        i, j = (self.poses.get(body, GROUND_POSE) for body in joint.bodies)
+        found = angle_about(vec([*unit(joint.axis)]), i.q.conjugate() * j.q)
+        angle: Array = found + np.zeros(self.n)
+        order = np.argsort(self.times, kind="stable")
+        turned = np.asarray(np.unwrap(angle[order]), dtype=np.float64)
+        # the sample nearest to the design is within half a turn of it
+        nearest = float(turned[int(np.argmin(np.abs(self.times[order])))])
+        turned = turned - 2.0 * np.pi * round(nearest / (2.0 * np.pi))
+        continuous = np.empty(self.n)
+        continuous[order] = turned
+        return continuous

@@ -1,0 +1,220 @@
+"""Hardpoint tables as spreadsheets and people write them: decimal commas, titles, further columns,
+UTF-16, own names; what has two meanings is refused.
+"""
+
+import pytest
+from kincheck.core.case.io.reader_options import LEFT_OUT, Supplied
+from kincheck.core.case.models.files import load
+from kincheck.core.cli.main import main
+from kincheck.core.errors import CaseError
+
+POINTS = {
+    "uca_front": (-89.75, -259.75, 285.25),
+    "uca_rear": (110.25, -264.75, 280.25),
+    "uca_outer": (15.25, -539.75, 312.25),
+    "lca_front": (-119.75, -209.75, 125.25),
+    "lca_rear": (130.25, -214.75, 120.25),
+    "lca_outer": (-4.75, -574.75, 118.25),
+    "tierod_inner": (-69.75, -219.75, 150.25),
+    "tierod_outer": (-74.75, -559.75, 148.25),
+    "wheel_center": (0.25, -611.75, 228.25),
+}
+SAID = Supplied("double_wishbone", "mm", "rearward,right,up")
+
+
+def table(head="name;x;y;z", row="{};{};{};{}", points=POINTS):
+    return "\n".join([head, *(row.format(name, *at) for name, at in points.items())]) + "\n"
+
+
+def comma(text):
+    return text.replace(".", ",")
+
+
+def read(folder, text, supplied=SAID, encoding="utf-8"):
+    file = folder / "car.csv"
+    file.write_bytes(text if isinstance(text, bytes) else text.encode(encoding))
+    return load(file, supplied)
+
+
+@pytest.fixture
+def plain(tmp_path):
+    return read(tmp_path, table().replace(";", ",")).mechanism
+
+
+DIALECTS = {
+    "decimal comma": comma(table()),
+    "decimal comma, tabs": comma(table()).replace(";", "\t"),
+    "quoted decimal comma": comma(table(row='{};"{}";"{}";"{}"')).replace(";", ","),
+    "trailing separators": table("name;x;y;z;", "{};{};{};{};"),
+    "trailing in rows": table(row="{};{};{};{};;;"),
+    "trailing in the head": table("name;x;y;z;;"),
+    "trailing commas": table("name,x,y,z,", "{},{},{},{},"),
+    "sep line": "sep=;\n" + comma(table()),
+    "sep bar": "\ufeffSEP=|\r\n" + table().replace(";", "|").replace("\n", "\r\n"),
+    "title": "Front suspension, left\n\nDate;2026-11-26;;\n" + table(),
+    "further columns": table("No;Name;X [mm];Y [mm];Z [mm];Remark", "1;{};{};{};{};is 1,5 off"),
+    "commas and further": table("name,x,y,z,mass,by", "{},{},{},{},1.5,me"),
+    "other order": table("z;y;x;name", "{3};{2};{1};{0}"),
+    "units below": table("name;x;y;z\n;[mm];[mm];[mm]"),
+    "points": table("Point;X_mm;Y_mm;Z_mm"),
+    "Adams columns": table("hardpoint_name;x_value;y_value;z_value"),
+    "exponents": comma(table()).replace("228,25", "2,2825e2"),
+    "grouped by nothing": comma(table()).replace("228,25", "228,250"),
+    "three decimals": table(row="{};{:.3f};{:.3f};{:.3f}"),
+}
+
+
+@pytest.mark.parametrize("kind", DIALECTS)
+def test_dialects(tmp_path, plain, kind):
+    assert read(tmp_path, DIALECTS[kind]).mechanism == plain
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be", "utf-8-sig"])
+def test_encodings(tmp_path, plain, encoding):
+    """Excel's Unicode text, with its mark."""
+    mark = "\ufeff" if encoding in ("utf-16-le", "utf-16-be") else ""
+    assert read(tmp_path, mark + comma(table()), encoding=encoding).mechanism == plain
+
+
+def test_left_out_is_listed(tmp_path):
+    text = "Front suspension\n" + table("Name;X;Y;Z;Mass;", "{};{};{};{};3;")
+    source = read(tmp_path, text).source
+    assert source.endswith(f"{LEFT_OUT}line 1 (Front suspension), column Mass")
+
+
+def integers(points=POINTS):
+    return {name: tuple(map(int, at)) for name, at in points.items()}
+
+
+THOUSANDS = table(points=integers()).replace("-611", "-1.611")
+FAULTS = {
+    "both signs": (comma(table()).replace("-611,75", "-611.75"), ["line 10", "'-611.75'", "above"]),
+    "thousands and decimals": (
+        table().replace("-611.75", "-1.611,75"),
+        ["line 10: wheel_center: y", "'-1.611,75'", "thousands"],
+    ),
+    "two commas": (table().replace("-611.75", "-1,611,750"), ["'-1,611,750'", "thousands"]),
+    "grouped or not": (THOUSANDS, ["'-1.611'", "is -1.611 or -1611", "write -1.6110 or -1611"]),
+    "grouped by comma": (comma(THOUSANDS), ["'-1,611'", "is -1.611 or -1611"]),
+    "quoted and grouped": (
+        comma(table(points=integers())).replace(";", ",").replace("-611", '"-1,611"'),
+        ["'-1,611'", "is -1.611 or -1611"],
+    ),
+    "decimal commas between commas": (
+        comma(table()).replace(";", ","),
+        ["line 2", "found 7 fields, expected 4", "decimal comma needs semicolons"],
+    ),
+    "shifted by a comma": (
+        table("name,x,y,z,mass", "{},{},{},{},3").replace(
+            "15.25,-539.75,312.25,3", "15,25,-539,312,"
+        ),
+        ["line 4", "decimal comma needs semicolons"],
+    ),
+    "shorter by a comma": (
+        table("name,x,y,z,mass", "{},{},{},{},3").replace("15.25,-539.75,312.25,3", "15,-539,312"),
+        ["line 4", "complete the row"],
+    ),
+    "below no head": (table().replace("228.25", "228;25"), ["line 10", "found 5 fields"]),
+    "two x": (table("name;x [mm];y [mm];z [mm];x [m]", "{};{};{};{};1"), ["line 1", "'x' twice"]),
+    "points above the head": (
+        "lca_front;1;2;3\n" + table(),
+        ["line 1", "expected the head", "above the points"],
+    ),
+    "row of two units": (table("name;x;y;z\n;mm;mm;m"), ["line 2", "name the point"]),
+    "half of UTF-16": (table().encode("utf-16")[:-1], ["is not UTF-16"]),
+}
+
+
+@pytest.mark.parametrize("kind", FAULTS)
+def test_faults(tmp_path, kind):
+    text, fragments = FAULTS[kind]
+    with pytest.raises(CaseError) as caught:
+        read(tmp_path, text)
+    assert [each for each in fragments if each not in str(caught.value)] == [], caught.value
+
+
+@pytest.mark.parametrize("unit", ["inch", "in", "inches"])
+def test_inches(tmp_path, unit):
+    """In the head, or said; a unit of one's own is not taken for another."""
+    inches = {name: tuple(x / 25.4 for x in at) for name, at in POINTS.items()}
+    said = Supplied("double_wishbone", unit, "adams")
+    for case in (
+        read(tmp_path, table(points=inches), said),
+        read(tmp_path, table(f"name;x [{unit}];y [{unit}];z [{unit}]", points=inches), said),
+    ):
+        assert case.mechanism.point("wheel_center").position == pytest.approx(
+            (-0.00025, 0.61175, 0.22825), abs=1e-15
+        )
+
+
+OWN = {name: f"P{k}" for k, name in enumerate(POINTS, 1)}
+
+
+def named(folder, text):
+    file = folder / "names.toml"
+    file.write_text(text)
+    return Supplied("double_wishbone", "mm", "adams", names=file)
+
+
+def test_own_names(tmp_path, plain):
+    own = {OWN[name]: at for name, at in POINTS.items()}
+    said = named(tmp_path, "\n".join(f'{role} = "{name}"' for role, name in OWN.items()))
+    assert read(tmp_path, table(points=own), said).mechanism == plain
+
+
+def test_own_names_go_before_known_ones(tmp_path):
+    """One of two points that are called alike; roles without a line keep their names."""
+    text = table(points=POINTS | {"wheel": (0.25, -600.0, 228.25)})
+    case = read(tmp_path, text, named(tmp_path, 'wheel_center = "wheel"'))
+    assert case.mechanism.point("wheel_center").position[1] == 0.6
+
+
+@pytest.mark.parametrize(
+    ("line", "fragments"),
+    [
+        ('lca_inner = "lca_front"', ["names.toml: lca_inner", "expected a role", "lca_outer"]),
+        ('lca_front = "lca_fornt"', ["names.toml: lca_front", "'lca_fornt'", "'lca_front'"]),
+        ("lca_front = 3", ["names.toml: lca_front", "found 3", "quotes"]),
+        ("lca_front", ["names.toml", "not valid TOML"]),
+    ],
+)
+def test_faults_in_own_names(tmp_path, line, fragments):
+    with pytest.raises(CaseError) as caught:
+        read(tmp_path, table(), named(tmp_path, line))
+    assert [each for each in fragments if each not in str(caught.value)] == [], caught.value
+
+
+def test_missing_points_advise_own_names(tmp_path, capsys):
+    file = tmp_path / "car.csv"
+    file.write_text(table(points={OWN[name]: at for name, at in POINTS.items()}))
+    options = ["--template", "double_wishbone", "--units", "mm", "--axes", "adams"]
+    assert main(["run", str(file), "--engine", "native", *options]) == 2
+    assert "--names FILE" in capsys.readouterr().err
+    names = tmp_path / "names.toml"
+    names.write_text("\n".join(f'{role} = "{name}"' for role, name in OWN.items()))
+    options += ["--names", str(names)]
+    assert main(["run", str(file), "--engine", "native", "mujoco", *options]) == 0
+
+
+ADAMS = """[UNITS]
+ LENGTH = 'mm'
+[HARDPOINT]
+{{hardpoint_name symmetry x_value y_value z_value}}
+{}
+(VARIANTS)
+{{hardpoint_name symmetry x_value y_value z_value}}
+ 'lca_outer' 'left/right' -5 -580 115
+ 'spare' 'left/right' 1 2 3
+[PARAMETER]
+ 'a' 'single' 'real' 1
+"""
+
+
+def test_variants_of_adams(tmp_path, plain):
+    file = tmp_path / "car.sub"
+    rows = [f"'{name}' 'left/right' {x} {y} {z}" for name, (x, y, z) in POINTS.items()]
+    file.write_text(ADAMS.format("\n".join(rows)))
+    case = load(file, Supplied("double_wishbone"))
+    assert case.mechanism == plain
+    assert "(VARIANTS): lca_outer in line 16, spare in line 17" in case.source
+    assert "[PARAMETER] (1 rows)" in case.source

@@ -1,0 +1,327 @@
+"""Outputs of joints, bodies and pairs of points, against closed forms and in every engine."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import kincheck.cases
+import numpy as np
+import pytest
+from kincheck import adapters
+from kincheck.adapters.native import Native
+from kincheck.core.case.case import Case, Sweep, Truth
+from kincheck.core.case.io.case_file import load_case
+from kincheck.core.case.io.case_writer import case_text
+from kincheck.core.case.io.coordinates import with_all_coordinates, with_all_motions
+from kincheck.core.case.io.reader_options import Supplied
+from kincheck.core.case.markers import with_markers
+from kincheck.core.case.measures import (
+    Angle,
+    Component,
+    Distance,
+    JointAngle,
+    JointDisplacement,
+    Measure,
+    Orientation,
+)
+from kincheck.core.case.models.files import load
+from kincheck.core.case.notes import notes
+from kincheck.core.harness.compare import output_series
+from kincheck.core.harness.record import Outcome
+from kincheck.core.harness.run import run
+from kincheck.core.joints import Cylindrical, Fixed, Revolute
+from kincheck.core.mechanism.drivers import JointAngle as AngleDriver
+from kincheck.core.mechanism.drivers import JointDisplacement as DisplacementDriver
+from kincheck.core.mechanism.mechanism import Body, Mechanism, Point
+from kincheck.core.mechanism.motions import Ramp, Sine
+
+from ..support.case_texts import BASE, complains, edited, write
+
+TOLERANCE = (1e-9, 0.0, "test")
+AXIS = (1.0, 2.0, 2.0)
+RATE = 2.0
+
+
+def arm(values, **more) -> Case:
+    """A disc that turns about an oblique axis, and a slide that moves along it on the disc."""
+    mechanism = Mechanism(
+        "arm",
+        [Body("disc"), Body("slide"), Body("weld")],
+        [
+            Revolute("hinge", "ground", "disc", (1.0, 0.0, 0.0), AXIS),
+            Cylindrical("bore", "disc", "slide", (1.0, 0.5, 0.0), AXIS),
+            Fixed("glue", "slide", "weld"),
+        ],
+        [Point("A", "ground", (0.0, 0.0, 0.0)), Point("B", "disc", (1.0, 1.0, 0.0))],
+        [
+            AngleDriver("turn", "hinge"),
+            AngleDriver("spin", "bore"),
+            DisplacementDriver("push", "bore"),
+        ],
+    )
+    motions = {"spin": Ramp(-3.0 * RATE), "push": Ramp(0.25)}
+    sweep = Sweep("turn", np.array(values), RATE, 0.0, motions)
+    return replace(Case("arm", "test", Truth.CONSENSUS_ONLY, mechanism, sweep, ()), **more)
+
+
+def series(case: Case, *outputs: Measure):
+    case = replace(case, mechanism=with_markers(case.mechanism, outputs), outputs=outputs)
+    engine = Native()
+    trajectory = engine.solve(engine.build(case), case, 1e-12)
+    found = [output_series(case, output, trajectory) for output in outputs]
+    return found[0] if len(found) == 1 else found
+
+
+def close(found, position, velocity, acceleration, atol=1e-13):
+    np.testing.assert_allclose(found.position, position, rtol=0, atol=atol)
+    np.testing.assert_allclose(found.velocity, velocity, rtol=0, atol=atol)
+    np.testing.assert_allclose(found.acceleration, acceleration, rtol=0, atol=10 * atol)
+
+
+TURNS = np.linspace(-4.0 * math.pi, 4.0 * math.pi, 33)
+"""Of the driver: eight samples a turn, and the slide turns by 135 degrees the other way."""
+
+
+def test_joint_angles_count_turns_from_the_design():
+    driven, spun = series(
+        arm(TURNS), JointAngle("a", *TOLERANCE, "hinge"), JointAngle("b", *TOLERANCE, "bore")
+    )
+    close(driven, TURNS, RATE, 0.0)
+    close(spun, -3.0 * TURNS, -3.0 * RATE, 0.0)
+
+
+def test_turns_are_counted_by_velocities_where_samples_are_coarse():
+    """A turn and a half from sample to sample, and no sample near the design."""
+    values = np.arange(-4, 5) * math.pi + 0.3
+    close(series(arm(values), JointAngle("b", *TOLERANCE, "bore")), -3.0 * values, -3.0 * RATE, 0.0)
+
+
+def test_turns_need_no_order_of_the_samples():
+    values = np.random.default_rng(1).permutation(TURNS)
+    close(series(arm(values), JointAngle("a", *TOLERANCE, "hinge")), values, RATE, 0.0)
+
+
+def test_an_angle_that_starts_away_from_the_design_is_the_smallest():
+    """Its driver is a sine with a phase: at time zero it is not at the design."""
+    case = arm([0.0])
+    motions = {"turn": Sine(4.0, 1.0, 0.5), "spin": Ramp(0.0), "push": Ramp(0.0)}
+    times = np.linspace(0.0, 0.1, 9)
+    case = replace(case, sweep=Sweep("time", times, 1.0, 0.0, motions))
+    found = series(case, JointAngle("a", *TOLERANCE, "hinge"))
+    np.testing.assert_allclose(found.position, Sine(4.0, 1.0, 0.5).at(times)[0], atol=1e-12)
+
+
+def test_joint_displacements_are_along_the_axis_of_the_first_body():
+    close(
+        series(arm(TURNS), JointDisplacement("d", *TOLERANCE, "bore")),
+        0.25 * TURNS / RATE,
+        0.25,
+        0.0,
+    )
+
+
+def test_the_reverse_joint_has_the_opposite_angle():
+    case = arm(TURNS)
+    hinge, *others = case.mechanism.joints
+    mechanism = replace(case.mechanism, joints=[hinge.reversed(), *others])
+    found = series(replace(case, mechanism=mechanism), JointAngle("a", *TOLERANCE, "hinge"))
+    close(found, TURNS, RATE, 0.0)  # of the driver of the joint, which is reversed too
+
+
+def rotated(angle, component):
+    n = np.array(AXIS) / 3.0
+    if component in ("x", "y", "z"):
+        return n["xyz".index(component)] * angle
+    e = [np.cos(angle / 2.0), *(each * np.sin(angle / 2.0) for each in n)]
+    return e[int(component[1])]
+
+
+@pytest.mark.parametrize("component", Component)
+def test_orientations_are_continuous_from_the_design(component):
+    """Beyond half a turn, and through the design, where the axis of a rotation is unknown."""
+    angle = np.linspace(-1.9 * math.pi, 1.9 * math.pi, 39)
+    found = series(arm(angle), Orientation("o", *TOLERANCE, "disc", component))
+    step = 1e-4
+    x = [rotated(angle + k * step, component) for k in (-1, 0, 1)]
+    np.testing.assert_allclose(found.position, x[1], rtol=0, atol=1e-13)
+    rates = RATE * (x[2] - x[0]) / (2 * step)
+    np.testing.assert_allclose(found.velocity, rates, rtol=0, atol=1e-7)
+    seconds = RATE**2 * (x[2] - 2 * x[1] + x[0]) / step**2
+    np.testing.assert_allclose(found.acceleration, seconds, rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("away", [1e-9, 1e-5, 0.0316, 0.0633, 0.0634, 1.0])
+def test_the_rotation_vector_is_as_exact_near_the_design(away):
+    found = series(arm([away]), Orientation("o", *TOLERANCE, "disc", Component.Z))
+    close(found, AXIS[2] / 3.0 * away, AXIS[2] / 3.0 * RATE, 0.0, atol=1e-13)
+
+
+def test_the_rotation_vector_of_a_whole_turn_is_unknown():
+    found = series(
+        arm([0.0, 2.0, 4.0, 2.0 * math.pi]), Orientation("o", *TOLERANCE, "disc", Component.X)
+    )
+    assert np.isnan(found.position).tolist() == [False, False, False, True]
+
+
+def test_distances_and_angles():
+    angle = np.linspace(0.2, 3.0, 15)
+    n = np.array(AXIS) / 3.0
+    start = np.array([0.0, 1.0, 0.0])
+    across = start - (n @ start) * n
+    place = np.array([1.0, 0.0, 0.0])
+    B = (
+        place
+        + (n @ start) * n
+        + np.cos(angle)[:, None] * across
+        + np.sin(angle)[:, None] * np.cross(n, across)
+    )
+    length, change, opened = series(
+        arm(angle),
+        Distance("l", *TOLERANCE, ("A", "B")),
+        Distance("c", *TOLERANCE, ("A", "B"), relative=True),
+        Angle("w", *TOLERANCE, ("ground", "disc"), ((0.0, 3.0, 0.0), (0.0, 1.0, 0.0))),
+    )
+    expected = np.linalg.norm(B, axis=1)
+    np.testing.assert_allclose(length.position, expected, atol=1e-14)
+    np.testing.assert_allclose(change.position, expected - math.sqrt(2.0), atol=1e-14)
+    np.testing.assert_allclose(opened.position, np.arccos((B - place) @ start), atol=1e-12)
+    for each in (length, opened):  # the rates are those of the values
+        spline = np.gradient(each.position, angle / RATE, edge_order=2)
+        np.testing.assert_allclose(each.velocity[2:-2], spline[2:-2], atol=0.03)
+        spline = np.gradient(each.velocity, angle / RATE, edge_order=2)
+        np.testing.assert_allclose(each.acceleration[2:-2], spline[2:-2], atol=0.1)
+
+
+def test_a_measure_of_a_mechanism_without_points_has_a_size():
+    mechanism = replace(arm([0.1]).mechanism, points=[])
+    case = replace(arm([0.1]), mechanism=mechanism)
+    close(series(case, JointAngle("a", *TOLERANCE, "hinge")), 0.1, RATE, 0.0)
+
+
+MEASURES = """
+[outputs.length]
+type = "distance"
+points = ["home", "tip"]
+relative = true
+[outputs.stroke]
+type = "joint_displacement"
+joint = "guide"
+atol = 0.5
+why = "test"
+[outputs.turn]
+type = "orientation"
+body = "slider"
+component = "y"
+atol = 2.0
+why = "test"
+[outputs.e2]
+type = "orientation"
+body = "slider"
+component = "e2"
+[outputs.open]
+type = "angle"
+bodies = ["ground", "slider"]
+directions = [[1, 0, 0], [0, 0.5, 0]]
+[points.home]
+body = "ground"
+position = [0.0, 0.0, 0.0]
+"""
+OUTPUT = (
+    '[outputs.tip_x]\npoint = "tip"\ncomponent = "x"\natol = 1e-9\nwhy = "made up for this test"\n'
+)
+MM = BASE.replace(OUTPUT, '[units]\nlength = "mm"\nangle = "deg"\n')
+
+
+def test_a_case_file_has_all_measures(tmp_path: Path):
+    case = load_case(write(tmp_path, MM + MEASURES))
+    length, stroke, turn, e2, wide = case.outputs
+    assert length == Distance("length", length.atol, 1e-9, length.why, ("home", "tip"), True)
+    assert stroke == JointDisplacement("stroke", 5e-4, 0.0, "test", "guide")
+    assert turn.atol == math.radians(2.0)
+    assert (turn.unit, e2.unit, wide.unit) == ("rad", "1", "rad")
+    assert wide.directions == ((1.0, 0.0, 0.0), (0.0, 0.5, 0.0))
+    results = run([case], [Native()], tol=1e-12)
+    outputs = results.records[0].outputs
+    assert outputs["stroke"].position == pytest.approx([-1e-4, 0.0, 1e-4], abs=1e-15)
+    assert outputs["open"].position == pytest.approx([math.pi / 2.0] * 3)
+    assert outputs["e2"].position == [0.0, 0.0, 0.0]
+    middle = 2e-3 * 1.5 / math.hypot(1.5, 2, 3)
+    assert outputs["length"].velocity[1] == pytest.approx(middle, rel=1e-9)
+
+
+def test_measures_are_written_and_read_again(tmp_path: Path):
+    case = load_case(write(tmp_path, MM + MEASURES))
+    again = load_case(write(tmp_path, case_text(case), "again.toml"))
+    assert again.outputs == case.outputs
+    assert again.mechanism.points == case.mechanism.points
+
+
+FREE = ('"joint_displacement"\njoint = "guide"\natol', '"joint_angle"\njoint = "guide"\natol')
+NOBODY = ('body = "slider"\ncomponent = "e2"', 'body = "bed"\ncomponent = "e2"')
+FEW = ("[[1, 0, 0], [0, 0.5, 0]]", "[[1, 0, 0]]")
+WRONG = [
+    (('["home", "tip"]', '["home", "top"]'), ["outputs.length.points", "'top'", "'tip'?"]),
+    (('["home", "tip"]', '["home"]'), ["outputs.length.points", "two names", "first point"]),
+    (('joint = "guide"\natol', 'joint = "guid"\natol'), ["outputs.stroke.joint", "'guide'?"]),
+    (FREE, ["outputs.stroke.joint", "no rotation to measure", "translation"]),
+    (('component = "y"', 'component = "w"'), ["outputs.turn.component", "one of x, y, z, e0"]),
+    (NOBODY, ["outputs.e2.body", "'bed'"]),
+    (("[0, 0.5, 0]", "[0, 0, 0]"), ["outputs.open.directions", "zero"]),
+    (FEW, ["outputs.open.directions", "two directions"]),
+    (('type = "angle"', 'type = "angel"'), ["outputs.open.type", "'angle'?"]),
+]
+
+
+@pytest.mark.parametrize(("change", "fragments"), WRONG)
+def test_wrong_measures_are_refused(tmp_path: Path, change, fragments):
+    complains(write(tmp_path, edited(change, base=MM + MEASURES)), fragments)
+
+
+FOUR_BAR = """
+<mujoco model="four bar"><compiler angle="radian"/><worldbody>
+ <body name="crank"><joint name="crank" axis="0 0 1"/><geom size=".01"/>
+  <body name="rod" pos="0.1 0 0"><joint name="rod" axis="0 0 1"/><geom size=".01"/></body></body>
+ <body name="rocker" pos="0.4 -0.1 0"><joint name="rocker" axis="0 0 1"/><geom size=".01"/></body>
+ </worldbody><equality><connect body1="rod" body2="rocker" anchor="0.3 0.15 0"/></equality></mujoco>
+"""
+
+
+def test_every_joint_and_body_of_a_model_is_compared_in_every_engine(tmp_path: Path):
+    file = write(tmp_path, FOUR_BAR, "four_bar.xml")
+    case = load(file, Supplied(drive=("crank:-0.3:6.6:24",)))
+    names = [output.name for output in case.outputs]
+    for each in ("crank", "rod", "rocker"):
+        assert f"{each}.angle" in names
+        assert [f"{each}.e{k}" in names for k in range(4)] == [True] * 4
+    assert notes(case) == []
+    every = [adapters.engine(name) for name in adapters.ENGINES]
+    results = run([case], [each for each in every if each.version()], tol=1e-10)
+    assert [record.outcome for record in results.records] == [Outcome.UNJUDGED] + [Outcome.PASS] * (
+        len(results.records) - 1
+    )
+    for record in results.records:
+        rocker = np.array(record.outputs["rocker.angle"].position)
+        e0, e3 = (np.array(record.outputs[f"rocker.{each}"].position) for each in ("e0", "e3"))
+        np.testing.assert_allclose(2.0 * np.arctan2(e3, e0), rocker, atol=1e-9)
+
+
+def test_a_run_whose_outputs_no_closure_enters_says_so(tmp_path: Path):
+    case = load(write(tmp_path, FOUR_BAR, "four_bar.xml"), Supplied(drive=("crank:-0.3:0.3:7",)))
+    vacuous = tuple(each for each in case.outputs if each.name.startswith("crank"))
+    (note,) = notes(replace(case, outputs=vacuous))
+    assert "no output depends on a closure" in note
+    rocking = tuple(each for each in case.outputs if each.name == "rocker.angle")
+    assert notes(replace(case, outputs=rocking)) == []
+
+
+def test_a_coordinate_that_is_driven_is_no_result_of_a_closure():
+    case = load_case(kincheck.cases.FOLDER / "mcpherson_strut.toml")
+    driven = case.mechanism.drivers[0]
+    up = with_all_coordinates(case, [driven.point]).outputs[2]
+    (note,) = [n for n in notes(replace(case, outputs=(up,), reference={})) if "closure" in n]
+    assert "follow from the drivers" in note
+    assert not [n for n in notes(case) if "closure" in n]
+
+
+def test_an_open_chain_has_no_closure_to_depend_on():
+    assert notes(with_all_motions(arm([0.0, 1.0]))) == []

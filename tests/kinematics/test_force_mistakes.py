@@ -1,0 +1,135 @@
+"""Planted mistakes in forces: equilibrium and the balance of power find each."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from kincheck import cases
+from kincheck.core.algebra import ZERO
+from kincheck.core.kinematics.forces import demand, motion_lanes, reactions
+from kincheck.core.mechanism.loads import SpringDamper
+from kincheck.core.primitives.base import GROUND_POSE, Pose, Twist
+
+from ..oracles import newton_euler
+from ..support.loads import loaded, pushes, solved
+
+
+def worst(mechanism, case):
+    """The largest wrench missing to the equilibrium of a body, as a part of the largest force.
+
+    And the power that is missing, as a part of the largest power.
+    """
+    found = solved(mechanism, case)
+    largest = max(np.abs(each.force).max() for each in found.forces.joints.values())
+    k = len(case.sweep.values) // 3
+    pushed = pushes(mechanism, found, k)
+    for spring in mechanism.forces:
+        ends = [
+            newton_euler.carried(mechanism.body(name), found.bodies[name], k, point)
+            for name, point in zip(spring.bodies, spring.points, strict=True)
+        ]
+        d = ends[1] - ends[0]
+        length = np.linalg.norm(d)
+        pull = spring.stiffness * (length - spring.free_length) * d / length
+        for name, end, sign in zip(spring.bodies, ends, (1.0, -1.0), strict=True):
+            pushed.setdefault(name, []).append((sign * pull, end, np.zeros(3)))
+    left = newton_euler.left_over(mechanism, found, k, pushed)
+    off = max(np.abs(part).max() for pair in left.values() for part in pair)
+    return off / largest, np.abs(found.forces.power).max() / found.forces.largest_power.max()
+
+
+MISTAKES = {
+    "sign of gravity": (
+        "reactions.inertial",
+        lambda right: lambda body, at, gravity: right(body, at, -gravity),
+    ),
+    "no gyroscopic term": (
+        "demand.spin_change",
+        lambda right: (
+            lambda body, at: (
+                demand.inertia_now(body, at.poses[body.name]) @ at.accelerations[body.name].w_t
+            )
+        ),
+    ),
+    "inertia that does not turn": (
+        "demand.inertia_now",
+        lambda right: lambda body, pose: right(body, GROUND_POSE),
+    ),
+    "inertia turned backwards": (
+        "demand.inertia_now",
+        lambda right: lambda body, pose: right(body, Pose.of(pose.u, pose.q.conjugate())),
+    ),
+    "centre of mass at the origin": (
+        "reactions.inertial",
+        lambda right: lambda body, at, g: right(replace(body, center_of_mass=body.origin), at, g),
+    ),
+    "moment about the wrong point": (
+        "reactions._Lines._arm",
+        lambda right: lambda self, joint, body: 0.0 * right(self, joint, body),
+    ),
+    "reaction on the wrong body": (
+        "reactions._Lines.reaction",
+        lambda right: (
+            lambda self, joint, *rest: (
+                *(-each for each in right(self, joint, *rest)[:2]),
+                right(self, joint, *rest)[2],
+            )
+        ),
+    ),
+    "sign of the effort": (
+        "reactions._Lines.effort",
+        lambda right: lambda self, *rest: -right(self, *rest),
+    ),
+    "no centripetal acceleration": (
+        "demand.inertial",
+        lambda right: (
+            lambda body, at, g: right(
+                body, replace(at, twists={k: Twist(v.v, ZERO) for k, v in at.twists.items()}), g
+            )
+        ),
+    ),
+    "spring that pushes": (
+        "motion_lanes.spring",
+        lambda right: (
+            lambda each, at: replace(
+                right(each, at), wrenches={k: -v for k, v in right(each, at).wrenches.items()}
+            )
+        ),
+    ),
+    "spring on one body": (
+        "motion_lanes.spring",
+        lambda right: (
+            lambda each, at: replace(
+                right(each, at), wrenches={each.j: right(each, at).wrenches[each.j]}
+            )
+        ),
+    ),
+}
+
+
+def with_spring():
+    case = cases.load("mcpherson_strut")
+    mechanism = loaded(case.mechanism)
+    ends = ((1.0, 0.5, 0.0), (0.99, 0.56, 0.5))
+    spring = SpringDamper("spring", "lca", "strut", ends, 3e3, free_length=0.3)
+    return case, replace(mechanism, forces=[spring])
+
+
+def test_without_a_mistake_nothing_is_missing():
+    case, mechanism = with_spring()
+    assert max(worst(mechanism, case)) <= 1e-11
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_planted_mistake_is_found(mistake, monkeypatch):
+    place, change = MISTAKES[mistake]
+    module, *path = place.split(".")
+    owner = {"reactions": reactions, "demand": demand, "motion_lanes": motion_lanes}[module]
+    for name in path[:-1]:
+        owner = getattr(owner, name)
+    right = getattr(owner, path[-1])
+    monkeypatch.setattr(owner, path[-1], change(right))
+    if place == "demand.inertial":  # imported by name where it is used
+        monkeypatch.setattr(reactions, "inertial", change(right))
+    case, mechanism = with_spring()
+    assert max(worst(mechanism, case)) > 1e-6

@@ -1,0 +1,90 @@
+"""Random masses for any mechanism, its forces, and what drivers do to its bodies."""
+
+from dataclasses import replace
+
+import numpy as np
+from kincheck.core.kinematics.compiled.request import Request
+from kincheck.core.kinematics.forces.reactions import with_forces
+from kincheck.core.kinematics.formulation.constraints import Style
+from kincheck.core.kinematics.solver_selection import prepare
+from kincheck.core.mechanism.drivers import JointAngle, PointCoordinate
+
+from ..oracles import naive, newton_euler
+
+GRAVITY = (0.3, -2.0, -9.6)
+
+
+def six(matrix):
+    """The entries Ixx, Iyy, Izz, Ixy, Iyz, Ixz."""
+    return [*np.diag(matrix), matrix[0, 1], matrix[1, 2], matrix[0, 2]]
+
+
+def ball(moment):
+    return [moment] * 3 + [0.0] * 3
+
+
+def loaded(mechanism, seed=1, gravity=GRAVITY):
+    """The mechanism with random masses, with products of inertia."""
+    random = np.random.default_rng(seed)
+    bodies = []
+    for body in mechanism.bodies:
+        if body.fixed:
+            bodies.append(body)
+            continue
+        points = random.normal(size=(6, 3)) * 0.1
+        matrix = np.trace(points.T @ points) * np.eye(3) - points.T @ points
+        entries = [
+            matrix[0, 0],
+            matrix[1, 1],
+            matrix[2, 2],
+            matrix[0, 1],
+            matrix[1, 2],
+            matrix[0, 2],
+        ]
+        center = np.array(body.origin) + random.normal(size=3) * 0.2
+        mass = random.uniform(1.0, 5.0)
+        bodies.append(replace(body, mass=mass, center_of_mass=tuple(center), inertia=entries))
+    return replace(mechanism, bodies=bodies, gravity=gravity)
+
+
+def solved(mechanism, case, style="native"):
+    path, names = case.sweep.path, tuple(body.name for body in mechanism.moving)
+    request = Request(tuple(path.motions), (), names, 2, Style(style))
+    motion = prepare(mechanism, request, path)(1e-12)
+    assert motion.solved.all(), motion.message
+    return with_forces(mechanism, path, motion, bodies=names)
+
+
+def pushes(mechanism, trajectory, k):
+    """What drivers do to the bodies: by body, force, point and torque."""
+    found = {}
+
+    def add(name, force, at, torque):
+        found.setdefault(name, []).append((np.array(force), np.array(at), np.array(torque)))
+
+    def turned(name, vector):
+        if name not in trajectory.bodies:
+            return np.array(vector)
+        A_design = naive.A(np.array(mechanism.body(name).euler_parameters))
+        return naive.A(trajectory.bodies[name].p[k]) @ A_design.T @ np.array(vector)
+
+    for driver in mechanism.drivers:
+        effort = trajectory.forces.drivers[driver.name][k]
+        if isinstance(driver, PointCoordinate):
+            point = mechanism.point(driver.point)
+            d = np.array(driver.direction) / np.linalg.norm(driver.direction)
+            body = mechanism.body(point.body)
+            at = newton_euler.carried(body, trajectory.bodies[point.body], k, point.position)
+            add(point.body, effort * d, at, np.zeros(3))
+            continue
+        joint = mechanism.joint(driver.joint)
+        axis = turned(joint.i, np.array(joint.axis) / np.linalg.norm(joint.axis))
+        for name, sign in ((joint.i, -1.0), (joint.j, 1.0)):
+            if isinstance(driver, JointAngle):
+                add(name, np.zeros(3), np.zeros(3), sign * effort * axis)
+            else:
+                second = trajectory.bodies.get(joint.j)
+                body = mechanism.body(joint.j) if second else None
+                at = newton_euler.carried(body, second, k, joint.point)
+                add(name, sign * effort * axis, at, np.zeros(3))
+    return found

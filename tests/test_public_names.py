@@ -1,0 +1,101 @@
+"""The names of `import kincheck`, and when they are loaded."""
+
+import ast
+import subprocess
+import sys
+
+import kincheck
+import kincheck.adapters
+import kincheck.core
+import pytest
+
+from .test_architecture import ROOT
+
+ONLY_NAMES = """
+import sys
+import kincheck
+assert kincheck.__version__ and "Mechanism" in dir(kincheck)
+print(*sorted({name.split(".")[0] for name in sys.modules} & {"numpy", "scipy", "msgspec", "rich"}))
+print(*sorted(name for name in sys.modules if name.startswith("kincheck")))
+kincheck.Revolute
+print("numpy" in sys.modules, "kincheck.core.harness" in sys.modules)
+"""
+
+
+def test_import_loads_names_only():
+    """In a fresh interpreter: numpy alone would take three times as long as all the rest."""
+    found = subprocess.run(
+        [sys.executable, "-c", ONLY_NAMES], cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout.splitlines()
+    assert found == ["", "kincheck kincheck.core kincheck.core.version", "True False"]
+
+
+@pytest.mark.parametrize("name", kincheck.__all__)
+def test_every_name_is_there(name):
+    assert getattr(kincheck, name) is not None
+
+
+def test_core_has_all_but_the_functions_by_name():
+    assert set(kincheck.__all__) - set(kincheck.core.__all__) == {"load", "run"}
+    assert kincheck.Mechanism is kincheck.core.Mechanism
+
+
+def test_type_checkers_are_told_the_same_names():
+    """The imports under TYPE_CHECKING: name -> module, as the table that loads them."""
+    syntax = ast.parse((ROOT / "core" / "__init__.py").read_text(encoding="utf-8"))
+    block = next(node for node in syntax.body if isinstance(node, ast.If))
+    told = {alias.name: node.module for node in block.body for alias in node.names}
+    assert told == kincheck.core._MODULES
+    assert {*told, "__version__"} == set(kincheck.core.__all__)
+
+
+def test_there_is_no_other_name():
+    with pytest.raises(AttributeError, match="no attribute 'solv'"):
+        _ = kincheck.solv
+
+
+def test_run_in_one_line():
+    results = kincheck.run("rssr", engines=["native"])
+    assert [(each.case, each.outcome) for each in results.records] == [("rssr", "pass")]
+    assert "rssr" in results.scenes
+
+
+def test_run_takes_cases_files_and_engines_of_its_own():
+    class Own:
+        name, mode, loop, settings = "own", "projection", "python", {}
+        in_process = True
+
+        def __init__(self):
+            self.native = kincheck.adapters.engine("native")
+
+        def version(self):
+            return "1"
+
+        def unsupported(self, case):
+            return "only native's" if case.name == "rssr" else None
+
+        def build(self, case):
+            return self.native.build(case)
+
+        def solve(self, model, case, tol):
+            return self.native.solve(model, case, tol)
+
+    file = ROOT / "cases" / "hooke_joint.toml"
+    results = kincheck.run([kincheck.load("rssr"), file], [Own()])
+    assert [(each.case, each.engine, each.outcome) for each in results.records] == [
+        ("rssr", "own", "unsupported"),
+        ("hooke_joint", "own", "pass"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("cases", "engines", "message"),
+    [
+        ("rsrs", None, "there is no case 'rsrs'; did you mean 'rssr'"),
+        ("rssr", "mujocco", "there is no engine 'mujocco'; did you mean 'mujoco'"),
+        ("no/such.toml", "native", "no/such.toml"),
+    ],
+)
+def test_wrong_names_are_told(cases, engines, message):
+    with pytest.raises(kincheck.KincheckError, match=message):
+        kincheck.run(cases, engines)
