@@ -87,9 +87,7 @@ IMPORTS = {
     "case": ". joints mechanism",
     "case/suspension": ". mechanism case",
     "case/measures": ". joints mechanism case",
-    "case/io": (
-        ". joints mechanism kinematics/compiled kinematics case case/suspension case/measures"
-    ),
+    "case/io": ". joints mechanism kinematics case case/suspension case/measures",
     "case/models/hardpoints": ". mechanism case/models/hardpoints/templates case case/io",
     "case/variation": ". joints mechanism kinematics case case/io",
     "case/models/mjcf": ". joints mechanism kinematics case case/io",
@@ -112,9 +110,8 @@ IMPORTS = {
         "case/variation harness harness/workers history report"
     ),
     "studies/stress": (
-        ". joints mechanism kinematics/compiled kinematics/continuation kinematics case "
-        "case/io harness harness/workers report studies/stress/truth "
-        "studies/stress/families"
+        ". joints mechanism kinematics case case/io harness harness/workers report "
+        "studies/stress/truth studies/stress/families"
     ),
     "studies/paper": ". primitives program joints mechanism kinematics case harness report",
     "studies/diagnosis": ". joints kinematics case harness report",

@@ -12,8 +12,7 @@ import numpy as np
 from ..case.case import MARKER, Case
 from ..errors import KincheckError
 from ..joints import Kind
-from ..kinematics.compiled.request import Request
-from ..kinematics.solver_selection import prepare
+from ..kinematics import NativeSolver
 from ..mechanism.mechanism import Vector
 from ..trajectory import Array, BodyMotion
 from .record import Record, Results
@@ -116,8 +115,10 @@ def _poses(case: Case) -> tuple[list[int], dict[str, BodyMotion], str]:
     frames = min(FRAMES, count, POSES // max(1, len(bodies)))
     taken = np.unique(np.linspace(0, count - 1, frames).round().astype(int))
     # not compiled: for so few samples compilation takes longer than numpy
-    request = Request(tuple(path.motions), (), bodies, order=0, compiled=False)
-    found = prepare(case.mechanism, request, replace(path, times=path.times[taken]))(TOL)
+    solver = NativeSolver(order=0, compiled=False)
+    found = solver.prepare(case.mechanism, replace(path, times=path.times[taken]), bodies=bodies)(
+        TOL
+    )
     reached = {
         name: replace(motion, r=motion.r[found.solved], p=motion.p[found.solved])
         for name, motion in found.bodies.items()

@@ -18,10 +18,10 @@ from kincheck.core import PointCoordinate
 from kincheck.core.joints import Kind
 from kincheck.core.mechanism.motions import Sine
 from kincheck.core.studies.stress.families import loops
-from kincheck.core.studies.stress.solving import Interpreted
+from kincheck.core.studies.stress.solving import interpreted
 from scipy.spatial.transform import Rotation
 
-ENGINE = Interpreted(adapters.engine("native"))
+ENGINE = interpreted(adapters.engine("native"))
 LOOPS, LARGEST, SAMPLES = 8, 5, 5
 # The part of the loop's own reach that is driven: far from where it may lock up, and where rounding
 # is magnified without bound.

@@ -20,7 +20,7 @@ from kincheck.core.studies.stress.families.planar import any_plane, four_bar
 from kincheck.core.studies.stress.reproducers import judge as judge_file
 from kincheck.core.studies.stress.run import specimen, stress
 from kincheck.core.studies.stress.shrink import fewer_samples, reduced, rounded
-from kincheck.core.studies.stress.solving import Interpreted, once
+from kincheck.core.studies.stress.solving import interpreted, once
 from kincheck.core.studies.stress.truth.reference_motion import Reach, followed
 from kincheck.core.studies.stress.verdicts import Verdict, described_wrong, judged
 from kincheck.core.trajectory import PointMotion
@@ -190,7 +190,7 @@ def test_a_small_loop_hides_no_corner_of_the_large_one():
     made = FAMILIES["corners"].specimen(rng, samples)
     assert dict(made.facts)["ratio"] == pytest.approx(0.014, rel=0.05)
     case = made.describe()
-    found = judged(made, case, made.truth(case), once(Pair(case, Interpreted(NATIVE), made.tol)))
+    found = judged(made, case, made.truth(case), once(Pair(case, interpreted(NATIVE), made.tol)))
     assert found.counts[Verdict.RIGHT] == samples
 
 
@@ -253,7 +253,7 @@ def test_errors_do_not_grow_over_a_thousand_turns():
 
 def test_nothing_nearly_singular_is_silently_wrong_without_machine_code():
     found, _ = stress(
-        [FAMILIES["singular"]], [Interpreted(NATIVE)], samples=150, seed=0, prove=False
+        [FAMILIES["singular"]], [interpreted(NATIVE)], samples=150, seed=0, prove=False
     )
     assert found.cells[0].samples[Verdict.SILENTLY_WRONG] == 0
 

@@ -10,9 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from ...errors import SolveError
-from ...kinematics import start_of
-from ...kinematics.compiled.request import Request
-from ...kinematics.solver_selection import prepare
+from ...kinematics import NativeSolver, start_of
 from ...mechanism.mechanism import Mechanism
 from ...trajectory import Array, BodyMotion
 from ..case import Case
@@ -80,10 +78,7 @@ def way_to(case: Case, stop: float) -> Mapping[str, BodyMotion]:
             f" {case.sweep.driver!r}"
         )
     bodies, path = tuple(body.name for body in case.mechanism.moving), case.sweep.path
-    request, begin = (
-        Request(tuple(path.motions), (), bodies, order=0),
-        start_of(case.mechanism, path),
-    )
+    solver, begin = NativeSolver(order=0), start_of(case.mechanism, path)
     first = case.sweep.design + case.sweep.rate * begin.time
     for samples in (1,) if stop == first and begin.lead is None else SAMPLES:
         # its first is exact, also where it is the only one
@@ -91,7 +86,7 @@ def way_to(case: Case, stop: float) -> Mapping[str, BodyMotion]:
         ways = [replace(case.sweep, values=values).path]
         if begin.lead:
             ways.insert(0, replace(begin.lead, times=np.linspace(0.0, 1.0, samples)))
-        found = [prepare(case.mechanism, request, way)(TOL) for way in ways]
+        found = [solver.prepare(case.mechanism, way, bodies=bodies)(TOL) for way in ways]
         if not all(each.solved.all() for each in found):
             why = "; ".join(filter(None, [each.message for each in found]))
             raise SolveError(

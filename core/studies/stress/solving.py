@@ -4,23 +4,18 @@ simulators in worker processes.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import replace
 
 from ...case.case import Case
 from ...errors import KincheckError
 from ...harness.compare import output_series
 from ...harness.engine import Engine, may_run_here
 from ...harness.execution import Answer, Failure, Pair, bounded, check, said
+from ...harness.native_engine import NativeEngine
 from ...harness.provenance import plain
 from ...harness.record import Outcome
 from ...harness.resource_limits import Limits
-from ...harness.standard import STANDARD
-from ...kinematics.compiled.compiled_model import compile_model
-from ...kinematics.compiled.request import Request
-from ...kinematics.compiled.samples import Route
-from ...kinematics.continuation.sweep import follow
-from ...trajectory import Trajectory
 
 # A simulator hangs if a sweep of this size takes longer [s].
 PATIENCE = 60.0
@@ -32,44 +27,6 @@ MOST_INTERPRETED = 2000
 """Largest number of samples solved without compilation."""
 
 
-class Interpreted:
-    """The native engine with its programs run by numpy: a mechanism that is solved once
-    is not compiled.
-    """
-
-    name = STANDARD
-    mode = "projection"
-    loop = "python"
-    in_process = True
-    bounds_error = True
-    settings: Mapping[str, Any] = {"executor": "numpy, one call an operation over all lanes"}
-
-    def __init__(self, native: Engine) -> None:
-        self._native = native
-
-    def version(self) -> str | None:
-        """Return the version of the native engine."""
-        return self._native.version()
-
-    def unsupported(self, case: Case) -> str | None:
-        """Return the native engine's reason, which is always None."""
-        return self._native.unsupported(case)
-
-    def build(self, case: Case) -> Route:
-        """Build the native engine's model without a compiler."""
-        path = case.sweep.path
-        return Route(
-            compile_model(
-                case.mechanism, Request(tuple(path.motions), case.points, compiled=False)
-            ),
-            path,
-        )
-
-    def solve(self, model: Route, case: Case, tol: float) -> Trajectory:
-        """Solve all samples along the motion."""
-        return follow(model, tol)
-
-
 def suited(engine: Engine, case: Case, number: int) -> Engine:
     """Return the native engine, interpreted for every other small mechanism so that both executors
     are tested; return simulators unchanged.
@@ -78,7 +35,16 @@ def suited(engine: Engine, case: Case, number: int) -> Engine:
         len(case.mechanism.moving) <= LARGEST_INTERPRETED
         and len(case.sweep.values) <= MOST_INTERPRETED
     )
-    return Interpreted(engine) if engine.name == STANDARD and number % 2 and small else engine
+    if isinstance(engine, NativeEngine) and number % 2 and small:
+        return interpreted(engine)
+    return engine
+
+
+def interpreted(engine: NativeEngine) -> NativeEngine:
+    """Return the native engine with its programs run by numpy: a mechanism that is solved once is
+    not compiled.
+    """
+    return replace(engine, solver=replace(engine.solver, compiled=False))
 
 
 def solve_all(pairs: Sequence[Pair]) -> list[Answer | Failure]:

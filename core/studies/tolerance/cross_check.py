@@ -21,8 +21,7 @@ from ...harness.execution import Answer, Attempt, Pair, Solver
 from ...harness.record import Outcome
 from ...harness.standard import STANDARD, UNCERTAIN
 from ...harness.verdict import NAMED, excess, promised
-from ...kinematics.compiled.request import Request
-from ...kinematics.solver_selection import prepare
+from ...kinematics import NativeSolver
 from ...trajectory import QUANTITIES, Array
 from .study import Study
 
@@ -199,9 +198,8 @@ def _contradicted(study: Study, case: Case, answer: Answer, ours: Array) -> str:
     )
     if not (values & ~np.isfinite(ours).any(axis=0)).any():
         return ""
-    path = case.sweep.path
     try:
-        alone = prepare(case.mechanism, Request(tuple(path.motions), case.points), path)(study.tol)
+        alone = NativeSolver().prepare(case.mechanism, case.sweep.path, case.points)(study.tol)
     except SolveError:  # without an answer there is no standard
         return ""
     refused = values & ~alone.solved

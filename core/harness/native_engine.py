@@ -1,0 +1,86 @@
+"""The native engine: the solver of kincheck, entering by the same door as the simulators."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from ..case.case import Case
+from ..kinematics import LAST_ITERATION, NativeSolver, Solver, Style
+from ..program.llvm.compiler import available
+from ..trajectory import Trajectory
+from ..version import VERSION
+from .standard import STANDARD
+
+
+@dataclass(frozen=True)
+class NativeEngine:
+    """Geometric constraints, traced, run over lanes of samples by machine code, or by numpy without
+    llvmlite; see `Engine`.
+
+    Attributes:
+        solver: how it solves; with a `last_iteration` above the default, the rest that the last
+            iteration leaves is accepted.
+        every_body: the motion of every moving body is solved too, and not of the compared points
+            only.
+    """
+
+    solver: NativeSolver = field(default_factory=NativeSolver)
+    every_body: bool = False
+    name: str = STANDARD
+    mode = "projection"
+    in_process = True
+    bounds_error = True
+
+    @property
+    def loop(self) -> str:
+        """Newton's iteration over the samples runs in machine code where there is a compiler for
+        it.
+        """
+        return "compiled" if self.solver.compiled and available() else "python"
+
+    @property
+    def settings(self) -> Mapping[str, Any]:
+        """Formulation, executor and how the loop ends; and how much is solved, where that is not
+        the standard.
+        """
+        solver = self.solver
+        executor = (
+            "llvm, vectors of lanes"
+            if self.loop == "compiled"
+            else "numpy, one call an operation over all lanes"
+        )
+        last = solver.last_iteration if math.isfinite(solver.last_iteration) else "any"
+        axes = " (global axes)" if solver.style is Style.NATIVE else ""
+        return {
+            "row_style": f"{solver.style}{axes}",
+            "executor": executor,
+            "last_iteration_below": last,
+            **({"order": solver.order} if solver.order != NativeSolver.order else {}),
+            **({"every_body": True} if self.every_body else {}),
+        }
+
+    def version(self) -> str | None:
+        """Version of kincheck."""
+        return VERSION
+
+    def unsupported(self, case: Case) -> str | None:
+        """Return None always: a joint is supported by being composed of primitives."""
+        return None
+
+    def bodies(self, case: Case) -> tuple[str, ...]:
+        """Return the names of the bodies whose motion is solved."""
+        return tuple(body.name for body in case.mechanism.moving) if self.every_body else ()
+
+    def build(self, case: Case) -> Solver:
+        """Select the rows, trace the programs for the points that the outputs read, and lay out the
+        samples.
+        """
+        path, bodies = case.sweep.path, self.bodies(case)
+        return self.solver.prepare(case.mechanism, path, case.points, bodies, case.forces)
+
+    def solve(self, model: Solver, case: Case, tol: float) -> Trajectory:
+        """March all samples; tol is relative to the mechanism's size."""
+        return model(tol if self.solver.last_iteration <= LAST_ITERATION else math.inf)
