@@ -35,7 +35,8 @@ if TYPE_CHECKING:
     )
     from .kinematics.assembly.assemble import Assembled, assemble
     from .kinematics.assembly.assembly_modes import Assemblies, Assembly, find_assemblies
-    from .kinematics.continuation.trace import Curve, Event, trace
+    from .kinematics.continuation.curve import Curve, Event
+    from .kinematics.continuation.trace import trace
     from .kinematics.design_sweep import Designs, solve_designs
     from .kinematics.solve import solve
     from .mechanism.drivers import JointAngle, JointDisplacement, PointCoordinate
@@ -123,7 +124,8 @@ _NAMES = {
     "kinematics.design_sweep": "Designs solve_designs",
     "kinematics.assembly.assemble": "Assembled assemble",
     "kinematics.assembly.assembly_modes": "Assemblies Assembly find_assemblies",
-    "kinematics.continuation.trace": "Curve Event trace",
+    "kinematics.continuation.curve": "Curve Event",
+    "kinematics.continuation.trace": "trace",
     "harness.engine": "Engine",
     "harness.record": "Outcome Record Results",
     "studies.joint_check.check_joint": "check_joint",

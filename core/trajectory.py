@@ -5,10 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Generic, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+from .dataset import Dataset, Variable
+from .driving import Driving, in_words
+from .tabular import Tabular
 
 Array: TypeAlias = NDArray[np.float64]
 
@@ -85,8 +90,8 @@ class Motions(Mapping[str, _Motion], Generic[_Motion]):
         return len(self._columns)
 
 
-@dataclass(frozen=True, eq=False, init=False)
-class Trajectory:
+@dataclass(frozen=True, eq=False, init=False, repr=False)
+class Trajectory(Tabular):
     """The motion of all wanted points over the samples of a sweep, in the order of the sweep.
 
     Attributes:
@@ -98,6 +103,7 @@ class Trajectory:
         message: empty, or why samples are missing: what was found, where, and what to do.
         details: further facts worth a place in the record (rank, rows, degrees of freedom, ...).
         bodies: motion by body name, for engines and requests that give it.
+        driven_by: gives `drive`; None if the engine does not tell it.
     """
 
     points: Mapping[str, PointMotion]
@@ -107,6 +113,7 @@ class Trajectory:
     message: str
     details: Mapping[str, Any]
     bodies: Mapping[str, BodyMotion]
+    driven_by: Callable[[], Driving] | None
 
     def __init__(  # a frozen dataclass sets its fields by calls, which takes 3 us of a sweep's 25
         self,
@@ -117,12 +124,40 @@ class Trajectory:
         message: str = "",
         details: Mapping[str, Any] | None = None,
         bodies: Mapping[str, BodyMotion] | None = None,
+        driven_by: Callable[[], Driving] | None = None,
     ) -> None:
         known = self.__dict__
         known["points"], known["solved"], known["iterations"] = points, solved, iterations
         known["residual"], known["message"] = residual, message
         known["details"] = {} if details is None else details
         known["bodies"] = {} if bodies is None else bodies
+        known["driven_by"] = driven_by
+
+    def along(self, driven_by: Callable[[], Driving]) -> Trajectory:
+        """Return the trajectory with its drivers."""
+        found = object.__new__(Trajectory)
+        found.__dict__.update(self.__dict__, driven_by=driven_by)
+        return found
+
+    @cached_property
+    def drive(self) -> Driving | None:
+        """Driver values and times; computed on use, because a sweep takes microseconds."""
+        return None if self.driven_by is None else self.driven_by()
+
+    def summary(self) -> str:
+        """Return the driver's range, the samples and points, and why samples are missing."""
+        count, reached = len(self.solved), int(self.solved.sum())
+        samples = f"{count} samples" if reached == count else f"{reached} of {count} samples"
+        points = f"points {', '.join(self.points) or 'none'}"
+        found = [in_words(self.drive), samples, points, f"residual {self.residual:.1e}"]
+        return ", ".join(filter(None, [*found, self.message]))
+
+    def dataset(self) -> Dataset:
+        """Return the motion of the points over drivers and time."""
+        coords, variables, x = as_variables(self.points, ("sample",), self.drive)
+        variables["solved"] = Variable("sample", self.solved)
+        variables["iterations"] = Variable("sample", self.iterations)
+        return Dataset(("sample",), coords, variables, x)
 
 
 def largest_found(values: Array) -> float:
@@ -130,3 +165,28 @@ def largest_found(values: Array) -> float:
     success.
     """
     return float(values.max()) if values.size else math.nan
+
+
+def as_variables(
+    points: Mapping[str, PointMotion], dims: tuple[str, ...], drive: Driving | None
+) -> tuple[dict[str, Variable], dict[str, Variable], str]:
+    """Return coordinates and variables of the motion of points, and the name of the coordinate that
+    curves are drawn over.
+
+    Args:
+        dims: of the samples, the last one "sample".
+    """
+    along = {} if drive is None else drive.coords()
+    axes = {"point": Variable("point", [*points]), "axis": Variable("axis", ["x", "y", "z"])}
+    variables = dict[str, Variable]()
+    for quantity, per_time in zip(QUANTITIES, PER_TIME, strict=True):
+        series = [getattr(each, quantity) for each in points.values()]
+        if series and all(each is not None for each in series):
+            stacked = np.stack(series, axis=-2)
+            variables[quantity] = Variable((*dims, "point", "axis"), stacked, f"m{per_time}")
+    numbered = {} if along else {"sample": Variable("sample", np.arange(_samples(points)))}
+    return {**along, **numbered, **axes}, variables, next(iter(along), "sample")
+
+
+def _samples(points: Mapping[str, PointMotion]) -> int:
+    return next((each.position.shape[-2] for each in points.values()), 0)

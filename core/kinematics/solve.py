@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 import numpy as np
 
+from ..driving import Driving
 from ..errors import SolveError
 from ..input_checks import finite, no_such, real
 from ..mechanism.mechanism import Mechanism
@@ -77,7 +79,20 @@ def solve(
         tol=tol,
         style=style,
     )
-    return prepare(mechanism, request, path)(tol)
+    found = prepare(mechanism, request, path)(tol)
+    return found.along(partial(driving, mechanism, path, driver, np.array(values, dtype=float)))
+
+
+def driving(mechanism: Mechanism, path: Path, driver: str, values: Array) -> Driving:
+    """Return the driver values of a path; those of the swept driver are given."""
+    moved = path.drive([*path.motions], path.times)[0]
+    found = {
+        name: path.design.get(name, 0.0) + value
+        for name, value in zip(path.motions, moved, strict=True)
+    }
+    found = {driver: values} | {name: each for name, each in found.items() if name != driver}
+    units = {name: "rad" if mechanism.driver(name).turns else "m" for name in found}
+    return Driving(path.times, found, units)
 
 
 def asked(
