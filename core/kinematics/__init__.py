@@ -51,8 +51,8 @@ if TYPE_CHECKING:
     from .compiled.motion_start import solve_from_start as solve_from_start
     from .compiled.motion_start import start_of as start_of
     from .compiled.request import LAST_ITERATION as LAST_ITERATION
-    from .continuation.trace import Curve as Curve
-    from .continuation.trace import Event as Event
+    from .continuation.curve import Curve as Curve
+    from .continuation.curve import Event as Event
     from .continuation.trace import trace as trace
     from .design_batch import Variants as Variants
     from .design_sweep import Designs as Designs
@@ -111,7 +111,8 @@ _NAMES = {
     "assembly.assembly_modes": "Assemblies Assembly find_assemblies",
     "compiled.motion_start": "Start notes_on_start solve_from_start start_of",
     "compiled.request": "LAST_ITERATION",
-    "continuation.trace": "Curve Event trace",
+    "continuation.curve": "Curve Event",
+    "continuation.trace": "trace",
     "design_batch": "Variants",
     "design_sweep": "Designs solve_designs",
     "diagnosis.conditioning": "Conditioning PoseConditioning conditioning",

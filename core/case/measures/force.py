@@ -20,7 +20,8 @@ from ...jet import Jet
 from ...mechanism.drivers import JointDriver, PointCoordinate
 from ...mechanism.loads import Force, SpringDamper, Torque, TorsionSpringDamper
 from ...mechanism.mechanism import Mechanism, Point, Vector
-from ...trajectory import Array, Forces
+from ...forces import Forces
+from ...trajectory import Array
 from ..quantity import MARKER
 from .base import HIDDEN, Measure, coordinates, place_on
 

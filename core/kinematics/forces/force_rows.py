@@ -14,7 +14,8 @@ from ...algebra import vec
 from ...joints.base import Joint
 from ...mechanism.drivers import Driver
 from ...primitives.base import GROUND_POSE, Drive
-from ...trajectory import DETERMINED, Array
+from ...forces import DETERMINED
+from ...trajectory import Array
 from ..formulation.cartesian import COLUMNS, Cartesian
 from ..formulation.constraints import Constraint, Relation
 from ..formulation.driver_inputs import drive_numbers

@@ -20,7 +20,8 @@ from ...joints.base import Joint
 from ...mechanism.drivers import Driver
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path
-from ...trajectory import Array, Forces, Reaction, Trajectory
+from ...forces import Forces, Reaction
+from ...trajectory import Array, Trajectory
 from .force_rows import ForceRows
 from .motion_lanes import MotionLanes
 from .power import balance
