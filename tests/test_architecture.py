@@ -81,7 +81,9 @@ IMPORTS = {
     "case": ". joints mechanism",
     "case/suspension": ". mechanism case",
     "case/io": ". joints mechanism kinematics/compiled kinematics case case/suspension",
-    "case/models/hardpoints": ". mechanism case/models/hardpoints/templates case case/io",
+    "case/models/hardpoints": (
+        ". mechanism case/models/hardpoints/templates case case/io case/suspension"
+    ),
     "case/variation": ". joints mechanism kinematics/formulation case case/io",
     "case/models/mjcf": ". joints mechanism kinematics/structure case case/io",
     "case/models": "case case/io case/models/hardpoints case/models/mjcf",

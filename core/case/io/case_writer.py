@@ -15,8 +15,10 @@ from ...errors import CaseError
 from ...joints import Coupler
 from ...mechanism.motions import Absolute
 from ..case import MARKER, TIME, Case, Output
+from ..suspension import PerTravel, SuspensionOutput
 from .coordinates import AXES
 from .schema import SCHEMA, own_fields
+from .suspension_writer import suspension_keys, suspension_output
 
 # What a body has unless the file says otherwise.
 PLAIN: Mapping[str, Any] = {
@@ -34,8 +36,8 @@ def case_text(case: Case, comments: Sequence[str] = ()) -> str:
         comments: lines at the top.
 
     Raises:
-        CaseError: no case file can express the case: samples on no even grid, or an output of a
-            suspension.
+        CaseError: no case file can express the case: samples on no even grid, or outputs of
+            several wheels.
     """
     lines = [f"# {line}" for line in comments]
     lines += _keys({"schema": SCHEMA, "name": case.name, "source": case.source})
@@ -60,7 +62,11 @@ def case_text(case: Case, comments: Sequence[str] = ()) -> str:
                 f"drivers.{_key(driver.name)}", "motion", {"type": moved.type, **_own(moved)}
             )
     lines += ["", "[sweep]", *_keys(_sweep(case))]
+    if wheel := suspension_keys(case):
+        lines += ["", "[suspension]", *_keys(wheel)]
     for output in case.outputs:
+        if isinstance(output, PerTravel):  # follows from the output before it
+            continue
         lines += _table("outputs", output.name, dict(_output(case, output)))
     return "\n".join(lines) + "\n"
 
@@ -80,6 +86,10 @@ def _sweep(case: Case) -> Mapping[str, Any]:
 
 
 def _output(case: Case, output: Any) -> Iterator[tuple[str, Any]]:
+    if isinstance(output, SuspensionOutput):
+        yield from suspension_output(output)
+        yield from (("atol", output.atol), ("rtol", output.rtol), ("why", output.why))
+        return
     if not isinstance(output, Output):
         raise CaseError(
             f"case {case.name!r}: output {output.name!r} is not a coordinate of a point; leave"
