@@ -126,7 +126,7 @@ IMPORTS = {
     ),
     "cli": (
         ". program program/llvm joints kinematics/structure kinematics/continuation case "
-        "case/io case/variation case/models harness harness/workers history "
+        "case/io case/variation case/models case/models/hardpoints harness harness/workers history "
         "history/regression report studies/stress/families studies "
         "studies/joint_check studies/tolerance studies/stress studies/paper "
         "studies/diagnosis studies/bench"

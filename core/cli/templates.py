@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from ..errors import KincheckError, unknown
 from .registry import House, Status
 
 
@@ -30,11 +29,7 @@ def _templates(options: argparse.Namespace, house: House) -> int:
     Its numbers are made up. Rows marked optional may be left out, and so may the column of
     meanings.
     """
-    from ..case.models.hardpoints.sample_table import sample_table
-    from ..case.models.hardpoints.templates import TEMPLATES
+    from ..case.models.hardpoints.sample_table import sample_tables
 
-    for name in options.template:
-        if name not in TEMPLATES:
-            raise KincheckError(unknown("template", name, TEMPLATES))
-    print(*(sample_table(TEMPLATES[name]) for name in options.template or TEMPLATES), sep="\n")
+    print(*sample_tables(options.template), sep="\n")
     return Status.WITHIN

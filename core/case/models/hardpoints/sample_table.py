@@ -4,10 +4,24 @@ from __future__ import annotations
 
 import csv
 import io
+from collections.abc import Sequence
 
-from .templates import Template
+from ....errors import CaseError, unknown
+from .templates import TEMPLATES, Template
 
 AXES = "forward,left,up"
+
+
+def sample_tables(names: Sequence[str]) -> list[str]:
+    """Return the sample tables of the templates of these names, or of all if none is given.
+
+    Raises:
+        CaseError: there is no such template.
+    """
+    for name in names:
+        if name not in TEMPLATES:
+            raise CaseError(unknown("template", name, TEMPLATES))
+    return [sample_table(TEMPLATES[name]) for name in names or TEMPLATES]
 
 
 def sample_table(template: Template) -> str:
