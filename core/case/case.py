@@ -24,6 +24,9 @@ PER_TRAVEL = ".per_travel"
 """Suffix of derivatives by wheel travel, which the case reader adds to the outputs."""
 
 
+HELD_BUT = "held_but"
+"""Fact of an output that is differentiated by one driver while all others are held: its name."""
+
 NO_SIZE = 1e-3
 """Size of a mechanism whose points all coincide within rounding [m]."""
 _COINCIDE = 1e-12

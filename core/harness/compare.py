@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..algebra import Vec3
-from ..case.case import ORDERS, Case, Quantity, Series, pace
+from ..case.case import HELD_BUT, ORDERS, Case, Quantity, Series, pace
 from ..case.measures import ForceMeasure
 from ..case.rotation import counted
 from ..errors import CaseError
@@ -44,13 +44,23 @@ NO_VALUE = "has no value at"
 """Phrase in the reason of a standard without values at some samples, which are not judged."""
 
 
-def output_series(case: Case, output: Quantity, trajectory: Trajectory) -> Series:
+def output_series(
+    case: Case, output: Quantity, trajectory: Trajectory, held: Trajectory | None = None
+) -> Series:
     """Return an output over the samples of a trajectory.
+
+    Args:
+        held: the same poses with other velocities, for outputs that are derivatives by one driver
+            while others are held; without it they have no value.
 
     Values are NaN at unsolved samples. A quantity is None if the engine does not give it.
     """
     if isinstance(output, ForceMeasure):
         return _force_series(output, trajectory)
+    if HELD_BUT in output.facts:
+        if held is None:
+            return Series(np.full(len(trajectory.solved), np.nan), possible=False)
+        trajectory = held
     at = {name: _moving(trajectory.points[name]) for name in output.points}
     # unknown values are NaN, and so is everything computed from them
     with np.errstate(all="ignore"):

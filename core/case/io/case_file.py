@@ -191,7 +191,7 @@ def _with_outputs(
         return replace(case, mechanism=with_markers(mechanism, outputs), outputs=outputs)
     from . import suspension  # many classes, and few cases have a wheel
 
-    table = suspension.read_suspension(file, keys.suspension, mechanism, length, units["rad"])
+    table = suspension.read_suspension(file, keys.suspension, case, length, units["rad"])
     outputs = _outputs(file, keys, table, case, units) or with_all_coordinates(case).outputs
     case = replace(case, mechanism=with_markers(mechanism, outputs), outputs=outputs)
     return (

@@ -16,11 +16,11 @@ import numpy as np
 
 from ...algebra import Vec3
 from ...errors import MechanismError, SolveError
+from ...forces import Forces
 from ...jet import Jet
 from ...mechanism.drivers import JointDriver, PointCoordinate
 from ...mechanism.loads import Force, SpringDamper, Torque, TorsionSpringDamper
 from ...mechanism.mechanism import Mechanism, Point, Vector
-from ...forces import Forces
 from ...trajectory import Array
 from ..quantity import MARKER
 from .base import HIDDEN, Measure, coordinates, place_on

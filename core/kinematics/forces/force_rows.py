@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...algebra import vec
+from ...forces import DETERMINED
 from ...joints.base import Joint
 from ...mechanism.drivers import Driver
 from ...primitives.base import GROUND_POSE, Drive
-from ...forces import DETERMINED
 from ...trajectory import Array
 from ..formulation.cartesian import COLUMNS, Cartesian
 from ..formulation.constraints import Constraint, Relation

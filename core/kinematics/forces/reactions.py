@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SolveError, unknown
+from ...forces import Forces, Reaction
 from ...joints.base import Joint
 from ...mechanism.drivers import Driver
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path
-from ...forces import Forces, Reaction
 from ...trajectory import Array, Trajectory
 from .force_rows import ForceRows
 from .motion_lanes import MotionLanes
