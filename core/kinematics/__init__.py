@@ -21,6 +21,7 @@ Describe:
     prove, prove_pose                               samples and poses enclosed in balls
     constraints, Cartesian, Frames, Relation        the equations of joints and drivers
     continued, continuous, regular_between          tests of a step
+    with_forces                                     the forces of a solved motion
 
 The folders:
 
@@ -32,6 +33,7 @@ The folders:
     sparse           large mechanisms without small components, as a sparse system
     assembly         closed poses from estimates and random starts
     diagnosis        rank, conditioning and screws at a pose
+    forces           inverse dynamics of a solved motion
     verified         samples enclosed in balls by Krawczyk's test
 """
 
@@ -67,6 +69,7 @@ if TYPE_CHECKING:
     from .diagnosis.rank import NamedRow as NamedRow
     from .diagnosis.rank import Ranks as Ranks
     from .diagnosis.rank import Violation as Violation
+    from .forces.reactions import with_forces as with_forces
     from .formulation.acceptance_criteria import LONGEST_TURN as LONGEST_TURN
     from .formulation.acceptance_criteria import ROUNDING as ROUNDING
     from .formulation.acceptance_criteria import continued as continued
@@ -114,6 +117,7 @@ _NAMES = {
     "diagnosis.instantaneous_screws": "Screw describe_screws",
     "diagnosis.position_gradients": "Gradient",
     "diagnosis.rank": "Blocked ComponentCount Dependency NamedRow Ranks Violation",
+    "forces.reactions": "with_forces",
     "formulation.acceptance_criteria": "LONGEST_TURN ROUNDING continued continuous regular_between",
     "formulation.cartesian": "COLUMNS Cartesian",
     "formulation.constraints": "Frames Relation Style constraints unit_near",
