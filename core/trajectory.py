@@ -5,10 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Generic, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+from .dataset import Dataset, Variable
+from .driving import Driving, in_words
+from .forces import Forces
+from .tabular import Tabular
 
 Array: TypeAlias = NDArray[np.float64]
 
@@ -16,9 +22,6 @@ QUANTITIES = ("position", "velocity", "acceleration")
 """Quantities of a motion: each is the rate of the one before."""
 PER_TIME = ("", "/s", "/s^2")
 """Suffixes of their units."""
-# The null space of redundant rows is orthonormal to round-off over the smallest singular value,
-# which is above 1e-6 in sound linkages. A larger component is real.
-DETERMINED = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,72 +55,6 @@ class BodyMotion:
     p: Array
     v: Array | None
     a: Array | None
-
-
-@dataclass(frozen=True, eq=False)
-class Reaction:
-    """The wrench of a joint over n samples: what its first body exerts on its second, global axes.
-
-    Attributes:
-        force: [N], shape (n, 3).
-        moment: about the joint's point as carried by the second body [N m], shape (n, 3).
-        free: directions of wrenches (force, then moment per unit of length) that redundant rows
-            leave undetermined, shape (n, 6, redundant rows).
-    """
-
-    force: Array
-    moment: Array
-    free: Array
-
-    def along(self, direction: Sequence[float] | Array, *, moment: bool = False) -> Array:
-        """Return the component of force or moment along a unit direction, shape (n,).
-
-        It is NaN at samples where redundant rows leave it undetermined.
-        """
-        part = slice(3, 6) if moment else slice(0, 3)
-        d = np.asarray(direction, dtype=np.float64)
-        loose = np.abs(np.einsum("i,nik->nk", d, self.free[:, part])).max(axis=1, initial=0.0)
-        values: Array = (self.moment if moment else self.force) @ d
-        return np.where(loose <= DETERMINED, values, np.nan)
-
-    def determined(self) -> tuple[int, int, int]:
-        """Return how many directions of force, of moment and of the wrench are determined.
-
-        They are the fewest over the samples, of 3, 3 and 6.
-        """
-        parts = (slice(0, 3), slice(3, 6), slice(0, 6))
-        known = self.free[np.isfinite(self.free).all(axis=(1, 2))]
-        loose = [
-            int(np.linalg.matrix_rank(known[:, part], tol=DETERMINED).max(initial=0))
-            if known.size
-            else 0
-            for part in parts
-        ]
-        return 3 - loose[0], 3 - loose[1], 6 - loose[2]
-
-
-@dataclass(frozen=True, eq=False)
-class Forces:
-    """Forces over n samples; NaN at samples that were not reached or have none.
-
-    Attributes:
-        joints: reaction by joint.
-        drivers: effort by driver, [N] or, if it turns, [N m], shape (n,): effort times rate is the
-            power that the driver puts in.
-        elements: force by force element, shape (n,): tension of a spring-damper [N]; torque of a
-            torsional one on the joint's second body [N m]; amount of a force [N] or torque [N m].
-        power: of the drivers less the change of energy and the dissipation [W], shape (n,): zero
-            but for round-off.
-        largest_power: the largest of the powers that are summed [W], shape (n,).
-        message: empty, or why forces are missing.
-    """
-
-    joints: Mapping[str, Reaction]
-    drivers: Mapping[str, Array]
-    elements: Mapping[str, Array]
-    power: Array
-    largest_power: Array
-    message: str = ""
 
 
 _Motion = TypeVar("_Motion", PointMotion, BodyMotion)
@@ -154,8 +91,8 @@ class Motions(Mapping[str, _Motion], Generic[_Motion]):
         return len(self._columns)
 
 
-@dataclass(frozen=True, eq=False, init=False)
-class Trajectory:
+@dataclass(frozen=True, eq=False, init=False, repr=False)
+class Trajectory(Tabular):
     """The motion of all wanted points over the samples of a sweep, in the order of the sweep.
 
     Attributes:
@@ -168,6 +105,7 @@ class Trajectory:
         details: further facts worth a place in the record (rank, rows, degrees of freedom, ...).
         bodies: motion by body name, for engines and requests that give it.
         forces: reactions and efforts, for engines and requests that give them.
+        driven_by: gives `drive`; None if the engine does not tell it.
     """
 
     points: Mapping[str, PointMotion]
@@ -178,6 +116,7 @@ class Trajectory:
     details: Mapping[str, Any]
     bodies: Mapping[str, BodyMotion]
     forces: Forces | None
+    driven_by: Callable[[], Driving] | None
 
     def __init__(  # a frozen dataclass sets its fields by calls, which takes 3 us of a sweep's 25
         self,
@@ -189,6 +128,7 @@ class Trajectory:
         details: Mapping[str, Any] | None = None,
         bodies: Mapping[str, BodyMotion] | None = None,
         forces: Forces | None = None,
+        driven_by: Callable[[], Driving] | None = None,
     ) -> None:
         known = self.__dict__
         known["points"], known["solved"], known["iterations"] = points, solved, iterations
@@ -196,6 +136,33 @@ class Trajectory:
         known["details"] = {} if details is None else details
         known["bodies"] = {} if bodies is None else bodies
         known["forces"] = forces
+        known["driven_by"] = driven_by
+
+    def along(self, driven_by: Callable[[], Driving]) -> Trajectory:
+        """Return the trajectory with its drivers."""
+        found = object.__new__(Trajectory)
+        found.__dict__.update(self.__dict__, driven_by=driven_by)
+        return found
+
+    @cached_property
+    def drive(self) -> Driving | None:
+        """Driver values and times; computed on use, because a sweep takes microseconds."""
+        return None if self.driven_by is None else self.driven_by()
+
+    def summary(self) -> str:
+        """Return the driver's range, the samples and points, and why samples are missing."""
+        count, reached = len(self.solved), int(self.solved.sum())
+        samples = f"{count} samples" if reached == count else f"{reached} of {count} samples"
+        points = f"points {', '.join(self.points) or 'none'}"
+        found = [in_words(self.drive), samples, points, f"residual {self.residual:.1e}"]
+        return ", ".join(filter(None, [*found, self.message]))
+
+    def dataset(self) -> Dataset:
+        """Return the motion of the points over drivers and time."""
+        coords, variables, x = as_variables(self.points, ("sample",), self.drive)
+        variables["solved"] = Variable("sample", self.solved)
+        variables["iterations"] = Variable("sample", self.iterations)
+        return Dataset(("sample",), coords, variables, x)
 
 
 def largest_found(values: Array) -> float:
@@ -203,3 +170,28 @@ def largest_found(values: Array) -> float:
     success.
     """
     return float(values.max()) if values.size else math.nan
+
+
+def as_variables(
+    points: Mapping[str, PointMotion], dims: tuple[str, ...], drive: Driving | None
+) -> tuple[dict[str, Variable], dict[str, Variable], str]:
+    """Return coordinates and variables of the motion of points, and the name of the coordinate that
+    curves are drawn over.
+
+    Args:
+        dims: of the samples, the last one "sample".
+    """
+    along = {} if drive is None else drive.coords()
+    axes = {"point": Variable("point", [*points]), "axis": Variable("axis", ["x", "y", "z"])}
+    variables = dict[str, Variable]()
+    for quantity, per_time in zip(QUANTITIES, PER_TIME, strict=True):
+        series = [getattr(each, quantity) for each in points.values()]
+        if series and all(each is not None for each in series):
+            stacked = np.stack(series, axis=-2)
+            variables[quantity] = Variable((*dims, "point", "axis"), stacked, f"m{per_time}")
+    numbered = {} if along else {"sample": Variable("sample", np.arange(_samples(points)))}
+    return {**along, **numbered, **axes}, variables, next(iter(along), "sample")
+
+
+def _samples(points: Mapping[str, PointMotion]) -> int:
+    return next((each.position.shape[-2] for each in points.values()), 0)

@@ -89,11 +89,13 @@ IMPORTS = {
     "case/suspension": ". mechanism case",
     "case/measures": ". joints mechanism case",
     "case/io": ". joints mechanism kinematics case case/suspension case/measures",
-    "case/models/hardpoints": ". mechanism case/models/hardpoints/templates case case/io",
+    "case/models/hardpoints": (
+        ". mechanism case/models/hardpoints/templates case case/suspension case/io"
+    ),
     "case/variation": ". joints mechanism kinematics case case/io",
     "case/models/mjcf": ". joints mechanism kinematics case case/io",
     "case/models": "case case/io case/models/hardpoints case/models/mjcf",
-    "harness": ". program/llvm joints mechanism kinematics case case/io",
+    "harness": ". program/llvm joints mechanism kinematics case case/measures case/io",
     "harness/reporting": "",
     "harness/workers": ". harness",
     "history": ". case case/io harness",
@@ -118,9 +120,9 @@ IMPORTS = {
         "report studies studies/tolerance studies/paper"
     ),
     "cli": (
-        ". program program/llvm joints kinematics case case/io case/variation case/models "
-        "harness harness/workers history history/regression report "
-        "studies/stress/families studies studies/joint_check studies/tolerance "
+        ". program program/llvm joints kinematics case case/io case/models/hardpoints "
+        "case/variation case/models harness harness/workers history history/regression "
+        "report studies/stress/families studies studies/joint_check studies/tolerance "
         "studies/stress studies/paper studies/diagnosis studies/bench"
     ),
     "__init__": ". joints mechanism kinematics case case/io harness studies/joint_check",

@@ -28,13 +28,15 @@ class ProjectionEngine(ABC):
     Attributes:
         corrections: Newton steps after the predictor, whatever residual they leave; None: as many
             as it takes.
-        name: as on the command line, and of the simulator's Python package.
+        name: as on the command line, and of the simulator's Python package by default.
+        package: of the simulator, where it has another name.
         title: as in a sentence.
         joints: types that have a counterpart.
     """
 
     corrections: int | None = None
     name: ClassVar[str]
+    package: ClassVar[str] = ""
     title: ClassVar[str]
     joints: ClassVar[Collection[type[Joint]]]
     mode = "projection"
@@ -55,7 +57,7 @@ class ProjectionEngine(ABC):
     def version(self) -> str | None:
         """Return the simulator's version, or None if the import fails."""
         try:
-            return self.version_of(importlib.import_module(self.name))
+            return self.version_of(importlib.import_module(self.package or self.name))
         except (
             Exception,
             SystemExit,

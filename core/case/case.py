@@ -24,6 +24,9 @@ PER_TRAVEL = ".per_travel"
 """Suffix of derivatives by wheel travel, which the case reader adds to the outputs."""
 
 
+HELD_BUT = "held_but"
+"""Fact of an output that is differentiated by one driver while all others are held: its name."""
+
 NO_SIZE = 1e-3
 """Size of a mechanism whose points all coincide within rounding [m]."""
 _COINCIDE = 1e-12
@@ -99,6 +102,7 @@ class Series:
     """One output over the samples: value [unit], and time derivatives if known, each of shape (n,).
 
     Attributes:
+        reason: why solved samples have no value; empty if they have, or for another reason.
         possible: whether the engine returns the inputs of the value; an output that is a derivative
             needs velocities.
     """
@@ -107,6 +111,7 @@ class Series:
     velocity: Array | None = None
     acceleration: Array | None = None
     possible: bool = field(default=True, kw_only=True)
+    reason: str = field(default="", kw_only=True)
 
 
 @dataclass(frozen=True)
@@ -154,6 +159,11 @@ class Case:
         return tuple(dict.fromkeys(point for output in self.outputs for point in output.points))
 
     @property
+    def forces(self) -> tuple[str, ...]:
+        """Names of the joints, drivers and force elements whose forces outputs read."""
+        return tuple(dict.fromkeys(name for output in self.outputs for name in output.forces))
+
+    @property
     def signs(self) -> str:
         """Sign conventions of the outputs in words, for the head of each table, or empty."""
         return "; ".join(dict.fromkeys(output.signs for output in self.outputs if output.signs))
@@ -181,3 +191,13 @@ def turning(case: Case) -> NDArray[np.bool_]:
     return np.array(
         [case.mechanism.driver(name).turns for name in case.sweep.path.motions], dtype=np.bool_
     )
+
+
+def pace(case: Case) -> float:
+    """Return the pace of the mechanism [1/s]: the largest rate of a driver over a radian,
+    or over the mechanism's size; see `harness.compare`."""
+    path, turns = case.sweep.path, turning(case)
+    _, rates, seconds = path.drive(list(path.motions), path.times)
+    extent = np.where(turns, 1.0, size(case))
+    rate, second = (np.abs(each).max(axis=1) for each in (rates, seconds))
+    return float(np.maximum(rate / extent, np.sqrt(second / extent)).max())

@@ -24,6 +24,7 @@ class Quantity(Protocol):
 
     Attributes:
         points: names of the points it reads.
+        forces: names of the joints, drivers and force elements whose forces it reads.
         unit: SI unit of its value: m, rad, 1, or one of these per m.
         orders: number of orders (value, first and second time derivative) computable from results.
         period: values that differ by a multiple of it are the same pose [unit]; zero if none are.
@@ -40,6 +41,8 @@ class Quantity(Protocol):
     def name(self) -> str: ...
     @property
     def points(self) -> tuple[str, ...]: ...
+    @property
+    def forces(self) -> tuple[str, ...]: ...
     @property
     def unit(self) -> str: ...
     @property
@@ -120,6 +123,11 @@ class Output:
     def points(self) -> tuple[str, ...]:
         """The point."""
         return (self.point,)
+
+    @property
+    def forces(self) -> tuple[str, ...]:
+        """None: it is a motion."""
+        return ()
 
     @property
     def facts(self) -> Mapping[str, Any]:

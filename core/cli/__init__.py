@@ -8,6 +8,7 @@ COMMANDS = (
     "run",
     "sweep",
     "list",
+    "templates",
     "bench",
     "check_joint",
     "export",

@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import KincheckError
-from ..report.progress import complain, how_to_install
+from ..extras import how_to_install
+from ..report.progress import complain
 from .registry import House, Status, add_joint_types, whole
 from .run_options import TOL
 

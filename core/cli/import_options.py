@@ -48,6 +48,14 @@ def add_options(command: argparse.ArgumentParser) -> None:
         help='the file\'s own names of the points: TOML, a line ROLE = "NAME" each',
     )
     points.add_argument(
+        "--wheel-radius",
+        metavar="M",
+        help=(
+            "of the loaded wheel [m], where no point is its contact: for roll centre, scrub radius"
+            " and trail"
+        ),
+    )
+    points.add_argument(
         "--travel", metavar="M[:SAMPLES]", help="of the wheel, up and down [m]; default 0.05:41"
     )
     model = command.add_argument_group(
@@ -89,6 +97,7 @@ def supplied(options: argparse.Namespace) -> Supplied:
         (*options.drive,),
         (*options.hold,),
         options.names,
+        options.wheel_radius,
     )
 
 

@@ -15,6 +15,7 @@ from datetime import UTC, datetime
 import msgspec
 
 from ..case.case import Case
+from ..extras import how_to_install
 from ..harness.engine import Engine
 from ..harness.engine_versions import PATIENCE
 from ..harness.provenance import circumstances
@@ -22,7 +23,6 @@ from ..harness.record import Outcome, Record
 from ..harness.run import run
 from ..program import disk_cache
 from ..program.llvm import compiler
-from ..report.progress import how_to_install
 
 SCHEMA = "kincheck-doctor/1"
 # Extras of the package and their purposes; engines' extras are added. Requirements without an extra

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
-from ..report.progress import how_to_install
+from ..extras import how_to_install
 from .registry import House, Status, add_joint_types
 
 

@@ -117,7 +117,7 @@ class EngineTest(pytest.Item):
 
         record = _solved(self.case, self.engine)
         if record.outcome is Outcome.UNAVAILABLE and self.required:
-            from ..report.progress import how_to_install
+            from ..extras import how_to_install
 
             raise CaseFailedError(f"{record.message}: {how_to_install(record.engine)}")
         if record.outcome.bad:

@@ -31,7 +31,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..algebra import Vec3
-from ..case.case import ORDERS, Case, Quantity, Series, size, turning
+from ..case.case import HELD_BUT, ORDERS, Case, Quantity, Series, pace
+from ..case.measures import ForceMeasure
 from ..case.rotation import counted
 from ..errors import CaseError
 from ..jet import Jet
@@ -43,20 +44,23 @@ NO_VALUE = "has no value at"
 """Phrase in the reason of a standard without values at some samples, which are not judged."""
 
 
-def pace(case: Case) -> float:
-    """Return the pace of the mechanism [1/s]: see the head of this file."""
-    path, turns = case.sweep.path, turning(case)
-    _, rates, seconds = path.drive(list(path.motions), path.times)
-    extent = np.where(turns, 1.0, size(case))
-    rate, second = (np.abs(each).max(axis=1) for each in (rates, seconds))
-    return float(np.maximum(rate / extent, np.sqrt(second / extent)).max())
-
-
-def output_series(case: Case, output: Quantity, trajectory: Trajectory) -> Series:
+def output_series(
+    case: Case, output: Quantity, trajectory: Trajectory, held: Trajectory | None = None
+) -> Series:
     """Return an output over the samples of a trajectory.
+
+    Args:
+        held: the same poses with other velocities, for outputs that are derivatives by one driver
+            while others are held; without it they have no value.
 
     Values are NaN at unsolved samples. A quantity is None if the engine does not give it.
     """
+    if isinstance(output, ForceMeasure):
+        return _force_series(output, trajectory)
+    if HELD_BUT in output.facts:
+        if held is None:
+            return Series(np.full(len(trajectory.solved), np.nan), possible=False)
+        trajectory = held
     at = {name: _moving(trajectory.points[name]) for name in output.points}
     # unknown values are NaN, and so is everything computed from them
     with np.errstate(all="ignore"):
@@ -81,6 +85,14 @@ def output_series(case: Case, output: Quantity, trajectory: Trajectory) -> Serie
     )
 
 
+def _force_series(output: ForceMeasure, trajectory: Trajectory) -> Series:
+    """Return a force over the samples, NaN where it is missing or undetermined."""
+    if trajectory.forces is None:
+        return Series(np.full(len(trajectory.solved), np.nan), possible=False)
+    values = np.where(trajectory.solved, output.values(trajectory.forces), np.nan)
+    return Series(values, reason=output.undetermined(trajectory.forces))
+
+
 def _moving(motion: PointMotion) -> Vec3:
     """Return a point's position as jets, with NaN for derivatives that the engine does not give."""
     given = (motion.position, motion.velocity, motion.acceleration)
@@ -102,7 +114,12 @@ def _standing(position: Vector) -> Vec3:
 def as_numbers(series: Series, output: Quantity) -> OutputSeries:
     """Return the series as plain numbers, null for NaN, with the reason for missing values."""
     reasons = [] if np.isfinite(series.position).all() else ["samples without a value are null"]
-    reasons += [f"there is no {name}" for name in QUANTITIES[1:] if getattr(series, name) is None]
+    reasons += [series.reason] if series.reason else []
+    if output.forces:
+        reasons.append("forces have no rates")
+    else:
+        absent = (name for name in QUANTITIES[1:] if getattr(series, name) is None)
+        reasons += [f"there is no {name}" for name in absent]
     return OutputSeries(
         position=_numbers(series.position),
         velocity=None if series.velocity is None else _numbers(series.velocity),
@@ -137,7 +154,7 @@ def deviations(
         refused: samples out of reach of the standard's solver, shape (n,); a value there
             contradicts it.
     """
-    beat = pace(case)
+    beat, force = pace(case), isinstance(output, ForceMeasure)
     compared: dict[str, Deviation | None] = {}
     reasons: list[str] = []
     losses = 0
@@ -150,6 +167,8 @@ def deviations(
             if getattr(series, quantity) is not None
         ]
         compared[quantity] = None
+        if order and force:
+            continue  # forces have no rates
         if order >= output.orders:
             reasons.append(f"{quantity}: takes a derivative more than engines give")
         elif values is None:
@@ -172,9 +191,11 @@ def deviations(
                 reasons.append(f"{quantity}: {lost} samples without a value where {name} has one")
                 losses += lost
             elif not (order or found.possible):
-                reasons.append(f"{quantity}: the engine gives no velocities to make it of")
+                inputs = "forces" if force else "velocities to make it of"
+                reasons.append(f"{quantity}: the engine gives no {inputs}")
             elif off is None:
-                reasons.append(f"{quantity}: no sample is known to both the engine and {name}")
+                none = f"{quantity}: no sample is known to both the engine and {name}"
+                reasons.append(found.reason or none)
             alone = np.isfinite(values) & ~np.isfinite(reference) & ~unreached
             if off is not None and (count := int(alone.sum())):
                 reasons.append(f"{quantity}: {name} {NO_VALUE} {count} of {len(values)} samples")

@@ -16,6 +16,7 @@ from ..errors import KincheckError
 from ..trajectory import QUANTITIES, Array, Trajectory
 from .compare import output_series
 from .engine import Engine
+from .held_trajectory import held_trajectory
 from .provenance import plain, readable
 from .record import Outcome, Seconds
 from .resource_limits import memory_limit
@@ -183,12 +184,21 @@ def _solve(pair: Pair, seconds: dict[str, float]) -> Answer:
         seconds["warm"] = float(np.median(warm))
         seconds["waited"] = seconds["warm"] - float(np.median(undisturbed))
     solved = np.asarray(trajectory.solved, dtype=np.bool_)
+
+    def solve_anew(case: Case) -> Trajectory:
+        found = engine.solve(engine.build(case), case, pair.tol)
+        check(case, engine.name, found)
+        return found
+
+    held, why = held_trajectory(case, engine.mode, trajectory, solve_anew)
     return Answer(
-        outputs={output.name: output_series(case, output, trajectory) for output in case.outputs},
+        outputs={
+            output.name: output_series(case, output, trajectory, held) for output in case.outputs
+        },
         solved=int(solved.sum()),
         iterations=int(np.asarray(trajectory.iterations)[solved].sum()),
         residual=float(trajectory.residual),
-        message=bounded(trajectory.message),
+        message=bounded("; ".join(filter(None, (trajectory.message, why)))),
         details=plain(trajectory.details),
     )
 

@@ -78,7 +78,8 @@ class NativeEngine:
         """Select the rows, trace the programs for the points that the outputs read, and lay out the
         samples.
         """
-        return self.solver.prepare(case.mechanism, case.sweep.path, case.points, self.bodies(case))
+        path, bodies = case.sweep.path, self.bodies(case)
+        return self.solver.prepare(case.mechanism, path, case.points, bodies, case.forces)
 
     def solve(self, model: Solver, case: Case, tol: float) -> Trajectory:
         """March all samples; tol is relative to the mechanism's size."""

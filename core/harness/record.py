@@ -14,6 +14,7 @@ import msgspec
 from ..case.case import Truth
 from ..trajectory import QUANTITIES
 from .evidence import Evidence, Suspect
+from .record_tables import RecordTable, ResultsTable
 from .scene_record import Scene
 
 
@@ -136,7 +137,7 @@ class Seconds(msgspec.Struct, frozen=True, kw_only=True):
     waited: float | None = None
 
 
-class Record(msgspec.Struct, frozen=True, kw_only=True):
+class Record(RecordTable, msgspec.Struct, frozen=True, kw_only=True):
     """The result of one (case, engine) pair. A number that was not computed is null, never zero;
     `reasons` and `message` explain it.
 
@@ -206,7 +207,7 @@ class Record(msgspec.Struct, frozen=True, kw_only=True):
         return any(deviations.items() for deviations in self.errors.values())
 
 
-class Results(msgspec.Struct, frozen=True, kw_only=True):
+class Results(ResultsTable, msgspec.Struct, frozen=True, kw_only=True):
     """The results of a run.
 
     Attributes:

@@ -10,9 +10,9 @@ from time import perf_counter
 import msgspec
 import numpy as np
 
-from ..case.case import Case, Quantity
+from ..case.case import Case, Quantity, size
 from ..errors import shortened
-from .compare import NO_VALUE, describe, deviations, size
+from .compare import NO_VALUE, describe, deviations
 from .engine import Engine, bounds_error
 from .execution import Answer
 from .record import Deviation, Deviations, Outcome

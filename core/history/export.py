@@ -5,7 +5,6 @@ motion of a run.
 from __future__ import annotations
 
 import csv
-import importlib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from typing import Any
 from ..case.io.atomic_files import write
 from ..case.io.escape import cell
 from ..errors import KincheckError
+from ..extras import library
 from .queries import readable
 from .store import Store
 
@@ -110,14 +110,9 @@ def _csv(path: Path, chunks: Iterator[list[tuple[Any, ...]]]) -> int:
 
 
 def _parquet(path: Path, chunks: Iterator[list[tuple[Any, ...]]]) -> int:
-    try:
-        arrow: Any = importlib.import_module("pyarrow")
-        parquet: Any = importlib.import_module("pyarrow.parquet")
-    except ImportError:
-        raise KincheckError(
-            f"--export {path}: Parquet needs pyarrow: pip install 'kincheck[parquet]'; or give a"
-            " .csv"
-        ) from None
+    arrow, parquet = (
+        library(f"--export {path}", name, "parquet") for name in ("pyarrow", "pyarrow.parquet")
+    )
     kinds = (
         dict.fromkeys(INTEGERS, arrow.int64())
         | dict.fromkeys(NUMBERS, arrow.float64())

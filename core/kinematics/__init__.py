@@ -6,6 +6,7 @@ Solve:
 
     solve              one design over a sweep
     solve_designs      many designs over a sweep, each with its own geometry
+    forces_of          reactions of joints and efforts of drivers of a solved motion
     trace              a motion by its arc length, beyond lock-ups of a driver
     assemble           a closed pose from an estimate
     find_assemblies    all closed poses
@@ -21,7 +22,6 @@ Describe:
     prove, prove_pose                               samples and poses enclosed in balls
     constraints, Cartesian, Frames, Relation        the equations of joints and drivers
     continued, continuous, regular_between          tests of a step
-    with_forces                                     the forces of a solved motion
 
 The folders:
 
@@ -30,10 +30,10 @@ The folders:
     compiled         one mechanism as compiled programs: request, programs, model, samples
     continuation     the walk along a path, step halving, singular poses, curves by arc length
     by_components    large mechanisms, component by component
+    forces           reactions and efforts from a solved motion
     sparse           large mechanisms without small components, as a sparse system
     assembly         closed poses from estimates and random starts
     diagnosis        rank, conditioning and screws at a pose
-    forces           inverse dynamics of a solved motion
     verified         samples enclosed in balls by Krawczyk's test
 """
 
@@ -51,8 +51,8 @@ if TYPE_CHECKING:
     from .compiled.motion_start import solve_from_start as solve_from_start
     from .compiled.motion_start import start_of as start_of
     from .compiled.request import LAST_ITERATION as LAST_ITERATION
-    from .continuation.trace import Curve as Curve
-    from .continuation.trace import Event as Event
+    from .continuation.curve import Curve as Curve
+    from .continuation.curve import Event as Event
     from .continuation.trace import trace as trace
     from .design_batch import Variants as Variants
     from .design_sweep import Designs as Designs
@@ -69,6 +69,7 @@ if TYPE_CHECKING:
     from .diagnosis.rank import NamedRow as NamedRow
     from .diagnosis.rank import Ranks as Ranks
     from .diagnosis.rank import Violation as Violation
+    from .forces.reactions import forces_of as forces_of
     from .forces.reactions import with_forces as with_forces
     from .formulation.acceptance_criteria import LONGEST_TURN as LONGEST_TURN
     from .formulation.acceptance_criteria import ROUNDING as ROUNDING
@@ -110,14 +111,15 @@ _NAMES = {
     "assembly.assembly_modes": "Assemblies Assembly find_assemblies",
     "compiled.motion_start": "Start notes_on_start solve_from_start start_of",
     "compiled.request": "LAST_ITERATION",
-    "continuation.trace": "Curve Event trace",
+    "continuation.curve": "Curve Event",
+    "continuation.trace": "trace",
     "design_batch": "Variants",
     "design_sweep": "Designs solve_designs",
     "diagnosis.conditioning": "Conditioning PoseConditioning conditioning",
     "diagnosis.instantaneous_screws": "Screw describe_screws",
     "diagnosis.position_gradients": "Gradient",
     "diagnosis.rank": "Blocked ComponentCount Dependency NamedRow Ranks Violation",
-    "forces.reactions": "with_forces",
+    "forces.reactions": "forces_of with_forces",
     "formulation.acceptance_criteria": "LONGEST_TURN ROUNDING continued continuous regular_between",
     "formulation.cartesian": "COLUMNS Cartesian",
     "formulation.constraints": "Frames Relation Style constraints unit_near",

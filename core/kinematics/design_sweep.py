@@ -9,15 +9,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..dataset import Dataset, Variable
+from ..driving import Driving, in_words
 from ..errors import SolveError
 from ..input_checks import no_such, real
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.motions import Motion
-from ..trajectory import QUANTITIES, Array, PointMotion
+from ..tabular import Tabular
+from ..trajectory import QUANTITIES, Array, PointMotion, as_variables
 from .compiled.samples import recent_route
 from .design_batch import solve_variants
 from .formulation.parameters import places
-from .one_design import asked
+from .one_design import asked, driving
 from .solver_selection import start_notes
 
 # Variants solved at once: their lanes stay in the second-level cache. Fewer where the table of
@@ -26,8 +29,8 @@ from .solver_selection import start_notes
 MOST, LEAST, ROOM = 256, 32, 4_000_000
 
 
-@dataclass(frozen=True, eq=False)
-class Designs:
+@dataclass(frozen=True, eq=False, repr=False)
+class Designs(Tabular):
     """The motion of V designs over n samples.
 
     Attributes:
@@ -36,12 +39,29 @@ class Designs:
         solved: whether each sample of each design was reached, shape (V, n).
         messages: by design, why samples are missing.
         notes: what is assumed of where all are followed from, as of the nominal design.
+        drive: driver values, times and their units.
     """
 
     points: Mapping[str, PointMotion]
     solved: NDArray[np.bool_]
     messages: Mapping[int, str]
     notes: Sequence[str] = ()
+    drive: Driving | None = None
+
+    def summary(self) -> str:
+        """Return the driver's range, the designs, the samples and points."""
+        count, samples = self.solved.shape
+        designs = f"{count} designs of {samples} samples"
+        missing = f"{len(self.messages)} designs miss samples" if self.messages else ""
+        points = f"points {', '.join(self.points) or 'none'}"
+        return ", ".join(filter(None, [in_words(self.drive), designs, points, missing]))
+
+    def dataset(self) -> Dataset:
+        """Return the motion of the points by design and sample."""
+        dims = ("design", "sample")
+        coords, variables, x = as_variables(self.points, dims, self.drive)
+        coords["design"] = Variable("design", np.arange(len(self.solved)))
+        return Dataset(dims, coords, variables | {"solved": Variable(dims, self.solved)}, x)
 
 
 def solve_designs(
@@ -142,7 +162,9 @@ def solve_designs(
         name: PointMotion(each["position"], each.get("velocity"), each.get("acceleration"))
         for name, each in motion.items()
     }
-    return Designs(found, solved, messages, start_notes(mechanism, request, path, tol))
+    notes = start_notes(mechanism, request, path, tol)
+    drive = driving(mechanism, path, driver, np.array(values, dtype=float))
+    return Designs(found, solved, messages, notes, drive)
 
 
 def _numbers(place: str, given: Array, size: int) -> Array:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import partial
 
@@ -58,6 +58,7 @@ class NativeSolver:
         path: Path,
         points: Sequence[str] = (),
         bodies: Sequence[str] = (),
+        forces: Collection[str] = (),
     ) -> Solver:
         """Return the mechanism made ready for a path, to be solved to any tolerance.
 
@@ -65,11 +66,15 @@ class NativeSolver:
             mechanism: the mechanism.
             path: motions of the drivers, and the times of the samples.
             points, bodies: names of those whose motion is wanted.
+            forces: names of joints, drivers and force elements whose forces are wanted. They take
+                the motion of all bodies with accelerations.
 
         Raises:
             SolveError: drivers and degrees of freedom do not match, or the mechanism does not close
                 at the design position.
         """
+        if forces:
+            return self._with_forces(mechanism, path, points, bodies, forces)
         request = self._request(path, points, bodies)
         if self.method is Method.BY_SIZE:
             return prepare(mechanism, request, path)
@@ -86,6 +91,21 @@ class NativeSolver:
 
         model = SparseModel(mechanism, compiled=self.compiled)
         return partial(solve_sparse, model, path, request.points, request.bodies, self.order)
+
+    def _with_forces(
+        self,
+        mechanism: Mechanism,
+        path: Path,
+        points: Sequence[str],
+        bodies: Sequence[str],
+        forces: Collection[str],
+    ) -> Solver:
+        # most motions are asked for without forces: they need not wait for the import
+        from .forces.reactions import with_forces
+
+        moving = tuple(body.name for body in mechanism.moving)
+        motion = replace(self, order=2).prepare(mechanism, path, points, moving)
+        return lambda tol: with_forces(mechanism, path, motion(tol), forces, bodies)
 
     def prepare_designs(
         self, mechanism: Mechanism, path: Path, varied: Sequence[str], points: Sequence[str] = ()

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
+from ..driving import Driving
 from ..errors import SolveError
 from ..input_checks import finite, no_such, real
 from ..mechanism.mechanism import Mechanism
@@ -82,14 +84,28 @@ def solve(
         tol=tol,
         style=style,
     )
+    moved = partial(driving, mechanism, path, driver, np.array(values, dtype=float))
     if forces is False:
-        return prepare(mechanism, request, path)(tol)
+        return prepare(mechanism, request, path)(tol).along(moved)
     # most motions are asked for without forces: they need not wait for the import
     from .forces.reactions import with_forces
 
     moving = tuple(body.name for body in mechanism.moving)
     motion = prepare(mechanism, replace(request, bodies=moving, order=2), path)(tol)
-    return with_forces(mechanism, path, motion, None if forces is True else forces, request.bodies)
+    names = None if forces is True else forces
+    return with_forces(mechanism, path, motion, names, request.bodies).along(moved)
+
+
+def driving(mechanism: Mechanism, path: Path, driver: str, values: Array) -> Driving:
+    """Return the driver values of a path; those of the swept driver are given."""
+    moved = path.drive([*path.motions], path.times)[0]
+    found = {
+        name: path.design.get(name, 0.0) + value
+        for name, value in zip(path.motions, moved, strict=True)
+    }
+    found = {driver: values} | {name: each for name, each in found.items() if name != driver}
+    units = {name: "rad" if mechanism.driver(name).turns else "m" for name in found}
+    return Driving(path.times, found, units)
 
 
 def asked(

@@ -8,13 +8,13 @@ into doubles.
 
 from __future__ import annotations
 
-import importlib
 import operator
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, TypeAlias
 
 from ..errors import KincheckError
+from ..extras import library
 from .straight_line import Program
 
 Ball: TypeAlias = Any
@@ -34,12 +34,7 @@ def flint() -> Any:
     Raises:
         KincheckError: python-flint is not installed.
     """
-    try:
-        return importlib.import_module("flint")
-    except ImportError as error:
-        raise KincheckError(
-            "proofs need python-flint, which is not installed; pip install python-flint"
-        ) from error
+    return library("a proof", "flint", "proofs")
 
 
 @contextmanager

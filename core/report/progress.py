@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import re
-import shlex
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 
 from ..case.io.escape import visible
+from ..extras import how_to_install
 from ..harness.record import Outcome, Record, Results
 
 
@@ -82,17 +81,3 @@ def uncompared(results: Results) -> list[str]:
         f"nothing was compared ({found});"
         f" {remedy if counts[Outcome.UNJUDGED] else 'run other engines'}"
     ]
-
-
-def how_to_install(engine: str) -> str:
-    """Return the command to install an engine's simulator, from kincheck's own metadata. The
-    simulator's name is the engine's up to a hyphen.
-    """
-    import importlib.metadata  # rarely needed, and slow
-
-    wanted = [
-        requirement.split(";")[0].strip()
-        for requirement in importlib.metadata.requires("kincheck") or []
-        if re.search(rf"""extra == ['"]{engine.split("-")[0]}['"]""", requirement)
-    ]
-    return f"pip install {shlex.join(wanted)}" if wanted else "reinstall kincheck"

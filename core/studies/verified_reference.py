@@ -16,7 +16,7 @@ from fractions import Fraction
 import numpy as np
 
 from ..algebra import Vec3
-from ..case.case import Case, Quantity
+from ..case.case import HELD_BUT, Case, Quantity
 from ..case.io.reference_file import ProvedSeries, Reference, Sample
 from ..case.rotation import turns
 from ..jet import Jet
@@ -86,6 +86,11 @@ def prove_case(
         values: dict[str, Sequence[Column]] = {}
         reasons: dict[str, str] = {}
         for output in case.outputs:
+            if HELD_BUT in output.facts:
+                reasons[output.name] = (
+                    "is a derivative with other drivers held, which is no proof's"
+                )
+                continue
             try:
                 values[output.name] = _values(case, output, found, numbers)
             except (TypeError, AttributeError) as error:

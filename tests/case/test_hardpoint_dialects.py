@@ -193,7 +193,8 @@ def test_missing_points_advise_own_names(tmp_path, capsys):
     names = tmp_path / "names.toml"
     names.write_text("\n".join(f'{role} = "{name}"' for role, name in OWN.items()))
     options += ["--names", str(names)]
-    assert main(["run", str(file), "--engine", "native", "mujoco", *options]) == 0
+    assert main(["run", str(file), "--engine", "native", *options]) == 2
+    assert "left out: nothing" in capsys.readouterr().err
 
 
 ADAMS = """[UNITS]

@@ -76,7 +76,7 @@ def test_what_is_left_out_is_listed():
         "Spring (Spring Coefficient, Free Length)",
         "Shock/Location Chassis",
         "Spindle (Mass, Inertia",
-        "Camber Angle",
+        "Axle (Inertia)",
     ):
         assert part in listed
     assert "Control Arm/Location" not in listed

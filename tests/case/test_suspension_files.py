@@ -137,7 +137,7 @@ def test_refusals(name):
         assert part in str(error.value)
 
 
-def test_quotients_of_velocities_want_travel_alone():
+def test_quotients_of_velocities_want_a_driver_of_travel():
     rack = {**STRUT["bodies"]["rack"], "fixed": False}
     steered = STRUT | {
         "bodies": STRUT["bodies"] | {"rack": rack},
@@ -163,14 +163,25 @@ def test_quotients_of_velocities_want_travel_alone():
             }
         ),
     }
+    # other drivers are held; values only, because rates along the sweep are others
+    orders = {output.name: output.orders for output in loaded(unreferenced(steered)).outputs}
+    assert (orders["toe"], orders["toe.per_travel"], orders["motion_ratio"]) == (3, 1, 1)
+    of_knuckle = steered["drivers"]["stroke"] | {"point": "strut_foot"}
+    steered["drivers"]["stroke"] = of_knuckle
     with pytest.raises(
         CaseError,
-        match=r"outputs\.motion_ratio\.type: found 'motion_ratio' while stroke, steering move",
+        match=r"outputs\.motion_ratio\.type: found 'motion_ratio' while stroke, steering move,"
+        r" .* by suspension\.travel",
     ):
         loaded(unreferenced(steered))
     # along the path of both drivers a slope has a meaning
     case = loaded(unreferenced(steered | TOE))
-    assert [output.name for output in case.outputs] == ["toe", "toe.per_travel"]
+    assert [output.orders for output in case.outputs] == [3, 2]
+    named = steered | {"suspension": STRUT["suspension"] | {"travel": "stroke"}}
+    assert loaded(unreferenced(named)).outputs[0].vehicle.travel == "stroke"
+    named["suspension"]["travel"] = "strike"
+    with pytest.raises(CaseError, match=r"suspension\.travel: found 'strike', .*'stroke'"):
+        loaded(unreferenced(named))
 
 
 def test_signs_of_a_reference_table_must_be_those_of_the_case():

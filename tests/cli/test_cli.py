@@ -10,9 +10,9 @@ import kincheck.core
 import pytest
 from kincheck.core.cli import main
 from kincheck.core.errors import CaseError
+from kincheck.core.extras import how_to_install
 from kincheck.core.harness.results_file import read_results
 from kincheck.core.report.caveats import caveats
-from kincheck.core.report.progress import how_to_install
 from kincheck.core.report.report import headline
 
 from ..support.fakes import Fake, crank, off, partial, raising

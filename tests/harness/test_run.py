@@ -317,7 +317,7 @@ def test_what_the_reference_lacks_is_compared_with_the_native_engine():
 
 
 def test_an_output_that_has_no_value_where_the_reference_has_one_is_no_pass(monkeypatch):
-    def holed(case, output, trajectory):
+    def holed(case, output, trajectory, held):
         series = output_series(case, output, trajectory)
         return replace(series, position=np.where(np.arange(SAMPLES) == 3, np.nan, series.position))
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from kincheck import cases
 from kincheck.core.algebra import ZERO
-from kincheck.core.kinematics.forces import demand, motion_lanes, reactions
+from kincheck.core.kinematics.forces import demand, force_rows, motion_lanes
 from kincheck.core.mechanism.loads import SpringDamper
 from kincheck.core.primitives.base import GROUND_POSE, Pose, Twist
 
@@ -40,7 +40,7 @@ def worst(mechanism, case):
 
 MISTAKES = {
     "sign of gravity": (
-        "reactions.inertial",
+        "force_rows.inertial",
         lambda right: lambda body, at, gravity: right(body, at, -gravity),
     ),
     "no gyroscopic term": (
@@ -60,15 +60,15 @@ MISTAKES = {
         lambda right: lambda body, pose: right(body, Pose.of(pose.u, pose.q.conjugate())),
     ),
     "centre of mass at the origin": (
-        "reactions.inertial",
+        "force_rows.inertial",
         lambda right: lambda body, at, g: right(replace(body, center_of_mass=body.origin), at, g),
     ),
     "moment about the wrong point": (
-        "reactions._Lines._arm",
+        "force_rows.ForceRows._arm",
         lambda right: lambda self, joint, body: 0.0 * right(self, joint, body),
     ),
     "reaction on the wrong body": (
-        "reactions._Lines.reaction",
+        "force_rows.ForceRows.reaction",
         lambda right: (
             lambda self, joint, *rest: (
                 *(-each for each in right(self, joint, *rest)[:2]),
@@ -77,7 +77,7 @@ MISTAKES = {
         ),
     ),
     "sign of the effort": (
-        "reactions._Lines.effort",
+        "force_rows.ForceRows.effort",
         lambda right: lambda self, *rest: -right(self, *rest),
     ),
     "no centripetal acceleration": (
@@ -124,12 +124,12 @@ def test_without_a_mistake_nothing_is_missing():
 def test_a_planted_mistake_is_found(mistake, monkeypatch):
     place, change = MISTAKES[mistake]
     module, *path = place.split(".")
-    owner = {"reactions": reactions, "demand": demand, "motion_lanes": motion_lanes}[module]
+    owner = {"force_rows": force_rows, "demand": demand, "motion_lanes": motion_lanes}[module]
     for name in path[:-1]:
         owner = getattr(owner, name)
     right = getattr(owner, path[-1])
     monkeypatch.setattr(owner, path[-1], change(right))
     if place == "demand.inertial":  # imported by name where it is used
-        monkeypatch.setattr(reactions, "inertial", change(right))
+        monkeypatch.setattr(force_rows, "inertial", change(right))
     case, mechanism = with_spring()
     assert max(worst(mechanism, case)) > 1e-6

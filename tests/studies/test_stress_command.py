@@ -272,8 +272,11 @@ def test_what_a_case_file_cannot_say_is_named():
     uneven = replace(case, sweep=replace(case.sweep, values=np.array([0.0, 1.0, 1.5])))
     with pytest.raises(CaseError, match="no even grid"):
         case_text(uneven)
-    with pytest.raises(CaseError, match="'toe' is not a coordinate"):
-        case_text(cases.load("mcpherson_suspension"))
+    strut = cases.load("mcpherson_suspension")
+    first, *others = strut.outputs
+    wider = replace(first, vehicle=replace(first.vehicle, wheel_radius=0.4))
+    with pytest.raises(CaseError, match="of several wheels"):
+        case_text(replace(strut, outputs=(wider, *others)))
 
 
 def test_names_that_need_quotes_get_them(tmp_path):

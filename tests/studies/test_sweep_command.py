@@ -260,7 +260,7 @@ def test_without_pyarrow_there_is_a_message(file, tmp_path, capsys, monkeypatch)
         )
         == 2
     )
-    assert "pip install 'kincheck[parquet]'" in capsys.readouterr().err
+    assert "pip install 'pyarrow>=" in capsys.readouterr().err
     assert not os.path.exists(stored)
 
 

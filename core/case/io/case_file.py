@@ -78,7 +78,7 @@ def load_case(path: str | Path) -> Case:
     length, angle = LENGTHS[units.length], ANGLES[units.angle]
     mechanism = _mechanism(file, keys, length)
     sweep, driver_unit = read_sweep(file, keys, mechanism, length, angle)
-    by_unit: dict[str, Convert] = {"m": length, "rad": angle, "1": float}
+    by_unit: dict[str, Convert] = {"m": length, "rad": angle, "1": float, "N": float, "N m": length}
     case = Case(keys.name, keys.source, Truth.CONSENSUS_ONLY, mechanism, sweep, ())
     case = _with_outputs(
         file, keys, replace(case, length_unit=length.name, angle_unit=angle.name), length, by_unit
@@ -191,7 +191,7 @@ def _with_outputs(
         return replace(case, mechanism=with_markers(mechanism, outputs), outputs=outputs)
     from . import suspension  # many classes, and few cases have a wheel
 
-    table = suspension.read_suspension(file, keys.suspension, mechanism, length, units["rad"])
+    table = suspension.read_suspension(file, keys.suspension, case, length, units["rad"])
     outputs = _outputs(file, keys, table, case, units) or with_all_coordinates(case).outputs
     case = replace(case, mechanism=with_markers(mechanism, outputs), outputs=outputs)
     return (

@@ -16,8 +16,10 @@ from ...joints import Coupler
 from ...mechanism.motions import Absolute
 from ..case import MARKER, TIME, Case, Output
 from ..measures import Measure, key_of, own_keys
+from ..suspension import PerTravel, SuspensionOutput
 from .coordinates import AXES
 from .schema import SCHEMA, own_fields
+from .suspension_writer import suspension_keys, suspension_output
 
 # What a body has unless the file says otherwise.
 PLAIN: Mapping[str, Any] = {
@@ -35,8 +37,8 @@ def case_text(case: Case, comments: Sequence[str] = ()) -> str:
         comments: lines at the top.
 
     Raises:
-        CaseError: no case file can express the case: samples on no even grid, or an output of a
-            suspension.
+        CaseError: no case file can express the case: samples on no even grid, or outputs of
+            several wheels.
     """
     lines = [f"# {line}" for line in comments]
     lines += _keys({"schema": SCHEMA, "name": case.name, "source": case.source})
@@ -61,7 +63,11 @@ def case_text(case: Case, comments: Sequence[str] = ()) -> str:
                 f"drivers.{_key(driver.name)}", "motion", {"type": moved.type, **_own(moved)}
             )
     lines += ["", "[sweep]", *_keys(_sweep(case))]
+    if wheel := suspension_keys(case):
+        lines += ["", "[suspension]", *_keys(wheel)]
     for output in case.outputs:
+        if isinstance(output, PerTravel):  # follows from the output before it
+            continue
         lines += _table("outputs", output.name, dict(_output(case, output)))
     return "\n".join(lines) + "\n"
 
@@ -84,7 +90,8 @@ def _output(case: Case, output: Any) -> Iterator[tuple[str, Any]]:
     if isinstance(output, Measure):
         yield "type", output.type
         for each in own_keys(type(output)):
-            yield key_of(each), getattr(output, each.name)
+            if (value := getattr(output, each.name)) is not None:
+                yield key_of(each), value
     elif isinstance(output, Output):
         component = next((name for name, axis in AXES.items() if axis == output.direction), None)
         yield "point", output.point
@@ -92,9 +99,12 @@ def _output(case: Case, output: Any) -> Iterator[tuple[str, Any]]:
             [("direction", output.direction)] if component is None else [("component", component)]
         )
         yield "relative", output.relative
+    elif isinstance(output, SuspensionOutput):
+        yield from suspension_output(output)
     else:
         raise CaseError(
-            f"case {case.name!r}: output {output.name!r} is one of a suspension; leave it out"
+            f"case {case.name!r}: output {output.name!r} is a derivative, which the file cannot"
+            " name; leave it out"
         )
     yield from (("atol", output.atol), ("rtol", output.rtol), ("why", output.why))
 

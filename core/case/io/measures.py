@@ -7,20 +7,21 @@ from dataclasses import MISSING, replace
 from enum import StrEnum
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, get_type_hints
+from typing import Annotated, Any, get_args, get_type_hints
 
 import msgspec
 from msgspec import Meta
 
 from ...mechanism.mechanism import Vector
-from ..case import Case, size
-from ..measures import NAMES, Measure, key_of, own_keys
+from ..case import Case, pace, size
+from ..measures import NAMES, ForceMeasure, Measure, key_of, largest_load, own_keys
 from .document import explained
 from .reference import Convert
 from .schema import Flag, Text, ToleranceKeys
 from .tolerance import tolerance
 from .typed_tables import typed
 
+_DIRECTION = Annotated[Vector | None, Meta(description="a direction [x, y, z]")]
 _DIRECTIONS = Annotated[
     tuple[Vector, Vector], Meta(description="two directions [[x, y, z], [x, y, z]]")
 ]
@@ -42,14 +43,25 @@ def measure_keys(cls: type[Measure]) -> type[msgspec.Struct]:
 
 def _shape_of(key: str, hint: Any) -> Any:
     """Return the annotation of a field: names, directions, some words, or a flag."""
-    if isinstance(hint, type) and issubclass(hint, StrEnum):
-        return Annotated[hint, Meta(description=f"one of {', '.join(hint)}")]
+    words = next((each for each in (hint, *get_args(hint)) if _is_words(each)), None)
+    if words is not None:
+        return Annotated[hint, Meta(description=f"one of {', '.join(words)}")]
     what = NAMES.get(key)
     pair = Annotated[
         tuple[str, str], Meta(description=f'two names ["first {what}", "second {what}"]')
     ]
-    known = {str: Text, bool: Flag, tuple[str, str]: pair, tuple[Vector, Vector]: _DIRECTIONS}
+    known: Mapping[Any, Any] = {
+        str: Text,
+        bool: Flag,
+        tuple[str, str]: pair,
+        Vector | None: _DIRECTION,
+        tuple[Vector, Vector]: _DIRECTIONS,
+    }
     return known[hint]
+
+
+def _is_words(hint: Any) -> bool:
+    return isinstance(hint, type) and issubclass(hint, StrEnum)
 
 
 def read_measure(
@@ -75,7 +87,12 @@ def read_measure(
     with explained(file, key):
         output = cls(name, 0.0, 0.0, "", **given)
         output.check(case.mechanism)
+        output = output.bound(case.mechanism)
     assert isinstance(keys, ToleranceKeys)
     unit = output.unit
-    atol, rtol, why = tolerance(file, key, keys, units[unit], size(case), unit)
+    scale = size(case)
+    if isinstance(output, ForceMeasure):
+        loads = largest_load(case.mechanism, scale, pace(case))
+        scale = loads * scale if output.turns else loads
+    atol, rtol, why = tolerance(file, key, keys, units[unit], scale, unit)
     return replace(output, atol=atol, rtol=rtol, why=why)

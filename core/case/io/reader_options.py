@@ -16,6 +16,7 @@ class Supplied:
         axes: directions of x, y and z in a file of hardpoints: "forward,left,up", ...
         travel: wheel travel of a suspension, up and down: "METRES" or "METRES:SAMPLES".
         names: file of the user's own names of hardpoints, by role of the template.
+        wheel_radius: loaded radius of the wheel of hardpoints [m].
         drive: driven joint of a model: "JOINT:START:STOP" or "JOINT:START:STOP:SAMPLES", in its
             coordinate [rad, m].
         hold: joints or free bodies of a model that are held in place.
@@ -28,11 +29,14 @@ class Supplied:
     drive: tuple[str, ...] = ()
     hold: tuple[str, ...] = ()
     names: Path | None = None
+    wheel_radius: str | None = None
 
     @property
     def given(self) -> tuple[str, ...]:
-        """Names of the given options."""
-        return tuple(each.name for each in fields(self) if getattr(self, each.name))
+        """Names of the given options, as on the command line."""
+        return tuple(
+            each.name.replace("_", "-") for each in fields(self) if getattr(self, each.name)
+        )
 
 
 NOTHING = Supplied()

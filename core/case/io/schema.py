@@ -82,6 +82,8 @@ left out. `kincheck list --joints` prints all types with their keys.
                          0 to 1
                          (per_travel) = true: derivatives by travel, upward motion of the wheel
                          centre
+                         (travel), name of its driver, if that is not the one of the wheel centre:
+                         where other drivers move too, they are held for derivatives by travel
     [reference]          true values: file, the name of a CSV file beside the case file, or rows,
                          with (columns)
                          beside is in its folder or below, links followed: a case file from

@@ -23,7 +23,6 @@ from ..suspension import (
     Axle,
     Convention,
     PerTravel,
-    Rate,
     Reaction,
     Side,
     SuspensionOutput,
@@ -35,6 +34,7 @@ from .document import fault, join, shown
 from .reference import Convert
 from .schema import Flag, Number, Numbers3, Text, ToleranceKeys
 from .tolerance import tolerance
+from .travel_driver import require_travel, travel_driver
 from .typed_tables import typed
 
 # Axes written to nine digits are perpendicular to about 1e-9; a wrong sign or digit gives far more.
@@ -74,6 +74,7 @@ class SuspensionKeys(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
     brake_share: Share | None = None
     drive: Reactions = Reaction.INBOARD
     drive_share: Share | None = None
+    travel: Text | None = None
     per_travel: Flag = True
 
 
@@ -112,14 +113,17 @@ class SuspensionTable:
 
 
 def read_suspension(
-    file: Path, value: object, mechanism: Mechanism, length: Unit, angle: Convert
+    file: Path, value: object, case: Case, length: Unit, angle: Convert
 ) -> SuspensionTable:
     """Read the table, in SI.
 
+    Args:
+        case: the case as read so far.
+
     Raises:
-        CaseError: invalid axes, unknown points, or a wheel on the wrong side.
+        CaseError: invalid axes, unknown points or drivers, or a wheel on the wrong side.
     """
-    keys = typed(file, "suspension", value, SuspensionKeys)
+    keys, mechanism = typed(file, "suspension", value, SuspensionKeys), case.mechanism
     forward, up = (_direction(file, name, getattr(keys, name)) for name in ("forward", "up"))
     if abs(vec(forward) @ vec(up)) > SQUARE:
         found = (
@@ -143,6 +147,7 @@ def read_suspension(
     }
     given |= {name: length(given[name]) for name in _LENGTHS if given[name] is not None}
     given |= {name: angle(given[name]) for name in ("static_toe", "static_camber")}
+    given["travel"] = travel_driver(file, keys.travel, keys.wheel_center, keys.up, case)
     given |= {"forward": forward, "up": up, "middle": tuple(map(length, keys.center_plane))}
     vehicle = Vehicle(**given)
     _check_side(file, vehicle, mechanism, length)
@@ -248,16 +253,7 @@ def read_output(
         if isinstance(given[each.name], tuple):  # names of points
             for point in given[each.name]:
                 _check_point(file, join(key, each.name), point, case.mechanism)
-    if isinstance(output, Rate) and len(moving := list(case.sweep.path.motions)) > 1:
-        found = (
-            f"found {cls.type!r} while {', '.join(moving)} move, expected wheel travel alone to"
-            " move"
-        )
-        raise fault(
-            file,
-            join(key, "type"),
-            f"{found}, for it is a quotient of velocities; remove the motions or the output",
-        )
+    require_travel(file, key, output, case)
     return output
 
 

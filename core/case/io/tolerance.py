@@ -25,6 +25,12 @@ DEFAULT_WHY = (
     " thousandth of the micrometre that hardpoints are measured to, and millions of times the"
     f" round-off of metre-sized coordinates in double precision{_OF_RANGE}"
 )
+FORCES = ("N", "N m")
+_OF_LOADS = (
+    "the default of 1e-9 of the loads (weights, inertia at the drivers' pace, springs, applied"
+    " forces): a thousandth of what load cells resolve, and a thousand times the round-off of the"
+    f" least exact engine, which differentiates its rows numerically{_OF_RANGE}"
+)
 _DEFAULTS: Mapping[str, str] = {
     "m": DEFAULT_WHY,
     "rad": (
@@ -36,14 +42,20 @@ _DEFAULTS: Mapping[str, str] = {
         "the default of 1e-9 of a ratio: a nanometre, the default of lengths, in a metre, and"
         f" millions of times the round-off of a ratio near one in double precision{_OF_RANGE}"
     ),
+    **dict.fromkeys(FORCES, _OF_LOADS),
 }
 """Reason for the default, by the unit of the output."""
 
 
 def default(size: float, unit: str = "m") -> tuple[float, float, str]:
-    """Return the default atol [unit], rtol [-] and their reason for a mechanism of a size [m]."""
+    """Return the default atol [unit], rtol [-] and their reason.
+
+    Args:
+        size: of the mechanism [m]; for a force or torque, the loads [unit].
+    """
+    least = {"m": min(DEFAULT_ATOL, PART_OF_SIZE * size)}
     return (
-        min(DEFAULT_ATOL, PART_OF_SIZE * size) if unit == "m" else DEFAULT_ATOL,
+        least.get(unit, DEFAULT_ATOL * (size if unit in FORCES else 1.0)),
         DEFAULT_RTOL,
         _DEFAULTS[unit],
     )
@@ -56,7 +68,7 @@ def tolerance(
 
     Args:
         convert: conversion from the file's unit of the output to SI.
-        size: size of the mechanism [m].
+        size: as for `default`.
 
     Raises:
         CaseError: a tolerance without a reason, or a reason without a tolerance.

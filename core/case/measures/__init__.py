@@ -1,7 +1,8 @@
-"""Measures: outputs of joints, bodies and pairs of points."""
+"""Measures: outputs of joints, bodies, pairs of points, and forces."""
 
 from .base import NAMES, Measure, key_of, own_keys
 from .body import Component, Orientation
+from .force import DriverEffort, ElementForce, ForceMeasure, JointForce, JointMoment, largest_load
 from .joint import JointAngle, JointDisplacement
 from .pairs import Angle, Distance
 
@@ -10,10 +11,16 @@ __all__ = [
     "Angle",
     "Component",
     "Distance",
+    "DriverEffort",
+    "ElementForce",
+    "ForceMeasure",
     "JointAngle",
     "JointDisplacement",
+    "JointForce",
+    "JointMoment",
     "Measure",
     "Orientation",
     "key_of",
+    "largest_load",
     "own_keys",
 ]

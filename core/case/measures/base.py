@@ -15,7 +15,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import Field, dataclass, fields
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -25,8 +25,17 @@ from ...jet import Jet, sqrt
 from ...mechanism.mechanism import GROUND, Mechanism, Point, Vector
 from ..quantity import MARKER, ORDERS
 
-NAMES: Mapping[str, str] = {"points": "point", "joint": "joint", "body": "body", "bodies": "body"}
+NAMES: Mapping[str, str] = {
+    "points": "point",
+    "joint": "joint",
+    "body": "body",
+    "bodies": "body",
+    "driver": "driver",
+    "force": "force",
+}
 """Keys that hold names, and the kind of what they name."""
+HIDDEN: Mapping[str, Any] = {"hidden": True}
+"""Metadata of a field that case files do not give: `Measure.bound` finds it in the mechanism."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +68,11 @@ class Measure(ABC):
     @abstractmethod
     def points(self) -> tuple[str, ...]:
         """Names of the points it reads."""
+
+    @property
+    def forces(self) -> tuple[str, ...]:
+        """Names of the joints, drivers and force elements whose forces it reads."""
+        return ()
 
     @property
     def unit(self) -> str:
@@ -97,6 +111,8 @@ class Measure(ABC):
             "point": [p.name for p in mechanism.points if not p.name.startswith(MARKER)],
             "joint": [joint.name for joint in (*mechanism.joints, *mechanism.grounded)],
             "body": [GROUND, *(body.name for body in mechanism.bodies)],
+            "driver": [driver.name for driver in mechanism.drivers],
+            "force": [force.name for force in mechanism.forces],
         }
         for each in own_keys(type(self)):
             if (kind := NAMES.get(key_of(each))) is None:
@@ -107,6 +123,10 @@ class Measure(ABC):
                     raise MechanismError(
                         unknown(kind, name, known[kind]), f"outputs.{self.name}.{key_of(each)}"
                     )
+
+    def bound(self, mechanism: Mechanism) -> Self:
+        """Return the measure with what it needs to know of the mechanism."""
+        return self
 
     def markers(self, mechanism: Mechanism) -> Sequence[Point]:
         """Return the points it reads beyond those of the case."""
@@ -120,7 +140,11 @@ class Measure(ABC):
 def own_keys(cls: type[Measure]) -> list[Field[Any]]:
     """Return the fields of a type beyond the common ones, which case files give."""
     inherited = {each.name for each in fields(Measure)}
-    return [each for each in fields(cls) if each.name not in inherited]
+    return [
+        each
+        for each in fields(cls)
+        if each.name not in inherited and not each.metadata.get("hidden")
+    ]
 
 
 def key_of(each: Field[Any]) -> str:

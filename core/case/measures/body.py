@@ -28,8 +28,9 @@ class Component(StrEnum):
 
 @dataclass(frozen=True)
 class Orientation(Measure):
-    """Rotation of a body since design, global axes: a component of its rotation vector (axis times
-    angle, up to a whole turn), or one of its Euler parameters e0..e3.
+    """Rotation of a body since design: of its rotation vector or Euler parameters, global axes.
+
+    The rotation vector is axis times angle, up to a whole turn.
     """
 
     type = "orientation"

@@ -57,8 +57,9 @@ class _JointCoordinate(Measure):
 
 @dataclass(frozen=True)
 class JointAngle(_JointCoordinate):
-    """Rotation of a joint's second body relative to its first about the joint's axis, zero at
-    design; whole turns count.
+    """Rotation of a joint's second body relative to its first, zero at design; turns count.
+
+    If a study varies the axis, the measured axis stays nominal: the error is of second order.
     """
 
     type = "joint_angle"
@@ -86,8 +87,9 @@ class JointAngle(_JointCoordinate):
 
 @dataclass(frozen=True)
 class JointDisplacement(_JointCoordinate):
-    """Displacement of a joint's second body relative to its first along the joint's axis, zero at
-    design.
+    """Displacement of a joint's second body relative to its first along the axis, zero at design.
+
+    If a study varies the axis, the measured axis stays nominal: the error is of second order.
     """
 
     type = "joint_displacement"

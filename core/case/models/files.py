@@ -27,7 +27,7 @@ HARDPOINTS = (CHRONO, ADAMS, TABLE)
 _OPTIONS = {
     CASE: (),
     MODEL: ("drive", "hold"),
-    **dict.fromkeys(HARDPOINTS, ("template", "units", "axes", "travel", "names")),
+    **dict.fromkeys(HARDPOINTS, ("template", "units", "axes", "travel", "names", "wheel-radius")),
 }
 
 

@@ -18,7 +18,7 @@ from ...algebra import Vec3
 from ...jet import Jet
 from ...mechanism.mechanism import Mechanism, Point
 from ...trajectory import Array
-from ..case import PER_TRAVEL
+from ..case import HELD_BUT, PER_TRAVEL
 from .corner import Corner
 from .vehicle import Vehicle
 
@@ -91,6 +91,11 @@ class SuspensionOutput(ABC):
         return f"positive: {self.positive}"
 
     @property
+    def forces(self) -> tuple[str, ...]:
+        """None: it is a motion."""
+        return ()
+
+    @property
     def period(self) -> float:
         """Zero: each value is a pose of its own."""
         return 0.0
@@ -149,13 +154,20 @@ class Attitude(SuspensionOutput):
 class Rate(SuspensionOutput):
     """A quotient of velocities, known only while the wheel travels, with one derivative less.
 
-    It is a property of the position only if the travel alone moves the wheel.
+    It is a property of the position: other drivers are held, see `Vehicle.travel`.
     """
 
     @property
     def orders(self) -> int:
-        """Value and rate; they need velocities and accelerations."""
-        return 2
+        """Value and rate, which need velocities and accelerations; the value alone where other
+        drivers are held, because its rate along the sweep is another.
+        """
+        return 1 if self.vehicle.travel else 2
+
+    @property
+    def facts(self) -> Mapping[str, Any]:
+        """Properties for readers of results."""
+        return {**super().facts, **held(self.vehicle)}
 
     def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
         """Return the quotient, NaN while the wheel is at rest."""
@@ -168,7 +180,8 @@ class PerTravel:
     """The derivative of an output by wheel travel (jounce): the upward displacement of the wheel
     centre relative to the vehicle's body.
 
-    It is the slope along the sweep, q' / s', and includes the share of other moving drivers.
+    Other drivers are held, see `Vehicle.travel`. If the vehicle has no driver of its travel, it is
+    the slope along the sweep, q' / s', and includes the share of other moving drivers.
 
     Attributes:
         atol: tolerance of the output over the size of the mechanism [unit / m].
@@ -189,8 +202,13 @@ class PerTravel:
 
     @property
     def orders(self) -> int:
-        """One less than those of the output."""
-        return self.of_output.orders - 1
+        """One less than those of the output; the value alone where other drivers are held."""
+        return 1 if self.vehicle.travel else self.of_output.orders - 1
+
+    @property
+    def forces(self) -> tuple[str, ...]:
+        """None: it is a motion."""
+        return ()
 
     @property
     def period(self) -> float:
@@ -239,12 +257,20 @@ class PerTravel:
             "type": "per_travel",
             "of": self.of_output.name,
             **{each: getattr(self, each) for each in known},
+            **held(self.vehicle),
         }
 
     def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
         """Return the slope, NaN while the wheel is at rest."""
         corner = Corner(self.vehicle, at)
         return where_moving(self.of_output.of(at, design).dot / corner.center.z.dot, corner, at)
+
+
+def held(vehicle: Vehicle) -> Mapping[str, Any]:
+    """Return the driver by which outputs of the vehicle are differentiated while others are held,
+    as a fact; empty along the sweep.
+    """
+    return {HELD_BUT: vehicle.travel} if vehicle.travel else {}
 
 
 def where_moving(quotient: Jet, corner: Corner, at: Mapping[str, Vec3]) -> Jet:

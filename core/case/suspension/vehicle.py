@@ -79,6 +79,8 @@ class Vehicle:
         wheel_radius: loaded, from the wheel centre to the contact centre in the wheel plane [m].
         kingpin: names of the lower and the upper point of the steering axis.
         cg_height: height of the centre of gravity above the road [m].
+        travel: driver of the wheel's travel, if other drivers move too: derivatives by travel hold
+            the others. None: derivatives are along the sweep.
         brake_share, drive_share: parts of the vehicle's braking and driving force at this axle [-].
     """
 
@@ -99,6 +101,7 @@ class Vehicle:
     brake_share: float | None = None
     drive: Reaction = Reaction.INBOARD
     drive_share: float | None = None
+    travel: str | None = None
 
     @property
     def outboard(self) -> Vec3:

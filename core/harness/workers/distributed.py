@@ -5,7 +5,6 @@ machine, so that limits hold there too.
 from __future__ import annotations
 
 import asyncio
-import importlib
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from threading import Lock
@@ -14,6 +13,7 @@ from urllib.parse import urlsplit
 from uuid import uuid4
 
 from ...errors import KincheckError
+from ...extras import library
 from ...version import VERSION
 from ..execution import Attempt, Attempts, Failure, Pair, Solver, said
 from ..record import Outcome
@@ -141,13 +141,9 @@ def loaded() -> Any:
         ClusterError: it is not installed.
     """
     try:
-        distributed: Any = importlib.import_module("distributed")
-    except ImportError as error:
-        raise ClusterError(
-            "--scheduler needs dask.distributed, which is not installed; pip install"
-            " 'kincheck[distributed]'"
-        ) from error
-    return distributed
+        return library("--scheduler", "distributed", "distributed")
+    except KincheckError as error:
+        raise ClusterError(str(error)) from error
 
 
 _idle: dict[tuple[str, Limits], list[Seat]] = {}

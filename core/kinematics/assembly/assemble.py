@@ -21,11 +21,13 @@ from dataclasses import astuple, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...dataset import Dataset, Variable
 from ...errors import SolveError
 from ...input_checks import no_such, real, require_positive
 from ...mechanism.mechanism import Mechanism
 from ...primitives.base import Pose
 from ...program import NumpyExecutor, Plan, Program, program
+from ...tabular import Tabular
 from ...trajectory import Array, BodyMotion
 from ..compiled.programs import Tracer
 from ..compiled.request import CONSISTENT, Request
@@ -45,8 +47,8 @@ LARGEST_DAMPING = 1.0
 NEAR = 1e-6
 
 
-@dataclass(frozen=True, eq=False)
-class Assembled:
+@dataclass(frozen=True, eq=False, repr=False)
+class Assembled(Tabular):
     """Results of n estimates.
 
     Attributes:
@@ -64,6 +66,32 @@ class Assembled:
     spurious: NDArray[np.bool_]
     residual: Array
     iterations: NDArray[np.int64]
+
+    def summary(self) -> str:
+        """Return how many estimates ended in an assembly."""
+        count, closed = len(self.converged), int(self.converged.sum())
+        return f"{closed} of {count} estimates closed, {int(self.spurious.sum())} spurious"
+
+    def dataset(self) -> Dataset:
+        """Return the outcome of each estimate and the poses of its bodies."""
+        coords = {
+            "body": Variable("body", [*self.bodies]),
+            "axis": Variable("axis", ["x", "y", "z"]),
+            "parameter": Variable("parameter", ["e0", "e1", "e2", "e3"]),
+        }
+        variables = {
+            name: Variable("estimate", getattr(self, name))
+            for name in ("converged", "spurious", "residual", "iterations")
+        }
+        dims = ("estimate", "body")
+        if self.bodies:
+            r, p = (
+                np.stack([getattr(each, name) for each in self.bodies.values()], axis=1)
+                for name in ("r", "p")
+            )
+            variables["origin"] = Variable((*dims, "axis"), r, "m")
+            variables["euler_parameters"] = Variable((*dims, "parameter"), p)
+        return Dataset(("estimate",), coords, variables)
 
 
 def assemble(

@@ -12,10 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...algebra import Quat, quat, vec
+from ...dataset import Dataset, Variable
 from ...input_checks import require_positive
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.topology import spanning_tree
 from ...primitives.base import GROUND_POSE, Pose
+from ...tabular import Tabular
 from ...trajectory import Array
 from ..formulation.constraints import Frames
 from ..formulation.state_vectors import displaced
@@ -62,8 +64,8 @@ class Assembly:
     signs: Mapping[str, int]
 
 
-@dataclass(frozen=True, eq=False)
-class Assemblies:
+@dataclass(frozen=True, eq=False, repr=False)
+class Assemblies(Tabular):
     """Results of many starts.
 
     Attributes:
@@ -78,6 +80,34 @@ class Assemblies:
     starts: int
     lost: int
     spurious: int
+
+    def summary(self) -> str:
+        """Return the number of assemblies and of starts."""
+        ended = f"{self.lost} without closure, {self.spurious} spurious"
+        return f"{len(self.found)} assemblies from {self.starts} starts ({ended})"
+
+    def dataset(self) -> Dataset:
+        """Return the numbers and the poses of the assemblies."""
+        dims, bodies = ("assembly", "body"), [*self.found[0].poses] if self.found else []
+        poses = [[each.poses[body] for body in bodies] for each in self.found]
+        r, p = (
+            np.array([[pose[k] for pose in one] for one in poses]).reshape(len(poses), -1, size)
+            for k, size in ((0, 3), (1, 4))
+        )
+        numbers = ("distance", "starts", "residual", "smallest", "orientation")
+        coords = {
+            "assembly": Variable("assembly", np.arange(1, len(self.found) + 1)),
+            "body": Variable("body", bodies),
+            "axis": Variable("axis", ["x", "y", "z"]),
+            "parameter": Variable("parameter", ["e0", "e1", "e2", "e3"]),
+        }
+        variables = {
+            name: Variable("assembly", [getattr(each, name) for each in self.found])
+            for name in numbers
+        }
+        variables["origin"] = Variable((*dims, "axis"), r, "m")
+        variables["euler_parameters"] = Variable((*dims, "parameter"), p)
+        return Dataset(("assembly",), coords, variables)
 
 
 def find_assemblies(

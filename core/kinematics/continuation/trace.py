@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -18,65 +18,14 @@ from ..compiled.dense_equations import System
 from ..compiled.request import Request
 from ..formulation.constraints import Style
 from ..structure.driver_count import require_driven
+from .curve import Curve, Event
 from .curve_start import Beginning
 from .pseudo_arclength import NODE, ArclengthWalk, Beside, Spot
-from .singularity import Singularity, examine
+from .singularity import examine
 
 # A step is at most this long [units of the mechanism's size, rad]: poses far enough apart to be
 # cheap, near enough to be drawn.
 LONGEST = 0.05
-
-
-@dataclass(frozen=True, eq=False)
-class Event:
-    """A singular pose on a curve.
-
-    Attributes:
-        arc: length from where the curve begins.
-        value: of the driver, from the design position [m or rad].
-        singularity: which rows depend on each other there, and what moves with the driver held.
-        points: position of the wanted points [m], shape (3,) each.
-    """
-
-    arc: float
-    value: float
-    singularity: Singularity
-    points: Mapping[str, Array]
-
-    @property
-    def kind(self) -> str:
-        """ "limit point" where the driver locks up and turns back; "branch point" where the motion
-        may branch.
-        """
-        return "limit point" if self.singularity.lock_up else "branch point"
-
-
-@dataclass(frozen=True, eq=False)
-class Curve:
-    """The motion of a mechanism along its own length, n poses.
-
-    Attributes:
-        driver: its name.
-        arc: length from the design position, falling from zero where the curve was traced
-            backwards, shape (n,). The length of a step is that of all unknowns: displacements in
-            units of the mechanism's size, turns in radians.
-        values: of the driver, from its design value [m or rad], shape (n,).
-        sigma: smallest singular value of the rows, drivers included: how near a singular pose is
-            [-], shape (n,).
-        points: position by name [m], shape (n, 3).
-        events: limit points and branch points, in order.
-        closed: whether it came back to the design position, which then is the last pose too.
-        message: empty, or why it ends before its length.
-    """
-
-    driver: str
-    arc: Array
-    values: Array
-    sigma: Array
-    points: Mapping[str, Array]
-    events: tuple[Event, ...]
-    closed: bool
-    message: str = ""
 
 
 @dataclass
@@ -171,6 +120,7 @@ def trace(
         events=tuple(trail.events),
         closed=trail.closed,
         message=message,
+        unit="rad" if mechanism.driver(driver).turns else "m",
     )
 
 

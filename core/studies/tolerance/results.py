@@ -11,7 +11,9 @@ from typing import Any, Literal
 import msgspec
 import numpy as np
 
+from ...dataset import Dataset, Variable
 from ...harness.record import Outcome
+from ...tabular import Tabular
 from ...trajectory import Array
 from .cross_check import Checked
 from .gradients import Gradients
@@ -110,7 +112,7 @@ class Failed(msgspec.Struct, frozen=True, kw_only=True):
     message: str
 
 
-class SweepResults(msgspec.Struct, frozen=True, kw_only=True):
+class SweepResults(Tabular, msgspec.Struct, frozen=True, kw_only=True):
     """A study.
 
     Attributes:
@@ -147,6 +149,24 @@ class SweepResults(msgspec.Struct, frozen=True, kw_only=True):
     checked: list[Checked] = []
     measured: dict[str, Any] = {}
 
+    def summary(self) -> str:
+        """Return case, mode, variants and what is missing of them."""
+        found = f"{self.case}, {self.mode}, {self.partial or self.samples} variants"
+        missing = f"{self.unsolved} without a solution somewhere" if self.unsolved else ""
+        return ", ".join(filter(None, [found, f"{len(self.outputs)} outputs", missing]))
+
+    def dataset(self) -> Dataset:
+        """Return the envelope of every output over the driver [units of the output]."""
+        coords = {name: Variable("sample", values) for name, values in self.driver.items()}
+        coords["band"] = Variable("band", [*BANDS])
+        variables = {
+            name: Variable(
+                ("sample", "band"), np.array(_bands(each), dtype=np.float64).T, each.unit
+            )
+            for name, each in self.outputs.items()
+        }
+        return Dataset(("sample",), coords, variables, next(iter(self.driver), ""))
+
     @property
     def partial(self) -> str:
         """How many variants of how many there are, of a sweep that was stopped before its end; else
@@ -171,6 +191,14 @@ class SweepResults(msgspec.Struct, frozen=True, kw_only=True):
         """The rows not compared in the first passing variant, with the reason; else empty."""
         passed = (each.message for each in self.checked if each.outcome is Outcome.PASS)
         return next(filter(None, passed), "")
+
+
+BANDS = ("nominal", "mean", "min", "max", "standard_deviation")
+"""Curves of an envelope."""
+
+
+def _bands(each: Envelope) -> list[Numbers]:
+    return [getattr(each, name) for name in BANDS]
 
 
 def numbers(values: Array) -> Numbers:

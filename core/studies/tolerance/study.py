@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ...algebra import Vec3
 from ...case.case import Case, Quantity
+from ...case.held import require_no_held
 from ...case.rotation import counted
 from ...case.variation.variation import Mode, Stream, Variation, generator
 from ...jet import Jet
@@ -77,11 +78,12 @@ class Study:
     picked: frozenset[int] = frozenset()
     whole: bool = False
 
+    def __post_init__(self) -> None:
+        require_no_held(self.case)
+
     @property
     def of_a_chunk(self) -> int:
-        """Variants of a chunk, which is solved and reduced in one thread; told by the study alone,
-        so that sums are the same.
-        """
+        """Variants of a chunk, solved in one thread; the study alone decides: sums are equal."""
         share = self.samples // CHUNKS
         return min(MOST_STORED if self.whole else MOST, max(LEAST, share - share % LEAST))
 

@@ -5,7 +5,6 @@ Parquet.
 from __future__ import annotations
 
 import csv
-import importlib
 import io
 import json
 from collections.abc import Iterable, Sequence
@@ -20,6 +19,7 @@ from rich.text import Text
 from ...case.io.escape import cell
 from ...case.variation.variation import Coordinate
 from ...errors import KincheckError
+from ...extras import library
 from ...harness.labels import notes, number
 from ...report import terminal
 from ...report.table import print_signs
@@ -192,13 +192,8 @@ class ParquetStore:
     """
 
     def __init__(self, path: Path, study: Study) -> None:
-        try:
-            self._arrow: Any = importlib.import_module("pyarrow")
-            parquet: Any = importlib.import_module("pyarrow.parquet")
-        except ImportError as error:
-            raise KincheckError(
-                "--store needs pyarrow, which is not installed; pip install 'kincheck[parquet]'"
-            ) from error
+        self._arrow = library("--store", "pyarrow", "parquet")
+        parquet = library("--store", "pyarrow.parquet", "parquet")
         arrow, self._first, self._samples = self._arrow, 0, study.samples
         n = len(study.case.sweep.values)
         fields = [arrow.field("variant", arrow.int64())]

@@ -7,6 +7,7 @@ given (Chrono::Vehicle manual).
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 from typing import cast
@@ -17,6 +18,10 @@ from .table import Hardpoint, HardpointTable, number
 
 WHEEL_CENTER = "Spindle/COM"
 """The centre of mass of the spindle, which is where Chrono has its wheel."""
+
+TOE, CAMBER = "Toe Angle (deg)", "Camber Angle (deg)"
+"""Angles of the wheel at design; positive: toe-in, top outboard (ChDoubleWishbone.cpp turns the
+spindle by them about z, then about x)."""
 
 # What is open goes on to the end of the line or file: were it no match, every quote and every /*
 # would be searched from anew.
@@ -57,6 +62,7 @@ def read_chrono(file: Path, text: str) -> HardpointTable:
         )
     points: dict[str, Hardpoint] = {}
     left_out: list[str] = []
+    toe, camber = (math.radians(number(file, key, tables.pop(key, 0.0))) for key in (TOE, CAMBER))
     for section, content in tables.items():
         if section in ("Name", "Type", "Template"):
             continue
@@ -80,7 +86,7 @@ def read_chrono(file: Path, text: str) -> HardpointTable:
             " file of Chrono",
         )
     return HardpointTable(
-        file, "Project Chrono", points, "m", "forward,left,up", template, left_out
+        file, "Project Chrono", points, "m", "forward,left,up", template, left_out, toe, camber
     )
 
 

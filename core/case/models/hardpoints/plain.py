@@ -2,7 +2,8 @@
 between.
 
 The head may say the unit, `name,x [mm],y [mm],z [mm]`, and so may a row of units below it; so may a
-comment, `# units: mm`, and another one says the axes, `# axes: rearward,right,up`. Spreadsheets
+comment, `# units: mm`; others say the axes, `# axes: rearward,right,up`, and the template, `#
+template: mcpherson`. Spreadsheets
 have dialects: a line `sep=;`, titles above the head, further columns, separators at the end of a
 line, a decimal comma.
 """
@@ -31,7 +32,7 @@ _ALSO = {"point": "name", "hardpoint": "name", "hardpoint_name": "name"} | {
 }
 _COLUMN = re.compile(r"([a-z]+)\s*(?:[\[(_]\s*([a-z]+)\s*[\])]?)?")
 _UNIT = re.compile(r"[\[(]?\s*([a-z]+)\s*[\])]?", re.IGNORECASE)
-_REMARK = re.compile(r"#\s*(unit|axes)s?\s*[:=]\s*([^;\t]+)", re.IGNORECASE)
+_REMARK = re.compile(r"#\s*(unit|axes|template)s?\s*[:=]\s*([^;\t]+)", re.IGNORECASE)
 _SEPARATOR = re.compile(r"\"?sep=(.)\"?", re.IGNORECASE)
 
 
@@ -98,7 +99,13 @@ def read_plain(file: Path, text: str) -> HardpointTable:
     left_out = [f"{where} ({brief(line.strip())})" for where, line in titles]
     left_out += [f"column {brief(name)}" for name in head.others]
     return HardpointTable(
-        file, "CSV", points, unit or said.get("unit"), said.get("axes"), None, left_out
+        file,
+        "CSV",
+        points,
+        unit or said.get("unit"),
+        said.get("axes"),
+        said.get("template"),
+        left_out,
     )
 
 

@@ -13,18 +13,19 @@ import numpy as np
 
 from ....errors import MOST_NAMED, brief, remedy, shortened, similar
 from ....mechanism.drivers import PointCoordinate
-from ....mechanism.mechanism import GROUND, Body, Mechanism, Point, Vector
+from ....mechanism.mechanism import GROUND, Body, Mechanism, Vector
 from ....trajectory import Array
 from ...case import Case, Sweep, Truth
-from ...io.coordinates import AXES, with_all_coordinates
+from ...io.coordinates import AXES
 from ...io.document import decimal, explained, fault, shown
 from ...io.escape import visible
 from ...io.reader_options import LEFT_OUT, Supplied
 from ...io.schema import MOST_SAMPLES
+from .default_outputs import wheel_of, with_suspension_outputs
 from .own_names import read_own_names
 from .table import HardpointTable, coordinate, placed, require_size, unit_of
 from .templates import TEMPLATES, Template
-from .templates.base import KNUCKLE, normal
+from .templates.base import normal
 
 Reader = Callable[[Path, str], HardpointTable]
 
@@ -38,8 +39,8 @@ MOST_POINTS = 10_000
 
 
 def read_hardpoints(file: Path, text: str, reader: Reader, supplied: Supplied) -> Case:
-    """The case of a suspension: outputs are the coordinates of three points of the knuckle; it is
-    consensus_only.
+    """The case of a suspension: its outputs are those of suspensions that its points define,
+    and the coordinates of three points of the knuckle; it is consensus_only.
 
     Raises:
         CaseError: the file cannot be read, does not say enough, or does not fill the roles of the
@@ -58,22 +59,27 @@ def read_hardpoints(file: Path, text: str, reader: Reader, supplied: Supplied) -
     named = _filled(table, template, supplied.names)
     at = {role: points[name] for role, name in named.items()}
     require_size(table, at, supplied.units)
+    wheel = wheel_of(table, named, at, supplied.wheel_radius)
     travel = _travel(file, supplied.travel)
     _require_left_and_upright(table, template, named, at, supplied)
     with explained(file, "", unit_of(table, supplied.units)):
         joints = tuple(template.joints(at))
         bodies = dict.fromkeys(name for joint in joints for name in joint.bodies if name != GROUND)
-        watched = [Point(role, KNUCKLE, at[role]) for role in template.watched]
         stroke = PointCoordinate("stroke", WHEEL, AXES["z"])
-        mechanism = Mechanism(file.stem, [Body(name) for name in bodies], joints, watched, [stroke])
+        mechanism = Mechanism(
+            file.stem, [Body(name) for name in bodies], joints, template.points(at), [stroke]
+        )
     others = [*(name for name in points if name not in named.values()), *table.left_out]
     source = (
         f"{table.tool} hardpoints of {file.name} on the template {template.name}, left side, x"
-        f" forward, y left, z up{LEFT_OUT}"
+        f" forward, y left, z up"
     )
-    source += _listed(others)
+    if wheel.radius is None:
+        source += "; without a wheel's radius (--wheel-radius) no outputs at the road"
+    source += f"{LEFT_OUT}{_listed(others)}"
     case = Case(file.stem, source, Truth.CONSENSUS_ONLY, mechanism, Sweep("stroke", travel), ())
-    return with_all_coordinates(replace(case, length_unit=unit_of(table, supplied.units).name))
+    case = replace(case, length_unit=unit_of(table, supplied.units).name)
+    return with_suspension_outputs(case, template, wheel, at)
 
 
 def _template(table: HardpointTable, said: str | None) -> Template:
@@ -121,8 +127,10 @@ def _filled(table: HardpointTable, template: Template, own: Path | None) -> dict
         by_normal_name.setdefault(normal(name), []).append(name)
     filled: dict[str, str] = {}
     if own is not None:
-        filled |= read_own_names(own, [role.name for role in template.roles], table.points)
-    for role in template.roles:
+        filled |= read_own_names(
+            own, [role.name for role in (*template.roles, *template.optional)], table.points
+        )
+    for role in (*template.roles, *template.optional):
         if role.name in filled:
             continue
         found = [

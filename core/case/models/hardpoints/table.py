@@ -61,6 +61,7 @@ class HardpointTable:
         unit: unit of the coordinates, if file or format define it.
         axes: directions of x, y and z, if file or format define them: "forward,left,up".
         template: suspension of the points, if the file names it.
+        static_toe, static_camber: angles of the wheel at design, if the file gives them [rad].
         left_out: other content, of no use for kinematics or a template.
     """
 
@@ -71,6 +72,8 @@ class HardpointTable:
     axes: str | None
     template: str | None = None
     left_out: Sequence[str] = ()
+    static_toe: float = 0.0
+    static_camber: float = 0.0
 
 
 def number(file: Path, where: str, text: object, sign: str = ".") -> float:

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from .....joints import Joint
-from .....mechanism.mechanism import Vector
+from .....mechanism.mechanism import GROUND, Point, Vector
 
 KNUCKLE = "knuckle"
 """The body that carries the wheel, in every template."""
@@ -46,6 +46,12 @@ class Template:
         watched: roles of non-collinear points of the knuckle: their motion is compared, and with it
             the knuckle's.
         upper, lower: roles; the first is above the second in any car, which detects wrong axes.
+        sample: places by role for a table to begin with [m], made up.
+        optional: roles of points that only outputs need.
+        kingpin: roles of the lower and the upper point of the steering axis, if two points are on
+            it.
+        springs: roles of the ends of springs and dampers by the names of their motion ratios.
+        bodies: the body of each role that is a point of the case, if it is not the knuckle.
     """
 
     name: str
@@ -55,6 +61,19 @@ class Template:
     watched: Sequence[str]
     upper: str
     lower: str
+    sample: Mapping[str, Vector]
+    optional: Sequence[Role] = ()
+    kingpin: tuple[str, str] | None = None
+    springs: Mapping[str, tuple[str, str]] = field(default_factory=dict[str, tuple[str, str]])
+    bodies: Mapping[str, str] = field(default_factory=dict[str, str])
+
+    def points(self, at: Mapping[str, Vector]) -> list[Point]:
+        """Return the points that outputs read, of those roles that have a place."""
+        read = [*self.watched, *(self.kingpin or ())]
+        read += [role for ends in self.springs.values() if all(map(at.get, ends)) for role in ends]
+        return [
+            Point(role, self.bodies.get(role, KNUCKLE), at[role]) for role in dict.fromkeys(read)
+        ]
 
 
 def normal(name: str) -> str:
@@ -86,3 +105,47 @@ TIEROD_OUTER = Role(
     "the tie rod's joint on the knuckle",
     ("Tierod/Location Upright", "tierod_upright", "tierod_knuckle"),
 )
+WHEEL_CONTACT = Role(
+    "wheel_contact",
+    "the wheel's contact with the road",
+    ("contact_patch", "tire_contact", "tyre_contact", "wheel_ground"),
+)
+WHEEL_AXIS = Role(
+    "wheel_axis",
+    "a point of the wheel's axis of rotation, outboard of its centre",
+    ("spindle_outer", "wheel_spin_axis", "spindle_align"),
+)
+WHEEL = (WHEEL_CONTACT, WHEEL_AXIS)
+"""Optional roles of every template."""
+
+
+def spring_roles(lower: str, section: str) -> tuple[Role, ...]:
+    """Return the optional roles of a spring and a damper between the chassis and another body.
+
+    Args:
+        lower: the body of the lower ends, in words.
+        section: the key of Project Chrono for the lower ends.
+    """
+    return tuple(
+        Role(f"{name}_{end}", f"the {name}'s joint on the {body}", (f"{chrono}/{key}", *also))
+        for name, chrono in (("spring", "Spring"), ("damper", "Shock"))
+        for end, body, key, also in (
+            ("lower", lower, section, (f"lwr_{name}_mount",)),
+            ("upper", "chassis", "Location Chassis", (f"upr_{name}_mount",)),
+        )
+    )
+
+
+SPRINGS: Mapping[str, tuple[str, str]] = {
+    "spring_ratio": ("spring_lower", "spring_upper"),
+    "damper_ratio": ("damper_lower", "damper_upper"),
+}
+
+
+def spring_bodies(lower: str) -> Mapping[str, str]:
+    """Return the bodies of the ends of spring and damper."""
+    return {
+        role: body
+        for low, high in SPRINGS.values()
+        for role, body in ((low, lower), (high, GROUND))
+    }

@@ -6,7 +6,19 @@ from collections.abc import Mapping, Sequence
 
 from .....joints import Distance, Joint, Revolute, Spherical
 from .....mechanism.mechanism import GROUND, Vector
-from .base import KNUCKLE, TIEROD_INNER, TIEROD_OUTER, WHEEL_CENTER, Role, Template, between
+from .base import (
+    KNUCKLE,
+    SPRINGS,
+    TIEROD_INNER,
+    TIEROD_OUTER,
+    WHEEL,
+    WHEEL_CENTER,
+    Role,
+    Template,
+    between,
+    spring_bodies,
+    spring_roles,
+)
 
 
 def _joints(at: Mapping[str, Vector]) -> Sequence[Joint]:
@@ -52,4 +64,22 @@ DOUBLE_WISHBONE = Template(
     ("wheel_center", "tierod_outer", "lca_outer"),
     "uca_outer",
     "lca_outer",
+    {
+        "uca_front": (0.09, 0.26, 0.285),
+        "uca_rear": (-0.11, 0.265, 0.28),
+        "uca_outer": (-0.015, 0.54, 0.312),
+        "lca_front": (0.12, 0.21, 0.125),
+        "lca_rear": (-0.13, 0.215, 0.12),
+        "lca_outer": (0.005, 0.575, 0.118),
+        "tierod_inner": (0.07, 0.22, 0.15),
+        "tierod_outer": (0.075, 0.56, 0.148),
+        "wheel_center": (0.0, 0.612, 0.228),
+        "wheel_contact": (0.0, 0.612, 0.0),
+        "spring_lower": (0.0, 0.45, 0.13),
+        "spring_upper": (-0.01, 0.33, 0.48),
+    },
+    (*WHEEL, *spring_roles("lower arm", "Location Arm")),
+    ("lca_outer", "uca_outer"),
+    SPRINGS,
+    spring_bodies("lca"),
 )

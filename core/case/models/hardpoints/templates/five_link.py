@@ -8,7 +8,18 @@ from collections.abc import Mapping, Sequence
 
 from .....joints import Distance, Joint
 from .....mechanism.mechanism import GROUND, Vector
-from .base import KNUCKLE, TIEROD_INNER, TIEROD_OUTER, WHEEL_CENTER, Role, Template
+from .base import (
+    KNUCKLE,
+    SPRINGS,
+    TIEROD_INNER,
+    TIEROD_OUTER,
+    WHEEL,
+    WHEEL_CENTER,
+    Role,
+    Template,
+    spring_bodies,
+    spring_roles,
+)
 
 LINKS = ("upper_front", "upper_rear", "lower_front", "lower_rear", "tierod")
 
@@ -52,4 +63,24 @@ FIVE_LINK = Template(
     ("wheel_center", "tierod_outer", "lower_rear_outer"),
     "upper_front_outer",
     "lower_rear_outer",
+    {
+        "upper_front_inner": (0.1, 0.4, 0.52),
+        "upper_front_outer": (0.02, 0.65, 0.53),
+        "upper_rear_inner": (-0.15, 0.42, 0.51),
+        "upper_rear_outer": (-0.02, 0.66, 0.525),
+        "lower_front_inner": (0.25, 0.38, 0.25),
+        "lower_front_outer": (0.03, 0.69, 0.2),
+        "lower_rear_inner": (-0.06, 0.35, 0.2),
+        "lower_rear_outer": (-0.02, 0.7, 0.18),
+        "tierod_inner": (-0.18, 0.36, 0.26),
+        "tierod_outer": (-0.15, 0.69, 0.25),
+        "wheel_center": (0.0, 0.75, 0.32),
+        "wheel_contact": (0.0, 0.75, 0.0),
+        "spring_lower": (-0.01, 0.64, 0.21),
+        "spring_upper": (-0.02, 0.56, 0.62),
+    },
+    (*WHEEL, *spring_roles("knuckle", "Location Upright")),
+    None,
+    SPRINGS,
+    spring_bodies(KNUCKLE),
 )

@@ -8,7 +8,16 @@ from collections.abc import Mapping, Sequence
 
 from .....joints import Distance, Joint, Revolute, Spherical, Translational
 from .....mechanism.mechanism import GROUND, Vector
-from .base import KNUCKLE, TIEROD_INNER, TIEROD_OUTER, WHEEL_CENTER, Role, Template, between
+from .base import (
+    KNUCKLE,
+    TIEROD_INNER,
+    TIEROD_OUTER,
+    WHEEL,
+    WHEEL_CENTER,
+    Role,
+    Template,
+    between,
+)
 
 
 def _joints(at: Mapping[str, Vector]) -> Sequence[Joint]:
@@ -69,4 +78,19 @@ MCPHERSON = Template(
     ("wheel_center", "tierod_outer", "lca_outer"),
     "strut_upper",
     "lca_outer",
+    {
+        "lca_front": (0.15, 0.35, 0.19),
+        "lca_rear": (-0.18, 0.36, 0.185),
+        "lca_outer": (0.005, 0.7, 0.17),
+        "strut_lower": (-0.01, 0.64, 0.4),
+        "strut_upper": (-0.03, 0.56, 0.86),
+        "tierod_inner": (-0.12, 0.33, 0.23),
+        "tierod_outer": (-0.13, 0.69, 0.24),
+        "wheel_center": (0.0, 0.75, 0.31),
+        "wheel_contact": (0.0, 0.75, 0.0),
+    },
+    WHEEL,
+    ("lca_outer", "strut_upper"),
+    {"spring_ratio": ("strut_lower", "strut_upper")},
+    {"strut_upper": GROUND},
 )

@@ -1,0 +1,52 @@
+"""Derivatives by one driver while all others are held, at every sample of a combined sweep.
+
+A derivative needs a motion. The poses of the samples are passed once more, on a path of the same
+values: the one driver moves at a constant rate at each sample, the others stand still there, and
+between samples all go on smoothly. Velocities at the samples, over that rate, are the derivatives.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..errors import MOST_NAMED, CaseError, shortened
+from ..mechanism.motions import Motion
+from ..mechanism.waypoints import Waypoints
+from ..trajectory import Array
+from .case import HELD_BUT, TIME, Case, Sweep, size
+
+# Displacement of the driver at that rate in the time between two samples, over the mechanism's
+# size: small, so that the path between samples goes hardly beyond them.
+STEP = 1e-3
+
+
+def held_case(case: Case, driver: str) -> Case:
+    """Return the case on a path through the same poses, on which one driver alone moves at each
+    sample.
+    """
+    path = case.sweep.path
+    times: Array = np.unique([0.0, *path.times]) if path.covers(0.0) else np.unique(path.times)
+    shortest = float(np.diff(times).min(initial=1.0))
+    rate = STEP * size(case) / shortest
+    motions: dict[str, Motion] = {}
+    for name in dict.fromkeys((*path.motions, driver)):
+        values = path.motions[name].at(times)[0] if name in path.motions else np.zeros_like(times)
+        motions[name] = Waypoints(
+            tuple(times.tolist()), tuple(values.tolist()), rate if name == driver else 0.0
+        )
+    return replace(case, sweep=Sweep(TIME, path.times, motions=motions))
+
+
+def require_no_held(case: Case) -> None:
+    """Refuse outputs that are such derivatives.
+
+    Raises:
+        CaseError: there is one.
+    """
+    if held := [output.name for output in case.outputs if HELD_BUT in output.facts]:
+        raise CaseError(
+            f"case {case.name!r}: {shortened(held, MOST_NAMED)}: found derivatives with other"
+            " drivers held, expected outputs of poses; choose others by --output"
+        )

@@ -1,0 +1,68 @@
+"""The driver of a wheel's travel, for derivatives by travel in a combined sweep."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ...errors import remedy
+from ...joints.base import unit
+from ...mechanism.drivers import PointCoordinate
+from ...mechanism.mechanism import Vector
+from ..case import Case
+from ..suspension import Rate, SuspensionOutput
+from .document import fault, join, shown
+
+# A direction this near to a right angle with the vertical is no travel.
+LEVEL = 1e-8
+
+
+def travel_driver(
+    file: Path, named: str | None, wheel_center: str, up: Vector, case: Case
+) -> str | None:
+    """Return the driver of the wheel's travel if the sweep moves others; None if it does not, or
+    if there is none.
+
+    Args:
+        named: its name in the file; None for the driver of the wheel centre.
+        case: the case as read so far.
+
+    Raises:
+        CaseError: there is no driver of this name.
+    """
+    drivers, moving = case.mechanism.drivers, list(case.sweep.path.motions)
+    if named is None:
+        of_wheel = (
+            each.name
+            for each in drivers
+            if isinstance(each, PointCoordinate)
+            and each.point == wheel_center
+            and abs(unit(each.direction) @ unit(up)) > LEVEL
+        )
+        named = next(of_wheel, None)
+    elif named not in (names := [each.name for each in drivers]):
+        raise fault(
+            file,
+            "suspension.travel",
+            f"found {shown(named)}, expected a driver; {remedy(named, names)}",
+        )
+    return None if moving == [named] else named
+
+
+def require_travel(file: Path, key: str, output: SuspensionOutput, case: Case) -> None:
+    """Refuse a derivative by travel of a wheel without a driver of its travel, if several drivers
+    move.
+
+    Raises:
+        CaseError: the output is such a derivative.
+    """
+    moving = list(case.sweep.path.motions)
+    if isinstance(output, Rate) and len(moving) > 1 and output.vehicle.travel is None:
+        found = (
+            f"found {output.type!r} while {', '.join(moving)} move, expected one of them to be the"
+            " wheel's travel"
+        )
+        raise fault(
+            file,
+            join(key, "type"),
+            f"{found}, for it is a derivative by that; name it by suspension.travel",
+        )

@@ -1,0 +1,147 @@
+"""Suspension outputs of a case of hardpoints: all that its points and its template define."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from ....mechanism.mechanism import Vector
+from ...case import Case, Quantity, size
+from ...io.coordinates import with_all_coordinates
+from ...io.document import decimal, fault, shown
+from ...io.suspension import with_markers, with_slopes
+from ...io.tolerance import default
+from ...suspension import Convention, Side, SuspensionOutput, Vehicle
+from ...suspension.wheel import Place
+from .table import HardpointTable
+from .templates.base import WHEEL_AXIS, WHEEL_CENTER, WHEEL_CONTACT, Template, between
+
+WHEEL = ("toe", "camber")
+STEERING_AXIS = ("caster", "kingpin_inclination")
+ON_THE_ROAD = ("roll_center_height",)
+AXIS_ON_THE_ROAD = ("scrub_radius", "mechanical_trail")
+RADII = (0.02, 3.0)
+"""Radii of wheels [m], from model cars to haulage trucks."""
+
+
+@dataclass(frozen=True)
+class Wheel:
+    """The wheel of a table of hardpoints.
+
+    Attributes:
+        radius: from the centre to the road in the wheel plane [m]; None if unknown.
+        toe, camber: at design [rad].
+    """
+
+    radius: float | None
+    toe: float
+    camber: float
+
+
+def wheel_of(
+    table: HardpointTable, named: Mapping[str, str], at: Mapping[str, Vector], radius: str | None
+) -> Wheel:
+    """Return the wheel: radius and attitude follow from points if the table has them.
+
+    Args:
+        named: names of the points in the file, by role.
+        at: positions by role [m].
+        radius: radius from the user [m].
+
+    Raises:
+        CaseError: the radius is unusable or contradicts the points, or the axis points inboard.
+    """
+    center = at[WHEEL_CENTER.name]
+    toe, camber = table.static_toe, table.static_camber
+    if WHEEL_AXIS.name in at:
+        x, y, z = between(center, at[WHEEL_AXIS.name])
+        if y <= 0.0:
+            raise fault(
+                table.file,
+                named[WHEEL_AXIS.name],
+                f"found a point inboard of {named[WHEEL_CENTER.name]}, expected one outboard;"
+                " mirror it at the wheel's centre",
+            )
+        toe, camber = math.atan2(x, y), math.atan2(-z, math.hypot(x, y))
+    contact = at.get(WHEEL_CONTACT.name)
+    measured = None if contact is None else math.dist(center, contact)
+    if radius is not None and measured is not None:
+        raise fault(
+            table.file,
+            "--wheel-radius",
+            f"found {radius}, and the point {named[WHEEL_CONTACT.name]}, expected one of them;"
+            " leave out --wheel-radius",
+        )
+    given = _radius(table.file, radius) if measured is None else measured
+    if given is not None and not RADII[0] <= given <= RADII[1]:
+        where = "--wheel-radius" if measured is None else named[WHEEL_CONTACT.name]
+        raise fault(
+            table.file,
+            where,
+            f"found a wheel's radius of {given:.6g} m, expected {RADII[0]:g} to {RADII[1]:g} m;"
+            " correct it",
+        )
+    return Wheel(given, toe, camber)
+
+
+def _radius(file: Path, text: str | None) -> float | None:
+    if text is None:
+        return None
+    try:
+        return decimal(text)
+    except ValueError:
+        raise fault(
+            file,
+            "--wheel-radius",
+            f"found {shown(text)}, expected metres; say --wheel-radius 0.3",
+        ) from None
+
+
+def with_suspension_outputs(
+    case: Case, template: Template, wheel: Wheel, at: Mapping[str, Vector]
+) -> Case:
+    """Return the case with the suspension outputs, their slopes, and the coordinates of the
+    template's watched points.
+    """
+    vehicle = Vehicle(
+        convention=Convention.ISO_8855,
+        side=Side.LEFT,
+        forward=(1.0, 0.0, 0.0),
+        up=(0.0, 0.0, 1.0),
+        wheel_center=WHEEL_CENTER.name,
+        static_toe=wheel.toe,
+        static_camber=wheel.camber,
+        wheel_radius=wheel.radius,
+        kingpin=template.kingpin,
+    )
+    extent = size(case)
+    outputs: list[Quantity] = [
+        cls(name, vehicle, *default(extent, cls.measure), **own)
+        for name, cls, own in _types(template, wheel, at)
+    ]
+    outputs += with_all_coordinates(case, template.watched).outputs
+    return replace(
+        case,
+        mechanism=with_markers(case.mechanism, outputs),
+        outputs=with_slopes(outputs, extent),
+    )
+
+
+def _types(
+    template: Template, wheel: Wheel, at: Mapping[str, Vector]
+) -> Iterator[tuple[str, type[SuspensionOutput], Mapping[str, object]]]:
+    """Yield name, class and own fields of each output that is defined."""
+    types = [*WHEEL]
+    if template.kingpin:
+        types += STEERING_AXIS
+    if wheel.radius is not None:
+        types += [*ON_THE_ROAD, *(AXIS_ON_THE_ROAD if template.kingpin else ())]
+    for name in types:
+        yield name, SuspensionOutput.registry[name], {}
+    place = Place.WHEEL_CENTER if wheel.radius is None else Place.CONTACT
+    yield "half_track_change", SuspensionOutput.registry["half_track_change"], {"at": place}
+    for name, ends in template.springs.items():
+        if all(role in at for role in ends):
+            yield name, SuspensionOutput.registry["motion_ratio"], {"between": ends}

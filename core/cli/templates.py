@@ -1,0 +1,35 @@
+"""kincheck templates: print a sample table of hardpoints for each suspension template."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from .registry import House, Status
+
+
+def add(commands: Any) -> None:
+    """Add the command to the parser."""
+    templates: argparse.ArgumentParser
+    templates = commands.add_parser(
+        "templates",
+        help="print a sample table of hardpoints for each suspension template",
+        description=_templates.__doc__,
+    )
+    templates.set_defaults(do=_templates)
+    templates.add_argument(
+        "template", nargs="*", metavar="NAME", help="print these only; default: all"
+    )
+
+
+def _templates(options: argparse.Namespace, house: House) -> int:
+    """Print a table of hardpoints to fill in: `kincheck templates mcpherson > car.csv`, then
+    `kincheck run car.csv`.
+
+    Its numbers are made up. Rows marked optional may be left out, and so may the column of
+    meanings.
+    """
+    from ..case.models.hardpoints.sample_table import sample_tables
+
+    print(*sample_tables(options.template), sep="\n")
+    return Status.WITHIN

@@ -1,0 +1,43 @@
+"""Optional libraries: their import on use, and the command that installs a missing one."""
+
+from __future__ import annotations
+
+import importlib
+import re
+import shlex
+from typing import Any
+
+from .errors import KincheckError
+
+
+def how_to_install(extra: str) -> str:
+    """Return the command that installs an extra, from kincheck's own metadata. An engine's extra
+    has the engine's name up to a hyphen.
+    """
+    import importlib.metadata  # rarely needed, and slow
+
+    wanted = [
+        requirement.split(";")[0].strip()
+        for requirement in importlib.metadata.requires("kincheck") or []
+        if re.search(rf"""extra == ['"]{extra.split("-")[0]}['"]""", requirement)
+    ]
+    return f"pip install {shlex.join(wanted)}" if wanted else "reinstall kincheck"
+
+
+def library(purpose: str, module: str, extra: str) -> Any:
+    """Return an optional module.
+
+    Args:
+        purpose: the subject of the message, such as "to_dataframe".
+
+    Raises:
+        KincheckError: the module is not installed, or cannot be imported.
+    """
+    try:
+        return importlib.import_module(module)
+    except ImportError as error:
+        name = module.partition(".")[0]
+        absent = error.name if isinstance(error, ModuleNotFoundError) else None
+        missing = (absent or "").partition(".")[0] == name
+        found = "which is not installed" if missing else f"which cannot be imported ({error})"
+        raise KincheckError(f"{purpose} needs {name}, {found}: {how_to_install(extra)}") from error

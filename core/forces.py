@@ -1,0 +1,82 @@
+"""Forces of a motion, from any engine: reactions of joints, efforts of drivers, force elements."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array: TypeAlias = NDArray[np.float64]
+
+# The null space of redundant rows is orthonormal to round-off over the smallest singular value,
+# which is above 1e-6 in sound linkages. A larger component is real.
+DETERMINED = 1e-8
+
+
+@dataclass(frozen=True, eq=False)
+class Reaction:
+    """The wrench of a joint over n samples: what its first body exerts on its second, global axes.
+
+    Attributes:
+        force: [N], shape (n, 3).
+        moment: about the joint's point as carried by the second body [N m], shape (n, 3).
+        free: directions of wrenches (force, then moment per unit of length) that redundant rows
+            leave undetermined, shape (n, 6, redundant rows).
+    """
+
+    force: Array
+    moment: Array
+    free: Array
+
+    def along(self, direction: Sequence[float] | Array, *, moment: bool = False) -> Array:
+        """Return the component of force or moment along a unit direction, shape (n,).
+
+        It is NaN at samples where redundant rows leave it undetermined.
+        """
+        part = slice(3, 6) if moment else slice(0, 3)
+        d = np.asarray(direction, dtype=np.float64)
+        loose = np.abs(np.einsum("i,nik->nk", d, self.free[:, part])).max(axis=1, initial=0.0)
+        values: Array = (self.moment if moment else self.force) @ d
+        return np.where(loose <= DETERMINED, values, np.nan)
+
+    def determined(self) -> tuple[int, int, int]:
+        """Return how many directions of force, of moment and of the wrench are determined.
+
+        They are the fewest over the samples, of 3, 3 and 6.
+        """
+        parts = (slice(0, 3), slice(3, 6), slice(0, 6))
+        known = self.free[np.isfinite(self.free).all(axis=(1, 2))]
+        loose = [
+            int(np.linalg.matrix_rank(known[:, part], tol=DETERMINED).max(initial=0))
+            if known.size
+            else 0
+            for part in parts
+        ]
+        return 3 - loose[0], 3 - loose[1], 6 - loose[2]
+
+
+@dataclass(frozen=True, eq=False)
+class Forces:
+    """Forces over n samples; NaN at samples that were not reached or have none.
+
+    Attributes:
+        joints: reaction by joint.
+        drivers: effort by driver, [N] or, if it turns, [N m], shape (n,): effort times rate is the
+            power that the driver puts in.
+        elements: force by force element, shape (n,): tension of a spring-damper [N]; torque of a
+            torsional one on the joint's second body [N m]; amount of a force [N] or torque [N m].
+        power: of the drivers less the change of energy and the dissipation [W], shape (n,): zero
+            but for round-off.
+        largest_power: the largest of the powers that are summed [W], shape (n,).
+        message: empty, or why forces are missing.
+    """
+
+    joints: Mapping[str, Reaction]
+    drivers: Mapping[str, Array]
+    elements: Mapping[str, Array]
+    power: Array
+    largest_power: Array
+    message: str = ""

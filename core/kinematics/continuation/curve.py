@@ -1,0 +1,92 @@
+"""The motion of a mechanism along its own length, and the singular poses on it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...dataset import Dataset, Variable
+from ...tabular import Tabular
+from ...trajectory import Array
+from .singularity import Singularity
+
+
+@dataclass(frozen=True, eq=False)
+class Event:
+    """A singular pose on a curve.
+
+    Attributes:
+        arc: length from where the curve begins.
+        value: of the driver, from the design position [m or rad].
+        singularity: which rows depend on each other there, and what moves with the driver held.
+        points: position of the wanted points [m], shape (3,) each.
+    """
+
+    arc: float
+    value: float
+    singularity: Singularity
+    points: Mapping[str, Array]
+
+    @property
+    def kind(self) -> str:
+        """ "limit point" where the driver locks up and turns back; "branch point" where the motion
+        may branch.
+        """
+        return "limit point" if self.singularity.lock_up else "branch point"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Curve(Tabular):
+    """The motion of a mechanism along its own length, n poses.
+
+    Attributes:
+        driver: its name.
+        arc: length from the design position, falling from zero where the curve was traced
+            backwards, shape (n,). The length of a step is that of all unknowns: displacements in
+            units of the mechanism's size, turns in radians.
+        values: of the driver, from its design value [m or rad], shape (n,).
+        sigma: smallest singular value of the rows, drivers included: how near a singular pose is
+            [-], shape (n,).
+        points: position by name [m], shape (n, 3).
+        events: limit points and branch points, in order.
+        closed: whether it came back to the design position, which then is the last pose too.
+        message: empty, or why it ends before its length.
+        unit: of the driver, m or rad.
+    """
+
+    driver: str
+    arc: Array
+    values: Array
+    sigma: Array
+    points: Mapping[str, Array]
+    events: tuple[Event, ...]
+    closed: bool
+    message: str = ""
+    unit: str = ""
+
+    def summary(self) -> str:
+        """Return the driver's range, the number of poses, and the singular ones."""
+        low, high = self.values.min(initial=np.inf), self.values.max(initial=-np.inf)
+        kinds = [each.kind for each in self.events]
+        events = [f"{kinds.count(kind)} {kind}s" for kind in dict.fromkeys(kinds)]
+        span = f"{self.driver} from {low:.6g} to {high:.6g} {self.unit}".rstrip()
+        shape = "closed" if self.closed else "open"
+        return ", ".join(filter(None, [span, f"{len(self.arc)} poses", shape, *events]))
+
+    def dataset(self) -> Dataset:
+        """Return driver, points and distance from singularity over the length of the curve."""
+        coords = {
+            "arc": Variable("pose", self.arc),
+            "point": Variable("point", [*self.points]),
+            "axis": Variable("axis", ["x", "y", "z"]),
+        }
+        variables = {
+            self.driver: Variable("pose", self.values, self.unit),
+            "smallest_singular_value": Variable("pose", self.sigma),
+        }
+        if self.points:
+            positions = np.stack([*self.points.values()], axis=1)
+            variables["position"] = Variable(("pose", "point", "axis"), positions, "m")
+        return Dataset(("pose",), coords, variables, "arc")

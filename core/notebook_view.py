@@ -1,0 +1,122 @@
+"""Results in a notebook: a table and curves as HTML without scripts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from html import escape
+from itertools import islice
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .dataset import Dataset
+
+MOST_ROWS, MOST_COLUMNS, MOST_LINES, MOST_DIAGRAMS = 10, 10, 24, 9
+"""Rows and columns of a table, lines of a diagram, and diagrams; the rest is left out, and said."""
+WIDTH, HEIGHT, LEFT, BOTTOM = 320, 170, 58, 30
+COLOURS = ("#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#ff7f0e", "#17becf", "#8c564b", "#7f7f7f")
+CELL = "text-align:right;padding:2px 8px;white-space:nowrap"
+
+
+def to_html(title: str, data: Dataset) -> str:
+    """Return the title, the curves and the table of a result."""
+    drawn = "".join(_diagrams(data)) if data.x else ""
+    return f"<div><b>{escape(title)}</b><div>{drawn}</div>{_table(data)}</div>"
+
+
+def _table(data: Dataset) -> str:
+    columns, units = data.table(), {name: each.unit for name, each in data.columns().items()}
+    count = len(next(iter(columns.values()), ()))
+    half = MOST_ROWS // 2
+    rows = [*range(count)] if count <= MOST_ROWS else [*range(half), *range(count - half, count)]
+    shown = [*columns][:MOST_COLUMNS]
+    heads = (f"{name} [{unit}]" if (unit := units.get(name)) else name for name in shown)
+    lines = [f"<tr>{''.join(f'<th style={CELL!r}>{escape(head)}</th>' for head in heads)}</tr>"]
+    for k, row in enumerate(rows):
+        if k == half and count > MOST_ROWS:
+            lines.append(f"<tr><td style={CELL!r} colspan='{len(shown)}'>…</td></tr>")
+        cells = (escape(_number(columns[name][row])) for name in shown)
+        lines.append(f"<tr>{''.join(f'<td style={CELL!r}>{cell}</td>' for cell in cells)}</tr>")
+    more = len(columns) - len(shown)
+    left = f"<div>{count} rows, {more} further columns</div>" if more or count > MOST_ROWS else ""
+    return f"<table>{''.join(lines)}</table>{left}"
+
+
+def _number(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.6g}" if math.isfinite(value) else "–"
+    return str(value)
+
+
+def _diagrams(data: Dataset) -> Iterator[str]:
+    """Yield a diagram for each variable with curves."""
+    across = data.coords[data.x]
+    curves = data.curves()
+    for name, columns in islice(curves.items(), MOST_DIAGRAMS):
+        unit = data.variables[name].unit
+        label = f"{name} [{unit}]" if unit else name
+        below = f"{data.x} [{across.unit}]" if across.unit else data.x
+        short = {column.removeprefix(f"{name}."): lines for column, lines in columns.items()}
+        yield _diagram(label, below, across.values, short)
+    if len(curves) > MOST_DIAGRAMS:
+        yield f"<div>{len(curves) - MOST_DIAGRAMS} further curves</div>"
+
+
+def _diagram(label: str, below: str, x: NDArray[Any], columns: Mapping[str, NDArray[Any]]) -> str:
+    """Return one diagram as SVG; gaps where there is no number."""
+    lines = [
+        (name, line)
+        for name, values in columns.items()
+        for line in values.reshape(len(values), -1).T
+    ]
+    drawn = lines[:MOST_LINES]
+    every = np.array([line for _, line in drawn])
+    finite = every[np.isfinite(every)]
+    low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 0.0)
+    first, last = float(np.min(x, initial=np.inf)), float(np.max(x, initial=-np.inf))
+
+    def to_x(values: NDArray[Any]) -> NDArray[Any]:
+        return LEFT + (WIDTH - LEFT - 8) * (values - first) / ((last - first) or 1.0)
+
+    def to_y(values: NDArray[Any]) -> NDArray[Any]:
+        return HEIGHT - BOTTOM - (HEIGHT - BOTTOM - 22) * (values - low) / ((high - low) or 1.0)
+
+    names = [*columns]
+    parts = [
+        f"<text x='{LEFT}' y='13'>{escape(label)}</text>",
+        f"<rect x='{LEFT}' y='22' width='{WIDTH - LEFT - 8}' height='{HEIGHT - BOTTOM - 22}'"
+        " fill='none' stroke='#bbb'/>",
+        f"<text x='{LEFT - 4}' y='{HEIGHT - BOTTOM}' text-anchor='end'>{low:.4g}</text>",
+        f"<text x='{LEFT - 4}' y='30' text-anchor='end'>{high:.4g}</text>",
+        f"<text x='{LEFT}' y='{HEIGHT - BOTTOM + 13}'>{first:.4g}</text>",
+        f"<text x='{WIDTH - 8}' y='{HEIGHT - BOTTOM + 13}' text-anchor='end'>{last:.4g}</text>",
+        f"<text x='{(LEFT + WIDTH) // 2}' y='{HEIGHT - 4}' text-anchor='middle'>{escape(below)}"
+        "</text>",
+    ]
+    for name, line in drawn:
+        colour = COLOURS[names.index(name) % len(COLOURS)]
+        known = np.concatenate([[False], np.isfinite(line), [False]])
+        for start, stop in np.flatnonzero(known[1:] != known[:-1]).reshape(-1, 2).tolist():
+            points = zip(to_x(x[start:stop]), to_y(line[start:stop]), strict=True)
+            path = " ".join(f"{a:.1f},{b:.1f}" for a, b in points)
+            parts.append(
+                f"<polyline points='{path}' fill='none' stroke='{colour}'>"
+                f"<title>{escape(name)}</title></polyline>"
+            )
+    legend = (
+        ""
+        if len(names) == 1
+        else " ".join(
+            f"<span style='color:{COLOURS[k % len(COLOURS)]}'>{escape(name)}</span>"
+            for k, name in enumerate(names[: len(COLOURS)])
+        )
+    )
+    more = f" and {len(lines) - len(drawn)} more" if len(lines) > len(drawn) else ""
+    return (
+        "<div style='display:inline-block;margin:4px 12px 4px 0;vertical-align:top'>"
+        f"<svg width='{WIDTH}' height='{HEIGHT}' font-size='11' font-family='sans-serif'"
+        f" fill='currentColor'>{''.join(parts)}</svg>"
+        f"<div style='font-size:11px;max-width:{WIDTH}px'>{legend}{more}</div></div>"
+    )

@@ -1,0 +1,244 @@
+"""Derivatives by wheel travel at every sample of a combined sweep: other drivers are held."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from kincheck.adapters import engine
+from kincheck.core.case.held import held_case
+from kincheck.core.case.io.case_file import load_case
+from kincheck.core.case.models.hardpoints.templates import TEMPLATES
+from kincheck.core.errors import CaseError
+from kincheck.core.harness.execution import Answer, Pair, attempt
+from kincheck.core.mechanism.waypoints import Waypoints
+from kincheck.core.studies.tolerance.study import Study
+
+from ..oracles.rods import Carrier
+
+AT = TEMPLATES["double_wishbone"].sample
+RADIUS, WHEELBASE, HEIGHT, SHARE = 0.228, 1.55, 0.3, 0.6
+RODS = [
+    ("lca_front", "lca_outer"),
+    ("lca_rear", "lca_outer"),
+    ("uca_front", "uca_outer"),
+    ("uca_rear", "uca_outer"),
+    ("tierod_inner", "tierod_outer"),
+]
+
+
+def arm(name):
+    front, rear = (np.array(AT[f"{name}_{end}"]) for end in ("front", "rear"))
+    return {
+        "type": "revolute",
+        "bodies": ["ground", name],
+        "point": AT[f"{name}_rear"],
+        "axis": (front - rear).tolist(),
+    }
+
+
+def ball(name):
+    return {"type": "spherical", "bodies": [name, "knuckle"], "point": AT[f"{name}_outer"]}
+
+
+CASE = {
+    "schema": "kincheck-case/1",
+    "name": "steered",
+    "source": "made up",
+    "bodies": {name: {} for name in ("lca", "uca", "knuckle", "rack")},
+    "joints": {
+        "lca_pivot": arm("lca"),
+        "uca_pivot": arm("uca"),
+        "low": ball("lca"),
+        "up": ball("uca"),
+        "slide": {
+            "type": "translational",
+            "bodies": ["ground", "rack"],
+            "point": AT["tierod_inner"],
+            "axis": [0, 1, 0],
+        },
+        "tie": {
+            "type": "distance",
+            "bodies": ["rack", "knuckle"],
+            "points": [AT["tierod_inner"], AT["tierod_outer"]],
+        },
+    },
+    "points": {"wheel_center": {"body": "knuckle", "position": AT["wheel_center"]}},
+    "drivers": {
+        "rack": {"type": "joint_displacement", "joint": "slide"},
+        "stroke": {"type": "point_coordinate", "point": "wheel_center", "direction": [0, 0, 1]},
+    },
+    "suspension": {
+        "convention": "iso8855",
+        "side": "left",
+        "forward": [1, 0, 0],
+        "up": [0, 0, 1],
+        "axle": "front",
+        "wheel_radius": RADIUS,
+        "wheelbase": WHEELBASE,
+        "cg_height": HEIGHT,
+        "brake_share": SHARE,
+    },
+    "outputs": {
+        "toe": {"type": "toe"},
+        "rc": {"type": "roll_center_height"},
+        "dive": {"type": "anti_dive"},
+    },
+}
+
+
+def case_of(folder, rack, stroke, sweep, **suspension):
+    data = json.loads(json.dumps(CASE))
+    for name, motion in (("rack", rack), ("stroke", stroke)):
+        if motion:
+            data["drivers"][name]["motion"] = motion
+    data["sweep"] = sweep
+    data["suspension"] |= suspension
+    file = folder / "case.json"
+    file.write_text(json.dumps(data))
+    return load_case(file)
+
+
+RAMP, SINE = {"type": "ramp", "rate": 0.01}, {"type": "sine", "amplitude": 0.02, "frequency": 1.0}
+TIME = {"start": -1.0, "stop": 1.0, "steps": 9}
+SWEEPS = {
+    "both": (RAMP, {"type": "ramp", "rate": 0.02}, TIME),
+    # at the quarters of its period the wheel stands still
+    "sine": (RAMP, SINE, TIME),
+    "rack alone": (None, None, {"driver": "rack", "start": -0.02, "stop": 0.02, "steps": 9}),
+    "rack, late": (None, None, {"driver": "rack", "start": 0.005, "stop": 0.02, "steps": 4}),
+    "stroke swept": (
+        RAMP,
+        None,
+        {"driver": "stroke", "start": -0.03, "stop": 0.04, "steps": 8, "rate": 0.1},
+    ),
+    "one sample": (RAMP, SINE, {"start": 0.3, "stop": 0.3, "steps": 1}),
+}
+
+
+def answer(case, name, mode="projection"):
+    found = attempt(Pair(case, engine(name, mode), 1e-12, timed=False)).result
+    assert isinstance(found, Answer), found
+    return found
+
+
+def toe_of(carrier):
+    s = carrier.direction((0.0, 1.0, 0.0))
+    return np.arctan2(s[0], s[1])
+
+
+def expected(rack, stroke):
+    """Toe by travel, roll centre and anti-dive of five rods, the inner end of one displaced."""
+    moved = {4: (0.0, rack, 0.0)}
+    carrier = Carrier(AT["wheel_center"], [(AT[a], AT[b]) for a, b in RODS])
+    for part in (0.25, 0.5, 0.75, 1.0):
+        carrier.go(part * stroke, {4: (0.0, part * rack, 0.0)})
+    center, s = carrier.at(AT["wheel_center"]), carrier.direction((0.0, 1.0, 0.0))
+    rise = np.array([0.0, 0.0, 1.0]) - s[2] * s
+    contact = center - RADIUS * rise / np.linalg.norm(rise)
+    vx, vy, vz = carrier.velocity(contact, moved)
+    _, w = carrier.twist(moved)
+    s_t = np.cross(w, s)
+    return {
+        "toe": toe_of(carrier),
+        "toe.per_travel": (s[1] * s_t[0] - s[0] * s_t[1]) / (s[0] ** 2 + s[1] ** 2),
+        "rc": contact[1] * vy / vz,
+        "dive": SHARE * WHEELBASE / HEIGHT * vx / vz,
+    }
+
+
+@pytest.mark.parametrize("kind", SWEEPS)
+def test_derivatives_by_travel_at_every_sample(tmp_path, kind):
+    case = case_of(tmp_path, *SWEEPS[kind])
+    found = answer(case, "native")
+    assert found.message == ""
+    path = case.sweep.path
+    rack, stroke = path.drive(["rack", "stroke"], path.times)[0]
+    for k in range(len(path.times)):
+        true = expected(rack[k], stroke[k])
+        assert {name: found.outputs[name].position[k] for name in true} == pytest.approx(
+            true, abs=1e-12
+        )
+    assert found.outputs["rc"].velocity is None
+
+
+@pytest.mark.parametrize("name", ["mujoco", "pinocchio", "exudyn"])
+def test_in_every_engine(tmp_path, name):
+    pytest.importorskip(name)
+    case = case_of(tmp_path, *SWEEPS["sine"])
+    found, native = answer(case, name), answer(case, "native")
+    for output in case.outputs:
+        off = found.outputs[output.name].position - native.outputs[output.name].position
+        assert np.abs(off).max() < 1e-11
+
+
+def test_a_slope_of_a_quotient(tmp_path):
+    """The roll centre by travel, against its difference over two wheel heights."""
+    case = case_of(tmp_path, *SWEEPS["both"])
+    slope = answer(case, "native").outputs["rc.per_travel"].position
+    for k in (0, 6):
+        rack, stroke = 0.01 * case.sweep.values[k], 0.02 * case.sweep.values[k]
+        high, low = (expected(rack, stroke + d)["rc"] for d in (1e-5, -1e-5))
+        assert slope[k] == pytest.approx((high - low) / 2e-5, rel=1e-6)
+
+
+def test_without_a_driver_of_travel_the_slope_is_along_the_sweep(tmp_path):
+    """A reference point of the same carrier is no driver of travel unless it is named."""
+    data_path = case_of(tmp_path, *SWEEPS["both"])
+    assert data_path.outputs[0].vehicle.travel == "stroke"
+    alone = case_of(tmp_path, None, None, {**SWEEPS["stroke swept"][2]})
+    assert alone.outputs[0].vehicle.travel is None
+
+
+def test_unsolved_samples_say_so(tmp_path):
+    """A pose that the other path does not find has no derivative, and the reason is given."""
+    case = case_of(tmp_path, *SWEEPS["both"])
+
+    class Elsewhere(type(engine("native"))):
+        def solve(self, model, case, tol):
+            found = super().solve(model, case, tol)
+            if any(isinstance(each, Waypoints) for each in case.sweep.motions.values()):
+                points = {
+                    name: replace(motion, position=motion.position + 1.0)
+                    for name, motion in found.points.items()
+                }
+                found = replace(found, points=points)
+            return found
+
+    found = attempt(Pair(case, Elsewhere(), 1e-12, timed=False)).result
+    assert "no derivative by stroke at 9 of 9 samples: another assembly" in found.message
+    assert np.isnan(found.outputs["rc"].position).all()
+    assert np.isfinite(found.outputs["toe"].position).all()
+
+
+def test_no_tolerance_study_of_held_derivatives(tmp_path):
+    case = case_of(tmp_path, *SWEEPS["both"])
+    with pytest.raises(CaseError, match=r"rc, .* choose others by --output"):
+        Study(case, None, 10, 1)
+
+
+def test_waypoints_are_a_smooth_motion():
+    motion = Waypoints((0.0, 1.0, 1.5), (0.2, -0.3, 0.4), 0.05)
+    t = np.array([-0.5, 0.0, 0.3, 0.999999, 1.0, 1.3, 1.5, 2.0])
+    h = 1e-6
+    x, v, a = motion.at(t)
+    before, after = motion.at(t - h), motion.at(t + h)
+    assert np.abs((after[0] - before[0]) / (2 * h) - v).max() < 1e-8
+    assert np.abs((after[1] - before[1]) / (2 * h) - a).max() < 1e-3
+    at = np.array(motion.times)
+    assert np.array_equal(motion.at(at)[0], motion.values)
+    assert np.array_equal(motion.at(at)[1], [0.05] * 3)
+    assert np.array_equal(motion.at(at)[2], [0.0] * 3)
+    assert x[0] == 0.2 - 0.025
+
+
+def test_the_held_path_has_the_values_of_the_sweep(tmp_path):
+    case = case_of(tmp_path, *SWEEPS["sine"])
+    path, again = case.sweep.path, held_case(case, "stroke").sweep.path
+    names = ["rack", "stroke"]
+    assert np.array_equal(path.times, again.times)
+    value, rate, second = again.drive(names, again.times)
+    assert np.array_equal(value, path.drive(names, path.times)[0])
+    assert not rate[0].any()
+    assert (rate[1] > 0.0).all()
+    assert not second.any()

@@ -1,0 +1,201 @@
+"""Results as tables, curves, notebook views and data of other libraries, by one mechanism."""
+
+import json
+import pickle
+import re
+import sys
+
+import kincheck
+import numpy as np
+import pytest
+from kincheck.core.conversions import to_figure
+from kincheck.core.dataset import Dataset, Variable
+from kincheck.core.tabular import Tabular
+
+
+def rssr():
+    return kincheck.Mechanism(
+        "rssr",
+        [kincheck.Body("crank"), kincheck.Body("rocker")],
+        [
+            kincheck.Revolute("input", "ground", "crank", point=(0, 0, 0), axis=(0, 0, 1)),
+            kincheck.Revolute("output", "ground", "rocker", point=(2, 1, 3), axis=(1, 0, 0)),
+            kincheck.Distance("rod", "crank", "rocker", points=((1, 0, 0), (2, 4.9, 2.2))),
+        ],
+        [kincheck.Point("end", "rocker", (2, 4.9, 2.2))],
+        [kincheck.JointAngle("turn", "input")],
+    )
+
+
+VALUES = np.linspace(0.0, 1.0, 12)
+MOVED = {"joints.rod.points.0": np.array([[1.0, 0.0, 0.0], [1.01, 0.0, 0.0]])}
+
+
+@pytest.fixture(scope="module")
+def results():
+    """One result of every kind, by the name of its class."""
+    mechanism = rssr()
+    run = kincheck.run("rssr", "native")
+    found = [
+        kincheck.solve(mechanism, "turn", VALUES, rate=2.0),
+        kincheck.solve_designs(mechanism, "turn", VALUES, MOVED),
+        kincheck.trace(mechanism, "turn", length=0.2),
+        kincheck.assemble(mechanism, {}),
+        kincheck.find_assemblies(mechanism, {}, samples=20),
+        run,
+        run.records[0],
+    ]
+    return {type(each).__name__: each for each in found}
+
+
+KINDS = ["Trajectory", "Designs", "Curve", "Assembled", "Assemblies", "Results", "Record"]
+DRAWN = {"Trajectory", "Designs", "Curve", "Record"}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_result_tells_itself(results, kind):
+    found = results[kind]
+    assert re.fullmatch(f"<{kind}: .{{5,150}}>", repr(found))
+    html = found._repr_html_()
+    assert "<table>" in html
+    assert ("<polyline" in html) == (kind in DRAWN)
+    json.dumps(found.to_dict(), allow_nan=False)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_pandas_and_xarray_hold_the_same_numbers(results, kind):
+    pytest.importorskip("pandas")
+    pytest.importorskip("xarray")
+    data, frame, arrays = (
+        results[kind].dataset(),
+        results[kind].to_dataframe(),
+        results[kind].to_xarray(),
+    )
+    assert list(frame.columns) == list(data.table())
+    assert len(frame) == np.prod([data.sizes[dim] for dim in data.rows])
+    for name, each in data.variables.items():
+        assert np.array_equal(
+            arrays[name].values, each.values, equal_nan=each.values.dtype == float
+        )
+        assert arrays[name].attrs.get("units", "") == each.unit
+
+
+def test_a_trajectory_knows_drivers_time_and_units(results):
+    motion = results["Trajectory"]
+    assert np.array_equal(motion.drive.values["turn"], VALUES)
+    assert motion.drive.units == {"turn": "rad"}
+    assert np.allclose(motion.drive.times, VALUES / 2.0, rtol=1e-15, atol=0.0)
+    assert repr(motion).startswith("<Trajectory: turn 0 to 1 rad, 12 samples, points end, residual")
+    table = motion.dataset().table()
+    assert np.array_equal(table["position.end.y"], motion.points["end"].position[:, 1])
+    assert np.array_equal(table["acceleration.end.z"], motion.points["end"].acceleration[:, 2])
+    units = {name: each.unit for name, each in motion.dataset().columns().items()}
+    assert units["turn"] == "rad"
+    assert units["time"] == "s"
+    assert units["velocity.end.x"] == "m/s"
+    again = pickle.loads(pickle.dumps(motion))
+    assert np.array_equal(again.drive.values["turn"], VALUES)
+
+
+def test_values_changed_after_a_solve_change_no_result():
+    values = VALUES.copy()
+    motion = kincheck.solve(rssr(), "turn", values)
+    values[:] = 0.0
+    assert np.array_equal(motion.drive.values["turn"], VALUES)
+
+
+def test_a_motion_driven_by_several_knows_all_of_them():
+    mechanism = kincheck.Mechanism(
+        "arm",
+        [kincheck.Body("upper"), kincheck.Body("lower")],
+        [
+            kincheck.Revolute("shoulder", "ground", "upper", (0, 0, 0), (0, 0, 1)),
+            kincheck.Translational("slide", "upper", "lower", (1, 0, 0), (1, 0, 0)),
+        ],
+        [kincheck.Point("hand", "lower", (2, 0, 0))],
+        [kincheck.JointAngle("turn", "shoulder"), kincheck.JointDisplacement("reach", "slide")],
+    )
+    sine = kincheck.Sine(amplitude=0.1, frequency=0.5)
+    motion = kincheck.solve(mechanism, "turn", VALUES, rate=1.0, motions={"reach": sine})
+    assert list(motion.drive.values) == ["turn", "reach"]
+    assert motion.drive.units == {"turn": "rad", "reach": "m"}
+    assert np.allclose(motion.drive.values["reach"], 0.1 * np.sin(np.pi * VALUES), atol=1e-15)
+
+
+def test_designs_are_rows_by_design_and_sample(results):
+    designs = results["Designs"]
+    table = designs.dataset().table()
+    assert list(table)[:2] == ["design", "sample"]
+    assert np.array_equal(table["design"], np.repeat([0, 1], 12))
+    assert np.array_equal(table["turn"], np.tile(VALUES, 2))
+    assert np.array_equal(table["position.end.z"], designs.points["end"].position[..., 2].ravel())
+
+
+def test_records_are_rows_of_a_run(results):
+    run = results["Results"]
+    assert run.record("rssr", "native") is results["Record"]
+    with pytest.raises(KeyError):
+        run.record("rssr", "mujoco")
+    table = run.dataset().table()
+    assert table["outcome"].tolist() == ["pass"]
+    assert 0.0 < table["position_error_over_tolerance"][0] < 1.0
+    assert run.to_dict()["schema"] == "kincheck-results/1"
+
+
+def test_figures_have_a_diagram_for_each_variable(results):
+    pytest.importorskip("matplotlib")
+    figure = results["Trajectory"].plot()
+    assert [each.get_ylabel() for each in figure.axes] == [
+        "position [m]",
+        "velocity [m/s]",
+        "acceleration [m/s^2]",
+    ]
+    assert figure.axes[-1].get_xlabel() == "turn [rad]"
+    lines = results["Designs"].plot("position").axes[0].lines
+    assert len(lines) == 2 * 3
+    assert lines[0].get_color() == lines[1].get_color() != lines[2].get_color()
+    with pytest.raises(kincheck.KincheckError, match="no curve 'positon'; did you mean 'position'"):
+        results["Trajectory"].plot("positon")
+    with pytest.raises(kincheck.KincheckError, match="nothing to draw over record"):
+        results["Results"].plot()
+
+
+@pytest.mark.parametrize(
+    ("method", "module"),
+    [("to_dataframe", "pandas"), ("to_xarray", "xarray"), ("plot", "matplotlib.figure")],
+)
+def test_a_missing_library_is_one_message(results, monkeypatch, method, module):
+    name = module.split(".")[0]
+    monkeypatch.delitem(sys.modules, module, raising=False)
+    monkeypatch.setitem(sys.modules, name, None)
+    expected = f"{method} needs {name}, which is not installed: pip install '{name}>="
+    with pytest.raises(kincheck.KincheckError, match=re.escape(expected)):
+        getattr(results["Trajectory"], method)()
+
+
+class Made(Tabular):
+    def __init__(self, **variables):
+        self.data = Dataset(("k",), {"x": Variable("k", [0.0, 1.0, 2.0])}, variables, "x")
+
+    def summary(self):
+        return "<b>bold</b>"
+
+    def dataset(self):
+        return self.data
+
+
+def test_gaps_are_gaps_and_names_are_escaped():
+    html = Made(**{"a<b": Variable("k", [1.0, np.nan, 3.0])})._repr_html_()
+    assert html.count("<polyline") == 2
+    assert "a&lt;b" in html
+    assert "a<b" not in html
+    assert "<b>bold" not in html
+    assert "–" in html
+
+
+def test_nothing_solved_is_shown_too():
+    found = Made(y=Variable("k", [np.nan] * 3))
+    assert "<polyline" not in found._repr_html_()
+    assert found.to_dict()["data_vars"]["y"]["data"] == [None] * 3
+    pytest.importorskip("matplotlib")
+    assert to_figure(found.data, (), "").axes
