@@ -15,6 +15,7 @@ from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
+from kincheck.core import kinematics
 
 ROOT = Path(__file__).parent.parent
 PACKAGE = Path("core/kincheck")
@@ -100,16 +101,13 @@ IMPORTS = {
     "history": ". case case/io harness",
     "history/regression": ". case case/io harness history",
     "report": ". joints mechanism case case/io harness history history/regression",
-    "studies/stress/truth": (
-        ". program joints mechanism kinematics/formulation kinematics/structure "
-        "kinematics/continuation kinematics/verified kinematics case"
-    ),
+    "studies/stress/truth": ". program joints mechanism kinematics case",
     "studies/stress/families": ". joints mechanism case case/io studies/stress/truth",
     "studies": ". program joints mechanism kinematics case case/io harness",
     "studies/joint_check": ". primitives program joints mechanism kinematics case harness report",
     "studies/tolerance": (
-        ". program program/llvm mechanism kinematics/compiled kinematics case case/io "
-        "case/variation harness harness/workers history report"
+        ". program program/llvm mechanism kinematics case case/io case/variation harness "
+        "harness/workers history report"
     ),
     "studies/stress": (
         ". joints mechanism kinematics case case/io harness harness/workers report "
@@ -118,9 +116,8 @@ IMPORTS = {
     "studies/paper": ". primitives program joints mechanism kinematics case harness report",
     "studies/diagnosis": ". joints kinematics case harness report",
     "studies/bench": (
-        ". program/llvm joints mechanism kinematics/compiled kinematics/continuation "
-        "kinematics/by_components kinematics/sparse kinematics case case/io "
-        "case/variation harness report studies studies/tolerance studies/paper"
+        ". program/llvm joints mechanism kinematics case case/io case/variation harness "
+        "report studies studies/tolerance studies/paper"
     ),
     "cli": (
         ". program program/llvm joints kinematics case case/io case/models/hardpoints "
@@ -225,6 +222,19 @@ def imports_against_the_table(path, syntax):
             yield f"imports {'.'.join(target)}: engines share adapters/shared only"
 
 
+DOOR = Path("core/kinematics/__init__.py")
+
+
+def past_the_door(path, syntax):
+    """Yield imports of the files behind core/kinematics: its public names are those of the folder
+    itself.
+    """
+    for target in imported(path, syntax):
+        own = target[1:] if target[0] == "kincheck" else target
+        if own[:2] == DOOR.parts[:2] != path.parts[:2] and module_of(own) != DOOR:
+            yield f"imports {'.'.join(target)}: say core.kinematics"
+
+
 def simulators_at_import(path, syntax):
     """Yield simulators imported when the module loads, by a statement or by import_module."""
     waiting = list(ast.iter_child_nodes(syntax))
@@ -263,12 +273,25 @@ def bare_packages(path, syntax):
             yield f"imports {'.'.join(target)}: say kincheck.{target[0]}"
 
 
-RULES = [imports_against_the_table, simulators_at_import, undocumented]
+RULES = [imports_against_the_table, past_the_door, simulators_at_import, undocumented]
 
 
 @pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.__name__)
 def test_sources(rule):
     found = {str(path): offences for path in SOURCES if (offences := list(rule(path, tree(path))))}
+    assert found == {}
+
+
+INSIDE = {"kinematics", "program", "test_probe.py"}
+"""Below tests: those of the inside of kinematics, and of its programs."""
+
+
+def test_tests_of_anything_else_enter_kinematics_by_its_door():
+    found = {
+        str(path): offences
+        for path in TESTS
+        if INSIDE.isdisjoint(path.parts) and (offences := list(past_the_door(path, tree(path))))
+    }
     assert found == {}
 
 
@@ -303,6 +326,11 @@ OFFENDERS = [
     (imports_against_the_table, "adapters/shared/new.py", "from ..mujoco.spec import Sketch"),
     (imports_against_the_table, "adapters/mujoco/new.py", "from ...cases import load"),
     (imports_against_the_table, "cases/rssr.py", "from ..adapters import engine"),
+    (past_the_door, "core/case/new.py", "from ..kinematics.solver_selection import prepare"),
+    (past_the_door, "core/case/io/new.py", "from ...kinematics import compiled"),
+    (past_the_door, "core/cli/new.py", "def f():\n    from ..kinematics.one_design import solve"),
+    (past_the_door, "core/kincheck/new.py", "import kincheck.core.kinematics.sparse.sweep"),
+    (past_the_door, "adapters/new.py", "from ..core.kinematics.compiled.request import Request"),
     (simulators_at_import, "adapters/new.py", "import mujoco"),
     (simulators_at_import, "adapters/new.py", "class A:\n    from mujoco.viewer import launch"),
     (
@@ -340,6 +368,12 @@ ALLOWED = [
         "adapters/mujoco/new.py",
         "from ...core.mechanism.mechanism import Body\nfrom ..shared.projection import project",
     ),
+    (
+        past_the_door,
+        "adapters/shared/new.py",
+        "from ...core.kinematics import NativeSolver, solve\nfrom ...core import kinematics",
+    ),
+    (past_the_door, "core/kinematics/new.py", "from .compiled.request import Request"),
     (
         simulators_at_import,
         "adapters/new.py",
@@ -421,6 +455,22 @@ def test_no_layer_is_too_large():
             sizes[folder_of(path).split("/")[0]] += lines(path)
     whole = sum(sizes.values())
     assert {name: n / whole for name, n in sizes.items() if n > LARGEST_SHARE * whole} == {}
+
+
+def test_the_door_has_the_names_that_type_checkers_see():
+    """And none of a module, which would take its place once imported."""
+    seen = {
+        alias.asname: node.module
+        for node in ast.walk(tree(DOOR))
+        if isinstance(node, ast.ImportFrom) and node.level
+        for alias in node.names
+    }
+    assert seen == kinematics._MODULES
+    assert all(hasattr(kinematics, name) for name in seen)
+    assert [
+        name for name in seen if (ROOT / DOOR).with_name(name).with_suffix(".py").exists()
+    ] == []
+    assert [name for name in seen if (ROOT / DOOR).with_name(name).is_dir()] == []
 
 
 def test_the_harness_names_the_standard_in_one_place():

@@ -44,8 +44,8 @@ class ProgramSize:
 
         Args:
             iterations: Newton's iterations of the sample.
-            motions: lanes are motions of their own, and not samples of one motion; the first few
-                samples of a motion use other programs.
+            motions: lanes are motions of their own, of varied geometry, and not samples of one
+                motion; the first few samples of a motion use other programs.
         """
         tests = ("extend", *ALONE) if motions else ("extrapolate", *JOINED)
         once = sum(self.flops[name] for name in ("outputs", *tests))

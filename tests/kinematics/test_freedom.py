@@ -21,6 +21,7 @@ from kincheck.core import (
     Translational,
     Universal,
 )
+from kincheck.core.kinematics.diagnosis.instantaneous_screws import free_motions
 from kincheck.core.kinematics.formulation.cartesian import Cartesian
 from kincheck.core.kinematics.formulation.constraints import Constraint, constraints, frames
 from kincheck.core.kinematics.one_design import solve
@@ -316,3 +317,13 @@ def test_drivers_that_repeat_each_other_are_named_and_no_others():
         match=r"drivers 'first', 'second' do not move it .* follows already from each other; give",
     ):
         solve(twice, "first", [0.0])
+
+
+def test_motions_that_have_nothing_to_do_with_each_other_are_not_mixed():
+    """Three motions of two columns each, in a null space whose orthonormal basis mixes them."""
+    rng = np.random.default_rng(7)
+    apart = np.kron(np.eye(3), [[1.0, -1.0]])  # each row ties two columns together
+    found = free_motions(rng.normal(size=(3, 3)) @ apart)
+    assert found.shape == (3, 6)
+    assert np.abs(apart @ found.T).max() <= 1e-14
+    assert ((np.abs(found) > 1e-12).sum(axis=1) == 2).all()

@@ -67,12 +67,11 @@ def test_loops_alone_reach_every_sample_or_say_so():
 
 
 def test_flops_of_a_sample():
-    model = native_breakdown.Level().build(cases.load("rssr")).model
-    sizes = {name: each["flops"] for name, each in model.sizes.items()}
-    once, twice = (native_breakdown.flops_of(model, n) for n in (1.0, 2.0))
-    assert twice - once == sizes["newton"]
+    size = native_breakdown.program_size(cases.load("rssr"))
+    once, twice = (size.of_sample(n) for n in (1.0, 2.0))
+    assert twice - once == size.flops["newton"]
     assert once == sum(
-        sizes[name] for name in ("extrapolate", "newton", "outputs", "joined_gaps", "joined")
+        size.flops[name] for name in ("extrapolate", "newton", "outputs", "joined_gaps", "joined")
     )
 
 

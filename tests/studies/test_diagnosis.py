@@ -25,12 +25,7 @@ from kincheck.core import (
 from kincheck.core.case.case import Case, Output, Sweep, Truth
 from kincheck.core.cli.main import main
 from kincheck.core.joints import Kind
-from kincheck.core.kinematics import Ranks, kinds, places
-from kincheck.core.kinematics.compiled.compiled_model import compile_model
-from kincheck.core.kinematics.compiled.request import Request
-from kincheck.core.kinematics.compiled.samples import Route
-from kincheck.core.kinematics.design_batch import solve_variants
-from kincheck.core.kinematics.diagnosis.instantaneous_screws import free_motions
+from kincheck.core.kinematics import NativeSolver, Ranks, kinds, places
 from kincheck.core.studies.diagnosis import diagnose
 
 from ..support.mechanisms import four_bar, mcpherson, slider_crank
@@ -142,16 +137,6 @@ def test_what_is_left_free_is_described_body_by_body():
     )
 
 
-def test_motions_that_have_nothing_to_do_with_each_other_are_not_mixed():
-    """Three motions of two columns each, in a null space whose orthonormal basis mixes them."""
-    rng = np.random.default_rng(7)
-    apart = np.kron(np.eye(3), [[1.0, -1.0]])  # each row ties two columns together
-    found = free_motions(rng.normal(size=(3, 3)) @ apart)
-    assert found.shape == (3, 6)
-    assert np.abs(apart @ found.T).max() <= 1e-14
-    assert ((np.abs(found) > 1e-12).sum(axis=1) == 2).all()
-
-
 def test_a_link_turns_about_its_instantaneous_centre():
     """Where crank and rocker, drawn longer, meet: (0.3, 0.4) s = (1.4, 0) + (0.2, 1.2) t at s =
     6.
@@ -223,13 +208,10 @@ def test_sensitivities_are_those_of_mechanisms_solved_anew(name, value):
     ]
     h = 1e-5 * np.eye(len(numbers))
     designs = np.array([x for _, _, x in numbers])[:, None] + np.concatenate([h, -h], axis=1)
-    model = compile_model(
-        mechanism,
-        Request(
-            tuple(case.sweep.path.motions), case.points, order=0, varied=tuple(places(mechanism))
-        ),
+    ready = NativeSolver(order=0).prepare_designs(
+        mechanism, case.sweep.path, tuple(places(mechanism)), case.points
     )
-    solved = solve_variants(Route(model, case.sweep.path), designs, 1e-13)
+    solved = ready.solve(designs, 1e-13)
     assert solved.solved.all()
     known = {
         (each.output, each.number): each.by_sample[0]
@@ -240,7 +222,7 @@ def test_sensitivities_are_those_of_mechanisms_solved_anew(name, value):
         own = [place for place, _, _ in numbers].index(f"points.{output.point}.position")
         designed = designs[own : own + 3] if output.relative else 0.0
         found = np.array(output.direction) @ (
-            solved.kept[model.rows[f"position {output.point}"], 0] - designed
+            ready.motion(solved, output.point)[0][:, 0] - designed
         )
         differences = (found[: len(numbers)] - found[len(numbers) :]) / 2e-5
         for (place, k, _), difference in zip(numbers, differences, strict=True):

@@ -12,7 +12,6 @@ from kincheck.core.case.io.case_writer import case_text
 from kincheck.core.errors import KincheckError, SolveError
 from kincheck.core.harness.execution import Answer, Failure, Pair
 from kincheck.core.harness.record import Outcome
-from kincheck.core.kinematics.compiled import motion_start
 from kincheck.core.studies.stress.families import Family, Specimen
 from kincheck.core.studies.stress.families.base import as_case
 from kincheck.core.studies.stress.families.dimensions import crank_rocker
@@ -353,6 +352,6 @@ def test_the_family_of_starts_finds_a_start_that_rounding_decides(monkeypatch):
     found, _ = stress([FAMILIES["starts"]], [NATIVE], samples=240, seed=1, prove=False)
     assert found.cells[0].samples[Verdict.SILENTLY_WRONG] == 0
     assert found.cells[0].samples[Verdict.RIGHT] > 200
-    monkeypatch.setattr(motion_start, "TYPED", 0.0)
+    monkeypatch.setattr("kincheck.core.kinematics.compiled.motion_start.TYPED", 0.0)
     found, _ = stress([FAMILIES["starts"]], [NATIVE], samples=240, seed=1, prove=False)
     assert found.cells[0].samples[Verdict.SILENTLY_WRONG] > 20

@@ -18,14 +18,7 @@ from kincheck.core import (
     Spherical,
     Translational,
 )
-from kincheck.core.kinematics import solve
-from kincheck.core.kinematics.by_components.block_solver import Cascade
-from kincheck.core.kinematics.by_components.sweep import CascadeSweep
-from kincheck.core.kinematics.compiled.compiled_model import compile_model
-from kincheck.core.kinematics.compiled.request import Request
-from kincheck.core.kinematics.compiled.samples import Route
-from kincheck.core.kinematics.continuation.sweep import follow
-from kincheck.core.kinematics.sparse.sweep import solve_sparse
+from kincheck.core.kinematics import Method, NativeSolver, solve
 from kincheck.core.mechanism.motions import Path, Ramp
 
 from ..support.mechanisms import (
@@ -240,24 +233,17 @@ def test_an_arm_on_a_ball_and_two_rods():
 @pytest.mark.parametrize(
     ("way", "turn", "solved"),
     [
-        ("one program", 1000.0, True),
-        ("one program", 1e6, False),
-        ("components", 1000.0, True),
-        ("components", 1e6, False),
-        ("sparse", 100.0, True),  # a part takes it a hundred times as long
+        (Method.ONE_PROGRAM, 1000.0, True),
+        (Method.ONE_PROGRAM, 1e6, False),
+        (Method.BY_COMPONENTS, 1000.0, True),
+        (Method.BY_COMPONENTS, 1e6, False),
+        (Method.SPARSE, 100.0, True),  # a part takes it a hundred times as long
     ],
 )
 def test_a_step_of_many_turns_is_gone_part_by_part_or_refused_as_what_it_is(way, turn, solved):
     m = slider_crank()
-    path, request = Path({"turn": Ramp(1.0)}, np.array([0.0, turn])), Request(("turn",), ("end",))
-    if way == "components":
-        found = CascadeSweep(Cascade(m, request), path).solve(1e-12)
-    else:
-        found = (
-            solve_sparse(m, path, ("end",))
-            if way == "sparse"
-            else follow(Route(compile_model(m, request), path), 1e-12)
-        )
+    path = Path({"turn": Ramp(1.0)}, np.array([0.0, turn]))
+    found = NativeSolver(method=way).prepare(m, path, ("end",))(1e-12)
     assert found.solved.tolist() == [True, solved], found.message
     assert ("give samples in between" in found.message) is not solved
     assert "assembly" not in found.message

@@ -135,7 +135,7 @@ def test_gradients_are_the_closed_form(tmp_path):
     variation = vary(
         tmp_path, case, tip={"at": "tip", "sigma": 1}, axis={"at": "joints.pivot.axis", "sigma": 1}
     )
-    ready = Ready(Study(case, variation, 1, 0))
+    ready = Ready.of(Study(case, variation, 1, 0))
     found = gradients(ready)
     angle = np.append(case.sweep.change, 0.0)
     for k in range(6):
@@ -155,14 +155,16 @@ def test_gradients_that_are_rough_say_so(tmp_path, monkeypatch):
 
     monkeypatch.setattr(room, "STEP", 0.2)
     case = load("mcpherson_strut")
-    assert not gradients(Ready(Study(case, vary(tmp_path, case, axis=AXIS), 1, 0))).accurate.all()
+    assert not gradients(
+        Ready.of(Study(case, vary(tmp_path, case, axis=AXIS), 1, 0))
+    ).accurate.all()
 
 
 def test_gradients_agree_with_differences_of_whole_sweeps(tmp_path):
     """Of the strut, against `solve` of mechanisms made anew, over another step."""
     case = load("mcpherson_strut")
     study = Study(case, vary(tmp_path, case, ball=BALL), 1, 0)
-    found = gradients(Ready(study))
+    found = gradients(Ready.of(study))
     h, values = 1e-4, case.sweep.change
     for k in range(3):
         sides = []

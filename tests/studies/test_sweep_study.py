@@ -118,7 +118,7 @@ def test_outputs_of_variants_are_those_of_their_own_cases(tmp_path):
     """
     case = load("mcpherson_suspension")
     study = Study(case, vary(tmp_path, case, **STRUT), 40, 2, picked=frozenset({0, 17, 39}))
-    chunk = Ready(study).chunk(0)
+    chunk = Ready.of(study).chunk(0)
     engine = adapters.engine("native")
     assert len(study.rows) == len(case.outputs) == 26
     for variant, values in chunk.picked.items():
@@ -162,14 +162,12 @@ def test_derivatives_are_reduced_where_they_are_asked_for(tmp_path):
 
 
 def test_large_motions_are_solved_in_parts_of_a_chunk(tmp_path, monkeypatch):
-    from kincheck.core.studies.tolerance import study as room
-
     case = crank()
     variation = vary(tmp_path, case, tip=TIP, pivot=PIVOT)
     study = Study(case, variation, 300, 4)
-    whole = Ready(study).chunk(0)
-    monkeypatch.setattr(room, "ROOM", 22_000)
-    ready = Ready(study)
+    whole = Ready.of(study).chunk(0)
+    monkeypatch.setattr("kincheck.core.kinematics.prepared_designs.RECYCLED", 22_000)
+    ready = Ready.of(study)
     assert 8 < ready.lanes < 100
     parts = ready.chunk(0)
     np.testing.assert_array_equal(parts.kept, whole.kept)
@@ -249,7 +247,7 @@ def test_variants_without_a_solution_are_counted_and_named(tmp_path):
     )
     assert sum(60 - count for count in found.outputs["rocker_pin_y"].count) == sum(missing.values())
     assert None not in found.outputs["rocker_pin_y"].mean
-    later = Ready(Study(case, variation, 300, 1)).chunk(1).unsolved
+    later = Ready.of(Study(case, variation, 300, 1)).chunk(1).unsolved
     assert later
     assert {each.variant for each in later} <= set(range(64, 128))
 

@@ -3,10 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-from kincheck.core.kinematics.compiled.request import Request
-from kincheck.core.kinematics.forces.reactions import with_forces
-from kincheck.core.kinematics.formulation.constraints import Style
-from kincheck.core.kinematics.solver_selection import prepare
+from kincheck.core.kinematics import NativeSolver, Style, with_forces
 from kincheck.core.mechanism.drivers import JointAngle, PointCoordinate
 
 from ..oracles import naive, newton_euler
@@ -49,8 +46,7 @@ def loaded(mechanism, seed=1, gravity=GRAVITY):
 
 def solved(mechanism, case, style="native"):
     path, names = case.sweep.path, tuple(body.name for body in mechanism.moving)
-    request = Request(tuple(path.motions), (), names, 2, Style(style))
-    motion = prepare(mechanism, request, path)(1e-12)
+    motion = NativeSolver(style=Style(style)).prepare(mechanism, path, bodies=names)(1e-12)
     assert motion.solved.all(), motion.message
     return with_forces(mechanism, path, motion, bodies=names)
 

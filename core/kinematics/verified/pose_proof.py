@@ -17,9 +17,6 @@ from ..structure.degrees_of_freedom import select_rows
 from .exact import as_double, equations, exact_mechanism
 from .krawczyk import Enclosure, enclose
 
-Drive = tuple[Fraction, Fraction, Fraction]
-"""Value from the design, velocity and acceleration of a driver [SI]."""
-
 
 @dataclass(frozen=True)
 class PoseState:
@@ -48,7 +45,7 @@ def prove_pose(
     mechanism: Mechanism,
     points: Sequence[str],
     pose: Array,
-    drives: Mapping[str, Drive],
+    drives: Mapping[str, Sequence[Fraction]],
     bits: int,
 ) -> Enclosure:
     """Prove one pose of a mechanism, its numbers read as doubles.
@@ -57,7 +54,7 @@ def prove_pose(
         mechanism: the mechanism.
         points: names of the output points.
         pose: the approximate state, as `PoseState` orders it.
-        drives: of the moving drivers.
+        drives: value from the design, velocity and acceleration of the moving drivers [SI].
         bits: working precision.
 
     Raises:
@@ -65,7 +62,7 @@ def prove_pose(
         KincheckError: python-flint is not installed, or the rows cannot be selected.
     """
     frame = frames(mechanism)
-    change = {name: float(value) for name, (value, _, _) in drives.items()}
+    change = {name: float(value) for name, (value, *_) in drives.items()}
     selected = select_rows(mechanism, frame, Cartesian.of(mechanism, frame)).chosen
     kept = chosen_at(mechanism, change, pose, selected)
     with precision(bits):

@@ -13,14 +13,9 @@ import numpy as np
 from ...case.case import Case, size
 from ...harness.compare import output_series
 from ...joints import Kind
-from ...kinematics import kinds, places
-from ...kinematics.compiled.compiled_model import Model, compile_model
-from ...kinematics.compiled.request import Request
-from ...kinematics.compiled.samples import Route
-from ...kinematics.design_batch import Variants, solve_variants
+from ...kinematics import NativeSolver, PreparedDesigns, Variants, kinds, places
 from ...program.llvm.compiler import available
-from ...trajectory import QUANTITIES, Array, PointMotion, Trajectory
-from .native_breakdown import MOTIONS, flops_of
+from ...trajectory import Array, PointMotion, Trajectory
 from .peak import Peak
 from .rounds import Spread, Work, take_turns
 
@@ -59,13 +54,13 @@ class Batch(msgspec.Struct, frozen=True, kw_only=True):
 class _Batch:
     """A batch to be timed, with its last solution."""
 
-    route: Route
+    designs: PreparedDesigns
     geometry: Array
     tol: float
     found: list[Variants] = field(default_factory=list[Variants])
 
     def __call__(self) -> None:
-        self.found = [solve_variants(self.route, self.geometry, self.tol)]
+        self.found = [self.designs.solve(self.geometry, self.tol)]
 
 
 def measure_batches(case: Case, tol: float, rounds: int, peak: Peak | None) -> list[Batch]:
@@ -78,32 +73,30 @@ def measure_batches(case: Case, tol: float, rounds: int, peak: Peak | None) -> l
     varied = tuple(
         name for name, kind in kinds(case.mechanism).items() if kind is not Kind.DIRECTION
     )
-    path = case.sweep.path
-    model = compile_model(case.mechanism, Request(tuple(path.motions), case.points, varied=varied))
+    designs = NativeSolver().prepare_designs(case.mechanism, case.sweep.path, varied, case.points)
     nominal = np.array([number for name in varied for number in values[name]])
     scatter = (
         np.random.default_rng(SEED).normal(size=(len(nominal), max(SIZES))) * SCATTER * size(case)
     )
     scatter[:, 0] = 0.0
     batches = {
-        str(count): _Batch(Route(model, path), nominal[:, None] + scatter[:, :count], tol)
-        for count in SIZES
+        str(count): _Batch(designs, nominal[:, None] + scatter[:, :count], tol) for count in SIZES
     }
     work: dict[str, Work] = {**batches}
     if peak is not None:
         work["peak"] = peak
     seconds = take_turns(work, rounds)
     most = None if peak is None else peak.rate(seconds["peak"])
-    return [_batch(case, model, each, seconds[name], most) for name, each in batches.items()]
+    return [_batch(case, each, seconds[name], most) for name, each in batches.items()]
 
 
-def _batch(case: Case, model: Model, batch: _Batch, seconds: Spread, peak: float | None) -> Batch:
+def _batch(case: Case, batch: _Batch, seconds: Spread, peak: float | None) -> Batch:
     (found,) = batch.found
     n, count = found.solved.shape
     reached = int(found.solved.sum())
-    taken: list[float] = found.kept[model.rows["iterations"].start][found.solved].tolist()
+    taken: list[float] = batch.designs.iterations(found)[found.solved].tolist()
     iterations = statistics.fmean(taken) if taken else 0.0
-    flops = flops_of(model, iterations, MOTIONS)
+    flops = batch.designs.size.of_sample(iterations, motions=True)
     rate = flops * reached / seconds.median
     return Batch(
         case=case.name,
@@ -111,7 +104,7 @@ def _batch(case: Case, model: Model, batch: _Batch, seconds: Spread, peak: float
         loop="compiled" if available() else "python",
         solved=reached / (n * count),
         retried=found.retried,
-        error=_error(case, model, found),
+        error=_error(case, batch.designs, found),
         us_per_sample=seconds.times(1e6 / (n * count)),
         flops_per_sample=flops,
         gflops=1e-9 * rate,
@@ -119,11 +112,10 @@ def _batch(case: Case, model: Model, batch: _Batch, seconds: Spread, peak: float
     )
 
 
-def _error(case: Case, model: Model, found: Variants) -> float | None:
+def _error(case: Case, designs: PreparedDesigns, found: Variants) -> float | None:
     """Of the first variant."""
-    kept = found.kept[:, :, 0]
     points = {
-        name: PointMotion(*(kept[model.rows[f"{label} {name}"]].T for label in QUANTITIES))
+        name: PointMotion(*(each[:, :, 0].T for each in designs.motion(found, name)))
         for name in case.points
     }
     solved = found.solved[:, 0]

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from itertools import pairwise
 from time import perf_counter
 
-from ...kinematics.solver_selection import prepare
-from .native_breakdown import Level
+from ...harness.native_engine import NativeEngine
+from .native_breakdown import level
 
 STAGES = (
     "import numpy",
@@ -36,17 +36,17 @@ def first_use(clock: Sequence[float]) -> None:
     """
     case, tol = pickle.load(sys.stdin.buffer)
     begin = perf_counter()
-    level = Level()
-    model = level.build(case)
+    whole = level()
+    model = whole.build(case)
     now = [begin, perf_counter()]
     for solves in (1, 1, 10):  # in the course of ten more, programs are compiled
         for _ in range(solves):
-            level.solve(model, case, tol)
+            whole.solve(model, case, tol)
         now.append(perf_counter())
-    anew = 0.0
+    anew, recent = 0.0, NativeEngine(every_body=True)
     for _ in range(2):  # the first time nothing of it is among what is kept
         begin = perf_counter()
-        prepare(case.mechanism, level.request(case), case.sweep.path)(tol)
+        recent.solve(recent.build(case), case, tol)
         anew = perf_counter() - begin
     stages = [*(b - a for each in (clock, now) for a, b in pairwise(each)), anew]
     print(json.dumps(dict(zip(STAGES, stages, strict=True))))

@@ -13,8 +13,8 @@ import msgspec
 from ...case.case import Case
 from ...errors import KincheckError
 from ...harness.engine import Engine
+from ...harness.native_engine import NativeEngine
 from ...harness.provenance import THREADS, circumstances
-from ...harness.standard import STANDARD
 from ...program.llvm import compiler
 from ...program.llvm.jit import compiled_at_once
 from ...report.figure_data import Effort
@@ -137,7 +137,7 @@ def measure(
     if "size" in parts:
         tell("chains and rings of loops")
         add("sizes", measure_sizes(projections, tol, rounds))
-        if any(engine.name == STANDARD for engine in engines):
+        if any(isinstance(engine, NativeEngine) for engine in engines):
             tell("large mechanisms")
             add("scalings", scaling.measure(LARGE, LARGE, min(rounds, LARGE_ROUNDS)))
     if "processes" in parts:
@@ -182,7 +182,7 @@ def _measure_work(
     for engine in engines:
         for each in contestants(case, efforts_of(engine), tol):
             entering[f"{engine.name} {engine.mode}", each.entry.setting] = each
-    detailed = any(engine.name == STANDARD for engine in engines)
+    detailed = any(isinstance(engine, NativeEngine) for engine in engines)
     if detailed:
         for each in contestants(case, native_breakdown.LEVELS, tol):
             entering["levels", each.entry.setting] = each
@@ -230,9 +230,7 @@ def _rates(case: Case, native: Mapping[str, Entry], peak: Peak, seconds: Spread)
         entry = native.get(setting)
         if entry is None or entry.us_per_sample is None:
             continue
-        flops = native_breakdown.flops_of(
-            native_breakdown.Level().build(case).model, entry.iterations or 0.0
-        )
+        flops = native_breakdown.program_size(case).of_sample(entry.iterations or 0.0)
         us = entry.us_per_sample.median
         rates.append(
             Rate(

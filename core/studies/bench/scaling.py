@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import msgspec
 import numpy as np
 
 from ...errors import SolveError
-from ...kinematics.sparse.sparse_model import SparseModel
-from ...kinematics.sparse.sweep import solve_sparse
+from ...kinematics import Method, NativeSolver
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path, Ramp
 from ...trajectory import Trajectory
@@ -20,6 +20,8 @@ from .size import LEAN, chain
 
 TURN, SAMPLES = 0.8, 64
 """Angle to both sides [rad] and driver values of a sweep."""
+TOL = 1e-12
+"""Largest accepted residual, relative to the mechanism's size."""
 
 
 class Scaling(msgspec.Struct, frozen=True, kw_only=True):
@@ -65,9 +67,9 @@ def _far(name: str, n: int) -> str:
 
 
 def _work(mechanism: Mechanism, point: str) -> Callable[[], Trajectory]:
-    model = SparseModel(mechanism)
     path = Path({"turn": Ramp(1.0)}, np.linspace(-TURN, TURN, SAMPLES))
-    return lambda: solve_sparse(model, path, [point])
+    solver = NativeSolver(method=Method.SPARSE)
+    return partial(solver.prepare(mechanism, path, (point,)), TOL)
 
 
 def _row(name: str, n: int, mechanism: Mechanism, found: Trajectory, seconds: Spread) -> Scaling:

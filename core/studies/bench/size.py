@@ -10,8 +10,7 @@ a closed form.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
 from time import process_time
 from typing import Any
 
@@ -20,17 +19,13 @@ import numpy as np
 
 from ...case.case import Case, Output, Series, Sweep, Truth
 from ...harness.engine import Engine
+from ...harness.native_engine import NativeEngine
 from ...harness.record import Outcome
 from ...harness.standard import STANDARD
 from ...joints import Revolute, Spherical, Universal
-from ...kinematics.by_components.block_solver import Cascade
-from ...kinematics.by_components.sweep import CascadeSweep
-from ...kinematics.compiled.request import Request
+from ...kinematics import Method, NativeSolver
 from ...mechanism.drivers import JointAngle
 from ...mechanism.mechanism import Body, Mechanism, Point
-from ...program.llvm.compiler import available
-from ...trajectory import Trajectory
-from ...version import VERSION
 from .precision import Contestant, contestants
 from .ring import pivot, ring
 from .rounds import Spread, take_turns, warmed
@@ -129,43 +124,12 @@ def _turned(mechanism: Mechanism, tip: str, at: float, source: str) -> Case:
     )
 
 
-@dataclass(frozen=True)
-class ByComponents:
-    """The native engine, a component of the mechanism after the other, similar ones by the same
-    code; see `Engine`.
-    """
-
-    name = "native, by components"
-    mode = "projection"
-
-    @property
-    def loop(self) -> str:
-        """The place of the loop over components and iterations."""
-        return "compiled" if available() else "python"
-
-    @property
-    def settings(self) -> Mapping[str, Any]:
-        """None."""
-        return {}
-
-    def version(self) -> str | None:
-        """Version of kincheck."""
-        return VERSION
-
-    def unsupported(self, case: Case) -> str | None:
-        """Never: for chains only."""
-        return None
-
-    def build(self, case: Case) -> CascadeSweep:
-        """The components' programs."""
-        path = case.sweep.path
-        return CascadeSweep(
-            Cascade(case.mechanism, Request(tuple(path.motions), case.points)), path
-        )
-
-    def solve(self, model: CascadeSweep, case: Case, tol: float) -> Trajectory:
-        """All samples."""
-        return model.solve(tol)
+BY_COMPONENTS = NativeEngine(
+    NativeSolver(method=Method.BY_COMPONENTS), name=f"{STANDARD}, by components"
+)
+"""The native engine, a component of the mechanism after the other, similar ones by the same
+code.
+"""
 
 
 def measure_sizes(engines: Sequence[Engine], tol: float, rounds: int) -> list[Size]:
@@ -173,8 +137,8 @@ def measure_sizes(engines: Sequence[Engine], tol: float, rounds: int) -> list[Si
     chains, too, by components.
     """
     asked: list[tuple[str, Engine, Sequence[int]]] = [(CHAIN, engine, LOOPS) for engine in engines]
-    if any(engine.name == STANDARD for engine in engines):
-        asked.insert(1, (CHAIN, ByComponents(), MANY))
+    if any(isinstance(engine, NativeEngine) for engine in engines):
+        asked.insert(1, (CHAIN, BY_COMPONENTS, MANY))
     asked += [(RING, engine, CRANKS) for engine in engines]
     found = [
         each for family, engine, ladder in asked for each in _solved(family, engine, ladder, tol)

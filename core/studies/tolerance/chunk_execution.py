@@ -116,7 +116,7 @@ def solve_there(packed: bytes, index: int, version: str) -> Chunk:
     key = hashlib.sha256(packed).digest()
     with _lock:  # threads of a worker share the model; two studies at a time are enough
         if key not in _ready:
-            _ready[key] = Ready(pickle.loads(packed))
+            _ready[key] = Ready.of(pickle.loads(packed))
             if len(_ready) > 2:
                 _ready.popitem(last=False)
         ready = _ready[key]

@@ -60,7 +60,7 @@ def gradients(ready: Ready) -> Gradients:
     """Return the gradients of a study."""
     study, path = ready.study, ready.study.case.sweep.path
     n, count = len(path.times), len(study.variation.coordinates)
-    start = ready.route.begin
+    start = ready.designs.start
     from_design = start.stands
     if from_design:  # one sample more, at the design itself
         ready = ready.along(Path(path.motions, np.append(path.times, start.time), path.design))

@@ -5,7 +5,7 @@ Plain data, sent anywhere.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -17,11 +17,7 @@ from ...case.held import require_no_held
 from ...case.rotation import counted
 from ...case.variation.variation import Mode, Stream, Variation, generator
 from ...jet import Jet
-from ...kinematics import placed
-from ...kinematics.compiled.compiled_model import Model, compile_model
-from ...kinematics.compiled.request import Request
-from ...kinematics.compiled.samples import Route
-from ...kinematics.design_batch import RECYCLED, solve_variants
+from ...kinematics import NativeSolver, PreparedDesigns, Variants, placed
 from ...mechanism.motions import Path
 from ...trajectory import PER_TIME, QUANTITIES, Array
 from .reduce import Summary
@@ -30,9 +26,6 @@ from .streaming_totals import Totals
 # Variants that are solved together: what calls cost that reduce them is lost among as many.
 # `solve_designs`, which reduces nothing, is as fast with a quarter of them.
 TOGETHER = 1024
-# Bytes of motions at once, of one thread: many samples of many points are solved fewer at a time.
-# As many are used again.
-ROOM = RECYCLED
 # A study is in so many chunks for threads and workers to share, as far as that makes none smaller
 # than the least, nor larger than the most: each costs the other threads a pause of Python's lock,
 # and on a cluster the scheduler a millisecond.
@@ -160,23 +153,31 @@ class Ready:
     """A study with its model compiled: solves chunks, in any order and in several threads."""
 
     study: Study
-    model: Model = field(init=False)
-    route: Route = field(init=False)
+    designs: PreparedDesigns
 
-    def __post_init__(self) -> None:
-        self.model = compile_model(self.study.case.mechanism, request(self.study))
-        self.route = Route(self.model, self.study.case.sweep.path)
+    @staticmethod
+    def of(study: Study) -> Ready:
+        """Return a study made ready; no derivative is solved that no output needs."""
+        case = study.case
+        # an output of one derivative less is a quotient of velocities, and of two less has their
+        # derivatives in it
+        order = max(
+            3 - output.orders + min(study.order, output.orders - 1) for output in case.outputs
+        )
+        varied = tuple(study.variation.places)
+        solver = NativeSolver(order=order)
+        return Ready(
+            study, solver.prepare_designs(case.mechanism, case.sweep.path, varied, case.points)
+        )
 
     def along(self, path: Path) -> Ready:
         """The same model on another path of the same drivers."""
-        other = object.__new__(Ready)
-        other.study, other.model, other.route = self.study, self.model, Route(self.model, path)
-        return other
+        return Ready(self.study, self.designs.along(path))
 
     @property
     def lanes(self) -> int:
         """Variants that are solved at once."""
-        return max(8, min(TOGETHER, ROOM // (8 * self.model.kept * len(self.route.path.times))))
+        return self.designs.at_once(TOGETHER)
 
     @cached_property
     def nominal(self) -> Array:
@@ -188,19 +189,16 @@ class Ready:
         solved (n, V); retried; messages.
         """
         geometry = self.study.variation.geometry(offsets)
-        found = solve_variants(self.route, geometry, self.study.tol)
-        return self._rows(found.kept, geometry), found.solved, found.retried, found.messages
+        found = self.designs.solve(geometry, self.study.tol)
+        return self._rows(found, geometry), found.solved, found.retried, found.messages
 
-    def _rows(self, kept: Array, geometry: Array) -> Array:
+    def _rows(self, found: Variants, geometry: Array) -> Array:
         at: dict[str, Vec3] = {}
         design: dict[str, Vec3] = {}
         numbers = self._numbers
         unknown = np.full((1, 1), np.nan)
         for name in self.study.case.points:
-            known = [
-                kept[self.model.rows[f"{label} {name}"]]
-                for label in QUANTITIES[: self.model.orders]
-            ]
+            known = self.designs.motion(found, name)
             x, v, a = (known[k] if k < len(known) else (unknown,) * 3 for k in range(3))
             at[name] = Vec3(*(Jet(*each) for each in zip(x, v, a, strict=True)))
             place = f"points.{name}.position"
@@ -210,7 +208,7 @@ class Ready:
                 else np.array(self.study.case.mechanism.point(name).position)
             )
             design[name] = Vec3(*(Jet(each, np.zeros(()), np.zeros(())) for each in where))
-        values = np.empty((len(self.study.rows), *kept.shape[1:]))
+        values = np.empty((len(self.study.rows), *found.solved.shape))
         # what is not known is NaN, and what is made of it becomes NaN
         with np.errstate(all="ignore"):
             case = self.study.case
@@ -239,7 +237,7 @@ class Ready:
         offsets = study.variation.offsets(study.seed, first, count)
         chosen = generator(study.seed, index, Stream.SUBSET).random(count) < study.subset
         totals, picked, kept = (
-            Totals(len(study.rows), len(self.route.path.times)),
+            Totals(len(study.rows), len(study.case.sweep.values)),
             dict[int, Array](),
             list[Array](),
         )
@@ -281,17 +279,6 @@ class Ready:
         if not self.study.picked:
             return ()
         return [k for k in range(first + part.start, first + part.stop) if k in self.study.picked]
-
-
-def request(study: Study) -> Request:
-    """What the native solver is asked for: no derivative that no output needs."""
-    case = study.case
-    # an output of one derivative less is a quotient of velocities, and of two less has their
-    # derivatives in it
-    order = max(3 - output.orders + min(study.order, output.orders - 1) for output in case.outputs)
-    return Request(
-        tuple(case.sweep.path.motions), case.points, (), order, varied=tuple(study.variation.places)
-    )
 
 
 def largest(changes: Array) -> Array:

@@ -23,7 +23,6 @@ from ...harness.execution import Solver
 from ...harness.interrupts import deferred, hold
 from ...harness.provenance import circumstances
 from ...harness.workers.distributed import ClusterError
-from ...kinematics.solver_selection import start_notes
 from ...trajectory import Array
 from . import cross_check, results
 from .chunk_execution import Source, on_threads
@@ -125,7 +124,7 @@ def sweep_designs(
         cross_check.require_able(study, check.engine, check.solver, check.tol)
         study = replace(study, picked=cross_check.chosen(study.samples, check.share, seed))
     study = replace(study, subset=min(1.0, _kept(study) / study.samples))
-    ready = Ready(study)
+    ready = Ready.of(study)
     found = _Gathered(study)
     for chunk in part.finished(study) if part is not None else ():
         found.add(chunk)
@@ -184,9 +183,7 @@ def sweep_designs(
     with ThreadPoolExecutor(jobs) as pool:  # sorting runs without Python's lock
         kept = list(pool.map(partial(quantiles, exact=exact), by_row))
     run = circumstances([case], started=started, tol=tol, command=command)
-    run["cases"][case.name]["notes"] += start_notes(
-        case.mechanism, ready.model.request, case.sweep.path, tol
-    )
+    run["cases"][case.name]["notes"] += ready.designs.start_notes(tol)
     return results.SweepResults(
         run=run,
         case=case.name,

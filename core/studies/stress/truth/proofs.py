@@ -4,19 +4,12 @@ engine's equations.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
-from ....algebra import Vec3
-from ....kinematics import Cartesian
-from ....kinematics.continuation.row_exchange import chosen_at
-from ....kinematics.formulation.constraints import frames
-from ....kinematics.structure.degrees_of_freedom import select_rows
-from ....kinematics.verified.exact import as_double, equations, exact_mechanism
-from ....kinematics.verified.krawczyk import enclose
+from ....kinematics import PoseState, prove_pose
 from ....program.ball_executor import flint, precision
 from ....trajectory import Array
 from .long_double import Real, extended, unit
@@ -40,45 +33,32 @@ def distance_from_proof(truth: Truth, sample: int) -> float:
     mechanism, points = system.mechanism, system.case.points
     path = system.path
     drives = system.sampled(np.array([sample]))[:, :, 0]
-    frame = frames(mechanism)
-    still = Cartesian.of(mechanism, frame)
-    pose = _state(truth, at, [*still.design], frame.unit, frame.origins)
-    change = {name: float(drives[0, system.names.index(name)]) for name in path.motions}
-    kept = chosen_at(mechanism, change, pose, select_rows(mechanism, frame, still).chosen)
+    pose = _state(truth, at, PoseState.of(mechanism))
+    exact = {
+        name: [_exact(x) for x in drives[:, system.names.index(name)]] for name in path.motions
+    }
+    found = prove_pose(mechanism, points, pose, exact, BITS)
+    worst = 0.0
     with precision(BITS):
-        traced = equations(exact_mechanism(mechanism, as_double), tuple(path.motions), points, kept)
-        driven = [
-            [
-                flint().arb(_exact(x))
-                / (1.0 if mechanism.driver(name).turns else traced.frame.unit)
-                for x in drives[:, system.names.index(name)]
-            ]
-            for name in path.motions
-        ]
-        found = enclose(traced, points, pose, driven, BITS)
-        worst = 0.0
         for name in points:
             mine = truth.points[name][0][sample] - extended(mechanism.point(name).position)
-            for ball, x in zip(found.points[name][0], mine, strict=True):
-                off = float((ball - flint().arb(_exact(x))).abs_upper())
-                worst = max(worst, off / float(truth.bounds[name][0, sample]))
+            for ball, x in zip(found.points[name][0], map(_exact, mine), strict=True):
+                off = ball - flint().arb(flint().fmpq(x.numerator, x.denominator))
+                worst = max(worst, float(off.abs_upper()) / float(truth.bounds[name][0, sample]))
     return worst
 
 
-def _exact(x: Any) -> Any:
+def _exact(x: Any) -> Fraction:
     """An extended number, exactly: as two doubles."""
     high = float(x)
-    exact = Fraction(high) + Fraction(float(x - np.longdouble(high)))
-    return flint().fmpq(exact.numerator, exact.denominator)
+    return Fraction(high) + Fraction(float(x - np.longdouble(high)))
 
 
-def _state(
-    truth: Truth, at: Solved, names: Sequence[str], metres: float, origins: Mapping[str, Vec3]
-) -> Array:
+def _state(truth: Truth, at: Solved, state: PoseState) -> Array:
     """The scalars that fix the configuration, as the proof has them."""
-    stated = truth.system.rows.stated
+    stated, metres, origins = truth.system.rows.stated, state.unit, state.origins
     found: list[float] = []
-    for name in names:
+    for name in state.names:
         kind, of = name.split(" ", 1)
         if kind == "x":
             found.append(_coordinate(truth, at, of, metres))
