@@ -10,6 +10,7 @@ ENGINES = {
     "mujoco": ("mujoco.mujoco", "MuJoCo"),
     "pinocchio": ("pinocchio.pinocchio", "Pinocchio"),
     "exudyn": ("exudyn.exudyn", "Exudyn"),
+    "simbody": ("simbody.simbody", "Simbody"),
 }
 """Name on the command line: module and class of the engine in projection mode."""
 

@@ -27,13 +27,15 @@ class ProjectionEngine(ABC):
     Attributes:
         corrections: Newton steps after the predictor, whatever residual they leave; None: as many
             as it takes.
-        name: as on the command line, and of the simulator's Python package.
+        name: as on the command line.
+        package: name of the simulator's Python package; empty if it is the engine's.
         title: as in a sentence.
         joints: types that have a counterpart.
     """
 
     corrections: int | None = None
     name: ClassVar[str]
+    package: ClassVar[str] = ""
     title: ClassVar[str]
     joints: ClassVar[Collection[type[Joint]]]
     mode = "projection"
@@ -54,7 +56,7 @@ class ProjectionEngine(ABC):
     def version(self) -> str | None:
         """Return the simulator's version, or None if the import fails."""
         try:
-            return self.version_of(importlib.import_module(self.name))
+            return self.version_of(importlib.import_module(self.package or self.name))
         except (
             Exception,
             SystemExit,
