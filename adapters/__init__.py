@@ -10,6 +10,8 @@ ENGINES = {
     "mujoco": ("mujoco.mujoco", "MuJoCo"),
     "pinocchio": ("pinocchio.pinocchio", "Pinocchio"),
     "exudyn": ("exudyn.exudyn", "Exudyn"),
+    "drake": ("drake.drake", "Drake"),
+    "dart": ("dart.dart", "Dart"),
     "simbody": ("simbody.simbody", "Simbody"),
 }
 """Name on the command line: module and class of the engine in projection mode."""

@@ -10,37 +10,21 @@ classical acceleration of a frame. `loop_closures` makes the rows of any joint o
 from __future__ import annotations
 
 import importlib
-from collections.abc import Mapping
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ...core.case.case import Case
-from ...core.harness.engine import Floor
 from ...core.trajectory import Array
-from ..shared.compiled_floor import floor_of
 from ..shared.joint_chains import Link
-from ..shared.length_scaling import in_own_frame
-from ..shared.loop_closures import CLOSURES
-from ..shared.projection_engine import ProjectionEngine
+from ..shared.tree_engine import TreeEngine
 from ..shared.tree_model import TreeModel
 
 
-class Pinocchio(ProjectionEngine):
+class Pinocchio(TreeEngine):
     """The engine `pinocchio`."""
 
-    name, title, joints = "pinocchio", "Pinocchio", CLOSURES
-
-    @property
-    def described(self) -> Mapping[str, Any]:
-        """Coordinates of Pinocchio's tree and the equations of its loops."""
-        return {
-            "coordinates": (
-                "spanning tree of Pinocchio joints: a joint is a chain of slides, hinges and balls"
-            ),
-            "closures": "conditions on frame placements, Jacobians and classical accelerations",
-        }
+    name, title = "pinocchio", "Pinocchio"
 
     def version_of(self, simulator: Any) -> str | None:
         """Return the version; None for PyPI's unrelated "pinocchio", which has no Model.
@@ -49,46 +33,9 @@ class Pinocchio(ProjectionEngine):
         """
         return super().version_of(simulator) if hasattr(simulator, "Model") else None
 
-    def build(self, case: Case) -> PinocchioModel:
-        """Return tree, frames and conditions of the case, at the design position."""
-        return PinocchioModel(importlib.import_module("pinocchio"), in_own_frame(case))
-
-    def floor(self, case: Case) -> Floor:
-        """Return the floor from the Jacobians and placements of joints and frames."""
-        model = self.build(case)
-        solved = self.solve(model, case, 1e-12)
-        pin, least = model.pin, model.pin.Model()
-        # Pinocchio ends the process where it is asked for the Jacobian of a frame that no joint
-        # carries
-        joint = least.addJoint(0, pin.JointModelPX(), pin.SE3.Identity(), "joint")
-        frame = least.addFrame(
-            pin.Frame("frame", joint, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME)
-        )
-        own, empty = (model.model, model.data), (least, least.createData())
-        zero = np.zeros(model.model.nv)
-
-        def calls(
-            function: Any, *given: Any, none: tuple[Any, ...] | None = None, times: int = 1
-        ) -> tuple[Any, Any, int]:
-            return (
-                partial(function, *own, *given),
-                partial(function, *empty, *(none or (np.zeros(1),) * len(given))),
-                times,
-            )
-
-        pose = {
-            "computeJointJacobians": calls(pin.computeJointJacobians, model.q),
-            "updateFramePlacements": calls(pin.updateFramePlacements),
-            "getFrameJacobian": calls(
-                pin.getFrameJacobian,
-                1,
-                model.axes,
-                none=(frame, model.axes),
-                times=len(model.moving),
-            ),
-        }
-        rates = {"forwardKinematics": calls(pin.forwardKinematics, model.q, zero, zero, times=2)}
-        return floor_of(self, solved, model.model.nv, pose, rates)
+    def model_of(self, case: Case) -> PinocchioModel:
+        """Return tree, frames and conditions of the case."""
+        return PinocchioModel(importlib.import_module("pinocchio"), case)
 
 
 class PinocchioModel(TreeModel):

@@ -27,8 +27,8 @@ class ProjectionEngine(ABC):
     Attributes:
         corrections: Newton steps after the predictor, whatever residual they leave; None: as many
             as it takes.
-        name: as on the command line.
-        package: name of the simulator's Python package; empty if it is the engine's.
+        name: as on the command line, and of the simulator's Python package by default.
+        package: of the simulator, where it has another name.
         title: as in a sentence.
         joints: types that have a counterpart.
     """

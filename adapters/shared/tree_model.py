@@ -234,11 +234,21 @@ class TreeModel(ABC):
     def move(self, dx: Array) -> None:
         self.q = self.moved(dx)
 
-    def residual(self, c: Array) -> Array:
+    def observe(self) -> None:
+        """Ask the simulator for the poses and Jacobians of all frames in conditions, at q."""
         self.place()
         for frame in self.moving:
             frame.position, frame.rotation = self.placement(frame.handle)
             frame.jacobian = self.slope(frame.handle)
+
+    def observe_rates(self, v: Array) -> None:
+        """Ask the simulator for their velocities at v and their Jdot v, at the q last placed."""
+        self.rate(v, np.zeros_like(v))
+        for frame in self.moving:
+            frame.velocity, frame.acceleration = self.motion(frame.handle)
+
+    def residual(self, c: Array) -> Array:
+        self.observe()
         r = -(self.columns @ c)
         for rows, condition in zip(self.slices, self.conditions, strict=True):
             phi, self.J[rows] = condition.rows()
@@ -252,9 +262,7 @@ class TreeModel(ABC):
         return self.columns
 
     def bias(self, v: Array) -> Array:
-        self.rate(v, np.zeros_like(v))
-        for frame in self.moving:
-            frame.velocity, frame.acceleration = self.motion(frame.handle)
+        self.observe_rates(v)
         bias = np.empty(len(self.J))
         for rows, condition in zip(self.slices, self.conditions, strict=True):
             bias[rows] = condition.bias()

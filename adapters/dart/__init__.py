@@ -1,0 +1,1 @@
+"""DART: projection by the kinematics and Jacobians of its Skeleton."""

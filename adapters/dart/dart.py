@@ -1,0 +1,111 @@
+"""DART, projection mode: the tree of a Skeleton, closed by conditions on its body nodes.
+
+DART's own constraints live in the velocities of its time steps, and have no residual of a pose.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+import numpy as np
+
+from ...core.case.case import Case
+from ...core.trajectory import Array
+from ..shared.joint_chains import Link
+from ..shared.tree_engine import TreeEngine
+from ..shared.tree_model import TreeModel
+
+# DART has what turns above what shifts.
+ROWS = np.array([3, 4, 5, 0, 1, 2])
+
+
+class Dart(TreeEngine):
+    """The engine `dart`."""
+
+    name, title, package = "dart", "DART", "dartpy"
+
+    def model_of(self, case: Case) -> DartModel:
+        """Return tree, points and conditions of the case."""
+        return DartModel(importlib.import_module("dartpy"), case)
+
+
+class DartModel(TreeModel):
+    """The tree in DART: a body node and its joint for each link, a simple frame for each frame."""
+
+    def __init__(self, dart: Any, case: Case) -> None:
+        self.parts, self.transform = dart.dynamics, dart.math.Isometry3
+        self.skeleton = self.parts.Skeleton("mechanism")
+        self.nodes, self.joints = [None], [None]
+        super().__init__(case)
+
+    def add_link(self, parent: int, link: Link, offset: Array) -> None:
+        parts, skeleton = self.parts, self.skeleton
+        match link.move:
+            case "slide":
+                given = parts.PrismaticJointProperties()
+                create = skeleton.createPrismaticJointAndBodyNodePair
+            case "hinge":
+                given = parts.RevoluteJointProperties()
+                create = skeleton.createRevoluteJointAndBodyNodePair
+            case "ball":
+                given = parts.BallJointProperties()
+                create = skeleton.createBallJointAndBodyNodePair
+        if link.move != "ball":
+            given.mAxis = np.array(link.axis)
+        given.mName, given.mT_ParentBodyToJoint = f"joint {len(self.joints)}", self._at(offset)
+        joint, node = create(self.nodes[parent], given)
+        self.joints.append(joint)
+        self.nodes.append(node)
+
+    def make_frame(self, body: int, offset: Array) -> Any:
+        node = self.nodes[body]
+        # a node's own methods of a frame take ten times as long, in its Python binding
+        return self.parts.SimpleFrame(node, "frame", self._at(offset)), node, offset
+
+    def _at(self, offset: Array) -> Any:
+        placed = self.transform()
+        placed.set_translation(offset)
+        return placed
+
+    def finish(self) -> None:
+        pass  # a skeleton is always ready
+
+    @property
+    def unknowns(self) -> int:
+        return self.skeleton.getNumDofs()
+
+    def coordinate(self, body: int) -> tuple[int, int]:
+        at = self.joints[body].getIndexInSkeleton(0)
+        return at, at
+
+    def design(self) -> Array:
+        return np.zeros(self.unknowns)
+
+    def moved(self, dx: Array) -> Array:
+        self.skeleton.setPositions(self.q)
+        self.skeleton.setVelocities(dx)
+        self.skeleton.integratePositions(1.0)
+        return self.skeleton.getPositions()
+
+    def place(self) -> None:
+        self.skeleton.setPositions(self.q)
+
+    def rate(self, v: Array, a: Array) -> None:
+        self.skeleton.setVelocities(v)
+        self.skeleton.setAccelerations(a)
+
+    def placement(self, handle: Any) -> tuple[Array, Array]:
+        pose = handle[0].getWorldTransform()
+        return pose.translation(), pose.rotation()
+
+    def slope(self, handle: Any) -> Array:
+        _, node, offset = handle
+        return self.skeleton.getWorldJacobian(node, offset).take(ROWS, 0)
+
+    def motion(self, handle: Any) -> tuple[Array, Array]:
+        frame = handle[0]
+        return (
+            np.concatenate([frame.getLinearVelocity(), frame.getAngularVelocity()]),
+            np.concatenate([frame.getLinearAcceleration(), frame.getAngularAcceleration()]),
+        )

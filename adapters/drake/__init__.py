@@ -1,0 +1,1 @@
+"""Drake: projection by the kinematics and Jacobians of its MultibodyPlant."""

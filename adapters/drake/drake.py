@@ -1,0 +1,140 @@
+"""Drake, projection mode: the tree of a MultibodyPlant, closed by conditions on its frames.
+
+Drake's own constraints are soft or belong to its inverse kinematics, and have no Jdot v. A ball is
+its quaternion floating joint whose displacement stays zero, because its ball joint has roll, pitch
+and yaw, which lock at a right angle.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.metadata
+from typing import Any
+
+import numpy as np
+
+from ...core.case.case import Case
+from ...core.trajectory import Array
+from ..shared.joint_chains import Link
+from ..shared.tree_engine import TreeEngine
+from ..shared.tree_model import TreeModel
+
+# Drake has what turns above what shifts.
+ROWS = np.array([3, 4, 5, 0, 1, 2])
+
+
+class Drake(TreeEngine):
+    """The engine `drake`."""
+
+    name, title, package = "drake", "Drake", "pydrake.multibody.plant"
+
+    def version_of(self, simulator: Any) -> str | None:
+        """Return the version of the distribution: the package states none."""
+        return importlib.metadata.version("drake")
+
+    def model_of(self, case: Case) -> DrakeModel:
+        """Return tree, frames and conditions of the case."""
+        return DrakeModel(case)
+
+
+class DrakeModel(TreeModel):
+    """The tree in Drake: a body and its joint for each link, a fixed offset frame for each frame.
+
+    Attributes:
+        turning: places of the velocities that are unknowns: all but the displacements of balls.
+        balls: where in Drake's positions a ball has its quaternion.
+    """
+
+    def __init__(self, case: Case) -> None:
+        load = importlib.import_module
+        self.tree, plant = load("pydrake.multibody.tree"), load("pydrake.multibody.plant")
+        self.shift = load("pydrake.math").RigidTransform
+        self.plant = plant.MultibodyPlant(0.0)
+        self.world, self.kind = self.plant.world_frame(), self.tree.JacobianWrtVariable.kV
+        self.bodies, self.joints = [self.plant.world_body()], [None]
+        self.zero = np.zeros(3)
+        super().__init__(case)
+
+    def add_link(self, parent: int, link: Link, offset: Array) -> None:
+        tree, n, axis = self.tree, len(self.bodies), np.array(link.axis)
+        inertia = tree.SpatialInertia(1.0, np.zeros(3), tree.UnitInertia(1.0, 1.0, 1.0))
+        body = self.plant.AddRigidBody(f"body {n}", inertia)
+        ends = f"joint {n}", self._frame(parent, offset), body.body_frame()
+        match link.move:
+            case "slide":
+                joint = tree.PrismaticJoint(*ends, axis)
+            case "hinge":
+                joint = tree.RevoluteJoint(*ends, axis)
+            case "ball":
+                joint = tree.QuaternionFloatingJoint(*ends)
+        self.joints.append(self.plant.AddJoint(joint))
+        self.bodies.append(body)
+
+    def make_frame(self, body: int, offset: Array) -> Any:
+        return self._frame(body, offset)
+
+    def _frame(self, body: int, offset: Array) -> Any:
+        name = f"frame {self.plant.num_frames()}"
+        return self.plant.AddFrame(
+            self.tree.FixedOffsetFrame(name, self.bodies[body], self.shift(offset))
+        )
+
+    def finish(self) -> None:
+        self.plant.Finalize()
+        self.context = self.plant.CreateDefaultContext()
+        balls = [joint for joint in self.joints if joint and joint.num_velocities() == 6]
+        self.balls = [slice(at, at + 4) for at in (each.position_start() for each in balls)]
+        idle = [each.velocity_start() + k for each in balls for k in (3, 4, 5)]
+        self.turning = np.setdiff1d(np.arange(self.plant.num_velocities()), idle)
+        # of rows and unknowns in a Jacobian, whose columns Drake stores one after another
+        self.chosen = ROWS[:, None] + len(ROWS) * self.turning
+        self.places = {int(full): k for k, full in enumerate(self.turning)}
+
+    @property
+    def unknowns(self) -> int:
+        return len(self.turning)
+
+    def coordinate(self, body: int) -> tuple[int, int]:
+        joint = self.joints[body]
+        return joint.position_start(), self.places[joint.velocity_start()]
+
+    def design(self) -> Array:
+        return self.plant.GetPositions(self.plant.CreateDefaultContext())
+
+    def full(self, v: Array) -> Array:
+        """Return all velocities of the plant from the unknown ones."""
+        found = np.zeros(self.plant.num_velocities())
+        found[self.turning] = v
+        return found
+
+    def moved(self, dx: Array) -> Array:
+        self.plant.SetPositions(self.context, self.q)
+        q = self.q + self.plant.MapVelocityToQDot(self.context, self.full(dx))
+        for ball in self.balls:
+            q[ball] /= np.linalg.norm(q[ball])
+        return q
+
+    def place(self) -> None:
+        self.plant.SetPositions(self.context, self.q)
+
+    def rate(self, v: Array, a: Array) -> None:
+        self.plant.SetVelocities(self.context, self.full(v))
+        self.a = a
+
+    def placement(self, handle: Any) -> tuple[Array, Array]:
+        pose = handle.CalcPoseInWorld(self.context).GetAsMatrix34()
+        return pose[:, 3], pose[:, :3]
+
+    def slope(self, handle: Any) -> Array:
+        columns = self.plant.CalcJacobianSpatialVelocity(
+            self.context, self.kind, handle, self.zero, self.world, self.world
+        )
+        return columns.T.reshape(-1).take(self.chosen)
+
+    def motion(self, handle: Any) -> tuple[Array, Array]:
+        velocity = handle.CalcSpatialVelocityInWorld(self.context).get_coeffs()[ROWS]
+        bias = self.plant.CalcBiasSpatialAcceleration(
+            self.context, self.kind, handle, self.zero, self.world, self.world
+        ).get_coeffs()[ROWS]
+        # with accelerations of the coordinates for the few output points only
+        return velocity, bias + self.slope(handle) @ self.a if self.a.any() else bias

@@ -1,0 +1,77 @@
+"""Base of the engines in projection mode whose simulator is a tree of links; see `tree_model`."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from ...core.case.case import Case
+from ...core.harness.engine import Floor
+from ...core.joints import Translational
+from ...core.mechanism.drivers import PointCoordinate
+from ...core.mechanism.mechanism import GROUND, Body, Mechanism, Point
+from .compiled_floor import floor_of
+from .length_scaling import in_own_frame
+from .loop_closures import CLOSURES
+from .projection_engine import ProjectionEngine
+from .tree_model import TreeModel
+
+# One slide, whose point is driven: one frame in a condition.
+LEAST = Mechanism(
+    "slide",
+    [Body("slide")],
+    [Translational("rail", GROUND, "slide", point=(0.0, 0.0, 0.0), axis=(1.0, 0.0, 0.0))],
+    [Point("slide", "slide", (1.0, 0.0, 0.0))],
+    [PointCoordinate("stroke", "slide", (1.0, 0.0, 0.0))],
+)
+
+
+class TreeEngine(ProjectionEngine):
+    """An engine that makes a `TreeModel`."""
+
+    joints = CLOSURES
+
+    @property
+    def described(self) -> Mapping[str, Any]:
+        """Coordinates of the tree and the equations of its loops."""
+        return {
+            "coordinates": f"spanning tree in {self.title}; a joint is a chain of slides, hinges"
+            " and balls",
+            "closures": "conditions on placements, Jacobians and accelerations of frames",
+        }
+
+    @abstractmethod
+    def model_of(self, case: Case) -> TreeModel:
+        """Return the simulator's model of the case as it stands, at the design position."""
+
+    def build(self, case: Case) -> TreeModel:
+        """Return the simulator's model of the case in its own frame, at the design position."""
+        return self.model_of(in_own_frame(case))
+
+    def floor(self, case: Case) -> Floor:
+        """Return the floor from all that a pose and its rates ask of the simulator."""
+        model, least = self.build(case), self.model_of(replace(case, mechanism=LEAST, outputs=()))
+        solved = self.solve(model, case, 1e-12)
+        n, wanted = len(model.moving), len(model.wanted)
+        # the same Python, the smallest model
+        least.moving, least.wanted = least.moving * n, least.moving * wanted
+        zeros = np.zeros(model.unknowns), np.zeros(least.unknowns)
+        pose = {
+            f"placements and Jacobians of {n} frames": (model.observe, least.observe, 1),
+        }
+        rates = {
+            f"accelerations of {n} frames": (
+                *(partial(m.observe_rates, v) for m, v in zip((model, least), zeros, strict=True)),
+                1,
+            ),
+            f"motions of {wanted} points": (
+                *(partial(m.points, v, v) for m, v in zip((model, least), zeros, strict=True)),
+                1,
+            ),
+        }
+        return floor_of(self, solved, model.unknowns, pose, rates)
