@@ -1,14 +1,14 @@
 """A mechanism as a tree of bodies in an OpenSim model, with Simbody's constraints to close loops;
 private to its adapter.
 
-Names are numbers: at a name with a blank, as at other faults, OpenSim ends the process. The axes of every body are global at design. OpenSim's own limits of coordinates play no part: they
-act where its forces or `setValue` do, and neither is used.
+The axes of every body are global at design. Names are numbers, because OpenSim ends the process at
+a name with a blank. Its limits of coordinates play no part: they act on its forces and on
+`setValue`, and neither is used.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from math import atan2, hypot
 from typing import Any
 
@@ -23,14 +23,6 @@ from ..shared.joint_chains import CHAINS, Link, dependence, end_of_loop, relatio
 from ..shared.tree_model import TreeModel
 
 NO_TURN = (0.0, 0.0, 0.0)
-
-
-@dataclass(frozen=True, eq=False)
-class Station:
-    """A point in the axes of a body of OpenSim [m]."""
-
-    body: Any
-    point: Any
 
 
 class ConstrainedTree(TreeModel):
@@ -71,9 +63,6 @@ class ConstrainedTree(TreeModel):
         self.model.addJoint(move)
         self.bodies.append(body)
         self.moves.append(move)
-
-    def make_frame(self, body: int, offset: Array) -> Station:
-        return Station(self.bodies[body], self.vector(offset))
 
     def close(self, joint: Joint, ends: tuple[Vector, Vector], named: bool) -> None:
         i, j = self.bodies_of(joint)

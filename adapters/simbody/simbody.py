@@ -19,14 +19,15 @@ from ...core.case.case import Case
 from ...core.harness.engine import Floor
 from ...core.joints import Translational
 from ...core.mechanism.drivers import JointDisplacement
-from ...core.mechanism.mechanism import GROUND, Body, Mechanism
+from ...core.mechanism.mechanism import GROUND, Body, Mechanism, Vector
 from ...core.trajectory import Array
 from ..shared.compiled_floor import floor_of
 from ..shared.length_scaling import in_own_frame
 from ..shared.loop_closures import CLOSURES
 from ..shared.projection_engine import ProjectionEngine
-from .constrained_tree import ConstrainedTree, Station
+from .constrained_tree import ConstrainedTree
 from .rotations import UNTURNED, euler_angles, turned
+from .stations import Station
 
 
 class Simbody(ProjectionEngine):
@@ -104,7 +105,7 @@ def _calls(of: SimbodyModel) -> Mapping[str, Callable[[], Any]]:
         "calcFrameJacobian": lambda: matter.calcFrameJacobian(state, body, at.point, J),
         "realizeVelocity": lambda: (state.setU(u), whole.realizeVelocity(state)),
         "calcBiasForAccelerationConstraints": lambda: matter.calcBiasForAccelerationConstraints(
-            state, of.b
+            state, of.vector_
         ),
         "calcBiasForFrameJacobian": lambda: matter.calcBiasForFrameJacobian(state, body, at.point),
     }
@@ -160,7 +161,7 @@ class SimbodyModel(ConstrainedTree):
         self.single = np.array(
             [at for at, ball in zip(self.places, turns, strict=True) if not ball], dtype=np.intp
         ).reshape(-1, 2)
-        self.G, self.b, self.J6 = o.Matrix(), o.Vector(), o.Matrix()
+        self.matrix, self.vector_ = o.Matrix(), o.Vector()
         rows = self.state.getNQErr()
         if rows:
             self.conditions.insert(0, Constraints(self, rows))
@@ -197,37 +198,33 @@ class SimbodyModel(ConstrainedTree):
         self.state.setU(self.o.Vector.createFromMat(v))
         self.model.realizeVelocity(self.state)
 
+    def add_frame(self, body: int, at: Vector) -> Any:
+        # not among the frames of the base, which reads all of each at every pose
+        return self.make_frame(body, np.array(at) - self.origin[body])
+
+    def make_frame(self, body: int, offset: Array) -> Station:
+        return Station(self, self.bodies[body], self.vector(offset))
+
     def placement(self, handle: Station) -> tuple[Array, Array]:
-        state, body = self.state, handle.body
-        R = body.getTransformInGround(state).R()
-        return (
-            body.findStationLocationInGround(state, handle.point).to_numpy(),
-            np.array([[R.get(i, j) for j in range(3)] for i in range(3)]),
-        )
+        return handle.position, handle.rotation
 
     def slope(self, handle: Station) -> Array:
-        body, J = handle.body.getMobilizedBodyIndex(), np.empty((6, self.unknowns))
-        self.matter.calcFrameJacobian(self.state, body, handle.point, self.J6)
-        given = self.J6.to_numpy()
-        J[:3], J[3:] = given[3:], given[:3]  # Simbody has the rotation first
-        return J
+        return handle.jacobian
 
     def motion(self, handle: Station) -> tuple[Array, Array]:
-        state, body, at = self.state, handle.body, handle.point
-        velocity = (
-            body.findStationVelocityInGround(state, at).to_numpy(),
-            body.getAngularVelocityInGround(state).to_numpy(),
-        )
-        bias = self.matter.calcBiasForFrameJacobian(state, body.getMobilizedBodyIndex(), at)
-        of_bias = bias.get(1).to_numpy(), bias.get(0).to_numpy()
-        return np.concatenate(velocity), np.concatenate(of_bias) + self.slope(handle) @ self.a
+        return handle.velocity, handle.acceleration
+
+    def points(self, v: Array, a: Array) -> list[tuple[Array, Array, Array]]:
+        self.rate(v, a)
+        stations: list[Any] = self.wanted
+        return [station.motion() for station in stations]
 
     def constraint_rows(self) -> tuple[Array, Array]:
         """Return residual and Jacobian of Simbody's constraints."""
-        self.matter.calcG(self.state, self.G)
-        return self.state.getQErr().to_numpy(), self.G.to_numpy()
+        self.matter.calcG(self.state, self.matrix)
+        return self.state.getQErr().to_numpy(), self.matrix.to_numpy()
 
     def constraint_bias(self) -> Array:
         """Return Jdot v of Simbody's constraints."""
-        self.matter.calcBiasForAccelerationConstraints(self.state, self.b)
-        return self.b.to_numpy()
+        self.matter.calcBiasForAccelerationConstraints(self.state, self.vector_)
+        return self.vector_.to_numpy()
