@@ -33,8 +33,14 @@ PURPOSES = {
     "parquet": "history as Parquet",
     "distributed": "runs on many machines",
 }
-# Modules of distributions whose import name differs; of a simulator it is the engine's name.
-MODULES = {"python-flint": "flint", "llvmlite": "llvmlite.binding"}
+# Modules of distributions whose import name differs; of other simulators it is the engine's name.
+MODULES = {
+    "python-flint": "flint",
+    "llvmlite": "llvmlite.binding",
+    "drake": "pydrake.multibody.plant",
+    "dartpy": "dartpy",
+    "opensim": "opensim",
+}
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
 
@@ -140,7 +146,7 @@ def parts(engines: Collection[str]) -> list[Part]:
         group = extra[1] if extra else ""
         if group in purposes or not extra:
             if group in engines:
-                modules[name] = group
+                modules.setdefault(name, group)
             version = _version(name)
             remedy = (
                 how_to_install(group)

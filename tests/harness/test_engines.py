@@ -21,10 +21,8 @@ from ..support.mechanisms import placed
 # What each engine reaches on the strut, per unit stroke rate [m, m/s, m/s^2]: round-off of
 # metre-sized coordinates through its own arithmetic; Exudyn's accelerations come from differences
 # of its Jacobian.
-STRUT = {
+STRUT = dict.fromkeys(adapters.ENGINES, (1e-14, 1e-13, 1e-12)) | {
     "native": (5e-16, 1e-14, 1e-13),
-    "mujoco": (1e-14, 1e-13, 1e-12),
-    "pinocchio": (1e-14, 1e-13, 1e-12),
     "exudyn": (1e-12, 1e-11, 1e-8),
 }
 # Closed forms over a full turn: a thousand times the round-off of metres, so that a slip in

@@ -48,10 +48,8 @@ SENSITIVITY = np.array([9.0, 17.0, 88.0])
 NATIVE = 2 * 2.2e-16 * SENSITIVITY
 # Simulators stop at residuals of 1e-12. Exudyn's accelerations come from differences.
 SIMULATED = 1e-12 * SENSITIVITY
-LIMITS = {
+LIMITS = dict.fromkeys(adapters.ENGINES, SIMULATED) | {
     "native": NATIVE,
-    "mujoco": SIMULATED,
-    "pinocchio": SIMULATED,
     "exudyn": np.maximum(SIMULATED, (0.0, 0.0, 1e-8)),
 }
 
