@@ -9,31 +9,30 @@ coordinates. Residual, Jacobian and bias of these rows are Simbody's; the base a
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ...core.case.case import Case
 from ...core.harness.engine import Floor
-from ...core.joints import Translational
-from ...core.mechanism.drivers import JointDisplacement
-from ...core.mechanism.mechanism import GROUND, Body, Mechanism, Vector
+from ...core.mechanism.drivers import PointCoordinate
+from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
-from ..shared.compiled_floor import floor_of
+from ..shared.compiled_floor import Call, floor_of
 from ..shared.length_scaling import in_own_frame
-from ..shared.loop_closures import CLOSURES
-from ..shared.projection_engine import ProjectionEngine
+from ..shared.tree_engine import LEAST, TreeEngine
 from .constrained_tree import ConstrainedTree
 from .rotations import UNTURNED, euler_angles, turned
 from .stations import Station
 
 
-class Simbody(ProjectionEngine):
+class Simbody(TreeEngine):
     """The engine `simbody`."""
 
-    name, package, title, joints = "simbody", "opensim", "Simbody", CLOSURES
+    name, title, package = "simbody", "Simbody", "opensim"
 
     @property
     def described(self) -> Mapping[str, Any]:
@@ -55,59 +54,50 @@ class Simbody(ProjectionEngine):
             "relations": "CoordinateCouplerConstraint",
         }
 
-    def build(self, case: Case) -> SimbodyModel:
-        """Return OpenSim's model of the case, at the design position."""
-        return SimbodyModel(opensim(), in_own_frame(case))
+    def model_of(self, case: Case) -> SimbodyModel:
+        """Return OpenSim's model of the case."""
+        return SimbodyModel(opensim(), case)
 
     def floor(self, case: Case) -> Floor:
-        """Return the floor from Simbody's stages and its calls for constraints and frames."""
-        model = self.build(case)
+        """Return the floor from Simbody's stages and its calls for constraints and points."""
+        model = self.model_of(in_own_frame(case))
         solved = self.solve(model, case, 1e-12)
-        own, least = (
-            _calls(each)
-            for each in (model, SimbodyModel(model.o, replace(case, mechanism=LEAST, outputs=())))
+        own = _calls(model)
+        least = _calls(self.model_of(replace(case, mechanism=LEAST, outputs=())))
+        driven = sum(isinstance(each, PointCoordinate) for each in case.mechanism.drivers)
+        points = len(model.wanted)
+
+        def timed(**times: int) -> Mapping[str, tuple[Call, Call, int]]:
+            return {name: (own[name], least[name], n) for name, n in times.items()}
+
+        pose = timed(realizePosition=1, calcG=1, calcFrameJacobian=driven)
+        rates = timed(
+            realizeVelocity=2,
+            calcBiasForAccelerationConstraints=1,
+            calcBiasForFrameJacobian=driven,
+            calcStationJacobian=points,
+            calcBiasForStationJacobian=points,
         )
-        frames, points = len(model.moving), len(model.wanted)
-        times = {
-            "realizePosition": 1,
-            "calcG": 1,
-            "calcFrameJacobian": frames,
-            "realizeVelocity": 2,
-            "calcBiasForAccelerationConstraints": 1,
-            "calcBiasForFrameJacobian": frames + points,
-        }
-        parts = [(name, (own[name], least[name], each)) for name, each in times.items()]
-        return floor_of(self, solved, model.unknowns, dict(parts[:3]), dict(parts[3:]))
+        return floor_of(self, solved, model.unknowns, pose, rates)
 
 
-LEAST = Mechanism(
-    "slide",
-    [Body("slide")],
-    [Translational("rail", GROUND, "slide", point=(0.0, 0.0, 0.0), axis=(1.0, 0.0, 0.0))],
-    [],
-    [JointDisplacement("push", "rail")],
-)
-"""The smallest mechanism, for the floor."""
-
-
-def _calls(of: SimbodyModel) -> Mapping[str, Callable[[], Any]]:
+def _calls(of: SimbodyModel) -> Mapping[str, Call]:
     """Return the calls of the projection mode into Simbody, by name."""
-    whole, matter, state = of.model, of.matter, of.state
-    (q, u), J = (
-        (of.o.Vector.createFromMat(np.zeros(n)) for n in (of.slots, of.unknowns)),
-        of.o.Matrix(),
-    )
-    at = of.make_frame(1, np.zeros(3))
-    body = at.body.getMobilizedBodyIndex()
+    whole, matter, state, J, b = of.model, of.matter, of.state, of.matrix, of.column
+    q, u = (of.o.Vector.createFromMat(np.zeros(n)) for n in (of.slots, of.unknowns))
+    station = of.make_frame(1, np.zeros(3))
+    at = station.body.getMobilizedBodyIndex(), station.point
     return {
         "realizePosition": lambda: (state.setQ(q), whole.realizePosition(state)),
-        "calcG": lambda: matter.calcG(state, J),
-        "calcFrameJacobian": lambda: matter.calcFrameJacobian(state, body, at.point, J),
         "realizeVelocity": lambda: (state.setU(u), whole.realizeVelocity(state)),
-        "calcBiasForAccelerationConstraints": lambda: matter.calcBiasForAccelerationConstraints(
-            state, of.vector_
+        "calcG": partial(matter.calcG, state, J),
+        "calcBiasForAccelerationConstraints": partial(
+            matter.calcBiasForAccelerationConstraints, state, b
         ),
-        "calcBiasForFrameJacobian": lambda: matter.calcBiasForFrameJacobian(state, body, at.point),
+        "calcFrameJacobian": partial(matter.calcFrameJacobian, state, *at, J),
+        "calcBiasForFrameJacobian": partial(matter.calcBiasForFrameJacobian, state, *at),
+        "calcStationJacobian": partial(matter.calcStationJacobian, state, *at, J),
+        "calcBiasForStationJacobian": partial(matter.calcBiasForStationJacobian, state, *at),
     }
 
 
@@ -126,10 +116,13 @@ class Constraints:
     n: int
 
     def rows(self) -> tuple[Any, Array]:
-        return self.of.constraint_rows()
+        state, G = self.of.state, self.of.matrix
+        self.of.matter.calcG(state, G)
+        return state.getQErr().to_numpy(), G.to_numpy()
 
     def bias(self) -> Any:
-        return self.of.constraint_bias()
+        self.of.matter.calcBiasForAccelerationConstraints(self.of.state, self.of.column)
+        return self.of.column.to_numpy()
 
 
 class SimbodyModel(ConstrainedTree):
@@ -161,7 +154,7 @@ class SimbodyModel(ConstrainedTree):
         self.single = np.array(
             [at for at, ball in zip(self.places, turns, strict=True) if not ball], dtype=np.intp
         ).reshape(-1, 2)
-        self.matrix, self.vector_ = o.Matrix(), o.Vector()
+        self.matrix, self.column = o.Matrix(), o.Vector()
         rows = self.state.getNQErr()
         if rows:
             self.conditions.insert(0, Constraints(self, rows))
@@ -218,13 +211,3 @@ class SimbodyModel(ConstrainedTree):
         self.rate(v, a)
         stations: list[Any] = self.wanted
         return [station.motion() for station in stations]
-
-    def constraint_rows(self) -> tuple[Array, Array]:
-        """Return residual and Jacobian of Simbody's constraints."""
-        self.matter.calcG(self.state, self.matrix)
-        return self.state.getQErr().to_numpy(), self.matrix.to_numpy()
-
-    def constraint_bias(self) -> Array:
-        """Return Jdot v of Simbody's constraints."""
-        self.matter.calcBiasForAccelerationConstraints(self.state, self.vector_)
-        return self.vector_.to_numpy()
