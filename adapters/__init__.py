@@ -12,6 +12,7 @@ ENGINES = {
     "exudyn": ("exudyn.exudyn", "Exudyn"),
     "drake": ("drake.drake", "Drake"),
     "dart": ("dart.dart", "Dart"),
+    "simbody": ("simbody.simbody", "Simbody"),
 }
 """Name on the command line: module and class of the engine in projection mode."""
 

@@ -1,0 +1,1 @@
+"""Simbody, by OpenSim's Python package: projection by its kinematics and its own constraints."""

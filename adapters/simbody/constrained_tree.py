@@ -1,0 +1,142 @@
+"""A mechanism as a tree of bodies in an OpenSim model, with Simbody's constraints to close loops;
+private to its adapter.
+
+The axes of every body are global at design. Names are numbers, because OpenSim ends the process at
+a name with a blank. Its limits of coordinates play no part: they act on its forces and on
+`setValue`, and neither is used.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from math import atan2, hypot
+from typing import Any
+
+import numpy as np
+
+from ...core.case.case import Case
+from ...core.joints import Distance, Inline, Joint
+from ...core.joints.base import unit
+from ...core.mechanism.mechanism import Vector
+from ...core.trajectory import Array
+from ..shared.joint_chains import CHAINS, Link, dependence, end_of_loop, relations
+from ..shared.tree_model import TreeModel
+
+NO_TURN = (0.0, 0.0, 0.0)
+
+
+class ConstrainedTree(TreeModel):
+    """The OpenSim model of a case: a body and its joint for each link, a constraint for each cut
+    joint and each relation.
+
+    Attributes:
+        o: OpenSim's package.
+        model: OpenSim's model, which owns all the rest.
+        bodies: of OpenSim, by their numbers; the first is the ground.
+        moves: joint of OpenSim that carries each body after the ground.
+    """
+
+    def __init__(self, o: Any, case: Case) -> None:
+        self.o, self.model = o, o.Model()
+        self.bodies = [self.model.getGround()]
+        self.moves: list[Any] = []
+        super().__init__(case)
+
+    def add_link(self, parent: int, link: Link, offset: Array) -> None:
+        o, number = self.o, len(self.bodies)
+        joint = {"slide": o.SliderJoint, "hinge": o.PinJoint, "ball": o.BallJoint}[link.move]
+        axes = self.vector(orientation(link))
+        # kinematics does not depend on masses, but OpenSim asks for them
+        body = o.Body(f"body_{number}", 1.0, o.Vec3(0.0), o.Inertia(1.0, 1.0, 1.0))
+        move = joint(
+            f"joint_{number}",
+            self.bodies[parent],
+            self.vector(offset),
+            axes,
+            body,
+            o.Vec3(0.0),
+            axes,
+        )
+        if link.move != "ball":
+            move.upd_coordinates(0).setName(coordinate_name(number))
+        self.model.addBody(body)
+        self.model.addJoint(move)
+        self.bodies.append(body)
+        self.moves.append(move)
+
+    def close(self, joint: Joint, ends: tuple[Vector, Vector], named: bool) -> None:
+        i, j = self.bodies_of(joint)
+        links, point, turns = (), ends[0], False
+        if not isinstance(joint, Distance | Inline):
+            links, point, turns = end_of_loop(CHAINS[type(joint)](joint, point), point)
+            ends = point, point
+        i = self.add_links(i, links, joint.name)
+        for relation in relations(joint):
+            self.relate(relation)
+        if i == j:
+            # OpenSim ends the process at a constraint of a body with itself
+            super().close(joint, ends, named=False)
+            return
+        o = self.o
+        at_i, at_j = (
+            (self.bodies[body], self.vector(np.array(P) - self.origin[body]))
+            for body, P in zip((i, j), ends, strict=True)
+        )
+        none = self.vector(NO_TURN)
+        if isinstance(joint, Distance):
+            constraint = o.ConstantDistanceConstraint(*at_i, *at_j, joint.rod_length)
+        elif isinstance(joint, Inline):
+            body, P = at_i
+            along = self.vector(unit(joint.axis))
+            constraint = o.PointOnLineConstraint(body, along, P, *at_j)
+        elif turns:
+            constraint = o.PointConstraint(*at_i, *at_j)
+        else:
+            constraint = o.WeldConstraint("weld", *at_i, none, *at_j, none)
+        self.constrain(constraint)
+        moved = f", on a body that {' and '.join(each.move for each in links)} move on {joint.i!r}"
+        self.closures[joint.name] = constraint.getConcreteClassName() + (moved if links else "")
+
+    def relate(self, terms: Iterable[tuple[str, str, float]]) -> None:
+        terms = list(terms)
+        if len(terms) == 1:  # a driver's
+            super().relate(terms)
+            return
+        o, coupler = self.o, self.o.CoordinateCouplerConstraint()
+        moved = [(self.coordinates[joint, freedom], weight) for joint, freedom, weight in terms]
+        one, other, factor = dependence((body, sign * weight) for (body, sign), weight in moved)
+        names = o.ArrayStr()
+        names.append(coordinate_name(other))
+        coupler.setIndependentCoordinateNames(names)
+        coupler.setDependentCoordinateName(coordinate_name(one))
+        coupler.setFunction(o.LinearFunction(factor, 0.0))
+        self.constrain(coupler)
+
+    def constrain(self, constraint: Any) -> None:
+        """Add a constraint under a name of its own."""
+        constraint.setName(f"constraint_{self.model.getNumConstraints()}")
+        self.model.addConstraint(constraint)
+
+    def vector(self, a: Iterable[float]) -> Any:
+        """Return a vector as OpenSim takes it."""
+        return self.o.Vec3(*map(float, a))
+
+
+def coordinate_name(body: int) -> str:
+    """Return the name in OpenSim of the coordinate of a body's slide or hinge."""
+    return f"coordinate_{body}"
+
+
+def orientation(link: Link) -> Vector:
+    """Return the angles about x, y and z, one after the other, of frames along a link's axis [rad].
+
+    A slider moves along x of its frames, a pin turns about z.
+    """
+    x, y, z = link.axis
+    match link.move:
+        case "slide":
+            return 0.0, atan2(-z, x), atan2(y, hypot(x, z))
+        case "hinge":
+            return atan2(-y, z), atan2(x, hypot(y, z)), 0.0
+        case "ball":
+            return NO_TURN

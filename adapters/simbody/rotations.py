@@ -1,0 +1,51 @@
+"""Rotations of ball joints: Euler parameters here, Euler angles in OpenSim.
+
+OpenSim turns Simbody's quaternions off, and its package has no call to turn them on. At a second
+angle of 90 degrees the rates of the other two are infinite (gimbal lock), but the velocities of a
+ball joint in Simbody are its angular velocity and know no lock. So a step turns Euler parameters
+by that velocity, and Simbody gets the angles of the result: no rate of an angle is ever used.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import atan2, cos, hypot, sin
+
+Parameters = tuple[float, float, float, float]
+
+UNTURNED: Parameters = (1.0, 0.0, 0.0, 0.0)
+
+
+def turned(p: Sequence[float], turn: Sequence[float]) -> Parameters:
+    """Return Euler parameters p turned further by a rotation vector in the axes of the parent
+    [rad].
+    """
+    e0, e1, e2, e3 = p
+    x, y, z = turn
+    angle = hypot(x, y, z)
+    # sin(angle / 2) / angle; at an angle of 1e-8 its next term is below round-off
+    scale = sin(0.5 * angle) / angle if angle > 1e-8 else 0.5
+    w, x, y, z = cos(0.5 * angle), scale * x, scale * y, scale * z
+    parameters = (
+        w * e0 - x * e1 - y * e2 - z * e3,
+        w * e1 + x * e0 + y * e3 - z * e2,
+        w * e2 - x * e3 + y * e0 + z * e1,
+        w * e3 + x * e2 - y * e1 + z * e0,
+    )
+    size = hypot(*parameters)
+    e0, e1, e2, e3 = parameters
+    return e0 / size, e1 / size, e2 / size, e3 / size
+
+
+def euler_angles(p: Sequence[float]) -> tuple[float, float, float]:
+    """Return the angles [rad] of successive turns about the body's x, y and z axes, exact to
+    round-off at any rotation.
+
+    With half angles a, b, c the parameters of such turns give (e1 ± e3, e0 ± e2) =
+    (cos b ± sin b) (sin(a ± c), cos(a ± c)).
+    """
+    e0, e1, e2, e3 = p
+    plus, minus = (e1 + e3, e0 + e2), (e1 - e3, e0 - e2)
+    total, difference = atan2(*plus), atan2(*minus)
+    large, small = hypot(*plus), hypot(*minus)
+    return total + difference, 2.0 * atan2(large - small, large + small), total - difference
