@@ -45,7 +45,7 @@ IMPORTS = {
     "joints": ". primitives",
     "mechanism": ". joints",
     "kinematics/formulation": ". primitives program joints mechanism",
-    "kinematics/structure": ". joints mechanism kinematics/formulation",
+    "kinematics/structure": ". primitives joints mechanism kinematics/formulation",
     "kinematics/compiled": (
         ". primitives program program/llvm mechanism kinematics/formulation kinematics/structure"
     ),
@@ -78,7 +78,10 @@ IMPORTS = {
         "kinematics/sparse"
     ),
     "case/models/hardpoints/templates": "joints mechanism",
-    "case": ". joints mechanism",
+    "case": (
+        ". joints mechanism kinematics/formulation kinematics/structure kinematics/compiled "
+        "kinematics"
+    ),
     "case/suspension": ". mechanism case",
     "case/io": ". joints mechanism kinematics/compiled kinematics case case/suspension",
     "case/models/hardpoints": ". mechanism case/models/hardpoints/templates case case/io",

@@ -17,6 +17,7 @@ class Supplied:
         drive: driven joint of a model: "JOINT:START:STOP" or "JOINT:START:STOP:SAMPLES", in its
             coordinate [rad, m].
         hold: joints or free bodies of a model that are held in place.
+        closure: tolerance of rows that are redundant but for the digits of a file [m].
     """
 
     template: str | None = None
@@ -25,6 +26,7 @@ class Supplied:
     travel: str | None = None
     drive: tuple[str, ...] = ()
     hold: tuple[str, ...] = ()
+    closure: float | None = None
 
     @property
     def given(self) -> tuple[str, ...]:
