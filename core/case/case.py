@@ -140,6 +140,7 @@ class Case:
         reference: true values by output name, on the grid of the sweep.
         origin: source of the reference; None for the source of the case itself.
         length_unit, angle_unit: units of the file of the case, by their names in `units`.
+        assembly: notes on how the start was closed, and on rows left out.
     """
 
     name: str
@@ -152,6 +153,7 @@ class Case:
     origin: Origin | None = None
     length_unit: str = "m"
     angle_unit: str = "rad"
+    assembly: tuple[str, ...] = ()
 
     @property
     def points(self) -> tuple[str, ...]:

@@ -10,14 +10,14 @@ from .units import LENGTHS
 
 
 def notes(case: Case) -> list[str]:
-    """Return the notes on rod lengths, sizes, outputs and the source of the reference.
+    """Return the notes on rod lengths, closure, sizes, outputs and the source of the reference.
 
     Numbers are in the units of the case's file.
     """
     written = LENGTHS[case.length_unit].written
     joints = [note for joint in case.mechanism.joints for note in joint.notes]
     said = [note.within(written) if isinstance(note, Phrase) else note for note in joints]
-    return [*said, *size_notes(case), *_closure_notes(case), *_reference_notes(case)]
+    return [*said, *case.assembly, *size_notes(case), *_closure_notes(case), *_reference_notes(case)]
 
 
 def _closure_notes(case: Case) -> list[str]:

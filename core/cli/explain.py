@@ -6,8 +6,8 @@ import argparse
 from typing import Any
 
 from . import import_options
-from .registry import House, Status, whole
-from .run_options import TOL, positive
+from .registry import House, Status, positive, whole
+from .run_options import TOL
 
 
 def add(commands: Any) -> None:

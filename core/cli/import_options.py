@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from ..case.io.reader_options import LEFT_OUT, Supplied
 from ..report.progress import complain
-from .registry import add_joint_types
+from .registry import add_joint_types, positive
 
 if TYPE_CHECKING:
     from ..case.case import Case
@@ -20,6 +20,15 @@ if TYPE_CHECKING:
 def add_options(command: argparse.ArgumentParser) -> None:
     """Add the options to a command's parser."""
     add_joint_types(command)
+    command.add_argument(
+        "--closure",
+        type=positive,
+        metavar="X",
+        help=(
+            "rows that are redundant within X [m], because of the digits of the file, are left out;"
+            " default: [closure] tolerance of a case file, else none are"
+        ),
+    )
     points = command.add_argument_group(
         "hardpoints", "Suspensions of Project Chrono (.json), Adams/Car (.sub), tables (.csv)."
     )
@@ -98,6 +107,7 @@ def supplied(options: argparse.Namespace) -> Supplied:
         (*options.hold,),
         options.names,
         options.wheel_radius,
+        options.closure,
     )
 
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import math
 import os
 from pathlib import Path
 
 from . import execution_options, import_options
+from .registry import positive
 
 # Largest accepted constraint residual [m or -]: a thousand times the round-off of metre-sized
 # coordinates, and a thousandth of the outputs' 1e-9 m, so that a residual amplified a hundredfold
@@ -111,16 +111,3 @@ def add_options(run: argparse.ArgumentParser) -> None:
             " versions and commit that has no end"
         ),
     )
-
-
-def positive(text: str) -> float:
-    """Return the positive number in the text of an option."""
-    try:
-        tol = float(text)
-    except ValueError:
-        tol = math.nan
-    if not (math.isfinite(tol) and tol > 0):
-        raise argparse.ArgumentTypeError(
-            f"{text!r} is not a positive number; give one such as 1, 0.5 or 1e-12"
-        )
-    return tol

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import KincheckError, unknown
-from .registry import House, Status, given, whole
-from .run_options import MODES, TOL, positive
+from .registry import House, Status, given, positive, whole
+from .run_options import MODES, TOL
 
 if TYPE_CHECKING:
     from ..harness.engine import Engine

@@ -6,8 +6,8 @@ import argparse
 from pathlib import Path
 
 from . import import_options
-from .registry import whole
-from .run_options import TOL, positive
+from .registry import positive, whole
+from .run_options import TOL
 
 PART = "sweep.part"
 """File of a sweep's finished part, in the folder of its results until the sweep ends."""

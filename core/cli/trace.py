@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import KincheckError, unknown
 from . import import_options
-from .registry import House, Status
-from .run_options import positive
+from .registry import House, Status, positive
 
 if TYPE_CHECKING:
     from ..kinematics import Curve, Event

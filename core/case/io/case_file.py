@@ -26,6 +26,7 @@ from .schema import (
     SCHEMA,
     BodyKeys,
     CaseKeys,
+    ClosureKeys,
     OutputKeys,
     PointKeys,
     UnitsKeys,
@@ -45,9 +46,13 @@ MOST_PARTS = 60_000
 _PARTS = ("bodies", "joints", "points", "drivers", "outputs")
 
 
-def load_case(path: str | Path) -> Case:
+def load_case(path: str | Path, closure: float | None = None) -> Case:
     """Read a case from a file, in SI units. Without a [reference] it is consensus_only, whatever
     its truth.
+
+    Args:
+        closure: tolerance of rows that are redundant but for digits [m]; that of the file, or none,
+            unless given.
 
     Raises:
         CaseError: the file or its reference is unreadable or inconsistent; the message names file,
@@ -83,6 +88,7 @@ def load_case(path: str | Path) -> Case:
     case = _with_outputs(
         file, keys, replace(case, length_unit=length.name, angle_unit=angle.name), length, by_unit
     )
+    case = _within_digits(case, typed(file, "closure", keys.closure, ClosureKeys), closure)
     if keys.reference is None:
         return case
     if keys.truth in (None, Truth.CONSENSUS_ONLY):
@@ -104,6 +110,18 @@ def load_case(path: str | Path) -> Case:
         file, columns, driver_unit, by_unit, sweep.values, case.outputs, convention
     )
     return replace(case, truth=keys.truth, reference=series, origin=read_origin(file, columns))
+
+
+def _within_digits(case: Case, keys: ClosureKeys, closure: float | None) -> Case:
+    """Return the case without rows that are redundant within its tolerance, if it has one."""
+    why = "--closure"
+    if closure is None and keys.tolerance is not None:
+        closure, why = LENGTHS[case.length_unit](keys.tolerance), "[closure] tolerance"
+    if closure is None:
+        return case
+    from ..closing import within_digits  # with the solver, and few cases need it
+
+    return within_digits(case, closure, why)
 
 
 def _scaled(kind: Kind | None, value: Any, length: Convert) -> Any:

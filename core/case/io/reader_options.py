@@ -20,6 +20,7 @@ class Supplied:
         drive: driven joint of a model: "JOINT:START:STOP" or "JOINT:START:STOP:SAMPLES", in its
             coordinate [rad, m].
         hold: joints or free bodies of a model that are held in place.
+        closure: tolerance of rows that are redundant but for the digits of a file [m].
     """
 
     template: str | None = None
@@ -30,6 +31,7 @@ class Supplied:
     hold: tuple[str, ...] = ()
     names: Path | None = None
     wheel_radius: str | None = None
+    closure: float | None = None
 
     @property
     def given(self) -> tuple[str, ...]:

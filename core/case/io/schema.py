@@ -50,6 +50,9 @@ left out. `kincheck list --joints` prints all types with their keys.
                          without either, all drivers go straight from the design to their values at
                          time zero if the sweep has it, else at the first sample, and the result
                          says so
+    [closure]            (tolerance) [length]: rows that are redundant within it, because points and
+                         axes have few digits, are left out, with a note; strict without it;
+                         --closure of the command line stands above it
     [outputs.NAME]       (type) = "coordinate": point, component = "x", "y" or "z", or direction
                          type = "distance": points = [A, B]
                          type = "joint_angle" or "joint_displacement": joint
@@ -171,6 +174,7 @@ class CaseKeys(msgspec.Struct, forbid_unknown_fields=True):
     units: Table = {}
     joints: Table = {}
     points: Table = {}
+    closure: Table = {}
     suspension: Table | None = None
     outputs: Table = {}
     reference: Table | None = None
@@ -202,6 +206,14 @@ class SweepKeys(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
         Meta(ge=1, le=MOST_SAMPLES, description=f"a whole number of samples, 1 to {MOST_SAMPLES}"),
     ]
     rate: Number | None = None
+
+
+class ClosureKeys(msgspec.Struct, forbid_unknown_fields=True):
+    """[closure]; gaps and angles at the mechanism's size that the digits of the file leave."""
+
+    tolerance: Annotated[float, Meta(gt=0.0, description="a length greater than zero")] | None = (
+        None
+    )
 
 
 class ToleranceKeys(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):

@@ -25,7 +25,7 @@ CASE, CHRONO, ADAMS, TABLE, MODEL = (
 )
 HARDPOINTS = (CHRONO, ADAMS, TABLE)
 _OPTIONS = {
-    CASE: (),
+    CASE: ("closure",),
     MODEL: ("drive", "hold"),
     **dict.fromkeys(HARDPOINTS, ("template", "units", "axes", "travel", "names", "wheel-radius")),
 }
@@ -49,7 +49,7 @@ def load(file: Path, supplied: Supplied = NOTHING) -> Case:
                 " itself",
             )
     if kind == CASE:
-        return load_case(file)
+        return load_case(file, supplied.closure)
     text = _text(file, utf_16=kind in (TABLE, ADAMS))
     if not file.stem.isprintable():  # it becomes the name of the case
         raise fault(

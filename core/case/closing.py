@@ -1,0 +1,70 @@
+"""A case within the digits of its file: without rows that are redundant but for these digits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from ..errors import CaseError
+from ..joints import Joint
+from ..kinematics.compiled.request import Request
+from ..kinematics.formulation.constraints import frames
+from ..kinematics.solver_selection import prepare
+from ..kinematics.structure.driver_count import degrees_of_freedom
+from ..kinematics.structure.reduction import ADDED_UP, largest_residual, reduce_rows
+from .case import Case
+
+# Largest accepted residual of the rows that are solved, relative to the mechanism's size.
+_TOL = 1e-12
+
+
+def within_digits(case: Case, tolerance: float, why: str) -> Case:
+    """Return the case without rows that are redundant within a tolerance [m], with a note.
+
+    Rows that are redundant to round-off stay: all engines know them.
+
+    Args:
+        why: origin of the tolerance, for the note.
+
+    Raises:
+        CaseError: the rows are redundant at the start, but do not hold along the motion.
+        SolveError: the mechanism does not close, or its drivers do not move it.
+    """
+    found = reduce_rows(case.mechanism, tolerance)
+    less = replace(case, mechanism=found.mechanism)
+    if not found.originals or not _driven(less):
+        return case
+    left = _residual_left(less, found.originals)
+    names = ", ".join(map(str, found.originals))
+    if left <= _TOL * frames(case.mechanism).unit and _driven(case):
+        return case
+    if left <= ADDED_UP * tolerance:
+        note = (
+            f"rows that are redundant within {tolerance:.3g} m ({why}) are left out, of {names};"
+            f" along the motion they keep a residual of {left:.2g} m"
+        )
+        return replace(less, assembly=(*case.assembly, note))
+    if _driven(case):  # no digits: beside a singular pose
+        return case
+    raise CaseError(
+        f"case {case.name!r}: rows of {names} are redundant at the start within {tolerance:.3g} m"
+        f" ({why}), but along the motion they are off by up to {left:.3g} m, expected"
+        f" {ADDED_UP * tolerance:.3g} m at most; start farther from a singular pose, or give"
+        " another tolerance by --closure"
+    )
+
+
+def _driven(case: Case) -> bool:
+    return degrees_of_freedom(case.mechanism) == len(case.mechanism.drivers)
+
+
+def _residual_left(case: Case, joints: Sequence[Joint]) -> float:
+    """Return the largest residual of joints along the motion of a case [m]."""
+    path, bodies = case.sweep.path, tuple(body.name for body in case.mechanism.moving)
+    request = Request(tuple(path.motions), (), bodies, order=0)
+    motion = prepare(case.mechanism, request, path)(_TOL)
+    solved = {
+        name: replace(each, r=each.r[motion.solved], p=each.p[motion.solved])
+        for name, each in motion.bodies.items()
+    }
+    return largest_residual(case.mechanism, joints, solved)
