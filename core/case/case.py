@@ -103,6 +103,8 @@ class Series:
 
     Attributes:
         reason: why solved samples have no value; empty if they have, or for another reason.
+        uncertainty: of a reference: half-width of the interval around each value, by quantity
+            [unit, unit/s, unit/s^2], of shape (n,); none for exact ones.
         possible: whether the engine returns the inputs of the value; an output that is a derivative
             needs velocities.
     """
@@ -110,6 +112,7 @@ class Series:
     position: Array
     velocity: Array | None = None
     acceleration: Array | None = None
+    uncertainty: Mapping[str, Array] = field(default_factory=dict[str, Array], kw_only=True)
     possible: bool = field(default=True, kw_only=True)
     reason: str = field(default="", kw_only=True)
 
@@ -123,12 +126,20 @@ class Origin:
         file: name of the file of the reference; empty without a file.
         sha256: digest of that file.
         own: whether kincheck computed the reference.
+        units: units of its columns, by name: the driver, then outputs.
+        signs: sign convention of its outputs; empty if only the case's own axes apply.
+        grid: where it has values, if that is not at the samples of the sweep.
+        limits: by output, what is known of the error of its values, and why; none for exact ones.
     """
 
     citation: str
     file: str = ""
     sha256: str = ""
     own: bool = False
+    units: Mapping[str, str] = field(default_factory=dict[str, str])
+    signs: str = ""
+    grid: str = ""
+    limits: Mapping[str, str] = field(default_factory=dict[str, str])
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,6 +30,11 @@ def _closure_notes(case: Case) -> list[str]:
 
 
 def _reference_notes(case: Case) -> list[str]:
+    grid = [f"the reference has {case.origin.grid}"] if case.origin and case.origin.grid else []
+    return grid + _source_notes(case)
+
+
+def _source_notes(case: Case) -> list[str]:
     if not (case.reference and case.truth.validates and case.origin):
         return []
     if case.origin.own:

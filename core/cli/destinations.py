@@ -8,10 +8,12 @@ import sys
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass, fields
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
 from ..case.io.atomic_files import Content, Named, to_standard_output, unwritable, write_all
+from ..case.io.table_file import no_parquet
 from ..harness.record import Results, to_json
 
 if TYPE_CHECKING:  # drawing code is imported only for a report
@@ -34,6 +36,7 @@ class Destinations:
         junit: a file.
         markdown: a file, for the matrix of cases and engines.
         store: a file, for values in bulk.
+        csv, parquet: files, for the curves.
     """
 
     out: Path | None = None
@@ -41,6 +44,8 @@ class Destinations:
     junit: Path | None = None
     markdown: Path | None = None
     store: Path | None = None
+    csv: Path | None = None
+    parquet: Path | None = None
 
     @classmethod
     def of(cls, options: argparse.Namespace) -> Destinations:
@@ -74,7 +79,12 @@ class Destinations:
             ("--junit", self.junit),
             ("--markdown", self.markdown),
             ("--store", self.store),
+            ("--csv", self.csv),
+            ("--parquet", self.parquet),
         ]
+        if self.parquet is not None:
+            lack = no_parquet(f"--parquet {self.parquet}", "or give --csv FILE")
+            found += [lack] if lack else []
         return found + unwritable(files, history)
 
 
@@ -128,6 +138,11 @@ def deliver(
         contents.append((to.markdown, lambda path: path.write_text(to_markdown(results), "utf-8")))
     if to.json not in (None, "-"):
         contents.append((Path(to.json), encoded))
+    if to.csv is not None or to.parquet is not None:
+        from ..report.curves import write_curves_csv, write_curves_parquet
+
+        kinds = (to.csv, write_curves_csv), (to.parquet, write_curves_parquet)
+        contents += [(file, partial(kind, results)) for file, kind in kinds if file is not None]
     if to.out is not None:
         contents.append((to.out / "results.json", encoded))
         contents.append(

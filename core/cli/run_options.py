@@ -59,6 +59,13 @@ def add_options(run: argparse.ArgumentParser) -> None:
     run.add_argument(
         "--json", metavar="FILE", help="write the results as JSON; - for standard output"
     )
+    for kind in ("CSV", "Parquet"):
+        run.add_argument(
+            f"--{kind.lower()}",
+            type=Path,
+            metavar="FILE",
+            help=f"write the curves of all engines and references as {kind}",
+        )
     run.add_argument("--junit", type=Path, metavar="FILE", help="write the results as JUnit XML")
     run.add_argument(
         "--markdown",

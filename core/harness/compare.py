@@ -2,7 +2,8 @@
 
 Deviations are taken at the same samples, without interpolation, and of outputs only: generalized
 coordinates may differ between correct engines. A deviation is accepted up to atol + rtol * range,
-with the range of the reference over the compared samples.
+with the range of the reference over the compared samples. Rounded or interpolated references are
+known within an interval only; its half-width at each sample is accepted too.
 
 An output's atol applies to positions. A wrong pose propagates: the velocities of a mechanism are
 its driver's rate times functions of the pose. Moving the pose by d, small against the size D of the
@@ -161,8 +162,8 @@ def deviations(
     unreached = np.zeros(len(found.position), dtype=np.bool_) if refused is None else refused
     for order, quantity in enumerate(QUANTITIES):
         values: Array | None = getattr(found, quantity)
-        known: list[tuple[str, Array]] = [
-            (name, getattr(series, quantity))
+        known: list[tuple[str, Array, Array | None]] = [
+            (name, getattr(series, quantity), series.uncertainty.get(quantity))
             for name, series in standards
             if getattr(series, quantity) is not None
         ]
@@ -181,9 +182,9 @@ def deviations(
                 else f"{quantity}: there is nothing to compare with"
             )
         else:
-            name, reference = known[0]
+            name, reference, uncertainty = known[0]
             compared[quantity] = off = deviation(
-                values, reference, output.atol * beat**order, output.rtol, name
+                values, reference, output.atol * beat**order, output.rtol, name, uncertainty
             )
             lost = int((np.isfinite(reference) & ~np.isfinite(values)).sum()) if complete else 0
             if lost and (order or found.possible):
@@ -214,13 +215,21 @@ def deviations(
 
 
 def deviation(
-    values: Array, reference: Array, atol: float, rtol: float, against: str
+    values: Array,
+    reference: Array,
+    atol: float,
+    rtol: float,
+    against: str,
+    uncertainty: Array | None = None,
 ) -> Deviation | None:
     """Return the deviation of values from a reference over the samples known to both; None if there
     are none.
 
     Args:
         values, reference: shape (n,), NaN at unknown samples.
+        uncertainty: half-width of the interval around each reference value, which adds to the
+            tolerance there, shape (n,); None for exact ones. The deviation is then that of the
+            sample with the most tolerances.
 
     Raises:
         CaseError: the shapes differ.
@@ -235,11 +244,19 @@ def deviation(
         return None
     error = np.where(both, np.abs(values - reference), -1.0)
     largest, tolerance = float(error.max()), atol + rtol * float(np.ptp(reference[both]))
+    # scaled by the largest, so that no square can overflow or vanish
+    rms = largest * math.sqrt(float(np.mean((error[both] / largest) ** 2))) if largest else 0.0
+    worst = int(np.argmax(error))
+    if uncertainty is not None:
+        allowed = tolerance + uncertainty
+        exact = allowed <= 0.0
+        ratio = np.where(exact, np.where(error > 0.0, np.inf, error), error)
+        worst = int(np.argmax(ratio / np.where(exact, 1.0, allowed)))
+        largest, tolerance = float(error[worst]), float(allowed[worst])
     return Deviation(
         max_abs=largest,
-        # scaled by the largest, so that no square can overflow or vanish
-        rms=largest * math.sqrt(float(np.mean((error[both] / largest) ** 2))) if largest else 0.0,
-        worst_step=int(np.argmax(error)),
+        rms=rms,
+        worst_step=worst,
         tolerance=tolerance,
         against=against,
         within=largest <= tolerance,

@@ -29,12 +29,21 @@ class Evidence(msgspec.Struct, frozen=True, kw_only=True):
         sha256: digest of its content.
         of: the content: the name of a file, digested by its bytes, or "values", as in `digest`.
         own: claimed as data of others, but equal to native's own result in every bit.
+        units, signs: units of its columns by name, and convention of signs; empty in results of
+            older versions.
+        grid: where it has values; empty if at every sample.
+        limits: by output, the known errors of its values, which enter the tolerance; none for exact
+            ones.
     """
 
     citation: str
     sha256: str
     of: str
     own: bool = False
+    units: dict[str, str] = {}
+    signs: str = ""
+    grid: str = ""
+    limits: dict[str, str] = {}
 
     @property
     def sound(self) -> bool:
@@ -57,6 +66,10 @@ def evidence(case: Case, native: Mapping[str, Series]) -> Evidence | None:
         citation=origin.citation,
         sha256=origin.sha256 or digest(case.reference),
         of=origin.file or VALUES,
+        units=dict(origin.units),
+        signs=origin.signs,
+        grid=origin.grid,
+        limits=dict(origin.limits),
         own=origin.own or (case.truth is Truth.THIRD_PARTY_DATA and _identical(case, native)),
     )
 

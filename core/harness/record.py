@@ -74,7 +74,9 @@ class Deviation(msgspec.Struct, frozen=True, kw_only=True):
     """The deviation of an output from its standard, over the samples known to both.
 
     Attributes:
-        worst_step: index of the sample with the largest deviation.
+        max_abs, tolerance: the largest deviation, and what is accepted there. If the reference is
+            known to different accuracies, those of the sample with the most tolerances.
+        worst_step: index of that sample.
         against: kind of the reference, or the name of the engine compared with.
     """
 

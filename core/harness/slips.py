@@ -16,6 +16,7 @@ import numpy as np
 
 from ..trajectory import Array
 from .compare import deviation
+from .record import Deviation
 
 # Fewest samples: two are fitted by too many changes.
 FEWEST = 3
@@ -58,6 +59,25 @@ class Held:
     unit: str
 
 
+@dataclass(frozen=True, eq=False)
+class Uncertain:
+    """A reference, and the half-width of the interval around each value; None for exact ones."""
+
+    values: Array
+    half: Array | None = None
+
+    def changed(self, change: Callable[[Array], Array]) -> Uncertain:
+        """Return the reference after a linear change of its values and samples."""
+        if self.half is None:
+            return Uncertain(change(self.values))
+        half = np.abs(change(self.half) - change(np.zeros_like(self.half)))
+        return Uncertain(change(self.values), np.where(np.isfinite(half), half, 0.0))
+
+    def off(self, held: Held, against: str = "") -> Deviation | None:
+        """Return the deviation of values from it."""
+        return deviation(held.values, self.values, held.atol, held.rtol, against, self.half)
+
+
 @dataclass(frozen=True)
 class Slip:
     """A change that makes the reference fit.
@@ -82,7 +102,11 @@ _Change = tuple[str, Callable[[Array], Array]]
 
 
 def slips(
-    held: Held, reference: Array, others: Mapping[str, Held], *, offsets: bool = True
+    held: Held,
+    reference: Array | Uncertain,
+    others: Mapping[str, Held],
+    *,
+    offsets: bool = True,
 ) -> list[Slip]:
     """Return all single changes that make the reference fit; if there are none, all pairs of them.
 
@@ -92,13 +116,15 @@ def slips(
         others: values of the other outputs, by name, possibly confused with this one.
         offsets: whether a constant may be added; False for derivatives.
     """
+    if not isinstance(reference, Uncertain):
+        reference = Uncertain(reference)
     return list(_single(held, reference, others, offsets)) or list(
         _pairs(held, reference, others, offsets)
     )
 
 
 def _single(
-    held: Held, reference: Array, others: Mapping[str, Held], offsets: bool
+    held: Held, reference: Uncertain, others: Mapping[str, Held], offsets: bool
 ) -> Iterator[Slip]:
     yield from _fitting(held, reference, _scales(), "", constant=True)
     yield from _fitting(held, reference, _moves(held, reference, offsets), "")
@@ -106,14 +132,14 @@ def _single(
 
 
 def _pairs(
-    held: Held, reference: Array, others: Mapping[str, Held], offsets: bool
+    held: Held, reference: Uncertain, others: Mapping[str, Held], offsets: bool
 ) -> Iterator[Slip]:
     both = [(f"{OTHER_SIGN} and times {name}", _times(-factor)) for name, factor in FACTORS.items()]
     yield from _fitting(held, reference, both, "", constant=True)
     for words, change in _scales():
-        changed = change(reference)
+        changed = reference.changed(change)
         yield from _fitting(held, changed, _moves(held, changed, offsets), f"{words} and ")
-    yield from _exchanged(-reference, others, f"{OTHER_SIGN} ")
+    yield from _exchanged(reference.changed(_times(-1.0)), others, f"{OTHER_SIGN} ")
 
 
 def _scales() -> list[_Change]:
@@ -127,8 +153,8 @@ def _times(factor: float) -> Callable[[Array], Array]:
     return lambda x: factor * x
 
 
-def _moves(held: Held, reference: Array, offsets: bool) -> Iterator[_Change]:
-    off = held.values - reference
+def _moves(held: Held, reference: Uncertain, offsets: bool) -> Iterator[_Change]:
+    off = held.values - reference.values
     known = np.isfinite(off)
     if offsets and known.any():
         constant = 0.5 * float(off[known].max() + off[known].min())
@@ -147,7 +173,7 @@ def _moves(held: Held, reference: Array, offsets: bool) -> Iterator[_Change]:
 
 def _fitting(
     held: Held,
-    reference: Array,
+    reference: Uncertain,
     changes: Iterator[_Change] | list[_Change],
     before: str,
     *,
@@ -159,11 +185,11 @@ def _fitting(
         constant: whether a constant series is significant, unless all its values are zero.
     """
     for words, change in changes:
-        changed = change(reference)
-        both = np.isfinite(held.values) & np.isfinite(changed)
+        changed = reference.changed(change)
+        both = np.isfinite(held.values) & np.isfinite(changed.values)
         if both.sum() < FEWEST:
             continue
-        off = deviation(held.values, changed, held.atol, held.rtol, "")
+        off = changed.off(held)
         if off is None or not off.within:
             continue
         values = held.values[both]
@@ -171,7 +197,7 @@ def _fitting(
             yield Slip(before + words, off.max_abs, off.tolerance)
 
 
-def _exchanged(reference: Array, others: Mapping[str, Held], before: str) -> Iterator[Slip]:
+def _exchanged(reference: Uncertain, others: Mapping[str, Held], before: str) -> Iterator[Slip]:
     """Yield the other outputs that the reference fits, if it varies."""
     for name, other in others.items():
         yield from _fitting(

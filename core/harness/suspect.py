@@ -14,7 +14,7 @@ from ..trajectory import PER_TIME, QUANTITIES, Array
 from .compare import deviation, pace
 from .evidence import Explanation, Suspect
 from .record import Deviation, Deviations, OutputSeries, Record
-from .slips import Held, Slip, slips
+from .slips import Held, Slip, Uncertain, slips
 
 # Most outputs explained in a sentence; further ones are counted.
 MOST_EXPLAINED = 12
@@ -31,7 +31,7 @@ class _Off:
     output: str
     order: int
     held: Held
-    reference: Array
+    reference: Uncertain
     deviation: Deviation
 
     @property
@@ -183,9 +183,10 @@ def _off(case: Case, beat: float, record: Record) -> Iterator[_Off]:
             reference: Array | None = getattr(case.reference.get(name), quantity, None)
             if reference is None:
                 continue
-            found = deviation(held.values, reference, held.atol, held.rtol, str(case.truth))
+            known = Uncertain(reference, case.reference[name].uncertainty.get(quantity))
+            found = known.off(held, str(case.truth))
             if found is not None and found.max_abs > found.tolerance:
-                yield _Off(name, order, held, reference, found)
+                yield _Off(name, order, held, known, found)
 
 
 def _explained(

@@ -4,15 +4,13 @@ motion of a run.
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 from ..case.io.atomic_files import write
-from ..case.io.escape import cell
+from ..case.io.table_file import Kind, no_parquet, write_csv, write_parquet
 from ..errors import KincheckError
-from ..extras import library
 from .queries import readable
 from .store import Store
 
@@ -30,6 +28,12 @@ NUMBERS = (
     *("us_per_step", "residual_max", "max_abs", "rms", "tolerance"),
 )
 """Columns of the view `measured` that are no text. What was not computed is null, in CSV empty."""
+
+KINDS = (
+    dict.fromkeys(INTEGERS, Kind.INTEGER)
+    | dict.fromkeys(NUMBERS, Kind.NUMBER)
+    | dict.fromkeys(TRUTHS, Kind.TRUTH)
+)
 
 SUFFIXES = (".parquet", ".csv")
 
@@ -49,13 +53,22 @@ def export(
         KincheckError: the file cannot be written, its end says neither, or pyarrow is not
             installed.
     """
-    kind = {".parquet": _parquet, ".csv": _csv}.get(path.suffix.lower())
-    if kind is None:
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
         raise KincheckError(
             f"--export {path}: ends in {path.suffix or 'nothing'!r}; give a file that ends in"
             f" {' or '.join(SUFFIXES)}"
         )
-    return write("--export", path, lambda part: kind(part, _rows(store, cases, engines)))
+    if suffix == ".parquet" and (lack := no_parquet(f"--export {path}", "or give a .csv")):
+        raise KincheckError(lack)
+
+    def put(part: Path) -> int:
+        chunks = _rows(store, cases, engines)
+        (names,) = next(chunks)
+        columns = {name: KINDS.get(name, Kind.TEXT) for name in names}
+        return (write_parquet if suffix == ".parquet" else write_csv)(part, columns, chunks)
+
+    return write("--export", path, put)
 
 
 def _rows(
@@ -90,44 +103,3 @@ def _leave_out(store: Store) -> None:
             "FROM runs", f"FROM runs WHERE id NOT IN ({listed})", 1
         )
         store.connection.execute(spared)
-
-
-def _csv(path: Path, chunks: Iterator[list[tuple[Any, ...]]]) -> int:
-    (columns,) = next(chunks)
-    truths = [columns.index(name) for name in TRUTHS]
-    count = 0
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(columns)
-        for rows in chunks:
-            for row in rows:
-                values = [cell(each) for each in row]
-                for k in truths:
-                    values[k] = None if row[k] is None else ("false", "true")[row[k]]
-                writer.writerow(values)
-            count += len(rows)
-    return count
-
-
-def _parquet(path: Path, chunks: Iterator[list[tuple[Any, ...]]]) -> int:
-    arrow, parquet = (
-        library(f"--export {path}", name, "parquet") for name in ("pyarrow", "pyarrow.parquet")
-    )
-    kinds = (
-        dict.fromkeys(INTEGERS, arrow.int64())
-        | dict.fromkeys(NUMBERS, arrow.float64())
-        | dict.fromkeys(TRUTHS, arrow.bool_())
-    )
-    (columns,) = next(chunks)
-    schema = arrow.schema([(name, kinds.get(name, arrow.string())) for name in columns])
-    count = 0
-    with parquet.ParquetWriter(path, schema) as writer:
-        for rows in chunks:
-            values = {
-                name: [*each] for name, each in zip(columns, zip(*rows, strict=True), strict=True)
-            }
-            for name in TRUTHS:  # SQLite has 0 and 1
-                values[name] = [None if each is None else bool(each) for each in values[name]]
-            writer.write_table(arrow.table(values, schema=schema))
-            count += len(rows)
-    return count

@@ -22,12 +22,13 @@ DISPLAY = {
 }
 """Units of results, and what they are shown in: the unit and the factor."""
 
-_DRIVER_UNITS = {
+DRIVER_UNITS = {
     "point_coordinate": "m",
     "joint_displacement": "m",
     "joint_angle": "rad",
     "time": "s",
 }
+"""SI unit of the values of a driver, by its type."""
 # Directions in files are exact, or the three digits of a table: this allows for those.
 ALONG = 1 - 1e-5
 
@@ -44,7 +45,7 @@ class Moved:
     @classmethod
     def of(cls, name: str, driver: Mapping[str, Any], values: list[float]) -> Moved:
         """Return a driver in the display unit of its type, with its values."""
-        unit, scale = DISPLAY.get(_DRIVER_UNITS.get(driver.get("type", ""), ""), ("", 1.0))
+        unit, scale = DISPLAY.get(DRIVER_UNITS.get(driver.get("type", ""), ""), ("", 1.0))
         return cls(name.replace("_", " "), unit, scale, values)
 
     def at(self, step: int) -> str:

@@ -16,6 +16,7 @@
     return;
   }
   const { drivers, figures, scenes } = JSON.parse(await unpacked("report-data"));
+  for (const button of document.querySelectorAll("[data-curves]")) button.addEventListener("click", () => download(button));
   const canvases = [...document.querySelectorAll("[data-scene]")].map((box) => mechanism(box, scenes[box.dataset.scene]));
   const library = document.createElement("script");
   library.textContent = await unpacked("plotly");
@@ -27,6 +28,14 @@
     input.write(bytes);
     input.close();
     return new Response(stream.readable).text();
+  }
+
+  async function download(button) {
+    const text = JSON.parse(await unpacked("curves"))[button.dataset.curves], link = document.createElement("a");
+    link.href = URL.createObjectURL(new Blob([text], { type: "text/csv" }));
+    link.download = button.dataset.file;
+    link.click();
+    URL.revokeObjectURL(link.href);
   }
 
   // Samples at the driver's values say "driver". Zero has no place on a log axis: it breaks the curve and is ticked at the floor.

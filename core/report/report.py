@@ -15,6 +15,7 @@ from typing import Any, cast
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
+from ..case.io.escape import file_name
 from ..harness.labels import (
     TRUTHS,
     against,
@@ -30,6 +31,7 @@ from ..harness.labels import (
 from ..harness.record import Outcome, Record, Results
 from ..trajectory import QUANTITIES
 from .caveats import ANSWERED, caveats
+from .curves import downloads
 from .figure_data import Effort, Past
 from .figures import Figure, Style
 from .page_model import CaseView, Judged, Material, case_view, judged, worst
@@ -104,6 +106,7 @@ def render(given: Material, changes: Markup | None = None) -> str:
         "figures": figures,
         "scenes": {case.anchor: asdict(case.scene) for case in cases if case.scene},
     }
+    curves = downloads(given.results, {each.anchor: each.name for each in cases if each.outputs})
     return (
         _environment()
         .get_template("report.html")
@@ -150,6 +153,8 @@ def render(given: Material, changes: Markup | None = None) -> str:
             scripts=[_source("scene.js"), _source("report.js")],
             data=packed(json.dumps(data, allow_nan=False, separators=(",", ":"))),
             plotlyjs=packed(plotly.get_plotlyjs()),
+            curves=curves,
+            packed_curves=packed(json.dumps(curves)),
         )
     )
 
@@ -168,6 +173,7 @@ def _environment() -> Environment:
         engine=engine_name,
         against=against,
         model=_model,
+        file_name=file_name,
         known=known,
         worst=_worst_of,
     )

@@ -84,7 +84,7 @@ def test_a_driver_value_off_the_grid_is_quoted(tmp_path, number, unit, inline):
     reference = f"[reference]\n{given_by}\n"
     message = refused(write(tmp_path, text(**units, start=start, stop="1e5") + reference))
     quoted = re.search(
-        r"driver value (\S+) (\w+) of sample 0, expected (\S+) (\w+) as in the sweep", message
+        r"driver value (\S+) (\w+) at no sample of the sweep, the nearest is (\S+) (\w+),", message
     )
     assert quoted is not None, message
     assert quoted[2] == quoted[4] == unit

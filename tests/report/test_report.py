@@ -263,7 +263,7 @@ def test_text_from_files_is_escaped(tmp_path: Path) -> None:
         ),
         tmp_path,
     )
-    assert page.names == ["report-data", "plotly", "script 2", "script 3"]
+    assert page.names == ["report-data", "plotly", "curves", "script 3", "script 4"]
     assert not any("alert" in page.scripts[name] for name in page.names)
     assert not [
         attrs

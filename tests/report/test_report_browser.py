@@ -303,6 +303,22 @@ def test_hostile_text_is_text(visit: Any) -> None:
     )
     assert told["title"] == HOSTILE
     assert told["raw"] == told["images"] == told["links"] == 0
-    assert told["scripts"] == 6  # two of data, two of ours, Plotly unpacked, and this test's
+    assert told["scripts"] == 7  # three of data, two of ours, Plotly unpacked, and this test's
     assert told["drawn"] == 7
     assert told["shown"] > 5
+
+
+def test_the_curves_of_a_case_are_a_file(visit: Any) -> None:
+    name, text = visit(
+        strut(),
+        """
+        let text; const whole = URL.createObjectURL;
+        URL.createObjectURL = (blob) => { text = blob.text(); return whole(blob); };
+        let name; HTMLAnchorElement.prototype.click = function () { name = this.download; };
+        one("[data-curves]").click();
+        while (name === undefined) await pause();
+        return [name, await text];
+        """,
+    )
+    assert name.endswith(".csv")
+    assert text.startswith("case,engine,mode,output,unit,sample,driver,")

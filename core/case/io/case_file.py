@@ -19,7 +19,7 @@ from .coordinates import AXES, with_all_coordinates
 from .document import explained, fault, join, parse, read_text, shown
 from .driving import read_drivers, read_sweep
 from .measures import read_measure
-from .reference import Convert, is_derivative, read_origin, read_reference
+from .reference import Convert, is_derivative, read_reference
 from .reference_samples import ReferenceKeys
 from .schema import (
     COORDINATE,
@@ -82,14 +82,17 @@ def load_case(path: str | Path, closure: float | None = None) -> Case:
     units = typed(file, "units", keys.units, UnitsKeys)
     length, angle = LENGTHS[units.length], ANGLES[units.angle]
     mechanism = _mechanism(file, keys, length)
-    sweep, driver_unit = read_sweep(file, keys, mechanism, length, angle)
+    columns = None
+    if keys.reference is not None:
+        columns = typed(file, "reference", keys.reference, ReferenceKeys)
+    sweep, driver_unit, own_grid = read_sweep(file, keys, mechanism, length, angle, columns)
     by_unit: dict[str, Convert] = {"m": length, "rad": angle, "1": float, "N": float, "N m": length}
     case = Case(keys.name, keys.source, Truth.CONSENSUS_ONLY, mechanism, sweep, ())
     case = _with_outputs(
         file, keys, replace(case, length_unit=length.name, angle_unit=angle.name), length, by_unit
     )
     case = _within_digits(case, typed(file, "closure", keys.closure, ClosureKeys), closure)
-    if keys.reference is None:
+    if columns is None:
         return case
     if keys.truth in (None, Truth.CONSENSUS_ONLY):
         found = "nothing" if keys.truth is None else shown(str(keys.truth))
@@ -100,16 +103,22 @@ def load_case(path: str | Path, closure: float | None = None) -> Case:
             f"found {found} beside a [reference], expected where that comes from; give one of"
             f" {kinds}",
         )
-    columns = typed(file, "reference", keys.reference, ReferenceKeys)
     convention = (
         ""
         if keys.suspension is None
         else str(as_table(file, "suspension", keys.suspension)["convention"])
     )
-    series = read_reference(
-        file, columns, driver_unit, by_unit, sweep.values, case.outputs, convention
+    series, origin = read_reference(
+        file,
+        columns,
+        driver_unit,
+        by_unit,
+        sweep.values,
+        case.outputs,
+        convention,
+        own_grid=own_grid,
     )
-    return replace(case, truth=keys.truth, reference=series, origin=read_origin(file, columns))
+    return replace(case, truth=keys.truth, reference=series, origin=origin)
 
 
 def _within_digits(case: Case, keys: ClosureKeys, closure: float | None) -> Case:

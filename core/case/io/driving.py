@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,13 +17,21 @@ from ...trajectory import Array
 from ..case import TIME, Sweep
 from ..units import SECOND, Unit, plain
 from .document import explained, fault, join, shown
-from .reference import Convert
-from .schema import CaseKeys, SweepKeys, driver_keys, motion_keys, own_fields
+from .reference import Convert, read_grid
+from .reference_samples import ReferenceKeys
+from .schema import MOST_SAMPLES, CaseKeys, SweepKeys, driver_keys, motion_keys, own_fields
 from .typed_tables import class_of, typed
 
 DRIVERS: Mapping[str, type[Driver]] = {
     cls.type: cls for cls in (PointCoordinate, JointAngle, JointDisplacement)
 }
+
+_EVEN: Mapping[str, str] = {
+    "start": "a number",
+    "stop": "a number",
+    "steps": f"a whole number of samples, 1 to {MOST_SAMPLES}",
+}
+"""Keys of an even grid of samples, and what is expected of them."""
 
 
 def read_drivers(file: Path, tables: Mapping[str, Any]) -> list[Driver]:
@@ -65,9 +73,16 @@ def _driver(file: Path, key: str, name: str, value: object) -> Driver:
 
 
 def read_sweep(
-    file: Path, keys: CaseKeys, mechanism: Mechanism, length: Unit, angle: Unit
-) -> tuple[Sweep, Unit]:
-    """Read the sweep, with the motions of all other drivers, and the unit of the swept values."""
+    file: Path,
+    keys: CaseKeys,
+    mechanism: Mechanism,
+    length: Unit,
+    angle: Unit,
+    reference: ReferenceKeys | None = None,
+) -> tuple[Sweep, Unit, bool]:
+    """Read the sweep, with the motions of all other drivers, the unit of the swept values, and
+    whether its samples are those of the reference.
+    """
     sweep = typed(file, "sweep", keys.sweep, SweepKeys)
     moved = {
         name: value["motion"]
@@ -82,15 +97,43 @@ def read_sweep(
     if sweep.driver != TIME:
         driver = mechanism.driver(sweep.driver)
         convert, design = _unit(driver, length, angle), mechanism.design_value(sweep.driver)
-    grid = np.array(
-        [convert(value) for value in np.linspace(sweep.start, sweep.stop, sweep.steps).tolist()]
-    )
+    grid = np.array([convert(value) for value in _samples(file, sweep, keys.sweep, reference)])
     found = Sweep(
         sweep.driver, grid, convert(1.0 if sweep.rate is None else sweep.rate), design, motions
     )
     for name, motion in motions.items():
         _check_motion(file, join(join("drivers", name), "motion"), motion, found.path.times)
-    return found, convert
+    return found, convert, sweep.at is not None
+
+
+def _samples(
+    file: Path, sweep: SweepKeys, written: Mapping[str, Any], reference: ReferenceKeys | None
+) -> Sequence[float]:
+    """Return the samples in the file's unit: an even grid, or those of the reference."""
+    if sweep.at is None:
+        for key, expected in _EVEN.items():
+            if key not in written:
+                problem = f"missing, expected {expected}; add the key {key!r}"
+                raise fault(
+                    file,
+                    join("sweep", key),
+                    f'{problem}, or at = "reference" for the samples of the reference',
+                )
+        assert None not in (sweep.start, sweep.stop, sweep.steps)
+        _check_even(file, sweep, written)
+        return np.linspace(sweep.start or 0.0, sweep.stop or 0.0, sweep.steps or 1).tolist()
+    for key in _EVEN:
+        if key in written:
+            problem = f"found {shown(written[key])} beside at = {shown(sweep.at)}, expected one"
+            raise fault(file, join("sweep", key), f"{problem}; remove {key} or at")
+    if reference is None:
+        problem = f"found {shown(sweep.at)}, but the case has no [reference] with samples"
+        raise fault(file, "sweep.at", f"{problem}; add one, or give start, stop and steps")
+    found = read_grid(file, reference)
+    if len(found) > MOST_SAMPLES:
+        problem = f"found {len(found)} rows of the reference, expected {MOST_SAMPLES} at most"
+        raise fault(file, "sweep.at", f"{problem}; thin them out, or give start, stop and steps")
+    return found
 
 
 def _check(
@@ -134,7 +177,11 @@ def _check(
             "found 0, expected driver units per second; give 1 to differentiate by the driver's"
             " value",
         )
-    if sweep.start == sweep.stop and sweep.steps > 1:
+
+
+def _check_even(file: Path, sweep: SweepKeys, written: Mapping[str, Any]) -> None:
+    """Refuse a number of samples that contradicts their ends."""
+    if sweep.start == sweep.stop and (sweep.steps or 1) > 1:
         problem = (
             f"found the start {written['start']!r} again with {sweep.steps} steps, expected another"
             " value"

@@ -1,10 +1,11 @@
 """Reference of a case: samples of its outputs from a CSV file beside the case file, from rows
 inside it, or proved ones.
 
-The first column holds driver values on the grid of the sweep; nothing is interpolated. Further
-columns are OUTPUT, OUTPUT.velocity and OUTPUT.acceleration, in the units of the case file. Outputs
-without a column have no reference, and the comparison says so. A file ending in .json is a proved
-reference (`reference_file`), in SI units.
+The first column holds driver values. Where they are not those of the sweep, the reference is
+interpolated, or compared at its own samples only: see `reference_grid`. Further columns are OUTPUT,
+OUTPUT.velocity and OUTPUT.acceleration, in the units of the case file. Outputs without a column
+have no reference, and the comparison says so. A file ending in .json is a proved reference
+(`reference_file`), in SI units, on the grid of the sweep.
 
 A file with columns of suspension outputs names their sign convention in a comment, for example "#
 signs: iso8855". So it is readable by itself, and not mistaken for one with other signs.
@@ -14,17 +15,17 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TypeAlias
 
-import numpy as np
-
 from ...errors import remedy
-from ...trajectory import Array
+from ...trajectory import QUANTITIES, Array
 from ..case import Origin, Quantity, Series
 from ..units import Unit
 from .document import fault, sha256, shown
 from .reference_file import read, series
+from .reference_grid import Grid
 from .reference_samples import (
     DIGEST,
     ReferenceKeys,
@@ -36,9 +37,8 @@ from .reference_samples import (
 )
 
 DERIVATIVES = (".velocity", ".acceleration")
-# Twelve digits of a driver value: a smaller error moves no output by as much as a tolerance; a
-# rounded table has a larger error.
-SAME_GRID = 1e-12
+PROVED = ".json"
+"""Suffix of the files of proved references."""
 
 Convert: TypeAlias = Callable[[float], float]
 """Conversion from the unit of a file to SI."""
@@ -49,6 +49,19 @@ def is_derivative(name: str) -> bool:
     return name.endswith(DERIVATIVES)
 
 
+def read_grid(case_file: Path, keys: ReferenceKeys) -> Sequence[float]:
+    """Return the driver values of a reference in the units of the case file; of a proved one, SI.
+
+    Raises:
+        CaseError: the file is unreadable or lies elsewhere.
+    """
+    if keys.file is not None and keys.file.endswith(PROVED):
+        proved = read(only_beside(case_file, keys)).driver
+        return [value for values in [*proved.values()][:1] for value in values]
+    samples = inline(case_file, keys, ()) if keys.file is None else from_csv(case_file, keys)
+    return [row[0] for _, row in samples.rows]
+
+
 def read_reference(
     case_file: Path,
     keys: ReferenceKeys,
@@ -57,8 +70,10 @@ def read_reference(
     values: Array,
     outputs: Sequence[Quantity],
     convention: str,
-) -> dict[str, Series]:
-    """Return the true values by output name, in SI.
+    *,
+    own_grid: bool = False,
+) -> tuple[dict[str, Series], Origin]:
+    """Return the true values by output name, in SI, and their origin.
 
     Args:
         driver: unit of the driver in the file.
@@ -66,43 +81,59 @@ def read_reference(
         values: grid of the sweep [m or rad], shape (n,).
         outputs: outputs of the case.
         convention: sign convention of the outputs that have one.
+        own_grid: the samples of the sweep are those of the reference.
 
     Raises:
-        CaseError: the file is unreadable or lies elsewhere, a column is unknown, or grid or signs
-            differ from those of the case.
+        CaseError: the file is unreadable or lies elsewhere, a column is unknown, the sweep has no
+            sample within the grid, or the signs differ from those of the case.
     """
     by_name = {output.name: output for output in outputs}
-    if keys.file is not None and keys.file.endswith(".json"):
+    if keys.file is not None and keys.file.endswith(PROVED):
         file = only_beside(case_file, keys)
-        return series(file, read(file), values, outputs)
+        known = series(file, read(file), values, outputs)
+        return known, replace(_origin(case_file, keys), signs=convention)
     samples = inline(case_file, keys, outputs) if keys.file is None else from_csv(case_file, keys)
     names = list(samples.columns[1:])
     _check_columns(samples, names, [*by_name])
-    _check_grid(samples, driver, values)
+    signed = any(by_name[name].signs for name in names if name in by_name)
     if keys.file is not None:
-        _check_signs(
-            samples,
-            convention if any(by_name[name].signs for name in names if name in by_name) else "",
+        _check_signs(samples, convention if signed else "")
+    grid = Grid(samples, driver, values, own=own_grid)
+    known: dict[str, Series] = {}
+    limits: dict[str, str] = {}
+    for output in outputs:
+        if output.name not in names:
+            continue
+        unit, scale = unit_of(output.unit, units)
+        found = {
+            quantity: grid.column(1 + names.index(name), scale)
+            for quantity, ending in zip(QUANTITIES, ("", *DERIVATIVES), strict=True)
+            if (name := output.name + ending) in names
+        }
+        known[output.name] = Series(
+            found["position"].values,
+            *(found[each].values if each in found else None for each in QUANTITIES[1:]),
+            uncertainty={
+                quantity: each.uncertainty
+                for quantity, each in found.items()
+                if each.uncertainty.any()
+            },
         )
-    column = {name: [row[k] for _, row in samples.rows] for k, name in enumerate(names, start=1)}
-    return {
-        output.name: Series(
-            _in_si(column[output.name], output.unit, units),
-            *(
-                (
-                    _in_si(column[name], output.unit, units)
-                    if (name := output.name + ending) in column
-                    else None
-                )
-                for ending in DERIVATIVES
-            ),
-        )
-        for output in outputs
-        if output.name in column
-    }
+        if reasons := found["position"].reasons:
+            limits[output.name] = "; ".join(
+                f"{why}: {largest / scale(1.0):.2g} {unit}" for why, largest in reasons
+            )
+    own = {samples.columns[0]: driver.name}
+    return known, replace(
+        _origin(case_file, keys),
+        units=own | {name: unit_of(by_name[name].unit, units)[0] for name in known},
+        signs=samples.signs or (convention if signed else ""),
+        grid=grid.words,
+        limits=limits,
+    )
 
 
-def read_origin(case_file: Path, keys: ReferenceKeys) -> Origin:
+def _origin(case_file: Path, keys: ReferenceKeys) -> Origin:
     """Return the source of the true values of a reference after it was read.
 
     Raises:
@@ -129,13 +160,18 @@ def read_origin(case_file: Path, keys: ReferenceKeys) -> Origin:
             "reference.digest",
             f"{problem}; get the file that was meant, or give its digest",
         )
-    return Origin(citation, keys.file, found, own=keys.file.endswith(".json"))
+    return Origin(citation, keys.file, found, own=keys.file.endswith(PROVED))
 
 
-def _in_si(column: Sequence[float], unit: str, units: Mapping[str, Convert]) -> Array:
+def unit_of(unit: str, units: Mapping[str, Convert]) -> tuple[str, Convert]:
+    """Return the unit of an output in the file, and the conversion of its numbers to SI."""
     above, _, below = unit.partition("/")
-    scale = units[below](1.0) if below else 1.0
-    return np.array([units[above](value) / scale for value in column])
+    convert = units[above]
+    name, per = (getattr(units[each], "name", each) if each else "" for each in (above, below))
+    if not below:
+        return name, convert
+    scale = units[below](1.0)
+    return f"{name}/{per}", lambda number: convert(number) / scale
 
 
 def _check_signs(samples: Samples, convention: str) -> None:
@@ -181,22 +217,3 @@ def _check_columns(samples: Samples, names: Sequence[str], outputs: Sequence[str
         if stem not in counts:
             problem = f"found {name!r} alone, expected its positions too; add the column {stem!r}"
             raise fault(samples.file, samples.header, problem)
-
-
-def _check_grid(samples: Samples, driver: Unit, values: Array) -> None:
-    allowed = SAME_GRID * float(np.max(np.abs(values)))
-    advice = "give a row for each sample of the sweep, driver values to 13 digits or more"
-    for k, ((where, row), there) in enumerate(zip(samples.rows, values.tolist(), strict=False)):
-        if abs(driver(row[0]) - there) > allowed:
-            found = f"driver value {samples.driver_value(k)} {driver.name} of sample {k}"
-            raise fault(
-                samples.file,
-                where,
-                f"{found}, expected {driver.written(there)} as in the sweep; {advice}",
-            )
-    if len(samples.rows) != len(values):
-        problem = (
-            f"found {len(samples.rows)} rows, expected {len(values)}, the steps of the sweep;"
-            f" {advice}"
-        )
-        raise fault(samples.file, samples.key, problem)

@@ -16,6 +16,7 @@ import msgspec
 from msgspec import Meta
 
 from ..case import PER_TRAVEL, Quantity
+from ..printed import Printed
 from .document import LARGEST, decimal, fault, read_text, shown
 
 LARGEST_FILE = 64_000_000
@@ -75,6 +76,7 @@ class Samples:
         key: key of all rows.
         signs: sign convention named in a comment.
         lines: lines of a file of its own, for messages.
+        printed: digits of the numbers, by column.
     """
 
     file: Path
@@ -84,6 +86,7 @@ class Samples:
     key: str = ""
     signs: str = ""
     lines: Sequence[str] = ()
+    printed: Sequence[Printed] = ()
 
     def driver_value(self, k: int) -> str:
         """Return the driver value of a row as written."""
@@ -110,9 +113,12 @@ def inline(file: Path, keys: ReferenceKeys, outputs: Sequence[Quantity]) -> Samp
     ]
     key = "reference.rows"
     rows = [(f"{key}[{k}]", row) for k, row in enumerate(keys.rows)]
-    samples = Samples(file, "reference.columns", columns, rows, key)
+    printed = [Printed() for _ in columns]
+    samples = Samples(file, "reference.columns", columns, rows, key, printed=printed)
     for where, row in rows:
         _check_width(samples, where, len(row))
+        for column, number in zip(printed, row, strict=True):
+            column.add(repr(number))
     return samples
 
 
@@ -140,7 +146,13 @@ def from_csv(case_file: Path, keys: ReferenceKeys) -> Samples:
             where = f"line {reader.line_num}"
             if samples is None:
                 samples = Samples(
-                    file, where, [cell.strip() for cell in cells], rows, signs=signs, lines=lines
+                    file,
+                    where,
+                    [cell.strip() for cell in cells],
+                    rows,
+                    signs=signs,
+                    lines=lines,
+                    printed=[Printed() for _ in cells],
                 )
                 continue
             _check_width(samples, where, len(cells))
@@ -150,6 +162,8 @@ def from_csv(case_file: Path, keys: ReferenceKeys) -> Samples:
                 for name, cell in zip(samples.columns, cells, strict=True)
             )
             rows.append((where, array("d", numbers)))
+            for column, cell in zip(samples.printed, cells, strict=True):
+                column.add(cell)
     except csv.Error as error:
         raise fault(
             file, f"line {reader.line_num}", f"not valid CSV: {error}; correct the line"

@@ -43,6 +43,8 @@ left out. `kincheck list --joints` prints all types with their keys.
                          (rate) = 1, in driver units per second
                          driver: its samples from start to stop; it moves at the rate, whose sign
                          gives the direction, and has its design value at time zero
+                         at = "reference", in place of start, stop and steps: the samples of the
+                         reference
                          no driver, or "time": start and stop are times [s], there is no rate, and
                          the motions move everything
                          both are followed from the design position, in both directions: from time
@@ -91,8 +93,9 @@ left out. `kincheck list --joints` prints all types with their keys.
                          with (columns)
                          beside is in its folder or below, links followed: a case file from
                          elsewhere opens no other file
-                         first column: swept values, on the grid; others: OUTPUT, OUTPUT.velocity,
-                         OUTPUT.acceleration
+                         first column: swept values; others: OUTPUT, OUTPUT.velocity,
+                         OUTPUT.acceleration; interpolated where its rows are not at samples of the
+                         sweep; errors of interpolation and printed digits enter the tolerance
                          a CSV file of suspension outputs names their convention in a comment:
                          # signs: iso8855
                          (citation), source of the true values: author, title, page or address;
@@ -199,12 +202,18 @@ class SweepKeys(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
     """[sweep]; start, stop and rate in the driver's unit, or seconds."""
 
     driver: Text = TIME
-    start: Number
-    stop: Number
-    steps: Annotated[
-        int,
-        Meta(ge=1, le=MOST_SAMPLES, description=f"a whole number of samples, 1 to {MOST_SAMPLES}"),
-    ]
+    at: Annotated[Literal["reference"], Meta(description='"reference"')] | None = None
+    start: Number | None = None
+    stop: Number | None = None
+    steps: (
+        Annotated[
+            int,
+            Meta(
+                ge=1, le=MOST_SAMPLES, description=f"a whole number of samples, 1 to {MOST_SAMPLES}"
+            ),
+        ]
+        | None
+    ) = None
     rate: Number | None = None
 
 

@@ -1,0 +1,146 @@
+"""Grid of a reference: its rows at the samples of the sweep.
+
+A row belongs to the sample with its driver value. If every row belongs to one, the reference is
+compared at its own samples, which may be fewer than those of the sweep. Otherwise it is
+interpolated at the samples within its range.
+
+Three errors of the values are known, and enter the tolerance: the rounding of the numbers to their
+printed digits, that of the driver values times the slope, and the estimated error of the
+interpolation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...trajectory import Array
+from ..interpolation import FEWEST, interpolated, matched, slopes
+from ..printed import even
+from ..units import Unit
+from .document import fault
+from .reference_samples import Samples
+
+# Twelve digits of a driver value: a smaller error moves no output by as much as a tolerance; a
+# rounded table has a larger error.
+SAME_GRID = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Column:
+    """A column of a reference at the samples.
+
+    Attributes:
+        values, uncertainty: SI, shape (n,); NaN where there is none.
+        reasons: parts of the uncertainty, each with its largest value [SI].
+    """
+
+    values: Array
+    uncertainty: Array
+    reasons: Sequence[tuple[str, float]]
+
+
+class Grid:
+    """The rows of a reference, and the samples of a sweep.
+
+    Args:
+        driver: unit of the driver values in the file.
+        values: samples of the sweep [SI].
+        own: the samples are those of the reference.
+
+    Raises:
+        CaseError: no sample is within the rows, or there are too few rows, or two at one driver
+            value, to interpolate.
+    """
+
+    def __init__(self, samples: Samples, driver: Unit, values: Array, *, own: bool) -> None:
+        self._samples, self._at = samples, values
+        self._written = np.array([row[0] for _, row in samples.rows])
+        rows = np.array([driver(x) for x in self._written.tolist()])
+        self._allowed = allowed = SAME_GRID * float(np.max(np.abs(values)))
+        self._index = np.arange(len(rows)) if own else matched(rows, values, allowed)
+        half = samples.printed[0].half(self._written) * driver(1.0)
+        if (self._index is not None and not own) or even(self._written):
+            half = np.zeros_like(half)  # they are meant as they are
+        self._order = np.argsort(rows, kind="stable")
+        self._x, self._half = rows[self._order], float(half.max())
+        slack = max(allowed, self._half)
+        self._within = (values >= self._x[0] - slack) & (values <= self._x[-1] + slack)
+        if self._index is None:
+            self._check(driver, values)
+
+    def _check(self, driver: Unit, values: Array) -> None:
+        """Refuse rows that cannot be interpolated."""
+        samples, at = self._samples, 'or take its samples: [sweep] at = "reference"'
+        if not self._within.any():
+            low, high = (driver.written(float(x)) for x in (self._x[0], self._x[-1]))
+            ends = " to ".join(driver.written(float(x)) for x in (values[0], values[-1]))
+            problem = f"found driver values from {low} to {high}, expected some within the sweep"
+            raise fault(samples.file, samples.key, f"{problem}, {ends}; correct one, {at}")
+        if len(self._x) < FEWEST:
+            off = np.abs(self._x[:, None] - values).min(axis=1)
+            k = int(self._order[off.argmax()])
+            nearest = values[np.abs(values - driver(float(self._written[k]))).argmin()]
+            problem = (
+                f"found driver value {samples.driver_value(k)} {driver.name} at no sample of the"
+                f" sweep, the nearest is {driver.written(float(nearest))}, expected {FEWEST} rows"
+                f" or more to interpolate, found {len(self._x)}"
+            )
+            raise fault(samples.file, samples.rows[k][0], f"{problem}; correct it, {at}")
+        twice = np.flatnonzero(np.diff(self._x) <= 0.0)
+        if twice.size:
+            k = int(self._order[twice[0] + 1])
+            problem = f"found driver value {samples.driver_value(k)} {driver.name} twice"
+            raise fault(
+                samples.file,
+                samples.rows[k][0],
+                f"{problem}, expected it once where rows are interpolated; remove one, {at}",
+            )
+
+    @property
+    def words(self) -> str:
+        """Where the reference has values, in words; empty if at every sample."""
+        rows, samples = len(self._x), len(self._at)
+        if self._index is None:
+            where = f"interpolated at {int(self._within.sum())} of {samples} samples"
+            return f"{rows} rows on a grid of their own, {where}"
+        there = int((self._index >= 0).sum())
+        return "" if there == samples else f"rows for {there} of {samples} samples"
+
+    def column(self, k: int, scale: Callable[[float], float]) -> Column:
+        """Return a column at the samples.
+
+        Args:
+            scale: conversion from the unit of the file to SI.
+        """
+        written = np.array([row[k] for _, row in self._samples.rows])
+        printed = self._samples.printed[k]
+        y = np.array([scale(value) for value in written.tolist()])
+        half = printed.half(written) * scale(1.0)
+        error = np.zeros_like(self._at)
+        if self._index is not None:
+            there = self._index >= 0
+            values = np.where(there, y[self._index], np.nan)
+            rounding = np.where(there, half[self._index], 0.0)
+        else:
+            ordered = y[self._order]
+            values, error = interpolated(self._x, ordered, self._at)
+            values = np.where(self._within, values, np.nan)
+            above = np.clip(np.searchsorted(self._x, self._at), 1, len(self._x) - 1)
+            around = np.stack([above - 1, above])
+            at_row = (np.abs(self._x[around] - self._at) <= self._allowed).any(axis=0)
+            error = np.where(self._within & ~at_row, error, 0.0)
+            rounding = np.where(self._within, half[self._order][around].max(axis=0), 0.0)
+        shifted = np.zeros_like(self._at)
+        if self._half and len(self._x) > 1:
+            shifted = self._half * slopes(self._x, y[self._order], self._at)
+            shifted = np.where(np.isfinite(values), shifted, 0.0)
+        parts = {
+            f"printed to {printed.significant} digits": rounding,
+            f"driver values printed to {self._samples.printed[0].significant} digits": shifted,
+            f"interpolated between {len(self._x)} rows": error,
+        }
+        reasons = [(why, float(each.max())) for why, each in parts.items() if each.any()]
+        return Column(values, rounding + shifted + error, reasons)

@@ -1,0 +1,76 @@
+"""Tables for other programs: CSV, or Parquet where pyarrow is installed, written chunk by chunk."""
+
+from __future__ import annotations
+
+import csv
+import importlib
+from collections.abc import Iterable, Mapping, Sequence
+from enum import Enum
+from pathlib import Path
+from typing import Any, TextIO
+
+from .escape import cell
+
+Rows = Sequence[Sequence[Any]]
+
+
+class Kind(Enum):
+    """Kind of the values of a column, by pyarrow's name; None is an empty cell."""
+
+    TEXT = "string"
+    INTEGER = "int64"
+    NUMBER = "float64"
+    TRUTH = "bool_"
+
+
+def write_csv(path: Path, columns: Mapping[str, Kind], chunks: Iterable[Rows]) -> int:
+    """Write a CSV file and return the number of rows; numbers keep all digits."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        return put_csv(file, columns, chunks)
+
+
+def put_csv(file: TextIO, columns: Mapping[str, Kind], chunks: Iterable[Rows]) -> int:
+    """Write the lines of a CSV file and return the number of rows."""
+    truths = [k for k, kind in enumerate(columns.values()) if kind is Kind.TRUTH]
+    count = 0
+    writer = csv.writer(file)
+    writer.writerow([cell(name) for name in columns])
+    for rows in chunks:
+        for row in rows:
+            values = [cell(each) for each in row]
+            for k in truths:
+                values[k] = None if row[k] is None else ("false", "true")[row[k]]
+            writer.writerow(values)
+        count += len(rows)
+    return count
+
+
+def write_parquet(path: Path, columns: Mapping[str, Kind], chunks: Iterable[Rows]) -> int:
+    """Write a Parquet file and return the number of rows, a row group a chunk.
+
+    Raises:
+        ImportError: pyarrow is not installed; see `no_parquet`.
+    """
+    arrow: Any = importlib.import_module("pyarrow")
+    parquet: Any = importlib.import_module("pyarrow.parquet")
+    schema = arrow.schema([(name, getattr(arrow, kind.value)()) for name, kind in columns.items()])
+    count = 0
+    with parquet.ParquetWriter(path, schema) as writer:
+        for rows in filter(None, chunks):
+            values = dict(zip(columns, map(list, zip(*rows, strict=True)), strict=True))
+            for name, kind in columns.items():
+                if kind is Kind.TRUTH:  # SQLite has 0 and 1
+                    values[name] = [None if each is None else bool(each) for each in values[name]]
+            writer.write_table(arrow.table(values, schema=schema))
+            count += len(rows)
+    return count
+
+
+def no_parquet(named: str, remedy: str) -> str:
+    """Return the message that Parquet needs pyarrow, if it is not installed; else an empty one."""
+    try:
+        for name in ("pyarrow", "pyarrow.parquet"):
+            importlib.import_module(name)
+    except ImportError:
+        return f"{named}: Parquet needs pyarrow: pip install 'kincheck[parquet]'; {remedy}"
+    return ""
