@@ -26,7 +26,7 @@ def add_options(command: argparse.ArgumentParser) -> None:
     points.add_argument(
         "--template",
         metavar="NAME",
-        help="mcpherson, double_wishbone or five_link, where the file does not say it",
+        help="of the suspension, where the file does not say it; kincheck templates prints them",
     )
     points.add_argument(
         "--units",

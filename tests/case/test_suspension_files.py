@@ -184,6 +184,15 @@ def test_quotients_of_velocities_want_a_driver_of_travel():
         loaded(unreferenced(named))
 
 
+def test_one_steering_axis():
+    rods = [["strut_top", "strut_foot"]] * 4
+    with pytest.raises(CaseError, match=r"kingpin_links: found beside kingpin, .* remove"):
+        loaded(changed("suspension", kingpin_links=rods))
+    rods = [["strut_top", "strut_foot"]] * 3 + [["strut_tip", "strut_foot"]]
+    with pytest.raises(CaseError, match=r"kingpin_links: found 'strut_tip', .*'strut_top'"):
+        loaded(changed("suspension", kingpin_links=rods, kingpin=None))
+
+
 def test_signs_of_a_reference_table_must_be_those_of_the_case():
     with pytest.raises(CaseError, match=r"signs: found 'iso8855' of signs, expected 'sae_j670'"):
         loaded(changed("suspension", convention="sae_j670"))

@@ -67,8 +67,9 @@ left out. `kincheck list --joints` prints all types with their keys.
                          (center_plane) = [0, 0, 0], a point in the middle
                          (static_toe) = 0, toe-in, and (static_camber) = 0, top outboard: angles of
                          the wheel at design
-                         (kingpin) = ["lower", "upper"], names of points; (wheel_radius), loaded,
-                         to the contact centre
+                         (kingpin) = ["lower", "upper"], names of points; or (kingpin_links), of
+                         four rods: [["on the body", "on the wheel carrier"], ...], all but the one
+                         that steers; (wheel_radius), loaded, to the contact centre
                          (axle) = "front" or "rear"; (wheelbase), (cg_height), above the road
                          (brakes) = "outboard", (drive) = "inboard": support of the torque, wheel
                          carrier or vehicle body

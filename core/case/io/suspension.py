@@ -46,6 +46,10 @@ def _one_of(kind: type[StrEnum]) -> Any:
 
 
 Points = Annotated[tuple[str, str], Meta(description='two names ["first point", "second point"]')]
+Rods = Annotated[
+    tuple[tuple[str, str], tuple[str, str], tuple[str, str], tuple[str, str]],
+    Meta(description='the ends of four rods [["on the body", "on the wheel carrier"], ...]'),
+]
 Length = Annotated[float, Meta(gt=0.0, description="a positive length")]
 Share = Annotated[float, Meta(ge=0.0, le=1.0, description="a part of the whole, 0 to 1")]
 Conventions = Annotated[Convention, _one_of(Convention)]
@@ -67,6 +71,7 @@ class SuspensionKeys(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
     static_camber: Number = 0.0
     wheel_radius: Length | None = None
     kingpin: Points | None = None
+    kingpin_links: Rods | None = None
     axle: Axles | None = None
     wheelbase: Length | None = None
     cg_height: Length | None = None
@@ -79,7 +84,7 @@ class SuspensionKeys(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
 
 
 _LENGTHS = ("wheel_radius", "wheelbase", "cg_height")
-_NOT_OF_VEHICLE = ("center_plane", "per_travel")
+_NOT_OF_VEHICLE = ("center_plane", "per_travel", "kingpin_links")
 
 
 @cache
@@ -138,6 +143,7 @@ def read_suspension(
     for key, name in (
         ("wheel_center", keys.wheel_center),
         *(("kingpin", name) for name in keys.kingpin or ()),
+        *(("kingpin_links", name) for rod in keys.kingpin_links or () for name in rod),
     ):
         _check_point(file, join("suspension", key), name, mechanism)
     given: dict[str, Any] = {
@@ -147,6 +153,10 @@ def read_suspension(
     }
     given |= {name: length(given[name]) for name in _LENGTHS if given[name] is not None}
     given |= {name: angle(given[name]) for name in ("static_toe", "static_camber")}
+    if keys.kingpin_links and keys.kingpin:
+        problem = "found beside kingpin, expected one of them; remove the other"
+        raise fault(file, "suspension.kingpin_links", problem)
+    given["kingpin"] = keys.kingpin or keys.kingpin_links
     given["travel"] = travel_driver(file, keys.travel, keys.wheel_center, keys.up, case)
     given |= {"forward": forward, "up": up, "middle": tuple(map(length, keys.center_plane))}
     vehicle = Vehicle(**given)
@@ -194,10 +204,12 @@ def _check_side(file: Path, vehicle: Vehicle, mechanism: Mechanism, length: Unit
             "suspension.side",
             f"{problem} of the centre plane, {expected}; correct side, forward, up or center_plane",
         )
-    if vehicle.kingpin is not None:
-        lower, upper = (mechanism.point(name).position for name in vehicle.kingpin)
+    ends = [mechanism.point(name).position for name in vehicle.kingpin_points]
+    if len(ends) == 2:
+        lower, upper = ends
         if vec(vehicle.up) @ (vec(upper) - vec(lower)) <= 0.0:
-            problem = f"found {list(vehicle.kingpin)!r}, the first of which is not the lower"
+            found = list(vehicle.kingpin_points)
+            problem = f"found {found!r}, the first of which is not the lower"
             raise fault(
                 file,
                 "suspension.kingpin",

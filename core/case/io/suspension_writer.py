@@ -10,8 +10,12 @@ from ...errors import CaseError
 from ..case import Case
 from ..suspension import PerTravel, SuspensionOutput, Vehicle, own_keys
 
-_KEYS = {"middle": "center_plane"}
-"""Keys of the attributes of a vehicle that have another name."""
+
+def _key(name: str, value: Any) -> str:
+    """Return the key of an attribute of a vehicle."""
+    if name == "kingpin" and not isinstance(value[0], str):
+        return "kingpin_links"
+    return "center_plane" if name == "middle" else name
 
 
 def suspension_keys(case: Case) -> Mapping[str, Any]:
@@ -29,7 +33,7 @@ def suspension_keys(case: Case) -> Mapping[str, Any]:
             " leave out the others"
         )
     given = {
-        _KEYS.get(each.name, each.name): value
+        _key(each.name, value): value
         for each in fields(Vehicle)
         if (value := getattr(wheels[0], each.name)) != each.default
     }

@@ -25,7 +25,7 @@ from .default_outputs import wheel_of, with_suspension_outputs
 from .own_names import read_own_names
 from .table import HardpointTable, coordinate, placed, require_size, unit_of
 from .templates import TEMPLATES, Template
-from .templates.base import normal
+from .templates.base import WHEEL_CONTACT, normal
 
 Reader = Callable[[Path, str], HardpointTable]
 
@@ -192,8 +192,8 @@ def _require_left_and_upright(
             f"found {written(WHEEL, 1)}, not left of the middle, expected the left side; {advice},"
             " or give the left points",
         )
-    for rear in (role for role in at if role.endswith("_rear")):
-        front = f"{rear.removesuffix('_rear')}_front"
+    arms = [(f"{role.removesuffix('_rear')}_front", role) for role in at if role.endswith("_rear")]
+    for front, rear in (*arms, *template.ahead):
         if front in at and at[front][0] <= at[rear][0]:
             raise fault(
                 table.file,
@@ -201,14 +201,14 @@ def _require_left_and_upright(
                 f"found {written(front, 0)}, and {named[rear]} with {written(rear, 0)}, expected it"
                 f" in front of that; {advice}",
             )
-    high, low = (at[role][2] for role in (template.upper, template.lower))
-    if high <= low:
-        raise fault(
-            table.file,
-            named[template.upper],
-            f"found {written(template.upper, 2)}, not above {named[template.lower]} with"
-            f" {written(template.lower, 2)}, expected it above; {advice}",
-        )
+    for high, low in (*template.above, (WHEEL, WHEEL_CONTACT.name)):
+        if low in at and at[high][2] <= at[low][2]:
+            raise fault(
+                table.file,
+                named[high],
+                f"found {written(high, 2)}, not above {named[low]} with {written(low, 2)}, expected"
+                f" it above; {advice}",
+            )
 
 
 def _travel(file: Path, said: str | None) -> Array:
