@@ -82,7 +82,7 @@ IMPORTS = {
     "case/suspension": ". mechanism case",
     "case/io": ". joints mechanism kinematics/compiled kinematics case case/suspension",
     "case/models/hardpoints": (
-        ". mechanism case/models/hardpoints/templates case case/io case/suspension"
+        ". joints mechanism case/models/hardpoints/templates case case/io case/suspension"
     ),
     "case/variation": ". joints mechanism kinematics/formulation case case/io",
     "case/models/mjcf": ". joints mechanism kinematics/structure case case/io",

@@ -55,6 +55,15 @@ def add_options(command: argparse.ArgumentParser) -> None:
             " and trail"
         ),
     )
+    points.add_argument("--wheelbase", metavar="M", help="[m], for Ackermann of a whole axle")
+    points.add_argument(
+        "--axle",
+        metavar="MOTION",
+        help=(
+            "both wheels, the right one being the mirror image of the left, and a rack: heave, roll"
+            " or steer, over --travel of the left wheel or of the rack"
+        ),
+    )
     points.add_argument(
         "--travel", metavar="M[:SAMPLES]", help="of the wheel, up and down [m]; default 0.05:41"
     )
@@ -98,6 +107,8 @@ def supplied(options: argparse.Namespace) -> Supplied:
         (*options.hold,),
         options.names,
         options.wheel_radius,
+        options.wheelbase,
+        options.axle,
     )
 
 

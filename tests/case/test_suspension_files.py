@@ -178,7 +178,7 @@ def test_quotients_of_velocities_want_a_driver_of_travel():
     case = loaded(unreferenced(steered | TOE))
     assert [output.orders for output in case.outputs] == [3, 2]
     named = steered | {"suspension": STRUT["suspension"] | {"travel": "stroke"}}
-    assert loaded(unreferenced(named)).outputs[0].vehicle.travel == "stroke"
+    assert loaded(unreferenced(named)).outputs[0].vehicle.travel == ("stroke",)
     named["suspension"]["travel"] = "strike"
     with pytest.raises(CaseError, match=r"suspension\.travel: found 'strike', .*'stroke'"):
         loaded(unreferenced(named))

@@ -34,7 +34,7 @@ from .tolerance import tolerance
 from .typed_tables import as_table, class_of, typed
 
 if TYPE_CHECKING:
-    from .suspension import SuspensionTable
+    from .suspension_table import SuspensionTable
 
 LARGEST_FILE = 4_000_000
 # Twice the bodies of the largest measured mechanism; the same limit for joints and points.
@@ -184,8 +184,9 @@ def _with_outputs(
         outputs = _outputs(file, keys, None, case, units)
         return replace(case, outputs=outputs) if outputs else with_all_coordinates(case)
     from . import suspension  # many classes, and few cases have a wheel
+    from .suspension_table import read_suspension
 
-    table = suspension.read_suspension(file, keys.suspension, case, length, units["rad"])
+    table = read_suspension(file, keys.suspension, case, length, units["rad"])
     outputs = _outputs(file, keys, table, case, units) or with_all_coordinates(case).outputs
     case = replace(case, mechanism=suspension.with_markers(mechanism, outputs), outputs=outputs)
     return (

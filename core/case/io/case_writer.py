@@ -18,7 +18,7 @@ from ..case import MARKER, TIME, Case, Output
 from ..suspension import PerTravel, SuspensionOutput
 from .coordinates import AXES
 from .schema import SCHEMA, own_fields
-from .suspension_writer import suspension_keys, suspension_output
+from .suspension_writer import suspension_output, suspension_tables
 
 # What a body has unless the file says otherwise.
 PLAIN: Mapping[str, Any] = {
@@ -37,7 +37,7 @@ def case_text(case: Case, comments: Sequence[str] = ()) -> str:
 
     Raises:
         CaseError: no case file can express the case: samples on no even grid, or outputs of
-            several wheels.
+            several axles.
     """
     lines = [f"# {line}" for line in comments]
     lines += _keys({"schema": SCHEMA, "name": case.name, "source": case.source})
@@ -62,8 +62,8 @@ def case_text(case: Case, comments: Sequence[str] = ()) -> str:
                 f"drivers.{_key(driver.name)}", "motion", {"type": moved.type, **_own(moved)}
             )
     lines += ["", "[sweep]", *_keys(_sweep(case))]
-    if wheel := suspension_keys(case):
-        lines += ["", "[suspension]", *_keys(wheel)]
+    for name, keys in suspension_tables(case).items():
+        lines += ["", f"[{name}]", *_keys(keys)]
     for output in case.outputs:
         if isinstance(output, PerTravel):  # follows from the output before it
             continue
@@ -87,7 +87,7 @@ def _sweep(case: Case) -> Mapping[str, Any]:
 
 def _output(case: Case, output: Any) -> Iterator[tuple[str, Any]]:
     if isinstance(output, SuspensionOutput):
-        yield from suspension_output(output)
+        yield from suspension_output(case, output)
         yield from (("atol", output.atol), ("rtol", output.rtol), ("why", output.why))
         return
     if not isinstance(output, Output):

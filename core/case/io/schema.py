@@ -79,6 +79,9 @@ left out. `kincheck list --joints` prints all types with their keys.
                          centre
                          (travel), name of its driver, if that is not the one of the wheel centre:
                          where other drivers move too, they are held for derivatives by travel
+    [suspension.other]   the axle's other wheel: wheel_center, (kingpin) or (kingpin_links),
+                         (static_toe), (static_camber), (travel); the rest is as in [suspension];
+                         outputs of one wheel then may have (side)
     [reference]          true values: file, the name of a CSV file beside the case file, or rows,
                          with (columns)
                          beside is in its folder or below, links followed: a case file from

@@ -82,8 +82,9 @@ class Vehicle:
             about which the wheel turns when the fifth rod moves and the height of its centre is
             held.
         cg_height: height of the centre of gravity above the road [m].
-        travel: driver of the wheel's travel, if other drivers move too: derivatives by travel hold
-            the others. None: derivatives are along the sweep.
+        travel: driver of the wheel's travel, if other drivers move too, and that of the axle's
+            other wheel if there is one: derivatives by travel move these alone, and hold the
+            others. Empty: derivatives are along the sweep.
         brake_share, drive_share: parts of the vehicle's braking and driving force at this axle [-].
     """
 
@@ -104,7 +105,7 @@ class Vehicle:
     brake_share: float | None = None
     drive: Reaction = Reaction.INBOARD
     drive_share: float | None = None
-    travel: str | None = None
+    travel: tuple[str, ...] = ()
 
     @property
     def kingpin_points(self) -> tuple[str, ...]:

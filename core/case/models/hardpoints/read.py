@@ -1,5 +1,5 @@
 """From a file of hardpoints and a template to a case: the wheel goes up and down, the chassis and
-the steering stand still.
+the steering stand still; or both wheels of an axle and a rack move.
 """
 
 from __future__ import annotations
@@ -12,15 +12,14 @@ from pathlib import Path
 import numpy as np
 
 from ....errors import MOST_NAMED, brief, remedy, shortened, similar
-from ....mechanism.drivers import PointCoordinate
-from ....mechanism.mechanism import GROUND, Body, Mechanism, Vector
+from ....mechanism.mechanism import Vector
 from ....trajectory import Array
-from ...case import Case, Sweep, Truth
-from ...io.coordinates import AXES
+from ...case import Case, Truth
 from ...io.document import decimal, explained, fault, shown
 from ...io.escape import visible
 from ...io.reader_options import LEFT_OUT, Supplied
 from ...io.schema import MOST_SAMPLES
+from .axle import one_wheel, whole_axle
 from .default_outputs import wheel_of, with_suspension_outputs
 from .own_names import read_own_names
 from .table import HardpointTable, coordinate, placed, require_size, unit_of
@@ -59,27 +58,25 @@ def read_hardpoints(file: Path, text: str, reader: Reader, supplied: Supplied) -
     named = _filled(table, template, supplied.names)
     at = {role: points[name] for role, name in named.items()}
     require_size(table, at, supplied.units)
-    wheel = wheel_of(table, named, at, supplied.wheel_radius)
+    wheel = wheel_of(table, named, at, supplied.wheel_radius, supplied.wheelbase)
     travel = _travel(file, supplied.travel)
     _require_left_and_upright(table, template, named, at, supplied)
     with explained(file, "", unit_of(table, supplied.units)):
-        joints = tuple(template.joints(at))
-        bodies = dict.fromkeys(name for joint in joints for name in joint.bodies if name != GROUND)
-        stroke = PointCoordinate("stroke", WHEEL, AXES["z"])
-        mechanism = Mechanism(
-            file.stem, [Body(name) for name in bodies], joints, template.points(at), [stroke]
-        )
+        if supplied.axle is None:
+            mechanism, sweep = one_wheel(file.stem, template, at, travel)
+        else:
+            mechanism, sweep = whole_axle(file, supplied.axle, template, at, travel)
     others = [*(name for name in points if name not in named.values()), *table.left_out]
     source = (
-        f"{table.tool} hardpoints of {file.name} on the template {template.name}, left side, x"
-        f" forward, y left, z up"
+        f"{table.tool} hardpoints of {file.name} on the template {template.name},"
+        f" {'left side' if supplied.axle is None else 'both sides'}, x forward, y left, z up"
     )
     if wheel.radius is None:
         source += "; without a wheel's radius (--wheel-radius) no outputs at the road"
     source += f"{LEFT_OUT}{_listed(others)}"
-    case = Case(file.stem, source, Truth.CONSENSUS_ONLY, mechanism, Sweep("stroke", travel), ())
+    case = Case(file.stem, source, Truth.CONSENSUS_ONLY, mechanism, sweep, ())
     case = replace(case, length_unit=unit_of(table, supplied.units).name)
-    return with_suspension_outputs(case, template, wheel, at)
+    return with_suspension_outputs(case, template, wheel, at, supplied.axle)
 
 
 def _template(table: HardpointTable, said: str | None) -> Template:

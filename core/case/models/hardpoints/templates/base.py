@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from .....joints import Joint
 from .....mechanism.mechanism import GROUND, Point, Vector
@@ -55,6 +55,7 @@ class Template:
         optional: roles of points that only outputs need.
         kingpin: of the steering axis: roles of its lower and its upper point, or of the ends of the
             four rods that define it, see `Vehicle`; None without steering.
+        steered: the joint whose first end is on the rack, if there is steering.
         springs: roles of the ends of springs and dampers by the names of their motion ratios.
         bodies: the body of each role that is a point of the case, if it is not the knuckle.
     """
@@ -69,6 +70,7 @@ class Template:
     ahead: Sequence[tuple[str, str]] = ()
     optional: Sequence[Role] = ()
     kingpin: Kingpin | None = None
+    steered: str = ""
     springs: Mapping[str, tuple[str, str]] = field(default_factory=dict[str, tuple[str, str]])
     bodies: Mapping[str, str] = field(default_factory=dict[str, str])
 
@@ -97,6 +99,17 @@ def normal(name: str) -> str:
 def flattened(kingpin: Kingpin | tuple[()]) -> list[str]:
     """Return the roles of a steering axis."""
     return [role for each in kingpin for role in ([each] if isinstance(each, str) else each)]
+
+
+def prefixed(prefix: str, kingpin: Kingpin | None) -> Kingpin | None:
+    """Return the steering axis by the names of points with a prefix."""
+    if kingpin is None:
+        return None
+    ends: list[Any] = [
+        prefix + each if isinstance(each, str) else (prefix + each[0], prefix + each[1])
+        for each in kingpin
+    ]
+    return tuple(ends)
 
 
 def between(a: Vector, b: Vector) -> Vector:

@@ -32,15 +32,18 @@ def _joints(at: Mapping[str, Vector]) -> Sequence[Joint]:
         ),
         Spherical("upper_ball", "uca", KNUCKLE, at["uca_outer"]),
         Spherical("lower_ball", "lca", KNUCKLE, at["lca_outer"]),
-        Distance("tie_rod", GROUND, KNUCKLE, (at["tierod_inner"], at["tierod_outer"])),
+        _tie_rod(at),
     )
+
+
+def _tie_rod(at: Mapping[str, Vector]) -> Joint:
+    return Distance("tie_rod", GROUND, KNUCKLE, (at["tierod_inner"], at["tierod_outer"]))
 
 
 def _rods(at: Mapping[str, Vector]) -> Sequence[Joint]:
     ends = [(f"{arm}_{end}", f"{arm}_outer") for arm in ("uca", "lca") for end in ("front", "rear")]
-    return [
-        Distance(inner, GROUND, KNUCKLE, (at[inner], at[outer]))
-        for inner, outer in (*ends, ("tierod_inner", "tierod_outer"))
+    return [Distance(inner, GROUND, KNUCKLE, (at[inner], at[outer])) for inner, outer in ends] + [
+        _tie_rod(at)
     ]
 
 
@@ -88,6 +91,7 @@ DOUBLE_WISHBONE = Template(
     above=(("uca_outer", "lca_outer"),),
     optional=(*WHEEL, *spring_roles("lower arm", "Location Arm")),
     kingpin=("lca_outer", "uca_outer"),
+    steered="tie_rod",
     springs=SPRINGS,
     bodies=spring_bodies("lca"),
 )

@@ -80,6 +80,7 @@ FIVE_LINK = Template(
     above=(("upper_front_outer", "lower_rear_outer"),),
     optional=(*WHEEL, *spring_roles("knuckle", "Location Upright")),
     kingpin=tuple((f"{link}_inner", f"{link}_outer") for link in LINKS if link != "tierod"),
+    steered="tierod",
     springs=SPRINGS,
     bodies={**spring_bodies(KNUCKLE), **{f"{link}_inner": GROUND for link in LINKS}},
 )

@@ -90,6 +90,7 @@ MCPHERSON = Template(
     above=(("strut_upper", "lca_outer"),),
     optional=WHEEL,
     kingpin=("lca_outer", "strut_upper"),
+    steered="tie_rod",
     springs={"spring_ratio": ("strut_lower", "strut_upper")},
     bodies={"strut_upper": GROUND},
 )
