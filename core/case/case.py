@@ -25,7 +25,7 @@ PER_TRAVEL = ".per_travel"
 
 
 HELD_BUT = "held_but"
-"""Fact of an output that is differentiated by one driver while all others are held: its name."""
+"""Fact of an output that is differentiated by some drivers while others are held: their names."""
 
 NO_SIZE = 1e-3
 """Size of a mechanism whose points all coincide within rounding [m]."""

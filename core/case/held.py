@@ -1,12 +1,14 @@
-"""Derivatives by one driver while all others are held, at every sample of a combined sweep.
+"""Derivatives by the travel of wheels while other drivers are held, at every sample of a combined
+sweep.
 
 A derivative needs a motion. The poses of the samples are passed once more, on a path of the same
-values: the one driver moves at a constant rate at each sample, the others stand still there, and
+values: the drivers of travel move at one rate at each sample, the others stand still there, and
 between samples all go on smoothly. Velocities at the samples, over that rate, are the derivatives.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,13 +19,13 @@ from ..mechanism.waypoints import Waypoints
 from ..trajectory import Array
 from .case import HELD_BUT, TIME, Case, Sweep, size
 
-# Displacement of the driver at that rate in the time between two samples, over the mechanism's
+# Displacement of a driver at that rate in the time between two samples, over the mechanism's
 # size: small, so that the path between samples goes hardly beyond them.
 STEP = 1e-3
 
 
-def held_case(case: Case, driver: str) -> Case:
-    """Return the case on a path through the same poses, on which one driver alone moves at each
+def held_case(case: Case, drivers: Sequence[str]) -> Case:
+    """Return the case on a path through the same poses, on which these drivers alone move at each
     sample.
     """
     path = case.sweep.path
@@ -31,10 +33,10 @@ def held_case(case: Case, driver: str) -> Case:
     shortest = float(np.diff(times).min(initial=1.0))
     rate = STEP * size(case) / shortest
     motions: dict[str, Motion] = {}
-    for name in dict.fromkeys((*path.motions, driver)):
+    for name in dict.fromkeys((*path.motions, *drivers)):
         values = path.motions[name].at(times)[0] if name in path.motions else np.zeros_like(times)
         motions[name] = Waypoints(
-            tuple(times.tolist()), tuple(values.tolist()), rate if name == driver else 0.0
+            tuple(times.tolist()), tuple(values.tolist()), rate if name in drivers else 0.0
         )
     return replace(case, sweep=Sweep(TIME, path.times, motions=motions))
 

@@ -35,7 +35,7 @@ def add_options(command: argparse.ArgumentParser) -> None:
     points.add_argument(
         "--template",
         metavar="NAME",
-        help="mcpherson, double_wishbone or five_link, where the file does not say it",
+        help="of the suspension, where the file does not say it; kincheck templates prints them",
     )
     points.add_argument(
         "--units",
@@ -62,6 +62,15 @@ def add_options(command: argparse.ArgumentParser) -> None:
         help=(
             "of the loaded wheel [m], where no point is its contact: for roll centre, scrub radius"
             " and trail"
+        ),
+    )
+    points.add_argument("--wheelbase", metavar="M", help="[m], for Ackermann of a whole axle")
+    points.add_argument(
+        "--axle",
+        metavar="MOTION",
+        help=(
+            "both wheels, the right one being the mirror image of the left, and a rack: heave, roll"
+            " or steer, over --travel of the left wheel or of the rack"
         ),
     )
     points.add_argument(
@@ -107,6 +116,8 @@ def supplied(options: argparse.Namespace) -> Supplied:
         (*options.hold,),
         options.names,
         options.wheel_radius,
+        options.wheelbase,
+        options.axle,
         options.closure,
     )
 

@@ -51,7 +51,7 @@ def output_series(
     """Return an output over the samples of a trajectory.
 
     Args:
-        held: the same poses with other velocities, for outputs that are derivatives by one driver
+        held: the same poses with other velocities, for outputs that are derivatives by some drivers
             while others are held; without it they have no value.
 
     Values are NaN at unsolved samples. A quantity is None if the engine does not give it.

@@ -1,4 +1,4 @@
-"""Velocities by one driver while all others are held, for outputs that are such derivatives."""
+"""Velocities by some drivers while all others are held, for outputs that are such derivatives."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SAME_POSE = 1e-6
 def held_trajectory(
     case: Case, mode: str, found: Trajectory, solve: Callable[[Case], Trajectory]
 ) -> tuple[Trajectory | None, str]:
-    """Return the poses of a trajectory with the velocities by one driver while others are held, and
+    """Return the poses of a trajectory with velocities by some drivers while others are held, and
     why samples of it are missing.
 
     It is None if no output needs it, or if the engine runs through time, where velocities are those
@@ -43,5 +43,7 @@ def held_trajectory(
     why = held.message or "another assembly was found there"
     return (
         replace(held, solved=solved),
-        f"no derivative by {by} at {lost} of {len(same)} samples: {why}" if lost else "",
+        f"no derivative by {' and '.join(by)} at {lost} of {len(same)} samples: {why}"
+        if lost
+        else "",
     )

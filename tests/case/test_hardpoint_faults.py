@@ -76,7 +76,7 @@ CHRONO_FAULTS = {
     ),
     "other template": (
         ('"MacPhersonStrut"', '"SolidAxle"'),
-        ["Template", "SolidAxle", "mcpherson, double_wishbone, five_link"],
+        ["Template", "SolidAxle", "mcpherson, double_wishbone, ", "five_link, three_link"],
     ),
     "template no text": (('"MacPhersonStrut"', "7"), ["Template", "7", "name"]),
     "millimetres": (("0.22, 0.52, -0.156", "220.0, 520.0, -156.0"), ["span", "another unit"]),
@@ -141,7 +141,7 @@ TABLE_FAULTS = {
     "no template": (
         (),
         Supplied(None, "mm", "adams"),
-        ["--template", "mcpherson, double_wishbone, five_link"],
+        ["--template", "mcpherson, double_wishbone, ", "five_link, three_link"],
     ),
     "misspelt template": (
         (),

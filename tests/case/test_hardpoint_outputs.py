@@ -15,6 +15,7 @@ from kincheck.core.case.models.hardpoints.templates import TEMPLATES
 from kincheck.core.cli.main import main
 from kincheck.core.errors import CaseError
 from kincheck.core.harness.compare import output_series
+from scipy.optimize import brentq
 
 from ..oracles.rods import Carrier, rotation
 
@@ -34,7 +35,11 @@ RODS = {
         (f"{link}_inner", f"{link}_outer")
         for link in ("upper_front", "upper_rear", "lower_front", "lower_rear", "tierod")
     ),
+    "three_link": (("upper_inner", "upper_outer"), ("lower_inner", "lower_outer")),
+    "semi_trailing_arm": (),
 }
+RODS["reduced_double_wishbone"] = RODS["double_wishbone"]
+BALLS = {"three_link": ("arm_pivot",), "semi_trailing_arm": ("arm_inner", "arm_outer")}
 
 
 def solved(case):
@@ -58,6 +63,7 @@ def carrier_of(name, at):
         at["wheel_center"],
         [(at[inner], at[outer]) for inner, outer in RODS[name]],
         line and [at[role] for role in line],
+        [at[role] for role in BALLS.get(name, ())],
     )
 
 
@@ -90,7 +96,7 @@ def expected(name, at, travel, spin=(0.0, 1.0, 0.0)):
     }
     for role in TEMPLATES[name].watched:
         values |= dict(zip((f"{role}.{axis}" for axis in "xyz"), carrier.at(at[role]), strict=True))
-    if name == "five_link":
+    if name not in ("mcpherson", "double_wishbone"):
         ends = carrier.at(at["spring_lower"]), np.array(at["spring_upper"])
         moving = carrier.velocity(ends[0])
     elif name == "mcpherson":
@@ -101,12 +107,15 @@ def expected(name, at, travel, spin=(0.0, 1.0, 0.0)):
         ends = place, np.array(at["spring_upper"])
     along = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
     values["spring_ratio"] = along @ moving
-    if name != "five_link":
-        low = carrier.at(at["lca_outer"])
-        high = ends[1] if name == "mcpherson" else carrier.at(at["uca_outer"])
-        x, y, z = high - low
+    if name not in BALLS:
+        if name == "five_link":
+            low, axis = carrier.steering()
+        else:
+            low = carrier.at(at["lca_outer"])
+            axis = (ends[1] if name == "mcpherson" else carrier.at(at["uca_outer"])) - low
+        x, y, z = axis
         values |= {"caster": np.arctan2(-x, z), "kingpin_inclination": np.arctan2(-y, z)}
-        meets = low + (contact[2] - low[2]) / z * (high - low) - contact
+        meets = low + (contact[2] - low[2]) / z * axis - contact
         heading = np.cross(s, (0.0, 0.0, 1.0))
         heading = heading / np.linalg.norm(heading)
         values |= {
@@ -200,6 +209,84 @@ def test_chrono_strut_with_a_radius():
     assert np.abs(found["toe"] - np.arctan2(s[:, 0], s[:, 1])).max() < 1e-14
     assert np.abs(found["camber"] - np.arctan2(-s[:, 2], level)).max() < 1e-14
     assert np.abs(found["half_track_change"] - (track - track[7])).max() < 1e-14
+
+
+def test_chrono_semi_trailing_arm():
+    """A turn about one line: the angle of each travel by scipy's root, all else by rotation."""
+    case = load(
+        DATA / "chrono_semi_trailing_arm.json", Supplied(travel="0.1:9", wheel_radius="0.45")
+    )
+    found = solved(case)
+    pivot, outer, wheel = (
+        np.array(each) for each in ([0.42, 0.6, -0.05], [0.5, 0.9, 0.0], [0.0, 1.1, 0.0])
+    )
+    low, high = np.array([0.3, 0.8, 0.0]), np.array([0.3, 0.8, 0.4])
+    axis = (outer - pivot) / np.linalg.norm(outer - pivot)
+    for k, travel in enumerate(case.sweep.values):
+
+        def height(angle, travel=travel):
+            return (pivot + rotation(angle * axis) @ (wheel - pivot))[2] - travel
+
+        angle = brentq(height, -0.5, 0.5, xtol=1e-15, rtol=1e-15)
+        turn = rotation(angle * axis)
+        center, s, spring = (
+            pivot + turn @ (wheel - pivot),
+            turn @ (0.0, 1.0, 0.0),
+            pivot + turn @ (low - pivot),
+        )
+        rise = np.array([0.0, 0.0, 1.0]) - s[2] * s
+        contact = center - 0.45 * rise / np.linalg.norm(rise)
+        per_turn = [np.cross(axis, each - pivot) for each in (center, contact, spring)]
+        _, vy, vz = per_turn[1]
+        true = {
+            "wheel_center.x": center[0],
+            "wheel_center.y": center[1],
+            "toe": np.arctan2(s[0], s[1]),
+            "camber": -np.arcsin(s[2]),
+            "half_track_change": contact[1] - 1.1,
+            "roll_center_height": contact[1] * vy / vz,
+            "spring_ratio": (high - spring)
+            @ per_turn[2]
+            / np.linalg.norm(high - spring)
+            / per_turn[0][2],
+        }
+        assert {name: found[name][k] for name in true} == pytest.approx(true, abs=1e-13)
+
+
+def test_chrono_three_link():
+    case = load(DATA / "chrono_three_link.json", Supplied(travel="0.08:9", wheel_radius="0.45"))
+    at = {
+        "arm_pivot": (0.7, 0.9, 0.0),
+        "upper_inner": (-0.1, 0.2, 0.4),
+        "upper_outer": (-0.1, 0.9, 0.1),
+        "lower_inner": (-0.1, 0.2, 0.3),
+        "lower_outer": (-0.1, 0.9, 0.0),
+        "wheel_center": (0.0, 1.1, 0.0),
+        "wheel_contact": (0.0, 1.1, -0.45),
+        "spring_lower": (0.3, 0.9, 0.0),
+        "spring_upper": (0.3, 0.9, 0.4),
+    }
+    found = solved(case)
+    for k, travel in enumerate(case.sweep.values):
+        true = expected("three_link", at, travel)
+        assert {name: found[name][k] for name in true} == pytest.approx(true, abs=CLOSE)
+
+
+def test_chrono_reduced_double_wishbone(tmp_path):
+    """The wheel moves as with arms of mass; the damper is on the knuckle."""
+    text = (DATA / "chrono_double_wishbone.json").read_text()
+    file = tmp_path / "reduced.json"
+    shock = text.index('"Shock"')
+    tail = text[shock:].replace("Location Arm", "Location Upright")
+    file.write_text(text[:shock].replace('"DoubleWishbone"', '"DoubleWishboneReduced"') + tail)
+    found, whole = (
+        solved(load(each, Supplied(travel="0.07:15", wheel_radius="0.4")))
+        for each in (file, DATA / "chrono_double_wishbone.json")
+    )
+    assert "damper_ratio" in found
+    assert "spring_ratio" not in found
+    for name in found.keys() - {"damper_ratio", "damper_ratio.per_travel"}:
+        assert np.abs(found[name] - whole[name]).max() < 1e-12
 
 
 @pytest.mark.parametrize(

@@ -225,7 +225,8 @@ def test_templates_make_sense(template):
     """Roles are named once, and what is compared tells how the knuckle stands."""
     names = [role.name for role in template.roles]
     assert len(set(names)) == len(names)
-    assert {template.upper, template.lower, *template.watched} <= set(names)
+    paired = {role for pair in (*template.above, *template.ahead) for role in pair}
+    assert {*paired, *template.watched} <= set(names)
     assert len(template.watched) == 3
     for a, b in combinations(template.roles, 2):
         shared = set(a.names) & set(b.names)

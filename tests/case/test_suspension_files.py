@@ -178,10 +178,19 @@ def test_quotients_of_velocities_want_a_driver_of_travel():
     case = loaded(unreferenced(steered | TOE))
     assert [output.orders for output in case.outputs] == [3, 2]
     named = steered | {"suspension": STRUT["suspension"] | {"travel": "stroke"}}
-    assert loaded(unreferenced(named)).outputs[0].vehicle.travel == "stroke"
+    assert loaded(unreferenced(named)).outputs[0].vehicle.travel == ("stroke",)
     named["suspension"]["travel"] = "strike"
     with pytest.raises(CaseError, match=r"suspension\.travel: found 'strike', .*'stroke'"):
         loaded(unreferenced(named))
+
+
+def test_one_steering_axis():
+    rods = [["strut_top", "strut_foot"]] * 4
+    with pytest.raises(CaseError, match=r"kingpin_links: found beside kingpin, .* remove"):
+        loaded(changed("suspension", kingpin_links=rods))
+    rods = [["strut_top", "strut_foot"]] * 3 + [["strut_tip", "strut_foot"]]
+    with pytest.raises(CaseError, match=r"kingpin_links: found 'strut_tip', .*'strut_top'"):
+        loaded(changed("suspension", kingpin_links=rods, kingpin=None))
 
 
 def test_signs_of_a_reference_table_must_be_those_of_the_case():

@@ -185,9 +185,9 @@ def test_a_slope_of_a_quotient(tmp_path):
 def test_without_a_driver_of_travel_the_slope_is_along_the_sweep(tmp_path):
     """A reference point of the same carrier is no driver of travel unless it is named."""
     data_path = case_of(tmp_path, *SWEEPS["both"])
-    assert data_path.outputs[0].vehicle.travel == "stroke"
+    assert data_path.outputs[0].vehicle.travel == ("stroke",)
     alone = case_of(tmp_path, None, None, {**SWEEPS["stroke swept"][2]})
-    assert alone.outputs[0].vehicle.travel is None
+    assert alone.outputs[0].vehicle.travel == ()
 
 
 def test_unsolved_samples_say_so(tmp_path):
@@ -234,7 +234,7 @@ def test_waypoints_are_a_smooth_motion():
 
 def test_the_held_path_has_the_values_of_the_sweep(tmp_path):
     case = case_of(tmp_path, *SWEEPS["sine"])
-    path, again = case.sweep.path, held_case(case, "stroke").sweep.path
+    path, again = case.sweep.path, held_case(case, ["stroke"]).sweep.path
     names = ["rack", "stroke"]
     assert np.array_equal(path.times, again.times)
     value, rate, second = again.drive(names, again.times)

@@ -275,7 +275,7 @@ def test_what_a_case_file_cannot_say_is_named():
     strut = cases.load("mcpherson_suspension")
     first, *others = strut.outputs
     wider = replace(first, vehicle=replace(first.vehicle, wheel_radius=0.4))
-    with pytest.raises(CaseError, match="of several wheels"):
+    with pytest.raises(CaseError, match="of several axles"):
         case_text(replace(strut, outputs=(wider, *others)))
 
 

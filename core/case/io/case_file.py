@@ -38,7 +38,7 @@ from .tolerance import tolerance
 from .typed_tables import as_table, class_of, typed
 
 if TYPE_CHECKING:
-    from .suspension import SuspensionTable
+    from .suspension_table import SuspensionTable
 
 LARGEST_FILE = 4_000_000
 # Twice the bodies of the largest measured mechanism; the same limit for joints and points.
@@ -217,8 +217,9 @@ def _with_outputs(
             return with_all_coordinates(case)
         return replace(case, mechanism=with_markers(mechanism, outputs), outputs=outputs)
     from . import suspension  # many classes, and few cases have a wheel
+    from .suspension_table import read_suspension
 
-    table = suspension.read_suspension(file, keys.suspension, case, length, units["rad"])
+    table = read_suspension(file, keys.suspension, case, length, units["rad"])
     outputs = _outputs(file, keys, table, case, units) or with_all_coordinates(case).outputs
     case = replace(case, mechanism=with_markers(mechanism, outputs), outputs=outputs)
     return (

@@ -19,7 +19,7 @@ from ..measures import Measure, key_of, own_keys
 from ..suspension import PerTravel, SuspensionOutput
 from .coordinates import AXES
 from .schema import SCHEMA, own_fields
-from .suspension_writer import suspension_keys, suspension_output
+from .suspension_writer import suspension_output, suspension_tables
 
 # What a body has unless the file says otherwise.
 PLAIN: Mapping[str, Any] = {
@@ -38,7 +38,7 @@ def case_text(case: Case, comments: Sequence[str] = ()) -> str:
 
     Raises:
         CaseError: no case file can express the case: samples on no even grid, or outputs of
-            several wheels.
+            several axles.
     """
     lines = [f"# {line}" for line in comments]
     lines += _keys({"schema": SCHEMA, "name": case.name, "source": case.source})
@@ -63,8 +63,8 @@ def case_text(case: Case, comments: Sequence[str] = ()) -> str:
                 f"drivers.{_key(driver.name)}", "motion", {"type": moved.type, **_own(moved)}
             )
     lines += ["", "[sweep]", *_keys(_sweep(case))]
-    if wheel := suspension_keys(case):
-        lines += ["", "[suspension]", *_keys(wheel)]
+    for name, keys in suspension_tables(case).items():
+        lines += ["", f"[{name}]", *_keys(keys)]
     for output in case.outputs:
         if isinstance(output, PerTravel):  # follows from the output before it
             continue
@@ -100,7 +100,7 @@ def _output(case: Case, output: Any) -> Iterator[tuple[str, Any]]:
         )
         yield "relative", output.relative
     elif isinstance(output, SuspensionOutput):
-        yield from suspension_output(output)
+        yield from suspension_output(case, output)
     else:
         raise CaseError(
             f"case {case.name!r}: output {output.name!r} is a derivative, which the file cannot"

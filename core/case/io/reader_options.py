@@ -17,6 +17,8 @@ class Supplied:
         travel: wheel travel of a suspension, up and down: "METRES" or "METRES:SAMPLES".
         names: file of the user's own names of hardpoints, by role of the template.
         wheel_radius: loaded radius of the wheel of hardpoints [m].
+        wheelbase: of the vehicle of hardpoints [m].
+        axle: motion of both wheels of hardpoints: "heave", "roll" or "steer".
         drive: driven joint of a model: "JOINT:START:STOP" or "JOINT:START:STOP:SAMPLES", in its
             coordinate [rad, m].
         hold: joints or free bodies of a model that are held in place.
@@ -31,6 +33,8 @@ class Supplied:
     hold: tuple[str, ...] = ()
     names: Path | None = None
     wheel_radius: str | None = None
+    wheelbase: str | None = None
+    axle: str | None = None
     closure: float | None = None
 
     @property

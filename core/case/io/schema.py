@@ -78,8 +78,9 @@ left out. `kincheck list --joints` prints all types with their keys.
                          (center_plane) = [0, 0, 0], a point in the middle
                          (static_toe) = 0, toe-in, and (static_camber) = 0, top outboard: angles of
                          the wheel at design
-                         (kingpin) = ["lower", "upper"], names of points; (wheel_radius), loaded,
-                         to the contact centre
+                         (kingpin) = ["lower", "upper"], names of points; or (kingpin_links), of
+                         four rods: [["on the body", "on the wheel carrier"], ...], all but the one
+                         that steers; (wheel_radius), loaded, to the contact centre
                          (axle) = "front" or "rear"; (wheelbase), (cg_height), above the road
                          (brakes) = "outboard", (drive) = "inboard": support of the torque, wheel
                          carrier or vehicle body
@@ -89,6 +90,9 @@ left out. `kincheck list --joints` prints all types with their keys.
                          centre
                          (travel), name of its driver, if that is not the one of the wheel centre:
                          where other drivers move too, they are held for derivatives by travel
+    [suspension.other]   the axle's other wheel: wheel_center, (kingpin) or (kingpin_links),
+                         (static_toe), (static_camber), (travel); the rest is as in [suspension];
+                         outputs of one wheel then may have (side)
     [reference]          true values: file, the name of a CSV file beside the case file, or rows,
                          with (columns)
                          beside is in its folder or below, links followed: a case file from

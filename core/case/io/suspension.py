@@ -1,92 +1,36 @@
-"""Suspension outputs of a case file: the [suspension] table and typed [outputs.NAME], read to
-`case.suspension`.
-"""
+"""Suspension outputs of a case file: typed [outputs.NAME], read to `case.suspension`."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, dataclass
+from dataclasses import MISSING
 from enum import StrEnum
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, get_type_hints
 
 import msgspec
-from msgspec import Meta
 
-from ...algebra import vec
-from ...errors import remedy
-from ...mechanism.mechanism import Mechanism, Vector
 from ..case import Case, Quantity, size
-from ..suspension import (
-    Axle,
-    Convention,
-    PerTravel,
-    Reaction,
-    Side,
-    SuspensionOutput,
-    Vehicle,
-    own_keys,
-)
-from ..units import Unit
+from ..suspension import AxleOutput, PerTravel, Side, SuspensionOutput, Vehicle, own_keys
 from .document import fault, join, shown
 from .reference import Convert
-from .schema import Flag, Number, Numbers3, Text, ToleranceKeys
+from .schema import Flag, Text, ToleranceKeys
+from .suspension_table import Points, Sides, SuspensionTable, check_point, one_of
 from .tolerance import tolerance
-from .travel_driver import require_travel, travel_driver
+from .travel_driver import require_travel
 from .typed_tables import typed
-
-# Axes written to nine digits are perpendicular to about 1e-9; a wrong sign or digit gives far more.
-SQUARE = 1e-8
-
-
-def _one_of(kind: type[StrEnum]) -> Any:
-    return Meta(description=f"one of {', '.join(kind)}")
-
-
-Points = Annotated[tuple[str, str], Meta(description='two names ["first point", "second point"]')]
-Length = Annotated[float, Meta(gt=0.0, description="a positive length")]
-Share = Annotated[float, Meta(ge=0.0, le=1.0, description="a part of the whole, 0 to 1")]
-Conventions = Annotated[Convention, _one_of(Convention)]
-Sides = Annotated[Side, _one_of(Side)]
-Axles = Annotated[Axle, _one_of(Axle)]
-Reactions = Annotated[Reaction, _one_of(Reaction)]
-
-
-class SuspensionKeys(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
-    """[suspension]; global at design."""
-
-    convention: Conventions
-    side: Sides
-    forward: Numbers3
-    up: Numbers3
-    wheel_center: Text = "wheel_center"
-    center_plane: Numbers3 = (0.0, 0.0, 0.0)
-    static_toe: Number = 0.0
-    static_camber: Number = 0.0
-    wheel_radius: Length | None = None
-    kingpin: Points | None = None
-    axle: Axles | None = None
-    wheelbase: Length | None = None
-    cg_height: Length | None = None
-    brakes: Reactions = Reaction.OUTBOARD
-    brake_share: Share | None = None
-    drive: Reactions = Reaction.INBOARD
-    drive_share: Share | None = None
-    travel: Text | None = None
-    per_travel: Flag = True
-
-
-_LENGTHS = ("wheel_radius", "wheelbase", "cg_height")
-_NOT_OF_VEHICLE = ("center_plane", "per_travel")
 
 
 @cache
 def output_keys(cls: type[SuspensionOutput]) -> type[msgspec.Struct]:
-    """Return the keys of a suspension output class: type, fields, tolerance and its reason."""
+    """Return the keys of a suspension output class: type, side of a wheel, fields, tolerance and
+    its reason.
+    """
     hints = get_type_hints(cls)
     keys: list[Any] = [("type", Text)]
+    if not issubclass(cls, AxleOutput):
+        keys.append(("side", Sides | None, None))
     for each in own_keys(cls):
         shape = _shape_of(hints[each.name])
         keys.append(
@@ -100,109 +44,8 @@ def output_keys(cls: type[SuspensionOutput]) -> type[msgspec.Struct]:
 def _shape_of(hint: Any) -> Any:
     """Return the annotation of an output's own field: some words, two point names, or a flag."""
     if isinstance(hint, type) and issubclass(hint, StrEnum):
-        return Annotated[hint, _one_of(hint)]
+        return Annotated[hint, one_of(hint)]
     return {tuple[str, str]: Points, bool: Flag}[hint]
-
-
-@dataclass(frozen=True)
-class SuspensionTable:
-    """The [suspension] table: the vehicle, and whether outputs get their derivatives by travel."""
-
-    vehicle: Vehicle
-    per_travel: bool
-
-
-def read_suspension(
-    file: Path, value: object, case: Case, length: Unit, angle: Convert
-) -> SuspensionTable:
-    """Read the table, in SI.
-
-    Args:
-        case: the case as read so far.
-
-    Raises:
-        CaseError: invalid axes, unknown points or drivers, or a wheel on the wrong side.
-    """
-    keys, mechanism = typed(file, "suspension", value, SuspensionKeys), case.mechanism
-    forward, up = (_direction(file, name, getattr(keys, name)) for name in ("forward", "up"))
-    if abs(vec(forward) @ vec(up)) > SQUARE:
-        found = (
-            f"found {shown(keys.up)}, which is not at right angles to forward ="
-            f" {shown(keys.forward)}"
-        )
-        raise fault(
-            file,
-            "suspension.up",
-            f"{found}, expected axes of the vehicle's body; correct one of them",
-        )
-    for key, name in (
-        ("wheel_center", keys.wheel_center),
-        *(("kingpin", name) for name in keys.kingpin or ()),
-    ):
-        _check_point(file, join("suspension", key), name, mechanism)
-    given: dict[str, Any] = {
-        name: each
-        for name, each in msgspec.structs.asdict(keys).items()
-        if name not in _NOT_OF_VEHICLE
-    }
-    given |= {name: length(given[name]) for name in _LENGTHS if given[name] is not None}
-    given |= {name: angle(given[name]) for name in ("static_toe", "static_camber")}
-    given["travel"] = travel_driver(file, keys.travel, keys.wheel_center, keys.up, case)
-    given |= {"forward": forward, "up": up, "middle": tuple(map(length, keys.center_plane))}
-    vehicle = Vehicle(**given)
-    _check_side(file, vehicle, mechanism, length)
-    return SuspensionTable(vehicle, keys.per_travel)
-
-
-def _direction(file: Path, key: str, found: Vector) -> Vector:
-    if not any(found):
-        raise fault(
-            file,
-            join("suspension", key),
-            "found zero, expected a direction; give one of any other length",
-        )
-    long = math.hypot(*found)
-    return found[0] / long, found[1] / long, found[2] / long
-
-
-def _check_point(file: Path, key: str, name: str, mechanism: Mechanism) -> None:
-    known = [point.name for point in mechanism.points]
-    if name not in known:
-        raise fault(file, key, f"found {shown(name)}, expected a point; {remedy(name, known)}")
-
-
-def _check_side(file: Path, vehicle: Vehicle, mechanism: Mechanism, length: Unit) -> None:
-    """Refuse the most common mistake: hardpoints of one side or of mirrored axes, declared as the
-    other side.
-    """
-    point = mechanism.point(vehicle.wheel_center)
-    if mechanism.is_fixed(point.body):
-        problem = (
-            f"found {shown(point.name)}, which is on {shown(point.body)}, expected a point of a"
-            " body that moves"
-        )
-        raise fault(file, "suspension.wheel_center", f"{problem}; name the centre of the wheel")
-    aside = vehicle.outboard @ (vec(point.position) - vec(vehicle.middle))
-    if aside <= 0.0:
-        problem = (
-            f"found {shown(str(vehicle.side))}, but {vehicle.wheel_center!r} is"
-            f" {length.written(-aside)} on the other side"
-        )
-        expected = "expected the side on which it is, looking forward with up upwards"
-        raise fault(
-            file,
-            "suspension.side",
-            f"{problem} of the centre plane, {expected}; correct side, forward, up or center_plane",
-        )
-    if vehicle.kingpin is not None:
-        lower, upper = (mechanism.point(name).position for name in vehicle.kingpin)
-        if vec(vehicle.up) @ (vec(upper) - vec(lower)) <= 0.0:
-            problem = f"found {list(vehicle.kingpin)!r}, the first of which is not the lower"
-            raise fault(
-                file,
-                "suspension.kingpin",
-                f"{problem}, expected the lower point, then the upper; give them in this order",
-            )
 
 
 def read_output(
@@ -231,8 +74,8 @@ def read_output(
             "suspension",
             f"missing, expected a table for {key} of type {cls.type!r}; add [suspension]",
         )
-    vehicle = table.vehicle
     keys: Any = typed(file, key, value, output_keys(cls))
+    vehicle = _wheel(file, key, cls, table, getattr(keys, "side", None))
     for need in cls.needs:
         if getattr(vehicle, need) is None:
             raise fault(
@@ -240,7 +83,9 @@ def read_output(
                 join("suspension", need),
                 f"missing, expected it for {key} of type {cls.type!r}; add it",
             )
-    given = {each.name: getattr(keys, each.name) for each in own_keys(cls)}
+    given: dict[str, Any] = {each.name: getattr(keys, each.name) for each in own_keys(cls)}
+    if issubclass(cls, AxleOutput):
+        given["other"] = table.other
     output = cls(
         name,
         vehicle,
@@ -252,13 +97,36 @@ def read_output(
     for each in own_keys(cls):
         if isinstance(given[each.name], tuple):  # names of points
             for point in given[each.name]:
-                _check_point(file, join(key, each.name), point, case.mechanism)
+                check_point(file, join(key, each.name), point, case.mechanism)
     require_travel(file, key, output, case)
     return output
 
 
+def _wheel(
+    file: Path, key: str, cls: type[SuspensionOutput], table: SuspensionTable, side: Side | None
+) -> Vehicle:
+    """Return the vehicle with the wheel of an output."""
+    if issubclass(cls, AxleOutput) and table.other is None:
+        raise fault(
+            file,
+            "suspension.other",
+            f"missing, expected the other wheel for {key} of type {cls.type!r}; add"
+            " [suspension.other]",
+        )
+    wheels = [each for each in (table.vehicle, table.other) if each]
+    for wheel in wheels:
+        if side in (None, wheel.side):
+            return wheel
+    raise fault(
+        file,
+        join(key, "side"),
+        f"found {shown(str(side))}, expected {wheels[0].side}, the side in [suspension]; correct"
+        " it, or add [suspension.other]",
+    )
+
+
 def with_slopes(outputs: Sequence[Quantity], size: float) -> tuple[Quantity, ...]:
-    """Return the outputs, each suspension output followed by its derivative by travel.
+    """Return the outputs, each output of a wheel followed by its derivative by travel.
 
     Args:
         size: size of the mechanism [m]. A pose error changes a slope by about 1 / size times its
@@ -267,6 +135,6 @@ def with_slopes(outputs: Sequence[Quantity], size: float) -> tuple[Quantity, ...
     both: list[Quantity] = []
     for output in outputs:
         both.append(output)
-        if isinstance(output, SuspensionOutput):
+        if isinstance(output, SuspensionOutput) and not isinstance(output, AxleOutput):
             both.append(PerTravel(output, output.atol / size))
     return tuple(both)

@@ -3,40 +3,78 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any
 
 from ...errors import CaseError
 from ..case import Case
-from ..suspension import PerTravel, SuspensionOutput, Vehicle, own_keys
+from ..suspension import AxleOutput, PerTravel, SuspensionOutput, Vehicle, own_keys
 
-_KEYS = {"middle": "center_plane"}
-"""Keys of the attributes of a vehicle that have another name."""
+_OWN = ("wheel_center", "kingpin", "static_toe", "static_camber")
+"""Attributes of a vehicle that each wheel of an axle has of its own, beside its side."""
 
 
-def suspension_keys(case: Case) -> Mapping[str, Any]:
-    """Return the keys of [suspension], in SI; empty without suspension outputs.
+def suspension_tables(case: Case) -> Mapping[str, Mapping[str, Any]]:
+    """Return the keys of [suspension] and [suspension.other], in SI, by the names of the tables;
+    empty without suspension outputs.
 
     Raises:
-        CaseError: the outputs are of several wheels.
+        CaseError: the outputs are of wheels of several axles.
     """
-    wheels = [each.vehicle for each in case.outputs if isinstance(each, SuspensionOutput)]
+    wheels = _wheels(case)
     if not wheels:
         return {}
-    if any(wheel != wheels[0] for wheel in wheels):
+    first, *others = wheels
+    per_travel = any(isinstance(each, PerTravel) for each in case.outputs)
+    tables = {"suspension": _keys(first, 0) | {"per_travel": per_travel}}
+    if not others:
+        return tables
+    other, *more = others
+    alike = replace(other, side=first.side, **{name: getattr(first, name) for name in _OWN})
+    if more or alike != first or other.side is first.side:
         raise CaseError(
-            f"case {case.name!r}: its outputs are of several wheels, and [suspension] is of one;"
+            f"case {case.name!r}: its outputs are of several axles, and [suspension] is of one;"
             " leave out the others"
         )
-    given = {
-        _KEYS.get(each.name, each.name): value
-        for each in fields(Vehicle)
-        if (value := getattr(wheels[0], each.name)) != each.default
-    }
-    return given | {"per_travel": any(isinstance(each, PerTravel) for each in case.outputs)}
+    names = {*_OWN, "kingpin_links", "travel"}
+    of_other = {key: value for key, value in _keys(other, -1).items() if key in names}
+    angles = {name: getattr(other, name) for name in ("static_toe", "static_camber")}
+    return tables | {"suspension.other": {"wheel_center": other.wheel_center, **angles, **of_other}}
 
 
-def suspension_output(output: SuspensionOutput) -> Iterator[tuple[str, Any]]:
-    """Yield the type of an output and the fields of its type."""
+def suspension_output(case: Case, output: SuspensionOutput) -> Iterator[tuple[str, Any]]:
+    """Yield the type of an output, its side if the case has two, and the fields of its type."""
     yield "type", output.type
+    if len(_wheels(case)) > 1 and not isinstance(output, AxleOutput):
+        yield "side", output.vehicle.side
     yield from ((each.name, getattr(output, each.name)) for each in own_keys(type(output)))
+
+
+def _wheels(case: Case) -> list[Vehicle]:
+    """Return the wheels of the outputs; the first one is that of [suspension]."""
+    outputs = [each for each in case.outputs if isinstance(each, SuspensionOutput)]
+    first = [each.vehicle for each in outputs if isinstance(each, AxleOutput)]
+    return [*dict.fromkeys([*first, *(wheel for each in outputs for wheel in each.vehicles)])]
+
+
+def _keys(wheel: Vehicle, place: int) -> dict[str, Any]:
+    """Return the keys of a vehicle that are not their defaults.
+
+    Args:
+        place: of its own driver of travel among those of the axle.
+    """
+    keys = {
+        _key(each.name, value): value
+        for each in fields(Vehicle)
+        if (value := getattr(wheel, each.name)) != each.default
+    }
+    if names := keys.pop("travel", ()):
+        keys["travel"] = names[place]
+    return keys
+
+
+def _key(name: str, value: Any) -> str:
+    """Return the key of an attribute of a vehicle."""
+    if name == "kingpin" and not isinstance(value[0], str):
+        return "kingpin_links"
+    return "center_plane" if name == "middle" else name

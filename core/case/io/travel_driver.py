@@ -7,9 +7,8 @@ from pathlib import Path
 from ...errors import remedy
 from ...joints.base import unit
 from ...mechanism.drivers import PointCoordinate
-from ...mechanism.mechanism import Vector
 from ..case import Case
-from ..suspension import Rate, SuspensionOutput
+from ..suspension import Rate, SuspensionOutput, Vehicle
 from .document import fault, join, shown
 
 # A direction this near to a right angle with the vertical is no travel.
@@ -17,35 +16,35 @@ LEVEL = 1e-8
 
 
 def travel_driver(
-    file: Path, named: str | None, wheel_center: str, up: Vector, case: Case
+    file: Path, key: str, named: str | None, vehicle: Vehicle, case: Case
 ) -> str | None:
-    """Return the driver of the wheel's travel if the sweep moves others; None if it does not, or
-    if there is none.
+    """Return the driver of the wheel's travel; None if there is none.
 
     Args:
+        key: of the table of the wheel.
         named: its name in the file; None for the driver of the wheel centre.
         case: the case as read so far.
 
     Raises:
         CaseError: there is no driver of this name.
     """
-    drivers, moving = case.mechanism.drivers, list(case.sweep.path.motions)
+    drivers = case.mechanism.drivers
     if named is None:
         of_wheel = (
             each.name
             for each in drivers
             if isinstance(each, PointCoordinate)
-            and each.point == wheel_center
-            and abs(unit(each.direction) @ unit(up)) > LEVEL
+            and each.point == vehicle.wheel_center
+            and abs(unit(each.direction) @ unit(vehicle.up)) > LEVEL
         )
         named = next(of_wheel, None)
     elif named not in (names := [each.name for each in drivers]):
         raise fault(
             file,
-            "suspension.travel",
+            join(key, "travel"),
             f"found {shown(named)}, expected a driver; {remedy(named, names)}",
         )
-    return None if moving == [named] else named
+    return named
 
 
 def require_travel(file: Path, key: str, output: SuspensionOutput, case: Case) -> None:
@@ -56,7 +55,7 @@ def require_travel(file: Path, key: str, output: SuspensionOutput, case: Case) -
         CaseError: the output is such a derivative.
     """
     moving = list(case.sweep.path.motions)
-    if isinstance(output, Rate) and len(moving) > 1 and output.vehicle.travel is None:
+    if isinstance(output, Rate) and len(moving) > 1 and not output.vehicle.travel:
         found = (
             f"found {output.type!r} while {', '.join(moving)} move, expected one of them to be the"
             " wheel's travel"

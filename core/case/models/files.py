@@ -27,7 +27,10 @@ HARDPOINTS = (CHRONO, ADAMS, TABLE)
 _OPTIONS = {
     CASE: ("closure",),
     MODEL: ("drive", "hold"),
-    **dict.fromkeys(HARDPOINTS, ("template", "units", "axes", "travel", "names", "wheel-radius")),
+    **dict.fromkeys(
+        HARDPOINTS,
+        ("template", "units", "axes", "travel", "names", "wheel-radius", "wheelbase", "axle"),
+    ),
 }
 
 

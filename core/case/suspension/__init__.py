@@ -2,14 +2,17 @@
 and the meaning of its sign.
 """
 
+from . import axle as axle
 from . import instant_axis as instant_axis
 from . import steering_axis as steering_axis
 from . import wheel as wheel
+from .axle import AxleOutput
 from .base import PerTravel, Rate, SuspensionOutput, own_keys
 from .vehicle import Axle, Convention, Reaction, Side, Vehicle
 
 __all__ = [
     "Axle",
+    "AxleOutput",
     "Convention",
     "PerTravel",
     "Rate",

@@ -1,8 +1,8 @@
 """Base classes of suspension outputs: a formula over the vectors of a corner, with unit and sign.
 
 A new output type is a frozen dataclass with `type`, `measure`, `positive`, `needs`, `reads` and a
-formula, derived from one of the three kinds here. The class declaration registers it: case files
-can name it at once, and `kincheck list --outputs` prints it.
+formula, derived from one of the three kinds here, or from `AxleOutput`. The class declaration
+registers it: case files can name it at once, and `kincheck list --outputs` prints it.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ STILL = 1e-3
 
 @dataclass(frozen=True)
 class SuspensionOutput(ABC):
-    """A quantity of one wheel over its travel, judged, reported and compared like any other output.
+    """A quantity of a wheel or an axle, judged, reported and compared like any other output.
 
     Attributes:
         type: name in case files.
@@ -59,21 +59,26 @@ class SuspensionOutput(ABC):
             SuspensionOutput.registry[cls.type] = cls
 
     @abstractmethod
-    def value(self, corner: Corner) -> Jet:
-        """Return the value of the formula over the samples."""
-
-    @abstractmethod
     def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
         """Return the output over the samples; see `Quantity.of`."""
 
     @property
     def points(self) -> tuple[str, ...]:
         """Names of the points it reads."""
+        return self.read_of(self.vehicle)
+
+    def read_of(self, vehicle: Vehicle) -> tuple[str, ...]:
+        """Return the names of the points it reads of a wheel."""
         read: list[str] = []
         for each in self.reads:
-            found: str | tuple[str, str] = getattr(self.vehicle, each)
+            found: str | tuple[str, ...] = getattr(vehicle, each)
             read += [found] if isinstance(found, str) else found
         return tuple(read)
+
+    @property
+    def vehicles(self) -> tuple[Vehicle, ...]:
+        """The wheels that it is of."""
+        return (self.vehicle,)
 
     @property
     def unit(self) -> str:
@@ -102,11 +107,16 @@ class SuspensionOutput(ABC):
 
     def markers(self, mechanism: Mechanism) -> Sequence[Point]:
         """Return the points on the wheel carrier that it reads beyond those of the case."""
-        center = mechanism.point(self.vehicle.wheel_center)
-        places = self.vehicle.marker_positions(center.position)
-        return [
-            Point(name, center.body, place) for name, place in places.items() if name in self.points
-        ]
+        found: list[Point] = []
+        for wheel in self.vehicles:
+            center = mechanism.point(wheel.wheel_center)
+            places = wheel.marker_positions(center.position)
+            found += [
+                Point(name, center.body, place)
+                for name, place in places.items()
+                if name in self.points
+            ]
+        return found
 
     @property
     def problem(self) -> str:
@@ -121,12 +131,23 @@ class SuspensionOutput(ABC):
     @property
     def facts(self) -> Mapping[str, Any]:
         """Properties for readers of results."""
-        own = {each: value for each, value in asdict(self).items() if each != "vehicle"}
+        own = {
+            each: value for each, value in asdict(self).items() if each not in ("vehicle", "other")
+        }
         return {"type": self.type, "unit": self.unit, "sense": self.sense, **own}
 
 
 @dataclass(frozen=True)
-class Change(SuspensionOutput):
+class WheelOutput(SuspensionOutput):
+    """A quantity of one wheel."""
+
+    @abstractmethod
+    def value(self, corner: Corner) -> Jet:
+        """Return the value of the formula over the samples."""
+
+
+@dataclass(frozen=True)
+class Change(WheelOutput):
     """A coordinate relative to the design position."""
 
     def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
@@ -135,7 +156,7 @@ class Change(SuspensionOutput):
 
 
 @dataclass(frozen=True)
-class Attitude(SuspensionOutput):
+class Attitude(WheelOutput):
     """An angle or an offset, known at every position.
 
     Attributes:
@@ -151,7 +172,7 @@ class Attitude(SuspensionOutput):
 
 
 @dataclass(frozen=True)
-class Rate(SuspensionOutput):
+class Rate(WheelOutput):
     """A quotient of velocities, known only while the wheel travels, with one derivative less.
 
     It is a property of the position: other drivers are held, see `Vehicle.travel`.
@@ -267,10 +288,10 @@ class PerTravel:
 
 
 def held(vehicle: Vehicle) -> Mapping[str, Any]:
-    """Return the driver by which outputs of the vehicle are differentiated while others are held,
+    """Return the drivers by which outputs of the vehicle are differentiated while others are held,
     as a fact; empty along the sweep.
     """
-    return {HELD_BUT: vehicle.travel} if vehicle.travel else {}
+    return {HELD_BUT: list(vehicle.travel)} if vehicle.travel else {}
 
 
 def where_moving(quotient: Jet, corner: Corner, at: Mapping[str, Vec3]) -> Jet:
@@ -295,4 +316,8 @@ def where_moving(quotient: Jet, corner: Corner, at: Mapping[str, Vec3]) -> Jet:
 def own_keys(cls: type[SuspensionOutput]) -> list[Any]:
     """Return the fields of an output type beyond the common ones, which case files give."""
     inherited = {each.name for each in fields(SuspensionOutput)}
-    return [each for each in fields(cls) if each.name not in inherited]
+    return [
+        each
+        for each in fields(cls)
+        if each.name not in inherited and each.metadata.get("key", True)
+    ]

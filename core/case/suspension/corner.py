@@ -15,6 +15,7 @@ from collections.abc import Mapping
 
 from ...algebra import Scalar, Vec3, cross, vec
 from ...jet import Jet, each, sqrt
+from .rods_axis import rods_axis
 from .vehicle import Vehicle
 
 
@@ -94,10 +95,12 @@ class Corner:
 
     @property
     def kingpin(self) -> tuple[Vec3, Vec3]:
-        """Lower point of the steering axis [m], and the vector from it to the upper point [m]."""
-        assert self.vehicle.kingpin is not None
-        lower, upper = (self.point(name) for name in self.vehicle.kingpin)
-        return lower, upper - lower
+        """A point of the steering axis [m], and a vector along it, upwards."""
+        ends = [self.point(name) for name in self.vehicle.kingpin_points]
+        if len(ends) == 2:
+            lower, upper = ends
+            return lower, upper - lower
+        return rods_axis(self.center, ends[::2], ends[1::2])
 
     @property
     def kingpin_offset(self) -> Vec3:

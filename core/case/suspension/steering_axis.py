@@ -1,5 +1,5 @@
-"""Outputs of the steering axis, the physical line through two points, not the instantaneous axis of
-rotation of the wheel.
+"""Outputs of the steering axis: the physical line through two points, or of a wheel on rods the
+axis of its rotation in steering. It is not the instantaneous axis of rotation in travel.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ class _Inclination(Attitude):
 
     measure = "rad"
     needs = ("kingpin",)
-    reads = ("kingpin",)
+    reads = ("wheel_center", "kingpin_points")
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class _GroundOffset(Attitude):
 
     measure = "m"
     needs = ("wheel_radius", "kingpin")
-    reads = ("wheel_center", "spin_marker", "kingpin")
+    reads = ("wheel_center", "spin_marker", "kingpin_points")
 
 
 @dataclass(frozen=True)

@@ -77,10 +77,14 @@ class Vehicle:
         static_toe, static_camber: angles at design [rad], as defined in `wheel`.
         middle: a point of the vehicle's centre plane [m].
         wheel_radius: loaded, from the wheel centre to the contact centre in the wheel plane [m].
-        kingpin: names of the lower and the upper point of the steering axis.
+        kingpin: names of the lower and the upper point of the steering axis; or of the ends of four
+            rods, on the body and on the wheel carrier each: the axis is then that of the screw
+            about which the wheel turns when the fifth rod moves and the height of its centre is
+            held.
         cg_height: height of the centre of gravity above the road [m].
-        travel: driver of the wheel's travel, if other drivers move too: derivatives by travel hold
-            the others. None: derivatives are along the sweep.
+        travel: driver of the wheel's travel, if other drivers move too, and that of the axle's
+            other wheel if there is one: derivatives by travel move these alone, and hold the
+            others. Empty: derivatives are along the sweep.
         brake_share, drive_share: parts of the vehicle's braking and driving force at this axle [-].
     """
 
@@ -94,14 +98,23 @@ class Vehicle:
     middle: Vector = (0.0, 0.0, 0.0)
     axle: Axle | None = None
     wheel_radius: float | None = None
-    kingpin: tuple[str, str] | None = None
+    kingpin: tuple[str, str] | tuple[tuple[str, str], ...] | None = None
     wheelbase: float | None = None
     cg_height: float | None = None
     brakes: Reaction = Reaction.OUTBOARD
     brake_share: float | None = None
     drive: Reaction = Reaction.INBOARD
     drive_share: float | None = None
-    travel: str | None = None
+    travel: tuple[str, ...] = ()
+
+    @property
+    def kingpin_points(self) -> tuple[str, ...]:
+        """Names of the points that define the steering axis."""
+        return tuple(
+            name
+            for each in self.kingpin or ()
+            for name in ((each,) if isinstance(each, str) else each)
+        )
 
     @property
     def outboard(self) -> Vec3:

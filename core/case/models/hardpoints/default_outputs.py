@@ -6,22 +6,34 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from ....mechanism.mechanism import Vector
 from ...case import Case, Quantity, size
 from ...io.coordinates import with_all_coordinates
 from ...io.document import decimal, fault, shown
-from ...io.suspension import with_markers, with_slopes
+from ...io.suspension import with_slopes
 from ...io.tolerance import default
+from ...markers import with_markers
 from ...suspension import Convention, Side, SuspensionOutput, Vehicle
 from ...suspension.wheel import Place
+from .axle import STROKE, AxleMotion, name_of
 from .table import HardpointTable
-from .templates.base import WHEEL_AXIS, WHEEL_CENTER, WHEEL_CONTACT, Template, between
+from .templates.base import (
+    WHEEL_AXIS,
+    WHEEL_CENTER,
+    WHEEL_CONTACT,
+    Template,
+    between,
+    prefixed,
+)
 
 WHEEL = ("toe", "camber")
 STEERING_AXIS = ("caster", "kingpin_inclination")
 ON_THE_ROAD = ("roll_center_height",)
 AXIS_ON_THE_ROAD = ("scrub_radius", "mechanical_trail")
+AXLE = ("track", "roll_angle", "axle_roll_center_height", "axle_roll_center_offset")
+ACKERMANN = ("ackermann",)
 RADII = (0.02, 3.0)
 """Radii of wheels [m], from model cars to haulage trucks."""
 
@@ -33,25 +45,31 @@ class Wheel:
     Attributes:
         radius: from the centre to the road in the wheel plane [m]; None if unknown.
         toe, camber: at design [rad].
+        wheelbase: [m]; None if unknown.
     """
 
     radius: float | None
     toe: float
     camber: float
+    wheelbase: float | None = None
 
 
 def wheel_of(
-    table: HardpointTable, named: Mapping[str, str], at: Mapping[str, Vector], radius: str | None
+    table: HardpointTable,
+    named: Mapping[str, str],
+    at: Mapping[str, Vector],
+    radius: str | None,
+    wheelbase: str | None,
 ) -> Wheel:
     """Return the wheel: radius and attitude follow from points if the table has them.
 
     Args:
         named: names of the points in the file, by role.
         at: positions by role [m].
-        radius: radius from the user [m].
+        radius, wheelbase: lengths from the user [m].
 
     Raises:
-        CaseError: the radius is unusable or contradicts the points, or the axis points inboard.
+        CaseError: a length is unusable or contradicts the points, or the axis points inboard.
     """
     center = at[WHEEL_CENTER.name]
     toe, camber = table.static_toe, table.static_camber
@@ -74,7 +92,7 @@ def wheel_of(
             f"found {radius}, and the point {named[WHEEL_CONTACT.name]}, expected one of them;"
             " leave out --wheel-radius",
         )
-    given = _radius(table.file, radius) if measured is None else measured
+    given = _length(table.file, "wheel-radius", radius) if measured is None else measured
     if given is not None and not RADII[0] <= given <= RADII[1]:
         where = "--wheel-radius" if measured is None else named[WHEEL_CONTACT.name]
         raise fault(
@@ -83,10 +101,13 @@ def wheel_of(
             f"found a wheel's radius of {given:.6g} m, expected {RADII[0]:g} to {RADII[1]:g} m;"
             " correct it",
         )
-    return Wheel(given, toe, camber)
+    base = _length(table.file, "wheelbase", wheelbase)
+    if base is not None and not base > 0.0:
+        raise fault(table.file, "--wheelbase", f"found {base:.6g} m, expected a length; correct it")
+    return Wheel(given, toe, camber, base)
 
 
-def _radius(file: Path, text: str | None) -> float | None:
+def _length(file: Path, option: str, text: str | None) -> float | None:
     if text is None:
         return None
     try:
@@ -94,34 +115,40 @@ def _radius(file: Path, text: str | None) -> float | None:
     except ValueError:
         raise fault(
             file,
-            "--wheel-radius",
-            f"found {shown(text)}, expected metres; say --wheel-radius 0.3",
+            f"--{option}",
+            f"found {shown(text)}, expected metres; say --{option} 0.3",
         ) from None
 
 
 def with_suspension_outputs(
-    case: Case, template: Template, wheel: Wheel, at: Mapping[str, Vector]
+    case: Case, template: Template, wheel: Wheel, at: Mapping[str, Vector], motion: str | None
 ) -> Case:
     """Return the case with the suspension outputs, their slopes, and the coordinates of the
     template's watched points.
+
+    Args:
+        motion: of both wheels; None for one wheel.
     """
-    vehicle = Vehicle(
-        convention=Convention.ISO_8855,
-        side=Side.LEFT,
-        forward=(1.0, 0.0, 0.0),
-        up=(0.0, 0.0, 1.0),
-        wheel_center=WHEEL_CENTER.name,
-        static_toe=wheel.toe,
-        static_camber=wheel.camber,
-        wheel_radius=wheel.radius,
-        kingpin=template.kingpin,
-    )
+    axle = motion is not None
     extent = size(case)
-    outputs: list[Quantity] = [
-        cls(name, vehicle, *default(extent, cls.measure), **own)
-        for name, cls, own in _types(template, wheel, at)
-    ]
-    outputs += with_all_coordinates(case, template.watched).outputs
+    outputs: list[Quantity] = []
+    watched: list[str] = []
+    vehicles = [_vehicle(side, template, wheel, axle) for side in (Side if axle else [Side.LEFT])]
+    for vehicle in vehicles:
+        prefix = f"{vehicle.side}_" if axle else ""
+        for name, cls, own in _types(template, wheel, at):
+            ends = {key: tuple(prefix + each for each in own[key]) for key in own if key != "at"}
+            given = default(extent, cls.measure)
+            outputs.append(cls(prefix + name, vehicle, *given, **{**own, **ends}))
+        watched += [prefix + role for role in template.watched]
+    if axle and wheel.radius is not None:
+        names = [*AXLE, *(ACKERMANN if wheel.wheelbase and motion == AxleMotion.STEER else ())]
+        for name in names:
+            cls = SuspensionOutput.registry[name]
+            given = default(extent, cls.measure)
+            beside: Mapping[str, Any] = {"other": vehicles[1]}
+            outputs.append(cls(name, vehicles[0], *given, **beside))
+    outputs += with_all_coordinates(case, watched).outputs
     return replace(
         case,
         mechanism=with_markers(case.mechanism, outputs),
@@ -129,9 +156,27 @@ def with_suspension_outputs(
     )
 
 
+def _vehicle(side: Side, template: Template, wheel: Wheel, axle: bool) -> Vehicle:
+    """Return the vehicle with the wheel of a side."""
+    prefix = f"{side}_" if axle else ""
+    return Vehicle(
+        convention=Convention.ISO_8855,
+        side=side,
+        forward=(1.0, 0.0, 0.0),
+        up=(0.0, 0.0, 1.0),
+        wheel_center=prefix + WHEEL_CENTER.name,
+        static_toe=wheel.toe,
+        static_camber=wheel.camber,
+        wheel_radius=wheel.radius,
+        wheelbase=wheel.wheelbase,
+        kingpin=prefixed(prefix, template.kingpin),
+        travel=tuple(name_of(each, STROKE) for each in Side) if axle else (),
+    )
+
+
 def _types(
     template: Template, wheel: Wheel, at: Mapping[str, Vector]
-) -> Iterator[tuple[str, type[SuspensionOutput], Mapping[str, object]]]:
+) -> Iterator[tuple[str, type[SuspensionOutput], Mapping[str, Any]]]:
     """Yield name, class and own fields of each output that is defined."""
     types = [*WHEEL]
     if template.kingpin:

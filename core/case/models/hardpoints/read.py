@@ -1,5 +1,5 @@
 """From a file of hardpoints and a template to a case: the wheel goes up and down, the chassis and
-the steering stand still.
+the steering stand still; or both wheels of an axle and a rack move.
 """
 
 from __future__ import annotations
@@ -12,20 +12,19 @@ from pathlib import Path
 import numpy as np
 
 from ....errors import MOST_NAMED, brief, remedy, shortened, similar
-from ....mechanism.drivers import PointCoordinate
-from ....mechanism.mechanism import GROUND, Body, Mechanism, Vector
+from ....mechanism.mechanism import Vector
 from ....trajectory import Array
-from ...case import Case, Sweep, Truth
-from ...io.coordinates import AXES
+from ...case import Case, Truth
 from ...io.document import decimal, explained, fault, shown
 from ...io.escape import visible
 from ...io.reader_options import LEFT_OUT, Supplied
 from ...io.schema import MOST_SAMPLES
+from .axle import one_wheel, whole_axle
 from .default_outputs import wheel_of, with_suspension_outputs
 from .own_names import read_own_names
 from .table import HardpointTable, coordinate, placed, require_size, unit_of
 from .templates import TEMPLATES, Template
-from .templates.base import normal
+from .templates.base import WHEEL_CONTACT, normal
 
 Reader = Callable[[Path, str], HardpointTable]
 
@@ -59,27 +58,25 @@ def read_hardpoints(file: Path, text: str, reader: Reader, supplied: Supplied) -
     named = _filled(table, template, supplied.names)
     at = {role: points[name] for role, name in named.items()}
     require_size(table, at, supplied.units)
-    wheel = wheel_of(table, named, at, supplied.wheel_radius)
+    wheel = wheel_of(table, named, at, supplied.wheel_radius, supplied.wheelbase)
     travel = _travel(file, supplied.travel)
     _require_left_and_upright(table, template, named, at, supplied)
     with explained(file, "", unit_of(table, supplied.units)):
-        joints = tuple(template.joints(at))
-        bodies = dict.fromkeys(name for joint in joints for name in joint.bodies if name != GROUND)
-        stroke = PointCoordinate("stroke", WHEEL, AXES["z"])
-        mechanism = Mechanism(
-            file.stem, [Body(name) for name in bodies], joints, template.points(at), [stroke]
-        )
+        if supplied.axle is None:
+            mechanism, sweep = one_wheel(file.stem, template, at, travel)
+        else:
+            mechanism, sweep = whole_axle(file, supplied.axle, template, at, travel)
     others = [*(name for name in points if name not in named.values()), *table.left_out]
     source = (
-        f"{table.tool} hardpoints of {file.name} on the template {template.name}, left side, x"
-        f" forward, y left, z up"
+        f"{table.tool} hardpoints of {file.name} on the template {template.name},"
+        f" {'left side' if supplied.axle is None else 'both sides'}, x forward, y left, z up"
     )
     if wheel.radius is None:
         source += "; without a wheel's radius (--wheel-radius) no outputs at the road"
     source += f"{LEFT_OUT}{_listed(others)}"
-    case = Case(file.stem, source, Truth.CONSENSUS_ONLY, mechanism, Sweep("stroke", travel), ())
+    case = Case(file.stem, source, Truth.CONSENSUS_ONLY, mechanism, sweep, ())
     case = replace(case, length_unit=unit_of(table, supplied.units).name)
-    return with_suspension_outputs(case, template, wheel, at)
+    return with_suspension_outputs(case, template, wheel, at, supplied.axle)
 
 
 def _template(table: HardpointTable, said: str | None) -> Template:
@@ -192,8 +189,8 @@ def _require_left_and_upright(
             f"found {written(WHEEL, 1)}, not left of the middle, expected the left side; {advice},"
             " or give the left points",
         )
-    for rear in (role for role in at if role.endswith("_rear")):
-        front = f"{rear.removesuffix('_rear')}_front"
+    arms = [(f"{role.removesuffix('_rear')}_front", role) for role in at if role.endswith("_rear")]
+    for front, rear in (*arms, *template.ahead):
         if front in at and at[front][0] <= at[rear][0]:
             raise fault(
                 table.file,
@@ -201,14 +198,14 @@ def _require_left_and_upright(
                 f"found {written(front, 0)}, and {named[rear]} with {written(rear, 0)}, expected it"
                 f" in front of that; {advice}",
             )
-    high, low = (at[role][2] for role in (template.upper, template.lower))
-    if high <= low:
-        raise fault(
-            table.file,
-            named[template.upper],
-            f"found {written(template.upper, 2)}, not above {named[template.lower]} with"
-            f" {written(template.lower, 2)}, expected it above; {advice}",
-        )
+    for high, low in (*template.above, (WHEEL, WHEEL_CONTACT.name)):
+        if low in at and at[high][2] <= at[low][2]:
+            raise fault(
+                table.file,
+                named[high],
+                f"found {written(high, 2)}, not above {named[low]} with {written(low, 2)}, expected"
+                f" it above; {advice}",
+            )
 
 
 def _travel(file: Path, said: str | None) -> Array:

@@ -3,11 +3,23 @@ to joints.
 """
 
 from .base import Role, Template
-from .double_wishbone import DOUBLE_WISHBONE
+from .double_wishbone import DOUBLE_WISHBONE, REDUCED_DOUBLE_WISHBONE
 from .five_link import FIVE_LINK
 from .mcpherson import MCPHERSON
+from .semi_trailing_arm import SEMI_TRAILING_ARM
+from .three_link import THREE_LINK
 
-TEMPLATES = {template.name: template for template in (MCPHERSON, DOUBLE_WISHBONE, FIVE_LINK)}
+TEMPLATES = {
+    template.name: template
+    for template in (
+        MCPHERSON,
+        DOUBLE_WISHBONE,
+        REDUCED_DOUBLE_WISHBONE,
+        FIVE_LINK,
+        THREE_LINK,
+        SEMI_TRAILING_ARM,
+    )
+}
 """By the name that --template takes."""
 
 __all__ = ["TEMPLATES", "Role", "Template"]

@@ -9,12 +9,16 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any, TypeAlias
 
 from .....joints import Joint
 from .....mechanism.mechanism import GROUND, Point, Vector
 
 KNUCKLE = "knuckle"
 """The body that carries the wheel, in every template."""
+
+
+Kingpin: TypeAlias = tuple[str, str] | tuple[tuple[str, str], ...]
 
 
 @dataclass(frozen=True)
@@ -45,11 +49,13 @@ class Template:
         joints: from places by role; the bodies are those named by the joints.
         watched: roles of non-collinear points of the knuckle: their motion is compared, and with it
             the knuckle's.
-        upper, lower: roles; the first is above the second in any car, which detects wrong axes.
+        above, ahead: pairs of roles; in any car the first is above the second, or in front of it,
+            which detects wrong axes.
         sample: places by role for a table to begin with [m], made up.
         optional: roles of points that only outputs need.
-        kingpin: roles of the lower and the upper point of the steering axis, if two points are on
-            it.
+        kingpin: of the steering axis: roles of its lower and its upper point, or of the ends of the
+            four rods that define it, see `Vehicle`; None without steering.
+        steered: the joint whose first end is on the rack, if there is steering.
         springs: roles of the ends of springs and dampers by the names of their motion ratios.
         bodies: the body of each role that is a point of the case, if it is not the knuckle.
     """
@@ -59,17 +65,18 @@ class Template:
     roles: Sequence[Role]
     joints: Callable[[Mapping[str, Vector]], Sequence[Joint]]
     watched: Sequence[str]
-    upper: str
-    lower: str
     sample: Mapping[str, Vector]
+    above: Sequence[tuple[str, str]] = ()
+    ahead: Sequence[tuple[str, str]] = ()
     optional: Sequence[Role] = ()
-    kingpin: tuple[str, str] | None = None
+    kingpin: Kingpin | None = None
+    steered: str = ""
     springs: Mapping[str, tuple[str, str]] = field(default_factory=dict[str, tuple[str, str]])
     bodies: Mapping[str, str] = field(default_factory=dict[str, str])
 
     def points(self, at: Mapping[str, Vector]) -> list[Point]:
         """Return the points that outputs read, of those roles that have a place."""
-        read = [*self.watched, *(self.kingpin or ())]
+        read = [*self.watched, *flattened(self.kingpin or ())]
         read += [role for ends in self.springs.values() if all(map(at.get, ends)) for role in ends]
         return [
             Point(role, self.bodies.get(role, KNUCKLE), at[role]) for role in dict.fromkeys(read)
@@ -87,6 +94,22 @@ def normal(name: str) -> str:
         .replace("tie_rod", "tierod")
     )
     return re.sub(r"^hp[ls]_", "", plain)
+
+
+def flattened(kingpin: Kingpin | tuple[()]) -> list[str]:
+    """Return the roles of a steering axis."""
+    return [role for each in kingpin for role in ([each] if isinstance(each, str) else each)]
+
+
+def prefixed(prefix: str, kingpin: Kingpin | None) -> Kingpin | None:
+    """Return the steering axis by the names of points with a prefix."""
+    if kingpin is None:
+        return None
+    ends: list[Any] = [
+        prefix + each if isinstance(each, str) else (prefix + each[0], prefix + each[1])
+        for each in kingpin
+    ]
+    return tuple(ends)
 
 
 def between(a: Vector, b: Vector) -> Vector:

@@ -1,8 +1,9 @@
-"""Double wishbone: two arms, the knuckle between them, a tie rod."""
+"""Double wishbone: two arms, the knuckle between them, a tie rod; and reduced to rods for arms."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from .....joints import Distance, Joint, Revolute, Spherical
 from .....mechanism.mechanism import GROUND, Vector
@@ -31,8 +32,19 @@ def _joints(at: Mapping[str, Vector]) -> Sequence[Joint]:
         ),
         Spherical("upper_ball", "uca", KNUCKLE, at["uca_outer"]),
         Spherical("lower_ball", "lca", KNUCKLE, at["lca_outer"]),
-        Distance("tie_rod", GROUND, KNUCKLE, (at["tierod_inner"], at["tierod_outer"])),
+        _tie_rod(at),
     )
+
+
+def _tie_rod(at: Mapping[str, Vector]) -> Joint:
+    return Distance("tie_rod", GROUND, KNUCKLE, (at["tierod_inner"], at["tierod_outer"]))
+
+
+def _rods(at: Mapping[str, Vector]) -> Sequence[Joint]:
+    ends = [(f"{arm}_{end}", f"{arm}_outer") for arm in ("uca", "lca") for end in ("front", "rear")]
+    return [Distance(inner, GROUND, KNUCKLE, (at[inner], at[outer])) for inner, outer in ends] + [
+        _tie_rod(at)
+    ]
 
 
 def _arm(arm: str, level: str) -> tuple[Role, Role, Role]:
@@ -62,8 +74,6 @@ DOUBLE_WISHBONE = Template(
     (*_arm("uca", "upper"), *_arm("lca", "lower"), TIEROD_INNER, TIEROD_OUTER, WHEEL_CENTER),
     _joints,
     ("wheel_center", "tierod_outer", "lca_outer"),
-    "uca_outer",
-    "lca_outer",
     {
         "uca_front": (0.09, 0.26, 0.285),
         "uca_rear": (-0.11, 0.265, 0.28),
@@ -78,8 +88,22 @@ DOUBLE_WISHBONE = Template(
         "spring_lower": (0.0, 0.45, 0.13),
         "spring_upper": (-0.01, 0.33, 0.48),
     },
-    (*WHEEL, *spring_roles("lower arm", "Location Arm")),
-    ("lca_outer", "uca_outer"),
-    SPRINGS,
-    spring_bodies("lca"),
+    above=(("uca_outer", "lca_outer"),),
+    optional=(*WHEEL, *spring_roles("lower arm", "Location Arm")),
+    kingpin=("lca_outer", "uca_outer"),
+    steered="tie_rod",
+    springs=SPRINGS,
+    bodies=spring_bodies("lca"),
 )
+
+REDUCED_DOUBLE_WISHBONE = replace(
+    DOUBLE_WISHBONE,
+    name="reduced_double_wishbone",
+    also=("DoubleWishboneReduced",),
+    joints=_rods,
+    optional=(*WHEEL, *spring_roles("knuckle", "Location Upright")),
+    bodies=spring_bodies(KNUCKLE),
+)
+"""Arms of no mass, as Project Chrono has them: each is two rods. Spring and damper are on the
+knuckle.
+"""

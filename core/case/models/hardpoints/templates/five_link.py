@@ -61,8 +61,6 @@ FIVE_LINK = Template(
     ),
     _joints,
     ("wheel_center", "tierod_outer", "lower_rear_outer"),
-    "upper_front_outer",
-    "lower_rear_outer",
     {
         "upper_front_inner": (0.1, 0.4, 0.52),
         "upper_front_outer": (0.02, 0.65, 0.53),
@@ -79,8 +77,10 @@ FIVE_LINK = Template(
         "spring_lower": (-0.01, 0.64, 0.21),
         "spring_upper": (-0.02, 0.56, 0.62),
     },
-    (*WHEEL, *spring_roles("knuckle", "Location Upright")),
-    None,
-    SPRINGS,
-    spring_bodies(KNUCKLE),
+    above=(("upper_front_outer", "lower_rear_outer"),),
+    optional=(*WHEEL, *spring_roles("knuckle", "Location Upright")),
+    kingpin=tuple((f"{link}_inner", f"{link}_outer") for link in LINKS if link != "tierod"),
+    steered="tierod",
+    springs=SPRINGS,
+    bodies={**spring_bodies(KNUCKLE), **{f"{link}_inner": GROUND for link in LINKS}},
 )

@@ -76,8 +76,6 @@ MCPHERSON = Template(
     ),
     _joints,
     ("wheel_center", "tierod_outer", "lca_outer"),
-    "strut_upper",
-    "lca_outer",
     {
         "lca_front": (0.15, 0.35, 0.19),
         "lca_rear": (-0.18, 0.36, 0.185),
@@ -89,8 +87,10 @@ MCPHERSON = Template(
         "wheel_center": (0.0, 0.75, 0.31),
         "wheel_contact": (0.0, 0.75, 0.0),
     },
-    WHEEL,
-    ("lca_outer", "strut_upper"),
-    {"spring_ratio": ("strut_lower", "strut_upper")},
-    {"strut_upper": GROUND},
+    above=(("strut_upper", "lca_outer"),),
+    optional=WHEEL,
+    kingpin=("lca_outer", "strut_upper"),
+    steered="tie_rod",
+    springs={"spring_ratio": ("strut_lower", "strut_upper")},
+    bodies={"strut_upper": GROUND},
 )

@@ -1,0 +1,207 @@
+"""Outputs of both wheels of an axle: track, roll angle, Ackermann, and the roll centre where the
+wheels do not travel alike.
+
+Vectors are of both corners, each in its own corner axes; see `Corner`. The left wheel has the y
+axis of the body, the right one the opposite.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ...algebra import Vec3
+from ...jet import Jet, arctan2, sqrt
+from ...trajectory import Array
+from .base import SuspensionOutput, held
+from .corner import Corner
+from .vehicle import Side, Vehicle
+
+# Lines of less than this angle to each other have no intersection of use [rad]: ten digits are left
+# of it there.
+PARALLEL = 1e-4
+# Wheels steered by less than this have no Ackermann of use [rad]: a quotient of two differences.
+STRAIGHT = 1e-2
+_CARRIER = ("wheel_center", "spin_marker", "top_marker")
+
+
+@dataclass(frozen=True)
+class AxleOutput(SuspensionOutput):
+    """A quantity of both wheels of an axle.
+
+    Attributes:
+        other: the other wheel.
+    """
+
+    measure = "m"
+    needs = ("wheel_radius",)
+    reads = ("wheel_center", "spin_marker")
+
+    other: Vehicle = field(metadata={"key": False})
+
+    @property
+    def vehicles(self) -> tuple[Vehicle, ...]:
+        """The left and the right wheel."""
+        both = (self.vehicle, self.other)
+        return both if self.vehicle.side is Side.LEFT else both[::-1]
+
+    @property
+    def points(self) -> tuple[str, ...]:
+        """Names of the points it reads, of both wheels."""
+        return tuple(name for wheel in self.vehicles for name in self.read_of(wheel))
+
+    @property
+    def signs(self) -> str:
+        """Convention of signs and axes, in words."""
+        return self.vehicles[0].signs.replace("left wheel", "both wheels")
+
+    @abstractmethod
+    def both(self, left: Corner, right: Corner) -> Jet:
+        """Return the value of the formula over the samples."""
+
+    def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
+        """Return the output over the samples."""
+        left, right = (Corner(wheel, at) for wheel in self.vehicles)
+        return self.both(left, right)
+
+
+@dataclass(frozen=True)
+class Track(AxleOutput):
+    """Lateral distance of the contact centres."""
+
+    type = "track"
+    positive = "always"
+
+    def both(self, left: Corner, right: Corner) -> Jet:
+        """Return the track [m]."""
+        return left.contact.y + right.contact.y
+
+
+@dataclass(frozen=True)
+class RollAngle(AxleOutput):
+    """Angle of the body to the line through both contact centres, seen from the front."""
+
+    type = "roll_angle"
+    measure = "rad"
+    positive = "right side of the body down"
+
+    def both(self, left: Corner, right: Corner) -> Jet:
+        """Return the roll angle [rad]."""
+        a, b = left.contact, right.contact
+        return arctan2(b.z - a.z, a.y + b.y)
+
+
+@dataclass(frozen=True)
+class Ackermann(AxleOutput):
+    """Part of the difference of steer angles that lets both wheels roll about one point of the rear
+    axle's line: wheelbase / track * (cot outer - cot inner), the track being that of the contact
+    centres (W. F. and D. L. Milliken, Race Car Vehicle Dynamics, chapter 19). It has no value while
+    a wheel is straight, or toes against the other.
+    """
+
+    type = "ackermann"
+    measure = "1"
+    needs = ("wheel_radius", "wheelbase")
+    positive = "the inner wheel steered further, fully at 1"
+
+    @property
+    def orders(self) -> int:
+        """The value alone: its rates grow without bound towards straight wheels."""
+        return 1
+
+    def both(self, left: Corner, right: Corner) -> Jet:
+        """Return the part of the difference [-]."""
+        a, b = left.spin, right.spin
+        track = left.contact.y + right.contact.y
+        wheelbase = self.vehicle.wheelbase
+        assert wheelbase is not None
+        # tan of the steer angles: -x / y on the left, x / y on the right
+        quotient = (a.y / a.x + b.y / b.x) * wheelbase / track
+        steered = -np.sign(a.x.x * b.x.x) * np.minimum(np.abs(a.x.x), np.abs(b.x.x))
+        return _where(quotient, steered > STRAIGHT)
+
+
+@dataclass(frozen=True)
+class _AxleRollCenter(AxleOutput):
+    """The kinematic roll centre: in the view from the front, the intersection of the lines from the
+    contact centres to the instant centres, each wheel travelling by itself. It has no value where
+    the lines are parallel.
+    """
+
+    reads = _CARRIER
+
+    @property
+    def orders(self) -> int:
+        """The value alone: steering is held for it, and its rate along the sweep is another."""
+        return 1
+
+    @property
+    def problem(self) -> str:
+        """Reason why there is none: a wheel has no driver of its travel. Otherwise empty."""
+        if self.vehicle.travel:
+            return ""
+        return (
+            f"found {self.type!r} without a driver of each wheel's travel, expected both; name them"
+            " by suspension.travel and suspension.other.travel"
+        )
+
+    @property
+    def facts(self) -> Mapping[str, Any]:
+        """Properties for readers of results."""
+        return {**super().facts, **held(self.vehicle)}
+
+    def place(self, left: Corner, right: Corner) -> tuple[Jet, Jet]:
+        """Return y to the left and z of the intersection, from the middle of the body [m].
+
+        A point P of a line satisfies v . P = v . C, v being the velocity of the contact centre C.
+        """
+        a, b, va, vb = (
+            left.contact,
+            right.contact,
+            left.contact_velocity,
+            right.contact_velocity,
+        )
+        first, second = va.y * a.y + va.z * a.z, vb.y * b.y + vb.z * b.z
+        whole = va.y * vb.z + va.z * vb.y
+        crossing = whole.x / (np.hypot(va.y.x, va.z.x) * np.hypot(vb.y.x, vb.z.x))
+        y = (first * vb.z - va.z * second) / whole
+        z = (va.y * second + first * vb.y) / whole
+        known = np.abs(crossing) > PARALLEL
+        return _where(y, known), _where(z, known)
+
+
+@dataclass(frozen=True)
+class AxleRollCenterHeight(_AxleRollCenter):
+    """Height of the roll centre above the line through both contact centres."""
+
+    type = "axle_roll_center_height"
+    positive = "above the road"
+
+    def both(self, left: Corner, right: Corner) -> Jet:
+        """Return the height [m]."""
+        a, b = left.contact, right.contact
+        y, z = self.place(left, right)
+        along, up = a.y + b.y, a.z - b.z
+        return (along * (z - a.z) - up * (y - a.y)) / sqrt(along * along + up * up)
+
+
+@dataclass(frozen=True)
+class AxleRollCenterOffset(_AxleRollCenter):
+    """Lateral distance of the roll centre from the middle of the body, along its y axis."""
+
+    type = "axle_roll_center_offset"
+    positive = "to the left (ISO 8855), to the right (SAE J670)"
+
+    def both(self, left: Corner, right: Corner) -> Jet:
+        """Return the offset [m]."""
+        y, _ = self.place(left, right)
+        return self.vehicle.convention.up * y
+
+
+def _where(jet: Jet, known: Array) -> Jet:
+    """Return a jet, NaN where it is not known."""
+    return Jet(*(np.where(known, each, np.nan) for each in (jet.x, jet.v, jet.a)))

@@ -1,0 +1,269 @@
+"""Whole axles: both wheels and a rack, in heave, roll and steer, against two independent carriers
+on rods.
+"""
+
+import json
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from kincheck.adapters import engine
+from kincheck.core.case.io.case_file import load_case
+from kincheck.core.case.io.case_writer import case_text
+from kincheck.core.case.io.reader_options import Supplied
+from kincheck.core.case.models.files import load
+from kincheck.core.case.models.hardpoints.sample_table import sample_table
+from kincheck.core.case.models.hardpoints.templates import TEMPLATES
+from kincheck.core.case.suspension import Convention
+from kincheck.core.errors import CaseError
+from kincheck.core.harness.execution import Answer, Pair, attempt
+
+from ..oracles.rods import Carrier
+
+WHEELBASE = 1.55
+LINKS = ("upper_front", "upper_rear", "lower_front", "lower_rear", "tierod")
+RODS = {
+    "double_wishbone": (
+        ("lca_front", "lca_outer"),
+        ("lca_rear", "lca_outer"),
+        ("uca_front", "uca_outer"),
+        ("uca_rear", "uca_outer"),
+        ("tierod_inner", "tierod_outer"),
+    ),
+    "five_link": tuple((f"{link}_inner", f"{link}_outer") for link in LINKS),
+    "mcpherson": (
+        ("lca_front", "lca_outer"),
+        ("lca_rear", "lca_outer"),
+        ("tierod_inner", "tierod_outer"),
+    ),
+}
+CLOSE = 1e-12
+
+
+def axle(folder, name, motion, travel="0.04:9"):
+    file = folder / f"{name}.csv"
+    file.write_text(sample_table(TEMPLATES[name]))
+    return load(file, Supplied(travel=travel, axle=motion, wheelbase=str(WHEELBASE)))
+
+
+def answer(case, name="native"):
+    found = attempt(Pair(case, engine(name), 1e-12, timed=False)).result
+    assert isinstance(found, Answer), found
+    assert found.message == ""
+    return {each: series.position for each, series in found.outputs.items()}
+
+
+class Wheel:
+    """A wheel of either side on its rods, where left is 1 and right -1."""
+
+    def __init__(self, name, side, stroke, rack):
+        at = {
+            role: np.array(place) * (1.0, side, 1.0)
+            for role, place in TEMPLATES[name].sample.items()
+        }
+        line = [at["strut_upper"], at["strut_lower"]] if name == "mcpherson" else None
+        self.carrier = Carrier(at["wheel_center"], [(at[a], at[b]) for a, b in RODS[name]], line)
+        tie_rod = len(RODS[name]) - 1
+        for part in (0.25, 0.5, 0.75, 1.0):
+            moved = {tie_rod: (0.0, part * rack, 0.0)}
+            self.carrier.go(part * stroke, moved)
+        self.s = self.carrier.direction((0.0, side, 0.0))
+        radius = np.linalg.norm(at["wheel_center"] - at["wheel_contact"])
+        rise = np.array([0.0, 0.0, 1.0]) - self.s[2] * self.s
+        self.contact = self.carrier.at(at["wheel_center"]) - radius * rise / np.linalg.norm(rise)
+        self.velocity = self.carrier.velocity(self.contact, moved)
+
+    @property
+    def cotangent(self):
+        """Of the steer angle to the left."""
+        heading = np.cross(self.s, (0.0, 0.0, 1.0)) * np.sign(self.s[1])
+        return heading[0] / heading[1]
+
+
+def expected(name, motion, value):
+    rack = value if motion == "steer" else 0.0
+    left, right = {"heave": (1, 1), "roll": (1, -1), "steer": (0, 0)}[motion]
+    a, b = Wheel(name, 1, left * value, rack), Wheel(name, -1, right * value, rack)
+    road = a.contact - b.contact
+    lines = np.array([a.velocity[1:], b.velocity[1:]])
+    y, z = np.linalg.solve(lines, [a.velocity[1:] @ a.contact[1:], b.velocity[1:] @ b.contact[1:]])
+    normal = np.array([-road[2], road[1]]) / np.hypot(*road[1:])
+    true = {
+        "left_toe": np.arctan2(a.s[0], a.s[1]),
+        "right_toe": np.arctan2(b.s[0], -b.s[1]),
+        "left_camber": -np.arcsin(a.s[2]),
+        "right_camber": -np.arcsin(b.s[2]),
+        "right_roll_center_height": -b.contact[1] * -b.velocity[1] / b.velocity[2],
+        "track": road[1],
+        "roll_angle": np.arctan2(-road[2], road[1]),
+        "axle_roll_center_height": ((y, z) - a.contact[1:]) @ normal,
+        "axle_roll_center_offset": y,
+    }
+    if motion == "steer" and abs(value) > 0.005:
+        true["ackermann"] = WHEELBASE / road[1] * (b.cotangent - a.cotangent)
+    return true
+
+
+@pytest.mark.parametrize("motion", ["heave", "roll", "steer"])
+@pytest.mark.parametrize("name", RODS)
+def test_axles(tmp_path, name, motion):
+    case = axle(tmp_path, name, motion, "0.03:7" if motion == "steer" else "0.04:9")
+    found = answer(case)
+    for k, value in enumerate(case.sweep.values):
+        true = expected(name, motion, value)
+        assert {each: found[each][k] for each in true} == pytest.approx(true, abs=CLOSE, rel=1e-11)
+    if motion == "steer":
+        assert np.isnan(found["ackermann"][3])
+        assert np.isfinite(np.delete(found["ackermann"], 3)).all()
+
+
+@pytest.mark.parametrize("name", ["mujoco", "pinocchio", "exudyn"])
+def test_in_every_engine(tmp_path, name):
+    pytest.importorskip(name)
+    case = axle(tmp_path, "double_wishbone", "roll", "0.03:5")
+    found, native = answer(case, name), answer(case)
+    for output in case.outputs:
+        off = np.abs(found[output.name] - native[output.name]).max()
+        assert off < 1e-10, output.name
+
+
+def test_wheels_in_heave_are_one_wheel(tmp_path):
+    """The roll centre of the axle is that of either wheel; half a track is of one wheel."""
+    found = answer(axle(tmp_path, "double_wishbone", "heave"))
+    height = found["axle_roll_center_height"]
+    assert np.abs(height - found["left_roll_center_height"]).max() < CLOSE
+    assert np.abs(height - found["right_roll_center_height"]).max() < CLOSE
+    assert np.abs(found["left_toe"] - found["right_toe"]).max() < CLOSE
+    assert np.abs(found["axle_roll_center_offset"]).max() < CLOSE
+
+
+def test_an_axle_without_steering(tmp_path):
+    case = axle(tmp_path, "three_link", "roll")
+    assert [driver.name for driver in case.mechanism.drivers] == ["left_stroke", "right_stroke"]
+    found = answer(case)
+    assert np.abs(found["left_camber"] - found["right_camber"][::-1]).max() < CLOSE
+    with pytest.raises(
+        CaseError, match=r"--axle: found steer, but .* no tie rod, .* heave or roll"
+    ):
+        axle(tmp_path, "three_link", "steer")
+
+
+def test_parallel_lines_have_no_roll_centre(tmp_path):
+    """Trailing arms on hinges across the car: the contacts move in planes along it."""
+    file = tmp_path / "car.csv"
+    rows = "arm_inner,0.5,0.3,0.3\narm_outer,0.5,0.6,0.3\nwheel_center,0,0.7,0.3\n"
+    file.write_text("# template: semi_trailing_arm\n# axes: iso\nname,x [m],y [m],z [m]\n" + rows)
+    found = answer(load(file, Supplied(axle="roll", wheel_radius="0.3", travel="0.02:5")))
+    assert np.isnan(found["axle_roll_center_height"]).all()
+    assert np.abs(found["left_roll_center_height"]).max() < 1e-15
+
+
+def test_a_case_file_of_an_axle(tmp_path):
+    """Written and read again: the same outputs; [suspension.other] and the sides are in it."""
+    case = axle(tmp_path, "five_link", "roll")
+    file = tmp_path / "case.toml"
+    file.write_text(case_text(case))
+    again = load_case(file)
+    assert again.outputs == case.outputs
+    assert again.mechanism == case.mechanism
+
+
+def changed(folder, edit):
+    """The file of an axle as data, changed."""
+    data = tomllib.loads(case_text(axle(folder, "double_wishbone", "roll", "0.02:3")))
+    edit(data)
+    file = Path(folder) / "case.json"
+    file.write_text(json.dumps(data))
+    return file
+
+
+FAULTS = {
+    "other side": (
+        lambda data: data["outputs"]["left_toe"].update(side="middle"),
+        [r"outputs.left_toe", "'middle'", "left, right"],
+    ),
+    "no other": (
+        lambda data: data["suspension"].pop("other"),
+        ["outputs.right_toe.side", "found 'right'", "expected left", "add [suspension.other]"],
+    ),
+    "no other for an axle": (
+        lambda data: (
+            data["suspension"].pop("other"),
+            data.update(outputs={"track": {"type": "track"}}),
+        ),
+        ["suspension.other: missing", "outputs.track of type 'track'", "add [suspension.other]"],
+    ),
+    "one wheel twice": (
+        lambda data: data["suspension"]["other"].update(wheel_center="left_wheel_center"),
+        ["suspension.other.side", "'right'", "on the other side"],
+    ),
+    "no point": (
+        lambda data: data["suspension"]["other"].update(wheel_center="right_wheel_centre"),
+        ["suspension.other.wheel_center", "'right_wheel_center'"],
+    ),
+    "upside down": (
+        lambda data: data["suspension"]["other"]["kingpin"].reverse(),
+        ["suspension.other.kingpin", "the lower point, then the upper"],
+    ),
+    "no driver": (
+        lambda data: data["suspension"]["other"].update(travel="right_strike"),
+        ["suspension.other.travel", "'right_stroke'"],
+    ),
+    "side of an axle": (
+        lambda data: data["outputs"]["track"].update(side="left"),
+        ["outputs.track", "side"],
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", FAULTS)
+def test_faults(tmp_path, kind):
+    edit, fragments = FAULTS[kind]
+    file = changed(tmp_path, edit)
+    with pytest.raises(CaseError) as caught:
+        load_case(file)
+    assert [each for each in fragments if each not in str(caught.value)] == [], caught.value
+
+
+def test_a_roll_centre_needs_both_drivers_of_travel(tmp_path):
+    def edit(data):
+        for side in ("left", "right"):
+            data["drivers"][f"{side}_stroke"]["point"] = f"{side}_tierod_outer"
+        data["suspension"].pop("travel")
+        data["suspension"]["other"].pop("travel")
+        data["outputs"] = {"rc": {"type": "axle_roll_center_height"}}
+
+    with pytest.raises(CaseError, match=r"outputs\.rc: .* name them by suspension\.travel and"):
+        load_case(changed(tmp_path, edit))
+
+
+@pytest.mark.parametrize(
+    ("supplied", "fragments"),
+    [
+        ({"axle": "pitch"}, ["--axle", "'pitch'", "heave"]),
+        ({"axle": "steer", "wheelbase": "two"}, ["--wheelbase", "'two'", "metres"]),
+        ({"axle": "steer", "wheelbase": "-2"}, ["--wheelbase", "-2 m"]),
+    ],
+)
+def test_faults_of_options(tmp_path, supplied, fragments):
+    file = tmp_path / "car.csv"
+    file.write_text(sample_table(TEMPLATES["mcpherson"]))
+    with pytest.raises(CaseError) as caught:
+        load(file, Supplied(**supplied))
+    assert [each for each in fragments if each not in str(caught.value)] == [], caught.value
+
+
+def test_signs_of_sae(tmp_path):
+    """The offset is along y, which points to the other side."""
+    case = axle(tmp_path, "double_wishbone", "roll", "0.03:5")
+    there = {output.name: output for output in case.outputs}["axle_roll_center_offset"]
+    wheels = [
+        replace(each, convention=Convention.SAE_J670) for each in (there.vehicle, there.other)
+    ]
+    sae = replace(there, vehicle=wheels[0], other=wheels[1])
+    here = answer(replace(case, outputs=(there,)))["axle_roll_center_offset"]
+    assert np.abs(here).max() > 1e-3
+    assert np.array_equal(answer(replace(case, outputs=(sae,)))["axle_roll_center_offset"], -here)
+    assert "both wheels" in there.signs
