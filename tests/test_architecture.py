@@ -100,10 +100,15 @@ IMPORTS = {
         "kinematics/continuation kinematics/verified case"
     ),
     "studies/stress/families": ". joints mechanism case case/io studies/stress/truth",
-    "studies": (". program joints kinematics/assembly kinematics/verified case case/io harness"),
+    "studies": (
+        ". program joints kinematics/assembly kinematics/verified case case/io harness report"
+    ),
     "studies/joint_check": (
         ". primitives program joints mechanism kinematics/formulation kinematics case harness "
-        "report"
+        "studies"
+    ),
+    "studies/engine_check": (
+        ". primitives joints case harness harness/workers studies studies/joint_check"
     ),
     "studies/tolerance": (
         ". program program/llvm mechanism kinematics/formulation "
@@ -131,13 +136,13 @@ IMPORTS = {
         "case/io case/variation case/models harness harness/workers history "
         "history/regression report studies/stress/families studies "
         "studies/joint_check studies/tolerance studies/stress studies/paper "
-        "studies/diagnosis studies/bench"
+        "studies/diagnosis studies/bench studies/engine_check"
     ),
     "__init__": (
         ". joints mechanism kinematics/assembly kinematics/continuation "
         "kinematics case case/io harness studies/joint_check"
     ),
-    "kincheck": "case case/io harness harness/workers cli __init__",
+    "kincheck": "case case/io harness harness/workers studies cli __init__",
 }
 """Folder of core: the folders it imports besides itself, whenever the import runs."""
 

@@ -10,6 +10,7 @@ COMMANDS = (
     "list",
     "bench",
     "check_joint",
+    "check_engine",
     "export",
     "reference",
     "explain",
