@@ -8,6 +8,7 @@ COMMANDS = (
     "run",
     "sweep",
     "list",
+    "schema",
     "bench",
     "check_joint",
     "check_engine",
