@@ -21,7 +21,7 @@ def how_to_install(extra: str) -> str:
         for requirement in importlib.metadata.requires("kincheck") or []
         if re.search(rf"""extra == ['"]{extra.split("-")[0]}['"]""", requirement)
     ]
-    return f"pip install {shlex.join(wanted)}" if wanted else "reinstall kincheck"
+    return f"pip install {shlex.join(wanted)}" if wanted else f"install what {extra} needs"
 
 
 def library(purpose: str, module: str, extra: str) -> Any:

@@ -17,7 +17,8 @@ def notes(case: Case) -> list[str]:
     written = LENGTHS[case.length_unit].written
     joints = [note for joint in case.mechanism.joints for note in joint.notes]
     said = [note.within(written) if isinstance(note, Phrase) else note for note in joints]
-    return [*said, *case.assembly, *size_notes(case), *_closure_notes(case), *_reference_notes(case)]
+    said += [*case.assembly, *size_notes(case), *_closure_notes(case)]
+    return [*said, *_reference_notes(case)]
 
 
 def _closure_notes(case: Case) -> list[str]:

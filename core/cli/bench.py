@@ -153,7 +153,8 @@ def _measured(options: argparse.Namespace, house: House, *, formulation: bool) -
             [name for name in known if name in options.engine or not options.engine], problems, mode
         )
     ]
-    house.find_engines(options.engine, problems)  # finds unknown names
+    others = [name for name in options.engine if name not in (*house.engines, *house.simulations)]
+    engines += house.find_engines(others, problems)  # of users, or a message
     if problems:
         raise KincheckError("\n".join(problems))
     with json_only() if options.json == "-" else nullcontext():
@@ -174,7 +175,7 @@ def _measured(options: argparse.Namespace, house: House, *, formulation: bool) -
     missing = {
         entry.engine
         for entry in found.entries
-        if entry.outcome is Outcome.UNAVAILABLE and entry.engine in options.engine
+        if entry.outcome is Outcome.UNAVAILABLE and options.engine
     }
     complain(
         f"engine {name!r} is named and missing; {how_to_install(name)}" for name in sorted(missing)

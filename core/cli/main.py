@@ -13,7 +13,7 @@ import sys
 import traceback
 from collections.abc import Sequence
 from io import TextIOWrapper
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 from ..errors import KincheckError
 from ..harness.interrupts import Terminated, listening, status_of, words_of
@@ -123,12 +123,20 @@ def _print_no_more() -> None:
 def house() -> House:
     """Return the registry of engines, cases and writers."""
     from ... import adapters, cases
+    from . import engine_loading
     from .registry import House
 
+    others = engine_loading.offered((*adapters.ENGINES, *adapters.SIMULATIONS))
     writers = adapters.WRITERS, adapters.writer
+
+    def engine(name: str, mode: str = "projection") -> Any:
+        if name in others:
+            return engine_loading.made(name, engine_loading.entry_points()[name].load())
+        return adapters.engine(name) if mode == "projection" else adapters.engine(name, mode)
+
     return House(
-        tuple(adapters.ENGINES),
-        adapters.engine,
+        (*adapters.ENGINES, *others),
+        engine,
         cases.names,
         cases.load,
         *writers,

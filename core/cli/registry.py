@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..case.io.reader_options import NOTHING, Supplied
 from ..errors import KincheckError, SolveError, unknown
+from .engine_loading import WHERE, load_engine
 
 if TYPE_CHECKING:
     from ..case.case import Case
@@ -125,7 +126,7 @@ class House:
     def find_engines(
         self, names: Sequence[str], problems: list[str], mode: str | None = None
     ) -> list[Engine]:
-        """Return the named engines, each once.
+        """Return the named engines, each once. A name is that of an engine, or MODULE:CLASS.
 
         Args:
             problems: receives the messages of unknown names and missing modes.
@@ -133,6 +134,9 @@ class House:
         """
         engines: list[Engine] = []
         for name in dict.fromkeys(names):
+            if WHERE.fullmatch(name):
+                self._add(engines, name, problems, mode)
+                continue
             modes = [
                 each
                 for each, known in (("projection", self.engines), ("simulate", self.simulations))
@@ -150,6 +154,23 @@ class House:
             else:
                 engines.append(self._loaded(name, mode or modes[0]))
         return engines
+
+    def _add(
+        self, engines: list[Engine], where: str, problems: list[str], mode: str | None
+    ) -> None:
+        """Add the engine at MODULE:CLASS, or a problem."""
+        try:
+            found = load_engine(where)
+        except KincheckError as error:
+            problems.append(str(error))
+            return
+        if mode not in (None, found.mode):
+            problems.append(
+                f"engine {where} has the mode {found.mode!r}, not {mode!r}: leave out --mode or the"
+                " engine"
+            )
+        else:
+            engines.append(found)
 
     def baseline(self, engines: Sequence[Engine]) -> Engine | None:
         """Return the native engine to compare with; None if it is among the engines."""

@@ -17,6 +17,7 @@ from ..errors import KincheckError, SolveError
 from ..harness.interrupts import hold, status_of, words_of
 from ..report.progress import complain, lacking, progress, uncompared
 from . import execution_options, history_options, import_options
+from .engine_loading import WHERE
 from .registry import House, Status
 from .run_options import HISTORY, add_options
 
@@ -44,6 +45,7 @@ class _Plan:
 
     Attributes:
         baseline: native engine to compare with, if it is not among the engines.
+        required, named: names of the engines that must be there.
         unread: messages of unreadable cases, by their names as given; the other cases are run.
     """
 
@@ -51,6 +53,8 @@ class _Plan:
     engines: Sequence[Engine]
     baseline: Engine | None
     unread: dict[str, str]
+    required: Sequence[str]
+    named: Sequence[str]
 
 
 def _run(options: argparse.Namespace, house: House) -> int:
@@ -89,7 +93,7 @@ def _run(options: argparse.Namespace, house: House) -> int:
     )
     if options.explain:
         print(*_explained(plan.cases), sep="\n", file=sys.stderr if to.json == "-" else sys.stdout)
-    problems += lacking(results, options.require, options.engine) + uncompared(results)
+    problems += lacking(results, plan.required, plan.named) + uncompared(results)
     complain(problems)
     if stopped is not None:
         return stopped
@@ -143,6 +147,8 @@ def _planned(options: argparse.Namespace, house: House, to: Destinations) -> _Pl
         engines,
         baseline,
         {visible(name): visible(message, also="\n") for name, message in unread.items()},
+        [each.name for each in house.find_engines(options.require, [], options.mode)],
+        [each.name for each in engines] if options.engine else [],
     )
 
 
@@ -229,6 +235,7 @@ def _return_cases(options: argparse.Namespace, house: House) -> None:
             name
             for name in names
             if name not in (*house.engines, *house.simulations)
+            and not WHERE.fullmatch(name)
             and (name in house.cases() or Path(name).suffix)
         ]
         options.case += swallowed

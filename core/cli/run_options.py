@@ -33,7 +33,10 @@ def add_options(run: argparse.ArgumentParser) -> None:
         action="store_true",
         help="run a small closed loop around every joint type, and the cases named",
     )
-    must = "only these, which must be installed (else status 2); default: all engines"
+    must = (
+        "only these, which must be installed (else status 2), by name or MODULE:CLASS; default: all"
+        " engines"
+    )
     run.add_argument("--engine", nargs="+", action="extend", default=[], metavar="NAME", help=must)
     run.add_argument(
         "--mode",

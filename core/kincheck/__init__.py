@@ -18,10 +18,11 @@ from typing import TYPE_CHECKING, Any
 from kincheck import core
 
 if TYPE_CHECKING:
-    from kincheck.by_name import load, run
+    from kincheck.by_name import check_engine, load, run
     from kincheck.core import *  # noqa: F403  # pyright: ignore[reportWildcardImportFromLibrary]
 
-__all__ = ["load", "run"]
+_BY_NAME = ("check_engine", "load", "run")
+__all__ = ["check_engine", "load", "run"]
 __all__ += core.__all__
 
 
@@ -29,7 +30,7 @@ def __getattr__(name: str) -> Any:
     """Import a public name on first use."""
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    module = import_module("kincheck.by_name") if name in ("load", "run") else core
+    module = import_module("kincheck.by_name") if name in _BY_NAME else core
     found = globals()[name] = getattr(module, name)
     return found
 

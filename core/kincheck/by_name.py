@@ -7,6 +7,7 @@ from typing import TypeVar, cast
 from kincheck.core import KincheckError
 from kincheck.core.case.case import Case
 from kincheck.core.case.io.reader_options import NOTHING, Supplied
+from kincheck.core.cli.check_engine import examined
 from kincheck.core.cli.main import house
 from kincheck.core.cli.run_options import TOL
 from kincheck.core.harness import run as running
@@ -14,6 +15,7 @@ from kincheck.core.harness.engine import Engine
 from kincheck.core.harness.record import Results
 from kincheck.core.harness.scene import with_scenes
 from kincheck.core.harness.workers.pool import solver_for
+from kincheck.core.studies.findings import Report
 
 _One = TypeVar("_One")
 
@@ -66,6 +68,18 @@ def run(
     solver, _ = solver_for(team, jobs)
     results = running.run(found, team, tol=tol, baseline=known.baseline(team), solver=solver)
     return with_scenes(results, found)
+
+
+def check_engine(engine: str | Engine) -> Report:
+    """Check an engine as the command `kincheck check-engine` does.
+
+    Args:
+        engine: an engine, its name, or MODULE:CLASS.
+
+    Raises:
+        KincheckError: there is no such engine.
+    """
+    return examined(engine, house())
 
 
 def _several(named: _One | Sequence[_One]) -> Sequence[_One]:

@@ -21,7 +21,7 @@ from kincheck.core.cli.main import main
 from kincheck.core.errors import KincheckError, MechanismError
 from kincheck.core.harness.results_file import read_results
 from kincheck.core.joints import AxialJoint
-from kincheck.core.studies.joint_check.findings import Verdict
+from kincheck.core.studies.findings import Verdict
 
 from ..support.fakes import Fake
 from .test_check_joint_mistakes import mistaken

@@ -9,8 +9,8 @@ import numpy as np
 from ...kinematics import Style
 from ...primitives.base import NoFormError
 from ...trajectory import Array
+from ..findings import Finding, Verdict, judged
 from .checks import ROUND_OFF, ROUND_OFF_WHY, Specimen
-from .findings import Finding, Verdict, judged
 from .manifold import design
 from .scalars import execute, precise
 from .traced import TracedJoint

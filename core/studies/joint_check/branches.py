@@ -13,8 +13,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...trajectory import Array
+from ..findings import Finding, Verdict
 from .checks import STEP, Specimen
-from .findings import Finding, Verdict
 from .manifold import Mask, design, newton, regular, straight, walk
 from .traced import COLUMNS, POSES, TracedJoint
 

@@ -28,6 +28,7 @@ import numpy as np
 
 from ...harness.engine import Engine
 from ...joints import Joint
+from ..findings import Finding, Report, Verdict
 from . import specimens as joint_specimens
 from .arithmetic import cost, round_off
 from .branches import branches
@@ -41,7 +42,6 @@ from .checks import (
     right_sides,
     specimen,
 )
-from .findings import Finding, Report, Verdict
 from .loop import loops
 from .variants import axis_lengths, exchange, named_coordinates, rigid_motion, size_and_place
 

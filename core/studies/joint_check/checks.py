@@ -16,7 +16,7 @@ import numpy as np
 
 from ...joints import AxialJoint, Joint
 from ...trajectory import Array
-from .findings import Finding, Verdict, judged
+from ..findings import Finding, Verdict, judged
 from .manifold import design, min_norm, newton, rank, smallest, straight, walk
 from .traced import Place, TracedJoint
 

@@ -20,8 +20,8 @@ from ...harness.verdict import excess
 from ...joints import Joint
 from ...kinematics import solve
 from ...trajectory import Array, Trajectory
+from ..findings import Finding, Verdict, judged
 from .checks import ROUND_OFF
-from .findings import Finding, Verdict, judged
 
 # Largest accepted constraint residual of an engine [m or -]: round-off of metre-sized coordinates,
 # x1000.
@@ -117,7 +117,7 @@ def _rates(case: Case) -> Iterator[Finding]:
         (motion.velocity, motion.acceleration, "acceleration"),
     )
     for before, rates, name in pairs:
-        slopes, coarse = _differences(before, dt), _differences(before[::2], 2.0 * dt)
+        slopes, coarse = differences(before, dt), differences(before[::2], 2.0 * dt)
         limit = float(np.abs(coarse - slopes[3:-3:2]).max()) + ROUND_OFF / dt
         remedy = "the solution's rates are not those of its positions: see rows, nu and gamma"
         yield judged(
@@ -130,7 +130,10 @@ def _rates(case: Case) -> Iterator[Finding]:
         )
 
 
-def _differences(values: Array, dt: float) -> Array:
+def differences(values: Array, dt: float) -> Array:
+    """Return sixth-order differences of values at equal steps, without the first and last three
+    samples, shape (n, ...) -> (n - 6, ...).
+    """
     windows = np.lib.stride_tricks.sliding_window_view(values, len(WEIGHTS), axis=0)
     return np.asarray(windows @ WEIGHTS / dt)
 

@@ -17,8 +17,8 @@ from ...algebra import quat, rotation_less_identity
 from ...joints import AxialJoint
 from ...kinematics import Style
 from ...trajectory import Array
+from ..findings import Finding, Verdict, judged
 from .checks import AMPLIFIED, AMPLIFIED_WHY, ROUND_OFF, ROUND_OFF_WHY, Specimen, defects, times
-from .findings import Finding, Verdict, judged
 from .manifold import min_norm, newton, rank
 from .specimens import moved, stretched
 from .traced import COLUMNS, POSES, Place, TracedJoint

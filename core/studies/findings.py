@@ -1,4 +1,4 @@
-"""Findings of the checks of a joint type, as data and as a table."""
+"""Findings of the checks of a joint type or an engine, as data and as a table."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import TextIO
 
 import numpy as np
 
-from ...trajectory import Array
+from ..trajectory import Array
 
 
 class Verdict(StrEnum):
@@ -90,17 +90,17 @@ def judged(
 
 @dataclass(frozen=True)
 class Report:
-    """The checks of a joint type.
+    """The checks of a joint type or an engine.
 
     Attributes:
-        joint: name of the class.
+        subject: name of the class or engine.
         specimens: the examined joints, as text.
-        seed: seed of all random numbers.
+        seed: seed of all random numbers; None if there are none.
     """
 
-    joint: str
+    subject: str
     specimens: tuple[str, ...]
-    seed: int
+    seed: int | None
     findings: tuple[Finding, ...]
 
     @property
@@ -126,7 +126,7 @@ class Report:
         from rich.table import Table
         from rich.text import Text
 
-        from ...report import terminal
+        from ..report import terminal
 
         console = terminal.console(file)
         table = Table(box=None, pad_edge=False, header_style="bold")
@@ -157,7 +157,8 @@ class Report:
         summary = ", ".join(
             f"{counts[verdict]} {verdict}" for verdict in Verdict if counts[verdict]
         )
-        console.print(Text(f"{self.joint}: {summary} (seed {self.seed})"))
+        seed = "" if self.seed is None else f" (seed {self.seed})"
+        console.print(Text(f"{self.subject}: {summary}{seed}"))
 
 
 def _where(finding: Finding) -> str:

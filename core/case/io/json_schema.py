@@ -1,0 +1,122 @@
+"""JSON Schemas of the files that kincheck reads and writes, made from the types that read them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, TypeAlias, cast
+
+import msgspec
+
+from ...joints import Coupler, Joint
+from ...mechanism.motions import Motion
+from ..suspension import SuspensionOutput
+from .driving import DRIVERS
+from .reference_samples import ReferenceKeys
+from .schema import (
+    COORDINATE,
+    SCHEMA,
+    BodyKeys,
+    CaseKeys,
+    OutputKeys,
+    PointKeys,
+    SweepKeys,
+    UnitsKeys,
+    driver_keys,
+    joint_keys,
+    motion_keys,
+)
+from .suspension import SuspensionKeys, output_keys
+
+Keys: TypeAlias = type[msgspec.Struct]
+Tables: TypeAlias = Mapping[str, Keys | Mapping[str, Keys]]
+"""By the name of a table of tables: the keys of each, or these by the value of `type`."""
+
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+TEMPLATE = "#/$defs/{name}"
+
+
+def case_schema() -> dict[str, Any]:
+    """Return the schema of case files, with all joint types that are registered now."""
+    joints: Mapping[str, type[Joint | Coupler]] = {**Joint.registry, **Coupler.registry}
+    outputs = {name: output_keys(cls) for name, cls in SuspensionOutput.registry.items()}
+    tables: Tables = {
+        "bodies": BodyKeys,
+        "joints": {name: joint_keys(cls) for name, cls in joints.items()},
+        "points": PointKeys,
+        "drivers": {name: driver_keys(cls) for name, cls in DRIVERS.items()},
+        "outputs": {COORDINATE: OutputKeys, **outputs},
+    }
+    single = {
+        "units": UnitsKeys,
+        "sweep": SweepKeys,
+        "suspension": SuspensionKeys,
+        "reference": ReferenceKeys,
+    }
+    motions = {name: motion_keys(cls) for name, cls in Motion.registry.items()}
+    found = document_schema(SCHEMA, CaseKeys, tables, single, {"motion": motions})
+    for name in DRIVERS:
+        keys = found["$defs"][f"drivers.{name}"]["properties"]
+        keys["motion"] = any_of([f"motion.{name}" for name in motions])
+    return found
+
+
+def document_schema(
+    name: str,
+    keys: Keys,
+    tables: Tables,
+    single: Mapping[str, Keys],
+    further: Tables | None = None,
+) -> dict[str, Any]:
+    """Return the schema of a file of tables.
+
+    Args:
+        name: name of the schema, which the key `schema` of the file repeats.
+        keys: the keys at the top of the file.
+        tables: the keys of each table in a table of tables.
+        single: the keys of a table.
+        further: definitions that other definitions will refer to.
+    """
+    structs = {"": keys, **single}
+    for table, each in {**tables, **(further or {})}.items():
+        kinds = each if isinstance(each, Mapping) else {"": each}
+        structs |= {f"{table}.{kind}".rstrip("."): struct for kind, struct in kinds.items()}
+    definitions = {label: _definition(label, struct) for label, struct in structs.items()}
+    whole = definitions.pop("")
+    properties = whole["properties"] | {"schema": {"const": name}}
+    for table, each in tables.items():
+        labels = [f"{table}.{kind}" for kind in each] if isinstance(each, Mapping) else [table]
+        properties[table] = {"type": "object", "additionalProperties": any_of(labels)}
+    properties |= {table: any_of([table]) for table in single}
+    return whole | {"$schema": DIALECT, "properties": properties, "$defs": definitions}
+
+
+def any_of(labels: list[str]) -> dict[str, Any]:
+    """Return the schema of a value that fits one of the definitions."""
+    refs = [{"$ref": TEMPLATE.format(name=label)} for label in labels]
+    return refs[0] if len(refs) == 1 else {"anyOf": refs}
+
+
+def _definition(label: str, struct: Keys) -> dict[str, Any]:
+    """Return the schema of one struct; the type in the label is the only value of `type`."""
+    found = struct_schema(struct)
+    _, _, kind = label.partition(".")
+    if kind:
+        found["properties"]["type"] = {"const": kind}
+    return found
+
+
+def struct_schema(struct: Keys) -> dict[str, Any]:
+    """Return the schema of a struct, with what it refers to written out."""
+    (ref,), parts = msgspec.json.schema_components([struct], ref_template=TEMPLATE)
+
+    def written_out(value: Any) -> Any:
+        if isinstance(value, dict):
+            table = cast("dict[str, Any]", value)
+            if "$ref" in table:
+                return written_out(parts[table["$ref"].rpartition("/")[2]])
+            return {key: written_out(each) for key, each in table.items()}
+        if isinstance(value, list):
+            return [written_out(each) for each in cast("list[Any]", value)]
+        return value
+
+    return written_out(ref)

@@ -1,0 +1,68 @@
+"""kincheck check-engine: check an engine of a user."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from typing import TYPE_CHECKING, Any
+
+from ..errors import KincheckError
+from .registry import House, Status
+from .run_options import TOL
+
+if TYPE_CHECKING:
+    from ..harness.engine import Engine
+    from ..studies.findings import Report
+
+TOPOLOGIES = {
+    "one loop": "rssr",
+    "open and closed": "spatial_slider_crank",
+    "several loops": "andrews_squeezer",
+    "parallel robot": "stewart_platform",
+    "redundant rows": "bennett",
+    "two drivers": "mcpherson_steered",
+    "outputs of orientation": "mcpherson_suspension",
+}
+"""Built-in cases by a word on their structure."""
+
+
+def add(commands: Any) -> None:
+    """Add the command to the parser."""
+    checking: argparse.ArgumentParser
+    checking = commands.add_parser(
+        "check-engine", help="check an engine of your own", description=_check_engine.__doc__
+    )
+    checking.set_defaults(do=_check_engine)
+    checking.add_argument(
+        "engine",
+        metavar="MODULE:CLASS",
+        help="the class, in a module of this folder or an installed one; or an engine's name",
+    )
+
+
+def _check_engine(options: argparse.Namespace, house: House) -> int:
+    """Check an engine: every joint type, several topologies, its rates against differences, its
+    refusals, and that it keeps no state. Each pair is solved in a worker process.
+    """
+    report = examined(options.engine, house)
+    report.print(sys.stdout)
+    return Status.WITHIN if report.passed else Status.DEVIATES
+
+
+def examined(engine: str | Engine, house: House) -> Report:
+    """Return the report on an engine, or on the engine of a name or at MODULE:CLASS.
+
+    Raises:
+        KincheckError: there is no such engine.
+    """
+    from ..harness.standard import STANDARD
+    from ..report.progress import progress
+    from ..studies.engine_check.check_engine import check_engine
+
+    problems = list[str]()
+    found = house.find_engines([engine], problems) if isinstance(engine, str) else [engine]
+    if problems:
+        raise KincheckError("\n".join(problems))
+    cases = {word: house.case(name) for word, name in TOPOLOGIES.items()}
+    native = house.engine(STANDARD)
+    return check_engine(found[0], native, cases, tol=TOL, progress=progress([]))

@@ -1,0 +1,68 @@
+"""kincheck schema: print the JSON Schema of a file that kincheck reads or writes."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import msgspec
+
+from ..case.io.atomic_files import to_standard_output
+from .registry import House, Status, add_joint_types
+
+
+def _case() -> dict[str, Any]:
+    from ..case.io.json_schema import case_schema
+
+    return case_schema()
+
+
+def _variation() -> dict[str, Any]:
+    from ..case.variation.json_schema import variation_schema
+
+    return variation_schema()
+
+
+def _results() -> dict[str, Any]:
+    from ..harness.record import Results
+
+    return msgspec.json.schema(Results)
+
+
+def _regression() -> dict[str, Any]:
+    from ..history.regression.findings import Regressions
+
+    return msgspec.json.schema(Regressions)
+
+
+SCHEMAS: Mapping[str, Callable[[], dict[str, Any]]] = {
+    "case": _case,
+    "variation": _variation,
+    "results": _results,
+    "regression": _regression,
+}
+
+
+def add(commands: Any) -> None:
+    """Add the command to the parser."""
+    schema: argparse.ArgumentParser = commands.add_parser(
+        "schema", help="print the JSON Schema of a file", description=_schema.__doc__
+    )
+    schema.set_defaults(do=_schema)
+    schema.add_argument(
+        "name",
+        choices=[*SCHEMAS],
+        metavar="NAME",
+        help=f"one of {', '.join(SCHEMAS)}; TOML files follow the schema of their content",
+    )
+    add_joint_types(schema)
+
+
+def _schema(options: argparse.Namespace, house: House) -> int:
+    """Print the JSON Schema of a file, for editors and validators, made from the types that read
+    and write it.
+    """
+    found = msgspec.json.encode(SCHEMAS[options.name]())
+    to_standard_output(msgspec.json.format(found, indent=2) + b"\n")
+    return Status.WITHIN

@@ -1,0 +1,1 @@
+"""Conformance of an engine with the engine protocol: one row for each check."""

@@ -1,0 +1,198 @@
+"""Examination of an engine from outside, by what the engine protocol promises.
+
+The engine solves a probe of every joint type, mechanisms of several topologies, a motion that ends
+at a fold and a joint that no engine knows, always in a worker process. Each check is a row of the
+report: the worst number found, the limit with its reason, the place.
+"""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ...case.case import Case
+from ...case.joint_probe import probe, probes
+from ...harness.engine import Engine, may_run_here
+from ...harness.engine_versions import versions
+from ...harness.execution import Answer, Attempt, Attempts, Pair, Solver, here
+from ...harness.record import Outcome, Record
+from ...harness.resource_limits import Limits
+from ...harness.run import Progress, run
+from ...harness.workers.pool import in_workers
+from ...joints import Revolute
+from ..findings import Finding, Report, Verdict
+from .rates import rates
+from .unknown_joint import UnknownJoint
+
+MODES = ("projection", "simulate")
+LOOPS = ("python", "simulator", "compiled")
+REACH = np.linspace(-3.0, 3.0, 61)
+"""Angles of the probe of a revolute joint [rad]: rods lock it at -1.8 and 2.4."""
+AGREE_WHY = "largest error over the tolerance of its output"
+SAME_WHY = "the same bits from a new model, in another process and order"
+VERDICTS = {
+    Outcome.PASS: Verdict.PASS,
+    Outcome.UNSUPPORTED: Verdict.SKIP,
+    Outcome.UNJUDGED: Verdict.SKIP,
+}
+BEYOND, UNKNOWN = "refusal: beyond a fold", "refusal: unknown joint"
+
+
+def check_engine(
+    engine: Engine,
+    native: Engine,
+    topologies: Mapping[str, Case],
+    *,
+    tol: float,
+    limits: Limits | None = None,
+    progress: Progress | None = None,
+) -> Report:
+    """Examine an engine.
+
+    Args:
+        native: the native engine, the standard where a case has no reference.
+        topologies: further cases, by a word on their structure.
+        tol: largest accepted constraint residual, as for `Engine.solve`.
+        limits: of a pair; those of the command line by default.
+        progress: called with each record.
+    """
+    found = [*_protocol(engine)]
+    if any(each.verdict is Verdict.FAIL for each in found):
+        return Report(str(engine.name), (), None, tuple(found))
+    refused = {BEYOND: _beyond(), UNKNOWN: probe(UnknownJoint)}
+    cases = {f"joint: {case.name}": case for case in probes()}
+    cases |= {f"topology: {word}": case for word, case in topologies.items()}
+    solver, answers = in_workers(1, limits or Limits()), dict[str, Attempt]()
+
+    def kept(pairs: Sequence[Pair]) -> Attempts:
+        for index, attempt in solver(pairs):
+            if pairs[index].engine is engine:
+                answers[pairs[index].case.name] = attempt
+            yield index, attempt
+
+    every = [*cases.values(), *refused.values()]
+    results = run(every, [engine], tol=tol, baseline=native, solver=kept, progress=progress)
+    records = {record.case: record for record in results.records}
+    found += [_compared(name, records[case.name]) for name, case in cases.items()]
+    found += rates([(case, records[case.name]) for case in cases.values()])
+    found += [_folded(refused[BEYOND], records), _unknown(records[refused[UNKNOWN].name])]
+    again = [Pair(case, engine, tol, timed=False) for case in reversed(cases.values())]
+    found.append(_same("determinism", again, answers, in_workers(1, limits or Limits())))
+    if may_run_here(engine):
+        found.append(_same("isolation: in this process", again, answers, here))
+    return Report(engine.name, (), None, tuple(found))
+
+
+def _beyond() -> Case:
+    case = probe(Revolute)
+    return replace(case, name="beyond_a_fold", sweep=replace(case.sweep, values=REACH))
+
+
+def _protocol(engine: Engine) -> Iterator[Finding]:
+    """Check attributes, version and transport; the rest needs all of them."""
+    given: Any = engine  # not known yet to be one
+    facts = (
+        ("name", given.name, isinstance(given.name, str) and given.name, "a text"),
+        ("mode", given.mode, given.mode in MODES, " or ".join(MODES)),
+        ("loop", given.loop, given.loop in LOOPS, " or ".join(LOOPS)),
+        ("settings", given.settings, isinstance(given.settings, Mapping), "a mapping"),
+    )
+    wrong = [
+        f"{name} is {value!r}, expected {wanted}" for name, value, good, wanted in facts if not good
+    ]
+    yield Finding("protocol", Verdict.FAIL if wrong else Verdict.PASS, message="; ".join(wrong))
+    try:
+        pickle.loads(pickle.dumps(engine))
+    except Exception as error:  # any error of the engine's own code
+        told = f"{type(error).__name__}: {error}; worker processes need an engine that pickle takes"
+        yield Finding("isolation: pickle", Verdict.FAIL, message=told)
+        return
+    yield Finding("isolation: pickle", Verdict.PASS)
+    (version,) = versions([engine])
+    told = "version() gives none: it is not installed, or cannot be imported"
+    verdict = Verdict.FAIL if version is None else Verdict.PASS
+    yield Finding("version", verdict, message=told if version is None else version)
+
+
+def _compared(name: str, record: Record) -> Finding:
+    """Return the agreement of a case with its reference and the native engine."""
+    shares = [
+        (each.max_abs / each.tolerance if each.tolerance else np.inf, f"{output} {quantity}")
+        for output, errors in record.errors.items()
+        for quantity, each in errors.items()
+    ]
+    worst, where = max(shares, default=(None, ""))
+    verdict = VERDICTS.get(record.outcome, Verdict.FAIL)
+    told = "" if record.outcome is Outcome.PASS else f"{record.outcome.shown}: {record.message}"
+    limit = None if worst is None else 1.0
+    why = "" if worst is None else AGREE_WHY
+    return Finding(name, verdict, worst, limit, why, row=where, message=told)
+
+
+def _folded(case: Case, records: Mapping[str, Record]) -> Finding:
+    """Check that samples behind a fold have no values, and that the message says why."""
+    record = records[case.name]
+    if record.outcome is Outcome.UNSUPPORTED:
+        return Finding(BEYOND, Verdict.SKIP, message=record.message)
+    beyond = sum(each.contradicted or 0 for each in record.errors.values())
+    reached = record.solved or 0
+    problems = [
+        f"ends with {record.outcome.shown}: {record.message}" if record.solved is None else "",
+        "has values at samples that cannot be reached; mark them unsolved" if beyond else "",
+        "" if reached else "reaches no sample, though the design is among them",
+        "" if "does not say why" not in record.message else "gives no message",
+    ]
+    told = "; ".join(filter(None, problems))
+    return Finding(
+        BEYOND,
+        Verdict.FAIL if told else Verdict.PASS,
+        float(beyond),
+        0.0,
+        "values at samples that cannot be reached",
+        message=told or f"reaches {reached} of {len(REACH)} samples",
+    )
+
+
+def _unknown(record: Record) -> Finding:
+    """Check that a joint of an unknown type is refused with a reason, or solved rightly."""
+    solved = record.outcome in (Outcome.PASS, Outcome.UNJUDGED)
+    good = solved or (record.outcome is Outcome.UNSUPPORTED and record.message)
+    told = record.outcome.shown + (f": {record.message}" if record.message else "")
+    remedy = "" if good else "; unsupported() is to return the reason"
+    return Finding(UNKNOWN, Verdict.PASS if good else Verdict.FAIL, message=told + remedy)
+
+
+def _same(
+    name: str, pairs: Sequence[Pair], first: Mapping[str, Attempt], solver: Solver
+) -> Finding:
+    """Check that pairs have the same answers again."""
+    worst, where = 0.0, ""
+    for index, attempt in solver(pairs):
+        case = pairs[index].case.name
+        off = _difference(first[case], attempt)
+        if off > worst:
+            worst, where = off, case
+    told = "keeps a state from one case to the next, or uses random numbers" if worst else ""
+    verdict = Verdict.FAIL if worst else Verdict.PASS
+    return Finding(name, verdict, worst, 0.0, SAME_WHY, row=where, message=told)
+
+
+def _difference(one: Attempt, other: Attempt) -> float:
+    """Return the largest difference between two answers; infinite if only one has values."""
+    if not (isinstance(one.result, Answer) and isinstance(other.result, Answer)):
+        return 0.0 if type(one.result) is type(other.result) else np.inf
+    worst = 0.0
+    for name, series in one.result.outputs.items():
+        found = other.result.outputs[name]
+        for quantity in ("position", "velocity", "acceleration"):
+            a, b = getattr(series, quantity), getattr(found, quantity)
+            if (a is None) != (b is None):
+                return np.inf
+            if a is not None and not np.array_equal(a, b, equal_nan=True):
+                off = np.abs(a - b)
+                worst = max(worst, float(np.nanmax(off, initial=0.0)) or np.inf)
+    return worst

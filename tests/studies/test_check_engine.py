@@ -1,0 +1,154 @@
+"""check-engine: a sound engine passes, each planted fault fails its own row, and engines from
+outside enter by module and class, or by an entry point.
+"""
+
+from importlib.metadata import EntryPoint
+from pathlib import Path
+
+import kincheck
+import kincheck.adapters
+import kincheck.cases
+import pytest
+from kincheck.core.case.joint_probe import probe
+from kincheck.core.cli import engine_loading, main
+from kincheck.core.joints import Gear, Planar, Screw
+from kincheck.core.studies.engine_check import check_engine as checking
+from kincheck.core.studies.findings import Verdict
+
+from ..support.faulty_engine import Odd, Shy, Sound
+
+ROOT = Path(__file__).parents[2]
+HERE = "tests.support.faulty_engine"
+
+
+@pytest.fixture
+def few(monkeypatch):
+    """Three joint types and one topology; modules of the tests are found by workers."""
+    monkeypatch.syspath_prepend(str(ROOT))
+    monkeypatch.setattr(checking, "probes", lambda: [probe(each) for each in (Screw, Planar, Gear)])
+    monkeypatch.setattr("kincheck.core.cli.check_engine.TOPOLOGIES", {"one loop": "rssr"})
+
+
+def failures(report):
+    return {each.check for each in report.findings if each.verdict is Verdict.FAIL}
+
+
+def test_a_sound_engine_passes(few):
+    report = kincheck.check_engine(Sound())
+    assert failures(report) == set()
+    assert [each.check for each in report.findings] == [
+        "protocol",
+        "isolation: pickle",
+        "version",
+        "joint: screw",
+        "joint: planar",
+        "joint: gear",
+        "topology: one loop",
+        "rates: velocity",
+        "rates: acceleration",
+        "refusal: beyond a fold",
+        "refusal: unknown joint",
+        "determinism",
+    ]
+    assert str(report).endswith("sound: 12 pass\n")
+
+
+def test_each_fault_fails_its_row(few, capsys):
+    assert main.main(["check-engine", f"{HERE}:Faulty"]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert {line.split("  ")[0] for line in lines if "  fail " in line} == {
+        "joint: screw",
+        "joint: planar",
+        "rates: acceleration",
+        "refusal: beyond a fold",
+        "refusal: unknown joint",
+        "determinism",
+    }
+    said = "\n".join(lines)
+    assert "planar: tip_" in said
+    assert "has values at samples that cannot be reached; mark them unsolved" in said
+    assert "KeyError: 'unknown_to_engines'; unsupported() is to return the reason" in said
+    assert "determinism: keeps a state from one case to the next" in said
+    assert lines[-1] == "faulty: 6 pass, 6 fail"
+
+
+def test_what_is_outside_the_protocol_ends_the_check(few):
+    report = kincheck.check_engine(Odd())
+    assert failures(report) == {"protocol", "isolation: pickle"}
+    assert "mode is 'magic', expected projection or simulate" in report["protocol"].message
+    assert failures(kincheck.check_engine(Shy())) == {"version"}
+
+
+@pytest.mark.parametrize(
+    ("where", "message"),
+    [
+        (f"{HERE}:Fauly", "has no class 'Fauly'; did you mean 'Faulty'?"),
+        (f"{HERE}:PointMotion", "PointMotion cannot be made: TypeError"),
+        (
+            f"{HERE}:np",
+            "np is no engine: name, mode, loop, settings, unsupported, build, solve missing",
+        ),
+        ("tests.nothing:Sound", "there is no module 'tests.nothing'"),
+        ("mujocco", "there is no engine 'mujocco'; did you mean 'mujoco'?"),
+    ],
+)
+def test_what_is_no_engine_is_one_message(monkeypatch, capsys, where, message):
+    monkeypatch.syspath_prepend(str(ROOT))
+    assert main.main(["check-engine", where]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_run_takes_module_and_class_and_a_case_behind_them(monkeypatch, capsys):
+    monkeypatch.syspath_prepend(str(ROOT))
+    assert main.main(["run", "--jobs", "0", "--engine", f"{HERE}:Sound", "rssr"]) == 0
+    assert "rssr  sound   pass" in capsys.readouterr().out
+
+
+def test_an_engine_named_by_module_and_class_must_be_there(monkeypatch, capsys):
+    monkeypatch.syspath_prepend(str(ROOT))
+    for option in ("--engine", "--require"):
+        argv = ["run", "rssr", "--jobs", "0", "--engine", "native", option, f"{HERE}:Shy"]
+        assert main.main(argv) == 2
+        assert "engine 'shy'" in capsys.readouterr().err
+
+
+@pytest.fixture
+def offered(monkeypatch):
+    """Entry points of other packages, by name."""
+
+    def offer(**points):
+        made = {
+            name: EntryPoint(name, value, engine_loading.GROUP) for name, value in points.items()
+        }
+        monkeypatch.setattr(engine_loading, "entry_points", lambda: made)
+        monkeypatch.syspath_prepend(str(ROOT))
+
+    return offer
+
+
+def test_other_packages_offer_engines(offered, capsys):
+    offered(sound=f"{HERE}:Sound", broken="tests.nothing:Engine")
+    assert "sound" in main.house().engines
+    assert main.main(["run", "rssr", "--jobs", "0", "--engine", "sound"]) == 0
+    assert main.main(["run", "rssr", "--jobs", "0", "--engine", "broken"]) == 2
+    assert "No module named 'tests.nothing'" in capsys.readouterr().out
+
+
+def test_no_package_takes_the_name_of_our_own(offered, capsys):
+    offered(mujoco=f"{HERE}:Sound")
+    assert main.main(["run", "rssr", "--engine", "native"]) == 2
+    assert "offers an engine named 'mujoco', which is kincheck's own" in capsys.readouterr().err
+
+
+def test_the_entry_point_group_is_asked_for(monkeypatch):
+    asked = []
+
+    def entry_points(*, group):
+        asked.append(group)
+        return [EntryPoint("own", "own:Own", group)]
+
+    engine_loading.entry_points.cache_clear()
+    monkeypatch.setattr("importlib.metadata.entry_points", entry_points)
+    assert engine_loading.offered(["native"]) == ("own",)
+    assert asked == ["kincheck.engines"]
+    engine_loading.entry_points.cache_clear()
