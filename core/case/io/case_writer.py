@@ -13,17 +13,14 @@ import numpy as np
 
 from ...errors import CaseError
 from ...joints import Coupler
+from ...mechanism.body import Body
 from ...mechanism.motions import Absolute
 from ..case import MARKER, TIME, Case, Output
 from .coordinates import AXES
 from .schema import SCHEMA, own_fields
 
 # What a body has unless the file says otherwise.
-PLAIN: Mapping[str, Any] = {
-    "origin": (0.0, 0.0, 0.0),
-    "euler_parameters": (1.0, 0.0, 0.0, 0.0),
-    "fixed": False,
-}
+PLAIN = Body("plain")
 
 
 def case_text(case: Case, comments: Sequence[str] = ()) -> str:
@@ -40,10 +37,17 @@ def case_text(case: Case, comments: Sequence[str] = ()) -> str:
     lines = [f"# {line}" for line in comments]
     lines += _keys({"schema": SCHEMA, "name": case.name, "source": case.source})
     mechanism = case.mechanism
+    if any(mechanism.gravity):
+        lines += _keys({"gravity": mechanism.gravity})
     for body in mechanism.bodies:
-        given = {f.name: getattr(body, f.name) for f in fields(body) if f.name != "name"}
         lines += _table(
-            "bodies", body.name, {key: value for key, value in given.items() if value != PLAIN[key]}
+            "bodies",
+            body.name,
+            {
+                f.name: value
+                for f in fields(body)
+                if f.name != "name" and (value := getattr(body, f.name)) != getattr(PLAIN, f.name)
+            },
         )
     for joint in (*mechanism.joints, *mechanism.grounded, *mechanism.couplers):
         what = {"joints": joint.joints} if isinstance(joint, Coupler) else {"bodies": joint.bodies}
@@ -59,6 +63,9 @@ def case_text(case: Case, comments: Sequence[str] = ()) -> str:
             lines += _table(
                 f"drivers.{_key(driver.name)}", "motion", {"type": moved.type, **_own(moved)}
             )
+    for force in mechanism.forces:
+        ends = {"bodies": force.bodies} if len(force.bodies) == 2 else {}
+        lines += _table("forces", force.name, {"type": force.type, **ends, **_own(force)})
     lines += ["", "[sweep]", *_keys(_sweep(case))]
     for output in case.outputs:
         lines += _table("outputs", output.name, dict(_output(case, output)))
