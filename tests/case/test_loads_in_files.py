@@ -228,7 +228,9 @@ vector = st.tuples(number, number, number)
 @st.composite
 def inertia(draw):
     """Return the inertia of a cloud of points, which is that of a rigid body."""
-    points = np.array(draw(st.lists(st.tuples(*3 * [st.integers(-99, 99)]), min_size=4, max_size=6)))
+    points = np.array(
+        draw(st.lists(st.tuples(*3 * [st.integers(-99, 99)]), min_size=4, max_size=6))
+    )
     points = np.vstack([points, np.eye(3)])
     matrix = (points**2).sum() * np.eye(3) - points.T @ points
     return tuple(float(matrix[at]) for at in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)))
