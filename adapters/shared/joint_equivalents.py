@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 
@@ -28,7 +29,7 @@ ALONG = 0.3
 def jointed(mechanism: Mechanism) -> Mechanism:
     """Return the mechanism with joint drivers only and without rods.
 
-    Rods whose length differs from the design stay.
+    Rods whose length differs from the design stay. Bodies that are added have no mass.
     """
     bodies, joints, drivers = list(mechanism.bodies), list[Joint](), list[Driver]()
     for joint in mechanism.joints:
@@ -54,7 +55,7 @@ def jointed(mechanism: Mechanism) -> Mechanism:
             drivers.append(JointDisplacement(driver.name, names[0], driver.relative))
         else:
             drivers.append(driver)
-    return Mechanism(mechanism.name, bodies, joints, mechanism.points, drivers, mechanism.couplers)
+    return replace(mechanism, bodies=bodies, joints=joints, drivers=drivers)
 
 
 def fits(rod: Distance) -> bool:

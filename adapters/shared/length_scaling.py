@@ -16,6 +16,7 @@ import numpy as np
 from ...core.case.case import Case, size
 from ...core.joints import Kind
 from ...core.kinematics import unit_near
+from ...core.mechanism.dimension import ACCELERATION
 from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
 
@@ -66,18 +67,24 @@ def own_frame(case: Case) -> OwnFrame:
 
 
 def in_own_frame(case: Case) -> Case:
-    """Return the case with its mechanism in its own frame; drivers and outputs stay in SI."""
+    """Return the case with its mechanism in its own frame; drivers and outputs stay in SI.
+
+    Loads are in kg, s and the unit u of length [m]: inertia in kg u^2, gravity in u/s^2, forces in
+    kg u/s^2, torques in kg u^2/s^2, stiffness and damping accordingly.
+    """
     mechanism, frame = case.mechanism, own_frame(case)
     ways: dict[Kind, Any] = {Kind.POSITION: frame.there, Kind.LENGTH: frame.units}
     return replace(
         case,
         mechanism=replace(
             mechanism,
-            bodies=[replace(body, origin=frame.there(body.origin)) for body in mechanism.bodies],
+            bodies=[body.in_frame(frame.there, frame.unit) for body in mechanism.bodies],
             joints=[joint.changed(**joint.mapped(ways)) for joint in mechanism.joints],
             points=[
                 replace(point, position=frame.there(point.position)) for point in mechanism.points
             ],
             couplers=[coupler.scaled(1.0 / frame.unit) for coupler in mechanism.couplers],
+            gravity=tuple(ACCELERATION.in_kg_and_s(x, frame.unit) for x in mechanism.gravity),
+            forces=[force.in_frame(frame.there, frame.unit) for force in mechanism.forces],
         ),
     )

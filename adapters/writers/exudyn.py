@@ -23,12 +23,14 @@ from ...core import joints as j
 from ...core.algebra import vec
 from ...core.errors import KincheckError
 from ...core.joints.base import unit
+from ...core.mechanism.loads import Force, ForceElement, SpringDamper, Torque, TorsionSpringDamper
 from ...core.mechanism.mechanism import GROUND, Body, Mechanism
 from ...core.trajectory import Array, BodyMotion
 from ..shared.joint_chains import CHAINS, dependence, relations
 from ..shared.loop_closures import ends_of
 from ..shared.poses import Displacement, displacements, frame_along, link_coordinates, link_motions
-from .exudyn_preamble import BEGINNING, END
+from . import exudyn_loads
+from .exudyn_preamble import END, beginning
 
 # Round-off of a right angle between unit vectors; a generic joint leaves as much as a residual.
 RIGHT_ANGLE = 1e-15
@@ -69,29 +71,37 @@ class _Script:
     def __init__(self, mechanism: Mechanism, way: Mapping[str, BodyMotion]) -> None:
         self.mechanism, self.way, self.placed = mechanism, way, displacements(mechanism, way)
         self.lines: list[str] = []
+        self.loaded = mechanism.has_loads
         self.measured = set[str]()
 
     def text(self, start: Mapping[str, float]) -> str:
         """The script."""
         self.lines.append(f"drivers = {dict(start)!r}")
         fixed = [GROUND, *(body.name for body in self.mechanism.bodies if body.fixed)]
+        if self.loaded:
+            self.lines.append(f"gravity = {_text(self.mechanism.gravity)}")
         self.lines.append(f"bodies |= dict.fromkeys({fixed!r}, ground)")
         for body in self.mechanism.moving:
             turn = np.array([float(each[-1]) for each in self.placed[body.name].turn])
             moved = [*(self.way[body.name].r[-1] - body.origin), *(turn - (1.0, 0.0, 0.0, 0.0))]
-            self.call("body", body.name, body.origin, moved, body.euler_parameters)
+            self.call(
+                *("body", body.name, body.origin, moved, body.euler_parameters),
+                *(exudyn_loads.inertial(body) if self.loaded else ()),
+            )
         for joint in self.mechanism.joints:
             self.joint(joint)
             for relation in relations(joint):
                 self.relate(joint.name, relation)
         for coupler in self.mechanism.couplers:
             self.relate(coupler.name, coupler.terms)
+        for force in self.mechanism.forces:
+            self.load(force)
         for point in self.mechanism.points:
             self.lines.append(
                 f"points[{point.name!r}] = bodies[{point.body!r}],"
                 f" {self.arm(point.body, point.position)}"
             )
-        return BEGINNING + "\n".join(self.lines) + "\n" + END
+        return beginning(self.loaded) + "\n".join(self.lines) + "\n" + END
 
     def call(self, function: str, *values: Any, **options: Any) -> None:
         """Add a call as a line."""
@@ -174,12 +184,33 @@ class _Script:
                 column, constrained = GENERIC[type(joint)]
                 self.generic(joint, constrained, frame_along(axis, column))
 
+    def load(self, force: ForceElement) -> None:
+        """A force element as an object or load of Exudyn."""
+        options = exudyn_loads.options(force)
+        if isinstance(force, SpringDamper):
+            ends = map(self.marker, force.bodies, force.points)
+            self.call("spring", force.name, *ends, **options)
+        elif isinstance(force, TorsionSpringDamper):
+            joint: Any = self.mechanism.joint(force.joint)
+            axes = frame_along(joint.axis, 2)
+            ends = [self.marker(body, joint.point, axes) for body in joint.bodies]
+            self.call("torsion", force.name, *ends, *self.values(joint)["rotation"], **options)
+        elif isinstance(force, Force | Torque):
+            at = force.point if isinstance(force, Force) else (0.0, 0.0, 0.0)
+            self.call(force.type, force.name, self.marker(force.body, at), **options)
+
     def relate(self, name: str, terms: Sequence[tuple[str, str, float]]) -> None:
         """Keep the weighted sum of two coordinates (joint, freedom, weight) at zero."""
         one, other, factor = dependence(
             ((joint, freedom), weight) for joint, freedom, weight in terms
         )
         self.call("relation", name, self.coordinate(*one), self.coordinate(*other), factor)
+
+    def values(self, joint: Any) -> Mapping[str, tuple[float, ...]]:
+        """Return the coordinates of a joint at the start, by freedom."""
+        links = CHAINS[type(joint)](joint, joint.point)
+        values = link_coordinates(joint, links, self.placed)
+        return {link.name: value for link, value in zip(links, values, strict=True)}
 
     def coordinate(self, name: str, freedom: str) -> str:
         """The name of a joint's coordinate, which is measured from now on."""
@@ -188,15 +219,7 @@ class _Script:
         if known not in self.measured:
             self.measured.add(known)
             ends = (self.marker(body, joint.point) for body in joint.bodies)
-            links = CHAINS[type(joint)](joint, joint.point)
-            values = dict(
-                zip(
-                    (link.name for link in links),
-                    link_coordinates(joint, links, self.placed),
-                    strict=True,
-                )
-            )
-            initial = values[freedom] if freedom == "rotation" else ()
+            initial = self.values(joint)[freedom] if freedom == "rotation" else ()
             self.call(freedom, known, *ends, [*unit(joint.axis)], *initial)
         return known
 

@@ -1,9 +1,72 @@
 """Text of the scripts for Exudyn before and after the lines of a mechanism."""
 
+from . import loads
+
+
+def beginning(loaded: bool) -> str:
+    """Return the functions that the lines call; with masses and force elements if loaded."""
+    masses, body = (loads.LOADED, LOADED_BODY) if loaded else (loads.PLAIN, PLAIN_BODY)
+    return BEGINNING.replace("MASSES", masses).replace("BODY", body)
+
+
+PLAIN_BODY = """
+def body(name, position, initial, frame):
+    frames[name], reference = frame, [*position, 1, 0, 0, 0]
+    node = NodeRigidBodyEP(
+        name=name, referenceCoordinates=reference, initialCoordinates=initial
+    )
+    nodes[name] = mbs.AddNode(node)
+    rigid = ObjectRigidBody(name=name, mass=1, inertia=[1, 1, 1, 0, 0, 0], nodeNumber=nodes[name])
+    bodies[name] = mbs.AddObject(rigid)
+"""
+LOADED_BODY = '''
+forces = {}
+
+
+def body(name, position, initial, frame, mass, center, inertia):
+    """The centre of mass is from the origin; the inertia is about the origin."""
+    frames[name], reference = frame, [*position, 1, 0, 0, 0]
+    node = NodeRigidBodyEP(
+        name=name, referenceCoordinates=reference, initialCoordinates=initial
+    )
+    nodes[name] = mbs.AddNode(node)
+    rigid = ObjectRigidBody(
+        name=name, mass=mass, inertia=inertia, centerOfMass=center, nodeNumber=nodes[name]
+    )
+    bodies[name] = mbs.AddObject(rigid)
+    falling = mbs.AddMarker(MarkerBodyMass(bodyNumber=bodies[name]))
+    mbs.AddLoad(LoadMassProportional(markerNumber=falling, loadVector=gravity))
+
+
+def spring(name, first, second, **options):
+    item = ObjectConnectorSpringDamper(
+        name=name, markerNumbers=[marker(*first), marker(*second)], **options
+    )
+    forces[name] = mbs.AddObject(item)
+
+
+def torsion(name, first, second, turn, **options):
+    """A torsional spring-damper about the z axis of its markers, whose turn a node counts."""
+    turns = mbs.AddNode(NodeGenericData(numberOfDataCoordinates=1, initialCoordinates=[turn]))
+    item = ObjectConnectorTorsionalSpringDamper(
+        name=name, markerNumbers=[marker(*first), marker(*second)], nodeNumber=turns, **options
+    )
+    forces[name] = mbs.AddObject(item)
+
+
+def force(name, at, **options):
+    item = LoadForceVector(markerNumber=marker(*at), **options)
+    forces[name] = mbs.AddLoad(item)
+
+
+def torque(name, at, **options):
+    item = LoadTorqueVector(markerNumber=marker(*at), **options)
+    forces[name] = mbs.AddLoad(item)
+'''
 BEGINNING = '''\
 """A mechanism in Exudyn, written by kincheck. Lengths are in m, angles in rad.
 
-Masses and inertias stand in for missing ones. Drivers are not part of the model: the initial
+MASSES Drivers are not part of the model: the initial
 coordinates are consistent with the driver values below. All bodies are parallel to the global axes
 at design, in their reference coordinates, from which the state of Exudyn is measured; `frames` has
 the Euler parameters of the bodies' own axes in these.
@@ -18,16 +81,7 @@ mbs = SC.AddSystem()
 ground = mbs.AddObject(ObjectGround())
 nodes, bodies, frames, joints, coordinates, points = {}, {}, {}, {}, {}, {}
 
-
-def body(name, position, initial, frame):
-    frames[name], reference = frame, [*position, 1, 0, 0, 0]
-    node = NodeRigidBodyEP(
-        name=name, referenceCoordinates=reference, initialCoordinates=initial
-    )
-    nodes[name] = mbs.AddNode(node)
-    rigid = ObjectRigidBody(name=name, mass=1, inertia=[1, 1, 1, 0, 0, 0], nodeNumber=nodes[name])
-    bodies[name] = mbs.AddObject(rigid)
-
+BODY
 
 def marker(name, position, rotation=np.eye(3)):
     frame = np.eye(4)

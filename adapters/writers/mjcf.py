@@ -4,18 +4,19 @@ would keep six digits.
 A body is a <body> with the frame that the case gives it. A joint is a chain of MuJoCo joints (see
 `joint_chains`), in the tree or, if it closes a loop, on an auxiliary body that an equality ties to
 the second body; a distance is a tendon of constant length. Joint equalities tie coordinates to one
-another. Bodies have a unit mass and inertia, for want of any.
+another. Spring-dampers are tendons and attributes of joints; MJCF has no constant forces. Without
+masses in the mechanism, bodies have a unit mass and inertia.
 """
 
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
 
 from ...core.algebra import vec
 from ...core.errors import KincheckError
 from ...core.joints import Distance, Joint
+from ...core.mechanism.loads import ForceElement, SpringDamper, TorsionSpringDamper
 from ...core.mechanism.mechanism import GROUND, Body, Mechanism
 from ...core.mechanism.topology import spanning_tree
 from ...core.trajectory import BodyMotion
@@ -30,13 +31,15 @@ from ..shared.poses import (
     local,
     rotated,
 )
+from . import loads
 from .xml_text import document, link_names, numbers
 
 NOTE = (
-    " Written by kincheck. Lengths are in m, angles in rad. Masses, inertias and armatures stand in"
-    " for missing ones. Drivers are not part of the model: the keyframe is consistent with the"
-    " driver values under custom. "
+    " Written by kincheck. Lengths are in m, angles in rad. {} Drivers are not part of the model:"
+    " the keyframe is consistent with the driver values under custom.{} "
 )
+PLAIN = "Masses, inertias and armatures stand in for missing ones."
+LOADED = f"{loads.LOADED} Coordinates have an armature of {loads.STAND_IN:g}."
 
 
 def write(
@@ -62,12 +65,16 @@ class _Model:
     def __init__(self, mechanism: Mechanism, way: Mapping[str, BodyMotion]) -> None:
         self.mechanism, self.way, self.placed = mechanism, way, displacements(mechanism, way)
         self.root = ET.Element("mujoco", model=mechanism.name)
-        self.root.append(ET.Comment(NOTE))
+        self.loaded = mechanism.has_loads
+        self.note = ET.Comment(NOTE)
+        self.root.append(self.note)
         ET.SubElement(self.root, "compiler", angle="radian")
-        ET.SubElement(self.root, "option", gravity="0 0 0")
+        gravity = numbers(mechanism.gravity) if self.loaded else "0 0 0"
+        ET.SubElement(self.root, "option", gravity=gravity)
         # an inertia of each coordinate alone: hinges in line would leave the mass matrix near to
         # singular
-        ET.SubElement(ET.SubElement(self.root, "default"), "joint", armature="1")
+        armature = numbers([loads.STAND_IN]) if self.loaded else "1"
+        ET.SubElement(ET.SubElement(self.root, "default"), "joint", armature=armature)
         self.custom = ET.SubElement(self.root, "custom")
         self.elements = {GROUND: ET.SubElement(self.root, "worldbody")}
         self.tendons, self.equalities = (
@@ -100,6 +107,10 @@ class _Model:
             )
         for point in mechanism.points:
             self.add_site(point.name, point.body, point.position)
+        sprung = {force.name for force in mechanism.forces if self.add_spring(force)}
+        self.note.text = NOTE.format(
+            LOADED if self.loaded else PLAIN, loads.left_out(mechanism, sprung, True)
+        )
 
     def text(self, start: Mapping[str, float]) -> str:
         """The document, with a consistent start."""
@@ -127,9 +138,14 @@ class _Model:
         self.elements[frame.name] = ET.SubElement(
             self.elements[parent], "body", {"name": frame.name, **at}
         )
-        ET.SubElement(
-            self.elements[frame.name], "inertial", pos="0 0 0", mass="1", diaginertia="1 1 1"
-        )
+        at = {"pos": "0 0 0", "mass": "1", "diaginertia": "1 1 1"}
+        if self.loaded:
+            at = {
+                "pos": numbers(local(frame, loads.center_of(frame))),
+                "mass": numbers([loads.mass_of(frame)]),
+                "fullinertia": numbers(loads.six(loads.own_inertia(frame))),
+            }
+        ET.SubElement(self.elements[frame.name], "inertial", at)
 
     def add_site(
         self, name: str, body: str, position: Sequence[float], aligned: bool = False
@@ -179,10 +195,7 @@ class _Model:
     def close(self, joint: Joint) -> None:
         """Express a joint that closes a loop by an equality."""
         if isinstance(joint, Distance):
-            sites = self.add_ends(joint.name, joint.bodies, joint.points)
-            tendon = ET.SubElement(self.tendons, "spatial", name=joint.name)
-            for site in sites:
-                ET.SubElement(tendon, "site", site=site)
+            self.add_tendon(joint.name, joint.bodies, joint.points)
             # its length may change by the constant of the polynomial, since design
             change = numbers([joint.rod_length - joint.design_distance, 0, 0, 0, 0])
             ET.SubElement(self.equalities, "tendon", tendon1=joint.name, polycoef=change)
@@ -191,20 +204,50 @@ class _Model:
         carrier = joint.i
         if links:
             carrier = f"{joint.name}.auxiliary"
-            self.add_body(replace(self.frames[joint.i], name=carrier), joint.i)
+            frame = self.frames[joint.i]
+            self.add_body(Body(carrier, frame.origin, frame.euler_parameters), joint.i)
             self.carry(carrier, joint, links)
         one, two = self.add_ends(joint.name, (carrier, joint.j), (point, point))
         ET.SubElement(
             self.equalities, "connect" if turns else "weld", name=joint.name, site1=one, site2=two
         )
 
+    def add_spring(self, force: ForceElement) -> bool:
+        """Add a spring-damper; return whether MJCF has the force element."""
+        if isinstance(force, SpringDamper):
+            tendon = self.add_tendon(force.name, force.bodies, force.points)
+            tendon.set("springlength", numbers([force.free_length]))
+        elif isinstance(force, TorsionSpringDamper):
+            name = self.coordinates.get((force.joint, "rotation"))
+            tendon = next(
+                (each for each in self.root.iter("joint") if name and each.get("name") == name),
+                None,
+            )
+            if tendon is None or "stiffness" in tendon.attrib:  # between fixed bodies, or a second
+                return False
+            tendon.set("springref", numbers([self.signs[force.joint] * force.free_angle]))
+        else:
+            return False
+        tendon.set("stiffness", numbers([force.stiffness]))
+        tendon.set("damping", numbers([force.damping]))
+        return True
+
+    def add_tendon(
+        self, name: str, bodies: Sequence[str], points: Sequence[Sequence[float]]
+    ) -> ET.Element:
+        """Add a tendon between a point of each of two bodies."""
+        tendon = ET.SubElement(self.tendons, "spatial", name=name)
+        for site in self.add_ends(name, bodies, points):
+            ET.SubElement(tendon, "site", site=site)
+        return tendon
+
     def add_ends(
-        self, joint: str, bodies: Sequence[str], points: Sequence[Sequence[float]]
+        self, name: str, bodies: Sequence[str], points: Sequence[Sequence[float]]
     ) -> list[str]:
-        """Add a site at either end of a loop closure; return their names."""
+        """Add a site at either end of a loop closure or spring; return their names."""
         ends = zip(("first", "second"), bodies, points, strict=True)
         return [
-            self.add_site(f"{joint}.{which}", body, point, aligned=True)
+            self.add_site(f"{name}.{which}", body, point, aligned=True)
             for which, body, point in ends
         ]
 

@@ -35,12 +35,13 @@ from ..shared.frame_constraints import (
 from ..shared.joint_chains import CHAINS, Link, relations
 from ..shared.loop_closures import CLOSURES, ends_of
 from ..shared.poses import backwards, displacements, link_coordinates
+from . import loads
 from .xml_text import document, link_names, numbers
 
 SCHEMA = "kincheck-constraints/1"
 NOTE = (
-    " Written by kincheck. Lengths are in m, angles in rad; nothing has a mass. The tree alone is"
-    " not the mechanism: the constraints in the file beside it close its loops. "
+    " Written by kincheck. Lengths are in m, angles in rad; {}. The tree alone is not"
+    " the mechanism: the constraints in the file beside it close its loops.{} "
 )
 MEANING = {
     "coincident": "the points i and j are one (3 equations)",
@@ -54,6 +55,7 @@ MEANING = {
         " z, w"
     ),
 }
+ENTRIES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 KINDS = {"hinge": "revolute", "slide": "prismatic"}
 FAR = {"lower": "-1e9", "upper": "1e9", "effort": "1e9", "velocity": "1e9"}
 
@@ -133,7 +135,10 @@ class _Model:
     def __init__(self, mechanism: Mechanism, way: Mapping[str, BodyMotion]) -> None:
         self.mechanism, self.way, self.placed = mechanism, way, displacements(mechanism, way)
         self.root = ET.Element("robot", name=mechanism.name)
-        self.root.append(ET.Comment(NOTE))
+        note = ("nothing has a mass", "")
+        if mechanism.has_loads:
+            note = ("masses are in kg", loads.left_out(mechanism, (), False))
+        self.root.append(ET.Comment(NOTE.format(*note)))
         self.origin: dict[str, Vector] = {}  # of links, global at design
         self.q: dict[str, list[float]] = {}
         # name and sign, by joint and freedom
@@ -161,6 +166,9 @@ class _Model:
             self.attach(
                 f"point.{point.name}", point.body, point.position, f"point.{point.name}.fixed"
             )
+        for body in mechanism.bodies:
+            if body.mass:
+                self.weigh(body)
 
     def links(self, joint: Joint) -> list[Link] | None:
         """A joint's chain, from its first body to its second; None where it has a ball or is
@@ -185,6 +193,17 @@ class _Model:
         ET.SubElement(element, "child", link=link)
         ET.SubElement(element, "origin", xyz=numbers(self.arm(parent, origin)), rpy="0 0 0")
         return element
+
+    def weigh(self, body: Body) -> None:
+        """Give a body's link its mass; a point mass has no inertia."""
+        link = next(each for each in self.root.iter("link") if each.get("name") == body.name)
+        inertial = ET.Element("inertial")
+        link.insert(0, inertial)
+        center = numbers(self.arm(body.name, loads.center_of(body)))
+        ET.SubElement(inertial, "origin", xyz=center, rpy="0 0 0")
+        ET.SubElement(inertial, "mass", value=numbers([body.mass]))
+        values = [numbers([x]) for x in loads.six(loads.inertia_of(body, 0.0))]
+        ET.SubElement(inertial, "inertia", dict(zip(ENTRIES, values, strict=True)))
 
     def arm(self, link: str, P: Sequence[float]) -> list[float]:
         """A point of a link, from its place at design."""

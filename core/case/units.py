@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from fractions import Fraction
 
 # A double holds any decimal of 15 digits. Numbers with more digits are computed ones: 10 are shown.
 DIGITS, ROUNDED = 15, 10
@@ -25,6 +26,12 @@ class Unit:
 
     def __call__(self, number: float) -> float:
         return self.convert(number)
+
+    def power(self, number: float, exponent: int) -> float:
+        """Return a number of a power of this unit in SI, rounded once."""
+        if exponent == 1 or self.size == 1.0:
+            return self.convert(number) if exponent else number
+        return float(Fraction(number) * Fraction(repr(self.size)) ** exponent)
 
     def written(self, value: float, among: Iterable[float] = ()) -> str:
         """Return a value in SI as the file writes it, with the unit.

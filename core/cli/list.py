@@ -80,9 +80,9 @@ def _list(options: argparse.Namespace, house: House) -> int:
 
 def _references() -> Iterator[str]:
     """Yield the descriptions of the keys of case and variation files, from their readers."""
-    from ..case.io import schema
+    from ..case.io import loads, schema
     from ..case.variation import variation_schema
 
-    for module in (schema, variation_schema):
+    for module in (schema, loads, variation_schema):
         what, _, keys = (module.__doc__ or "").partition("Reference. ")
         yield f"{what.splitlines()[0]}\n\n{keys}"

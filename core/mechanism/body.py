@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -12,6 +13,7 @@ from ..errors import MechanismError
 from ..input_checks import finite, held, plain, require_finite, triple
 from ..joints.base import Kind
 from ..trajectory import Array
+from .dimension import INERTIA
 
 Vector: TypeAlias = tuple[float, float, float]
 FOUR_NUMBERS = "four numbers, e0 first"
@@ -28,7 +30,7 @@ def inertia_matrix(inertia: Inertia) -> Array:
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], dtype=np.float64)
 
 
-def checked_mass(who: str, mass: Any) -> float:
+def checked_mass(body: str, mass: Any) -> float:
     """Return a mass [kg].
 
     Raises:
@@ -36,33 +38,38 @@ def checked_mass(who: str, mass: Any) -> float:
     """
     mass = plain(mass)
     if not finite(mass) or mass < 0.0:
-        raise MechanismError(f"{who}: mass is {mass!r}, expected a number of kg, zero or more")
+        raise MechanismError(
+            f"body {body!r}: mass is {mass!r}, expected a number of kg, zero or more",
+            f"bodies.{body}.mass",
+        )
     return float(mass)
 
 
-def checked_inertia(who: str, inertia: Any) -> Inertia:
-    """Return the inertia about the centre of mass [kg m^2].
+def checked_inertia(body: str, inertia: Any, unit: str = str(INERTIA)) -> Inertia:
+    """Return the inertia about the centre of mass, in the unit it is given in.
 
     Raises:
         MechanismError: no rigid body has it: a principal moment is not positive, or larger than the
             sum of the two others.
     """
-    what = f"{who}: inertia"
+    what, key = f"body {body!r}: inertia", f"bodies.{body}.inertia"
     numbers = held(what, inertia, 6, SIX_NUMBERS)
     require_finite(what, numbers, SIX_NUMBERS)
     found: Inertia = tuple(float(x) for x in numbers)  # pyright: ignore[reportAssignmentType]
     least, middle, most = (float(x) for x in np.linalg.eigvalsh(inertia_matrix(found)))
-    principal = f"its principal moments are {least:.6g}, {middle:.6g} and {most:.6g} kg m^2"
+    principal = f"its principal moments are {least:.6g}, {middle:.6g} and {most:.6g} {unit}"
     if not least > 0.0:
         raise MechanismError(
             f"{what} {[*found]} is not positive definite: {principal}, expected positive ones;"
             " check signs and the order [Ixx, Iyy, Izz, Ixy, Iyz, Ixz], or leave inertia out for a"
-            " point mass"
+            " point mass",
+            key,
         )
     if most > (least + middle) * (1.0 + DIGITS):
         raise MechanismError(
             f"{what} {[*found]} breaks the triangle inequality: {principal}, and no rigid body has"
-            " one larger than the sum of the two others; check the entries and their unit"
+            " one larger than the sum of the two others; check the entries and their unit",
+            key,
         )
     return found
 
@@ -112,17 +119,28 @@ class Body:
         if self.mass != 0.0 or self.center_of_mass is not None or self.inertia is not None:
             self._check_mass()
 
+    def in_frame(self, place: Callable[[Any], Any], unit: float = 1.0) -> Body:
+        """Return the body with its points passed to a function, and its inertia in kg and a unit of
+        length [m].
+        """
+        moved = replace(self, origin=place(self.origin), center_of_mass=None, inertia=None)
+        if self.center_of_mass is None:
+            return moved
+        scaled = self.inertia and tuple(INERTIA.in_kg_and_s(x, unit) for x in self.inertia)
+        return replace(moved, center_of_mass=place(self.center_of_mass), inertia=scaled)
+
     def _check_mass(self) -> None:
         who = f"body {self.name!r}"
-        object.__setattr__(self, "mass", checked_mass(who, self.mass))
+        object.__setattr__(self, "mass", checked_mass(self.name, self.mass))
         center = self.origin if self.center_of_mass is None else self.center_of_mass
         what = f"{who}: center_of_mass"
         object.__setattr__(self, "center_of_mass", triple(what, center, Kind.POSITION.value))
         require_finite(what, self.center_of_mass or (), Kind.POSITION.value)
         if self.inertia is None:
             return
-        object.__setattr__(self, "inertia", checked_inertia(who, self.inertia))
+        object.__setattr__(self, "inertia", checked_inertia(self.name, self.inertia))
         if self.mass == 0.0:
             raise MechanismError(
-                f"{who}: has an inertia, but no mass; give mass, or leave inertia out"
+                f"{who}: has an inertia, but no mass; give mass, or leave inertia out",
+                f"bodies.{self.name}.inertia",
             )

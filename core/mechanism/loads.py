@@ -7,13 +7,26 @@ says so.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
 from enum import StrEnum
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self, cast
 
-from ..errors import MechanismError
+from ..errors import MechanismError, Phrase
 from ..input_checks import finite, held, plain, require_finite, triple
-from ..joints.base import Joint, Kind
+from ..joints.base import Joint, Kind, position, positions
+from .dimension import (
+    ANGLE,
+    DAMPING,
+    FORCE,
+    LENGTH,
+    STIFFNESS,
+    TORQUE,
+    TURNING_DAMPING,
+    TURNING_STIFFNESS,
+    dimension_of,
+    quantity,
+)
 
 
 class Axes(StrEnum):
@@ -53,13 +66,37 @@ class ForceElement:
     def __str__(self) -> str:
         return f"force {self.name!r} ({self.type})"
 
-    def _number(self, what: str, unit: str, *, signed: bool = False) -> None:
-        """Make a field a finite number, of zero or more unless it has a sign."""
-        value = plain(getattr(self, what))
-        if not finite(value) or (value < 0.0 and not signed):
-            more = "" if signed else ", zero or more"
-            raise MechanismError(f"{self}: {what} is {value!r}, expected a number of {unit}{more}")
-        object.__setattr__(self, what, float(value))
+    def in_frame(self, place: Callable[[Any], Any], unit: float = 1.0) -> Self:
+        """Return the element with its points passed to a function, and its numbers in kg, s and a
+        unit of length [m].
+        """
+        changes: dict[str, Any] = {}
+        for each in fields(self):
+            value: Any = getattr(self, each.name)
+            if (dimension := dimension_of(each)) is not None:
+                numbers = cast("tuple[float, ...]", value if isinstance(value, tuple) else (value,))
+                new = tuple(dimension.in_kg_and_s(x, unit) for x in numbers)
+                changes[each.name] = new if isinstance(value, tuple) else new[0]
+            elif (kind := each.metadata.get("kind")) is not None:
+                changes[each.name] = tuple(map(place, value)) if kind.pair else place(value)
+        return replace(self, **changes)
+
+    def _key(self, what: str) -> str:
+        return f"forces.{self.name}.{what}"
+
+    def _numbers(self) -> None:
+        """Make the quantities finite numbers, of zero or more unless they are angles."""
+        for each in fields(self):
+            if (dimension := dimension_of(each)) is None:
+                continue
+            value, signed = plain(getattr(self, each.name)), dimension is ANGLE
+            if not finite(value) or (value < 0.0 and not signed):
+                more = "" if signed else ", zero or more"
+                raise MechanismError(
+                    f"{self}: {each.name} is {value!r}, expected a number of {dimension}{more}",
+                    self._key(each.name),
+                )
+            object.__setattr__(self, each.name, float(value))
 
     def _vector(self, what: str, kind: str) -> None:
         who = f"{self}: {what}"
@@ -84,10 +121,10 @@ class SpringDamper(ForceElement):
     type: ClassVar[str] = "spring_damper"
     i: str
     j: str
-    points: tuple[tuple[float, float, float], tuple[float, float, float]]
-    stiffness: float
-    damping: float = 0.0
-    free_length: float | None = None
+    points: tuple[tuple[float, float, float], tuple[float, float, float]] = positions()
+    stiffness: float = quantity(STIFFNESS)
+    damping: float = quantity(DAMPING, default=0.0)
+    free_length: float | None = quantity(LENGTH, default=None)
 
     def __post_init__(self) -> None:
         who = f"{self}: points"
@@ -98,22 +135,22 @@ class SpringDamper(ForceElement):
         object.__setattr__(self, "points", points)
         if self.i == self.j:
             raise MechanismError(
-                f"{self}: both ends are on {self.i!r}; a spring needs two different bodies"
+                f"{self}: both ends are on {self.i!r}; a spring needs two different bodies",
+                self._key("bodies"),
             )
         length = math.dist(*points)
         if length == 0.0:
+            x, y, z = points[0]
             raise MechanismError(
-                f"{self}: its points coincide at {[*points[0]]}, so that its force has no"
-                " direction; give the two ends of the spring"
+                Phrase(
+                    *(f"{self}: its points coincide at x = ", x, ", y = ", y, ", z = ", z),
+                    ", so that its force has no direction; give the two ends of the spring",
+                ),
+                self._key("points"),
             )
         if self.free_length is None:
             object.__setattr__(self, "free_length", length)
-        for what, unit in (
-            ("stiffness", "N/m"),
-            ("damping", "N s/m"),
-            ("free_length", "m"),
-        ):
-            self._number(what, unit)
+        self._numbers()
 
     @property
     def bodies(self) -> tuple[str, ...]:
@@ -137,14 +174,12 @@ class TorsionSpringDamper(ForceElement):
 
     type: ClassVar[str] = "torsion_spring_damper"
     joint: str
-    stiffness: float
-    damping: float = 0.0
-    free_angle: float = 0.0
+    stiffness: float = quantity(TURNING_STIFFNESS)
+    damping: float = quantity(TURNING_DAMPING, default=0.0)
+    free_angle: float = quantity(ANGLE, default=0.0)
 
     def __post_init__(self) -> None:
-        self._number("stiffness", "N m/rad")
-        self._number("damping", "N m s/rad")
-        self._number("free_angle", "rad", signed=True)
+        self._numbers()
 
     def check(self, joint: Joint) -> None:
         """Raise MechanismError unless the joint turns about an axis."""
@@ -152,7 +187,7 @@ class TorsionSpringDamper(ForceElement):
             raise MechanismError(
                 f"{self}: joint {joint.name!r} is {joint.type} and has no rotation; its freedoms:"
                 f" {', '.join(joint.freedoms) or 'none'}",
-                f"forces.{self.name}.joint",
+                self._key("joint"),
             )
 
 
@@ -169,8 +204,8 @@ class Force(ForceElement):
 
     type: ClassVar[str] = "force"
     body: str
-    point: tuple[float, float, float]
-    vector: tuple[float, float, float]
+    point: tuple[float, float, float] = position()
+    vector: tuple[float, float, float] = quantity(FORCE)
     frame: Axes = Axes.GLOBAL
 
     def __post_init__(self) -> None:
@@ -196,7 +231,7 @@ class Torque(ForceElement):
 
     type: ClassVar[str] = "torque"
     body: str
-    vector: tuple[float, float, float]
+    vector: tuple[float, float, float] = quantity(TORQUE)
     frame: Axes = Axes.GLOBAL
 
     def __post_init__(self) -> None:

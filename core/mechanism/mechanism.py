@@ -133,6 +133,7 @@ class Mechanism:
                 _known(str(force), "joint", force.joint, self._named["joints"], f"{key}.joint")
                 force.check(self.joint(force.joint))
                 continue
+            key = f"{key}.{'body' if len(force.bodies) == 1 else 'bodies'}"
             for name in force.bodies:
                 _known(str(force), "body", name, bodies, key)
 

@@ -7,12 +7,14 @@ import msgspec
 from kincheck.core.case.io import schema
 from kincheck.core.case.io.catalogue import catalogue, rows_of
 from kincheck.core.case.io.driving import DRIVERS
+from kincheck.core.case.io.loads import force_keys
 from kincheck.core.case.io.schema import driver_keys, joint_keys, motion_keys
 from kincheck.core.case.variation import variation_schema
 from kincheck.core.cli import main
 from kincheck.core.errors import MechanismError
 from kincheck.core.joints import Coupler, Joint, Spherical
 from kincheck.core.joints.base import directions
+from kincheck.core.mechanism.loads import ELEMENTS
 from kincheck.core.mechanism.motions import Motion
 
 # Rows as in textbooks: six less the freedoms left.
@@ -44,7 +46,8 @@ def lines():
 def test_every_type_is_printed(capsys):
     assert main.main(["list", "--joints"]) == 0
     assert capsys.readouterr().out.splitlines() == list(catalogue())
-    assert lines().keys() == {*Joint.registry, *Coupler.registry, *DRIVERS, *Motion.registry}
+    joints, motions = {*Joint.registry, *Coupler.registry}, {*DRIVERS, *Motion.registry}
+    assert lines().keys() == joints | motions | {*ELEMENTS}
 
 
 def test_every_key_is_printed():
@@ -52,6 +55,7 @@ def test_every_key_is_printed():
         (Joint.registry | Coupler.registry, joint_keys),
         (DRIVERS, driver_keys),
         (Motion.registry, motion_keys),
+        (ELEMENTS, force_keys),
     ):
         for name, cls in registry.items():
             for key in set(keys(cls).__struct_fields__) - {"type", "bodies", "joints", "motion"}:
@@ -130,6 +134,7 @@ def test_every_key_of_a_file_is_in_the_reference_that_is_printed(capsys):
         if issubclass(each, msgspec.Struct) and each is not msgspec.Struct
     ]
     assert len(keys) >= 8
+    keys += [*map(force_keys, ELEMENTS.values())]
     for name in [name for each in keys for name in msgspec.structs.fields(each)]:
         assert re.search(rf"[\[( ]{name.encode_name}\b", said), name.encode_name
     assert "kincheck-case/1" in said

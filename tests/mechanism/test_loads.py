@@ -68,7 +68,7 @@ def test_a_flat_plate_printed_with_six_digits_is_accepted():
     [
         (
             lambda: SpringDamper("s", "a", "b", ((1.0, 0.0, 0.0), (1.0, 0.0, 0.0)), 1.0),
-            "its points coincide at [1.0, 0.0, 0.0]",
+            "its points coincide at x = 1 m, y = 0 m, z = 0 m",
         ),
         (lambda: SpringDamper("s", "a", "a", APART, 1.0), "needs two different bodies"),
         (lambda: SpringDamper("s", "a", "b", APART, -1.0), "stiffness is -1.0"),

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...errors import remedy
 from ...joints import Coupler, Joint, Kind
+from ...mechanism.dimension import ACCELERATION
 from ...mechanism.mechanism import Body, Mechanism, Point, Vector
 from ..case import PER_TRAVEL, Case, Output, Quantity, Truth, size
 from ..markers import with_markers
@@ -18,6 +19,8 @@ from ..units import ANGLES, LENGTHS, Unit
 from .coordinates import AXES, with_all_coordinates
 from .document import explained, fault, join, parse, read_text, shown
 from .driving import read_drivers, read_sweep
+from .in_si import geometry_in_si, load_in_si
+from .loads import inertia_in_si, read_forces
 from .measures import read_measure
 from .reference import Convert, is_derivative, read_reference
 from .reference_samples import ReferenceKeys
@@ -43,7 +46,7 @@ if TYPE_CHECKING:
 LARGEST_FILE = 4_000_000
 # Twice the bodies of the largest measured mechanism; the same limit for joints and points.
 MOST_PARTS = 60_000
-_PARTS = ("bodies", "joints", "points", "drivers", "outputs")
+_PARTS = ("bodies", "joints", "points", "drivers", "forces", "outputs")
 
 
 def load_case(path: str | Path, closure: float | None = None) -> Case:
@@ -81,7 +84,7 @@ def load_case(path: str | Path, closure: float | None = None) -> Case:
             )
     units = typed(file, "units", keys.units, UnitsKeys)
     length, angle = LENGTHS[units.length], ANGLES[units.angle]
-    mechanism = _mechanism(file, keys, length)
+    mechanism = _mechanism(file, keys, length, angle)
     columns = None
     if keys.reference is not None:
         columns = typed(file, "reference", keys.reference, ReferenceKeys)
@@ -133,24 +136,7 @@ def _within_digits(case: Case, keys: ClosureKeys, closure: float | None) -> Case
     return within_digits(case, closure, why)
 
 
-def _scaled(kind: Kind | None, value: Any, length: Convert) -> Any:
-    """Return a field of a joint in SI. Directions and plain numbers have no unit; an omitted field
-    is None.
-    """
-    if value is None:
-        return None
-    match kind:
-        case Kind.LENGTH:
-            return length(value)
-        case Kind.POSITION:
-            return tuple(map(length, value))
-        case Kind.POSITIONS:
-            return tuple(tuple(map(length, each)) for each in value)
-        case Kind.DIRECTION | Kind.DIRECTIONS | None:
-            return value
-
-
-def _mechanism(file: Path, keys: CaseKeys, length: Unit) -> Mechanism:
+def _mechanism(file: Path, keys: CaseKeys, length: Unit, angle: Unit) -> Mechanism:
     bodies: list[Body] = []
     for name, value in keys.bodies.items():
         body = typed(file, key := join("bodies", name), value, BodyKeys)
@@ -158,15 +144,20 @@ def _mechanism(file: Path, keys: CaseKeys, length: Unit) -> Mechanism:
             bodies.append(
                 Body(
                     name,
-                    _scaled(Kind.POSITION, body.origin, length),
+                    geometry_in_si(Kind.POSITION, body.origin, length),
                     body.euler_parameters,
                     body.fixed,
+                    body.mass,
+                    geometry_in_si(Kind.POSITION, body.center_of_mass, length),
+                    inertia_in_si(name, body.inertia, length),
                 )
             )
     points: list[Point] = []
     for name, value in keys.points.items():
         point = typed(file, join("points", name), value, PointKeys)
-        points.append(Point(name, point.body, _scaled(Kind.POSITION, point.position, length)))
+        points.append(
+            Point(name, point.body, geometry_in_si(Kind.POSITION, point.position, length))
+        )
     joined = [
         _joint(file, join("joints", name), name, value, length)
         for name, value in keys.joints.items()
@@ -174,15 +165,19 @@ def _mechanism(file: Path, keys: CaseKeys, length: Unit) -> Mechanism:
     joints = [each for each in joined if isinstance(each, Joint)]
     couplers = [each for each in joined if isinstance(each, Coupler)]
     drivers = read_drivers(file, keys.drivers)
+    forces = read_forces(file, keys.forces, length, angle)
+    gravity = load_in_si(ACCELERATION, keys.gravity, length, angle)
     with explained(file, "", length):
-        return Mechanism(keys.name, bodies, joints, points, drivers, couplers)
+        return Mechanism(
+            *(keys.name, bodies, joints, points, drivers, couplers), gravity=gravity, forces=forces
+        )
 
 
 def _joint(file: Path, key: str, name: str, value: object, length: Unit) -> Joint | Coupler:
     cls = class_of(file, key, "joint", value, Joint.registry | Coupler.registry)
     keys: Any = typed(file, key, value, joint_keys(cls))
     given = {
-        each.name: _scaled(kind_of(each), getattr(keys, each.name), length)
+        each.name: geometry_in_si(kind_of(each), getattr(keys, each.name), length)
         for each in own_fields(cls)
     }
     with explained(file, key, length, value):

@@ -13,6 +13,7 @@ import numpy as np
 
 from ...errors import CaseError
 from ...joints import Coupler
+from ...mechanism.body import Body
 from ...mechanism.motions import Absolute
 from ..case import MARKER, TIME, Case, Output
 from ..measures import Measure, key_of, own_keys
@@ -22,11 +23,7 @@ from .schema import SCHEMA, own_fields
 from .suspension_writer import suspension_output, suspension_tables
 
 # What a body has unless the file says otherwise.
-PLAIN: Mapping[str, Any] = {
-    "origin": (0.0, 0.0, 0.0),
-    "euler_parameters": (1.0, 0.0, 0.0, 0.0),
-    "fixed": False,
-}
+PLAIN = Body("plain")
 
 
 def case_text(case: Case, comments: Sequence[str] = ()) -> str:
@@ -43,10 +40,17 @@ def case_text(case: Case, comments: Sequence[str] = ()) -> str:
     lines = [f"# {line}" for line in comments]
     lines += _keys({"schema": SCHEMA, "name": case.name, "source": case.source})
     mechanism = case.mechanism
+    if any(mechanism.gravity):
+        lines += _keys({"gravity": mechanism.gravity})
     for body in mechanism.bodies:
-        given = {f.name: getattr(body, f.name) for f in fields(body) if f.name != "name"}
         lines += _table(
-            "bodies", body.name, {key: value for key, value in given.items() if value != PLAIN[key]}
+            "bodies",
+            body.name,
+            {
+                f.name: value
+                for f in fields(body)
+                if f.name != "name" and (value := getattr(body, f.name)) != getattr(PLAIN, f.name)
+            },
         )
     for joint in (*mechanism.joints, *mechanism.grounded, *mechanism.couplers):
         what = {"joints": joint.joints} if isinstance(joint, Coupler) else {"bodies": joint.bodies}
@@ -62,6 +66,9 @@ def case_text(case: Case, comments: Sequence[str] = ()) -> str:
             lines += _table(
                 f"drivers.{_key(driver.name)}", "motion", {"type": moved.type, **_own(moved)}
             )
+    for force in mechanism.forces:
+        ends = {"bodies": force.bodies} if len(force.bodies) == 2 else {}
+        lines += _table("forces", force.name, {"type": force.type, **ends, **_own(force)})
     lines += ["", "[sweep]", *_keys(_sweep(case))]
     for name, keys in suspension_tables(case).items():
         lines += ["", f"[{name}]", *_keys(keys)]

@@ -8,13 +8,14 @@ from typing import Any
 
 from ...errors import MechanismError
 from ...joints import Coupler, Joint, Kind
-from ...mechanism.drivers import Driver
+from ...mechanism.dimension import dimension_of
+from ...mechanism.loads import ELEMENTS, SpringDamper
 from ...mechanism.motions import Motion
 from .. import measures
 from ..measures import Measure
 from ..suspension import SuspensionOutput, own_keys
 from .driving import DRIVERS
-from .schema import kind_of, own_fields
+from .schema import Described, kind_of, own_fields
 
 # Geometry that suits any joint. The two directions make a right angle up to the rounding of a
 # table, as a cross wants it, and point the same way on, as the shafts of a constant-velocity joint
@@ -30,7 +31,7 @@ _EXAMPLES: Mapping[Kind | None, Any] = {
 
 
 def catalogue() -> Iterator[str]:
-    """Lines to print: joints, couplers, drivers and motions, a type each."""
+    """Yield lines to print: joints, couplers, drivers, motions and force elements, a type each."""
     yield (
         "points and directions are [x, y, z], global, at the design; of points and axes there is"
         " one on each body"
@@ -58,6 +59,19 @@ def catalogue() -> Iterator[str]:
     yield "motions of drivers: type, and"
     yield from _columns(
         [(name, _keys(cls), _meaning(cls)) for name, cls in sorted(Motion.registry.items())]
+    )
+    yield "force elements: type, and"
+    yield from _columns(
+        [
+            (
+                name,
+                f'bodies = ["first", "second"], {_keys(cls)}'
+                if issubclass(cls, SpringDamper)
+                else _keys(cls),
+                _meaning(cls),
+            )
+            for name, cls in sorted(ELEMENTS.items())
+        ]
     )
 
 
@@ -104,12 +118,15 @@ def _counts(cls: type[Joint]) -> tuple[str, str]:
     return f"{count} {'row' if rows == 1 else 'rows'}", f"{left} free{names}"
 
 
-def _keys(cls: type[Joint] | type[Coupler] | type[Driver] | type[Motion]) -> str:
-    """Return the keys of a type; optional ones in brackets, those of a motion with the unit."""
+def _keys(cls: type[Described]) -> str:
+    """Return the keys of a type; optional ones in brackets, those of motions and forces with the
+    unit.
+    """
     names: list[str] = []
     for each in own_fields(cls):
-        measure = each.metadata.get("measure")
-        name = f"{each.name} [{measure.value}]" if measure else each.name
+        measure, dimension = each.metadata.get("measure"), dimension_of(each)
+        unit = dimension.of("length", "angle") if dimension else measure and measure.value
+        name = f"{each.name} [{unit}]" if unit else each.name
         names.append(name if each.default is MISSING else f"({name})")
     return ", ".join(names) or "nothing else"
 
@@ -120,7 +137,7 @@ def _measure_keys(cls: type[Measure]) -> Iterator[str]:
         yield key if each.default is MISSING else f"({key})"
 
 
-def _meaning(cls: type[Joint | Coupler | Driver | Motion | Measure]) -> str:
+def _meaning(cls: type[Described] | type[Measure]) -> str:
     """The first line of what a class says of itself; a dataclass that says nothing has its
     signature there.
     """

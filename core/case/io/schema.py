@@ -10,12 +10,14 @@ left out. `kincheck list --joints` prints all types with their keys.
 
     schema = "kincheck-case/1"
     name, source         name of the case, and source of its numbers
+    (gravity), [forces.NAME]   see masses and loads below
     (truth)              kind of the reference, with a reference only: closed_form,
                          third_party_data or in_house_oracle
 
     [units]              (length) "m" or "mm", (angle) "rad" or "deg"; time is in s and Hz
     [bodies.NAME]        (origin) = [0, 0, 0], (euler_parameters) = [1, 0, 0, 0], e0..e3, body to
                          global; (fixed) = false
+                         (mass), (center_of_mass), (inertia): see masses and loads below
                          the body "ground" exists without a declaration
     [joints.NAME]        type, bodies = [first, second], and the keys of the type: point, axis,
                          lengths, ...
@@ -113,13 +115,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import MISSING, Field, fields
 from functools import cache
-from typing import Annotated, Any, Literal, get_type_hints
+from typing import Annotated, Any, Literal, TypeAlias, get_type_hints
 
 import msgspec
 from msgspec import Meta
 
 from ...joints import Coupler, Joint, Kind
+from ...mechanism.body import SIX_NUMBERS, Inertia
 from ...mechanism.drivers import Driver
+from ...mechanism.loads import ForceElement
 from ...mechanism.mechanism import Vector
 from ...mechanism.motions import Motion
 from ..case import TIME, Truth
@@ -138,6 +142,7 @@ Numbers = Annotated[tuple[float, ...], Meta(description="a list of numbers")]
 Numbers4 = Annotated[
     tuple[float, float, float, float], Meta(description="four numbers [e0, e1, e2, e3]")
 ]
+Numbers6 = Annotated[Inertia, Meta(description=SIX_NUMBERS)]
 Table = Annotated[dict[str, Any], Meta(description="a table")]
 Bodies = Annotated[tuple[str, str], Meta(description='two names ["first body", "second body"]')]
 Joints = Annotated[tuple[str, str], Meta(description='two names ["first joint", "second joint"]')]
@@ -185,6 +190,8 @@ class CaseKeys(msgspec.Struct, forbid_unknown_fields=True):
     suspension: Table | None = None
     outputs: Table = {}
     reference: Table | None = None
+    gravity: Numbers3 = (0.0, 0.0, 0.0)
+    forces: Table = {}
 
 
 class BodyKeys(msgspec.Struct, forbid_unknown_fields=True):
@@ -193,6 +200,9 @@ class BodyKeys(msgspec.Struct, forbid_unknown_fields=True):
     origin: Numbers3 = (0.0, 0.0, 0.0)
     euler_parameters: Numbers4 = (1.0, 0.0, 0.0, 0.0)
     fixed: Flag = False
+    mass: Size = 0.0
+    center_of_mass: Numbers3 | None = None
+    inertia: Numbers6 | None = None
 
 
 class PointKeys(msgspec.Struct, forbid_unknown_fields=True):
@@ -247,6 +257,7 @@ class OutputKeys(ToleranceKeys, forbid_unknown_fields=True, kw_only=True):
     relative: Flag = False
 
 
+Described: TypeAlias = Joint | Coupler | Driver | Motion | ForceElement
 _Keys = list[tuple[str, Any] | tuple[str, Any, Any]]
 _INHERITED = {each.name for base in (Joint, Coupler, Driver, Motion) for each in fields(base)}
 
@@ -259,13 +270,7 @@ def joint_keys(cls: type[Joint] | type[Coupler]) -> type[msgspec.Struct]:
         ("joints", Joints) if issubclass(cls, Coupler) else ("bodies", Bodies),
     ]
     for each in own_fields(cls):
-        kind = kind_of(each)
-        keys.append(
-            _key(
-                each,
-                Number if kind is None else Annotated[_SHAPES[kind], Meta(description=kind.value)],
-            )
-        )
+        keys.append(key_of(each, shape_of(each)))
     return msgspec.defstruct(cls.__name__, keys, forbid_unknown_fields=True)
 
 
@@ -281,7 +286,7 @@ def motion_keys(cls: type[Motion]) -> type[msgspec.Struct]:
     return _keys_of_fields(cls)
 
 
-def own_fields(cls: type[Joint] | type[Coupler] | type[Driver] | type[Motion]) -> list[Field[Any]]:
+def own_fields(cls: type[Described]) -> list[Field[Any]]:
     """Return the fields of a class beyond those of its kind, which case files give."""
     return [each for each in fields(cls) if each.name not in _INHERITED]
 
@@ -297,11 +302,18 @@ def _keys_of_fields(
     hints = get_type_hints(cls)
     keys: _Keys = [
         ("type", Text),
-        *(_key(each, _OF_FIELDS[hints[each.name]]) for each in own_fields(cls)),
+        *(key_of(each, _OF_FIELDS[hints[each.name]]) for each in own_fields(cls)),
         *more,
     ]
     return msgspec.defstruct(cls.__name__, keys, forbid_unknown_fields=True)
 
 
-def _key(each: Field[Any], shape: Any) -> tuple[str, Any] | tuple[str, Any, Any]:
+def shape_of(each: Field[Any]) -> Any:
+    """Return the shape of a field with geometry, or of a plain number."""
+    kind = kind_of(each)
+    return Number if kind is None else Annotated[_SHAPES[kind], Meta(description=kind.value)]
+
+
+def key_of(each: Field[Any], shape: Any) -> tuple[str, Any] | tuple[str, Any, Any]:
+    """Return the key of a field: name, shape, and the default if there is one."""
     return (each.name, shape) if each.default is MISSING else (each.name, shape, each.default)

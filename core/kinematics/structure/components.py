@@ -200,7 +200,8 @@ def section(
 ) -> Section:
     """Return the component with numbered names.
 
-    Bodies are b0, b1, ..., prescribed bodies g0, ..., joints j0, ..., points p0, ...
+    Bodies are b0, b1, ..., prescribed bodies g0, ..., joints j0, ..., points p0, ... They have no
+    masses: motion does not need them, and components that differ in masses share a program.
 
     Args:
         origins: internal origin of every moving body, global [m].
@@ -238,7 +239,9 @@ def section(
         at[body] = found
     wanted = {body.name: body for body in bodies}
     described = [
-        replace(wanted[name], name=new) if name in wanted else Body(new)
+        Body(new, wanted[name].origin, wanted[name].euler_parameters)
+        if name in wanted
+        else Body(new)
         for name, new in names.items()
     ]
     return Section(

@@ -142,7 +142,7 @@ def _value(b: Any) -> Any:
 def exact_mechanism(mechanism: Mechanism, reading: Reading) -> Mechanism:
     """Return the mechanism with `Exact` numbers in joints, points, couplers and drivers.
 
-    The numbers of bodies stay: joints do not read them.
+    The numbers of bodies and loads stay: joints do not read them.
     """
 
     def read(value: Any) -> Any:
@@ -159,13 +159,12 @@ def exact_mechanism(mechanism: Mechanism, reading: Reading) -> Mechanism:
     def each(item: Any) -> Any:
         return replace(item, **{f.name: read(getattr(item, f.name)) for f in fields(item)})
 
-    return Mechanism(
-        mechanism.name,
-        mechanism.bodies,
-        [*map(each, mechanism.joints)],
-        [*map(each, mechanism.points)],
-        [*map(each, mechanism.drivers)],
-        [*map(each, mechanism.couplers)],
+    return replace(
+        mechanism,
+        joints=[*map(each, mechanism.joints)],
+        points=[*map(each, mechanism.points)],
+        drivers=[*map(each, mechanism.drivers)],
+        couplers=[*map(each, mechanism.couplers)],
     )
 
 

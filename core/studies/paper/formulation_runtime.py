@@ -113,7 +113,7 @@ def _largest(differences: Array) -> list[float]:
 
 
 def _moved(mechanism: Mechanism, by: Vector) -> Mechanism:
-    """The mechanism elsewhere: all points and origins shifted."""
+    """Return the mechanism elsewhere: all points, origins and loads shifted."""
 
     def shifted(point: Sequence[float]) -> Vector:
         x, y, z = (a + b for a, b in zip(point, by, strict=True))
@@ -121,11 +121,12 @@ def _moved(mechanism: Mechanism, by: Vector) -> Mechanism:
 
     return replace(
         mechanism,
-        bodies=[replace(body, origin=shifted(body.origin)) for body in mechanism.bodies],
+        bodies=[body.in_frame(shifted) for body in mechanism.bodies],
         joints=[
             replace(joint, **joint.mapped({Kind.POSITION: shifted})) for joint in mechanism.joints
         ],
         points=[replace(point, position=shifted(point.position)) for point in mechanism.points],
+        forces=[force.in_frame(shifted) for force in mechanism.forces],
     )
 
 

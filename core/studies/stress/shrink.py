@@ -82,10 +82,13 @@ def reduced(case: Case, bad: Bad) -> tuple[Case, list[str]]:
 
 
 def _smaller(case: Case) -> Iterator[Case]:
-    """Yield cases with one point or body less and one freedom per driver; the
+    """Yield cases with one force element, point or body less and one freedom per driver; the
     largest steps first.
     """
     mechanism = case.mechanism
+    for force in mechanism.forces:
+        others = [each for each in mechanism.forces if each is not force]
+        yield _with(case, replace(mechanism, forces=others), set())
     if len(mechanism.points) > 1:
         driven = {getattr(driver, "point", "") for driver in mechanism.drivers}
         for point in mechanism.points:
@@ -126,6 +129,11 @@ def _parts(
     names, known = {"ground", *(body.name for body in bodies)}, {joint.name for joint in joints}
     points = [point for point in mechanism.points if point.body in names]
     couplers = [coupler for coupler in mechanism.couplers if set(coupler.joints) <= known]
+    forces = [
+        force
+        for force in mechanism.forces
+        if set(force.bodies) <= names and getattr(force, "joint", None) in (None, *known)
+    ]
     there = {point.name for point in points}
     if not points or any(
         getattr(d, "joint", None) not in (None, *known) for d in mechanism.drivers
@@ -134,7 +142,15 @@ def _parts(
     if any(getattr(d, "point", None) not in (None, *there) for d in mechanism.drivers):
         return None
     try:
-        return Mechanism(mechanism.name, bodies, joints, points, mechanism.drivers, couplers)
+        return replace(
+            mechanism,
+            bodies=bodies,
+            joints=joints,
+            grounded=(),
+            points=points,
+            couplers=couplers,
+            forces=forces,
+        )
     except KincheckError:
         return None
 
@@ -175,7 +191,8 @@ def rounded(case: Case, digits: int) -> Case | None:
             for joint in mechanism.joints
         ]
         points = [replace(point, position=short(point.position)) for point in mechanism.points]
-        found = replace(mechanism, joints=joints, points=points)
+        forces = [force.in_frame(short) for force in mechanism.forces]
+        found = replace(mechanism, joints=joints, points=points, forces=forces)
         require_driven(found)
     except (KincheckError, ValueError):
         return None

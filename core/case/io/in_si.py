@@ -1,0 +1,35 @@
+"""Numbers of a case file in SI."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ...joints import Kind
+from ...mechanism.dimension import Dimension
+from ..units import Unit
+
+
+def geometry_in_si(kind: Kind | None, value: Any, length: Unit) -> Any:
+    """Return geometry in SI. Directions and plain numbers have no unit; an omitted field is
+    None.
+    """
+    if value is None:
+        return None
+    match kind:
+        case Kind.LENGTH:
+            return length(value)
+        case Kind.POSITION:
+            return tuple(map(length, value))
+        case Kind.POSITIONS:
+            return tuple(tuple(map(length, each)) for each in value)
+        case Kind.DIRECTION | Kind.DIRECTIONS | None:
+            return value
+
+
+def load_in_si(dimension: Dimension, value: Any, length: Unit, angle: Unit) -> Any:
+    """Return a number, or a tuple of numbers, of a dimension in SI; an omitted field is None."""
+    if value is None:
+        return None
+    if isinstance(value, tuple):
+        return tuple(load_in_si(dimension, each, length, angle) for each in value)  # pyright: ignore[reportUnknownVariableType]
+    return angle.power(length.power(value, dimension.length), dimension.angle)

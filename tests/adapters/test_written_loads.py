@@ -1,0 +1,186 @@
+"""Masses and loads of written models, read by their simulators: an arm of point masses on a hinge
+begins to turn as elementary mechanics says.
+"""
+
+import importlib
+import json
+import runpy
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from kincheck import adapters, cases
+from kincheck.core.case.case import Case, Sweep, Truth
+from kincheck.core.case.io.model_writer import way_to, written
+from kincheck.core.joints import Revolute
+from kincheck.core.mechanism.body import Body
+from kincheck.core.mechanism.drivers import JointAngle
+from kincheck.core.mechanism.loads import Force, SpringDamper, Torque, TorsionSpringDamper
+from kincheck.core.mechanism.mechanism import Mechanism, Point
+
+# The arm: masses [kg] and their places, global at design [m].
+MASSES = np.array([0.5, 0.75, 1.25, 0.3])
+PLACES = np.array([[0.4, 0.1, 0.0], [0.1, -0.2, 0.3], [0.7, 0.0, -0.1], [0.2, 0.3, 0.2]])
+ORIGIN = (0.25, -0.5, 0.125)
+TURNED = (0.5, 0.5, -0.5, 0.5)  # its frame, a third of a turn about a diagonal
+AXIS, GRAVITY = np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.5, -9.80665])
+ANGLE = 0.4
+HOOK, EYE = np.array([0.5, 0.2, 0.6]), np.array([0.45, 0.1, 0.1])
+PUSH = np.array([3.0, 1.0, -2.0])
+TWIST = np.array([0.2, 0.9, 0.1])
+# Small numbers that stand in for missing inertia are a millionth of the arm's.
+STOOD_IN = 1e-5
+
+
+def cloud(about):
+    """Return the inertia of the arm's masses about a point, shape (3, 3)."""
+    arms = PLACES - about
+    return (MASSES @ (arms**2).sum(axis=1)) * np.eye(3) - (MASSES[:, None] * arms).T @ arms
+
+
+CENTER = MASSES @ PLACES / MASSES.sum()
+
+
+def arm(**more):
+    about = cloud(CENTER)
+    entries = tuple(float(about[k]) for k in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)))
+    own = {"mass": float(MASSES.sum()), "center_of_mass": (*CENTER.tolist(),), "inertia": entries}
+    return Mechanism(
+        "pendulum",
+        [Body("arm", ORIGIN, TURNED, **own)],
+        [Revolute("pin", "ground", "arm", point=(0.0, 0.0, 0.0), axis=(0.0, 1.0, 0.0))],
+        [Point("tip", "arm", (0.7, 0.0, 0.0))],
+        [JointAngle("turn", "pin")],
+        gravity=(*GRAVITY.tolist(),),
+        **more,
+    )
+
+
+SPRINGS = [
+    SpringDamper("spring", "ground", "arm", (HOOK, EYE), 250.0, 5.0, 0.375),
+    TorsionSpringDamper("clock", "pin", 7.0, 0.25, -0.5),
+]
+LOADS = [
+    Force("push", "arm", EYE, PUSH, "body"),
+    Force("pull", "arm", EYE, PUSH),
+    Torque("twist", "arm", TWIST, "body"),
+]
+
+
+def turned(vector):
+    """Return a vector turned about the axis by the angle of the start."""
+    c, s = np.cos(ANGLE), np.sin(ANGLE)
+    return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]) @ vector
+
+
+def start(springs, loads):
+    """Return the angular acceleration of the arm at rest [rad/s^2]."""
+    torque = np.cross(turned(CENTER), MASSES.sum() * GRAVITY)
+    if springs:
+        eye = turned(EYE)
+        pull = HOOK - eye
+        length = np.linalg.norm(pull)
+        torque += np.cross(eye, 250.0 * (length - 0.375) * pull / length)
+        torque += -7.0 * (ANGLE + 0.5) * AXIS
+    if loads:
+        torque += np.cross(turned(EYE), turned(PUSH) + PUSH) + turned(TWIST)
+    return torque @ AXIS / (AXIS @ cloud(np.zeros(3)) @ AXIS)
+
+
+def texts(to, mechanism):
+    case = Case("c", "s", Truth.CONSENSUS_ONLY, mechanism, Sweep("turn", np.array([ANGLE])), ())
+    return adapters.writer(to)(mechanism, way_to(case, ANGLE), {})
+
+
+def test_mujoco_begins_to_turn():
+    mj = pytest.importorskip("mujoco")
+    text = texts("mjcf", arm(forces=[*SPRINGS, *LOADS]))[".xml"]
+    model = mj.MjModel.from_xml_string(text)
+    data = mj.MjData(model)
+    mj.mj_resetDataKeyframe(model, data, model.key("start").id)
+    mj.mj_forward(model, data)
+    assert data.qacc[0] == pytest.approx(start(springs=True, loads=False), rel=STOOD_IN)
+    body = data.body("arm")
+    axes = body.ximat.reshape(3, 3)
+    found = axes @ np.diag(model.body("arm").inertia) @ axes.T
+    R = np.column_stack([turned(each) for each in np.eye(3)])
+    np.testing.assert_allclose(found, R @ cloud(CENTER) @ R.T, atol=1e-14)
+    np.testing.assert_allclose(body.xipos, turned(CENTER), atol=1e-14)
+    assert (model.tendon_damping[0], model.dof_damping[0]) == (5.0, 0.25)
+    assert "Left out: force 'push' (force), force 'pull' (force), force 'twist' (torque)." in text
+
+
+def test_exudyn_begins_to_turn(tmp_path):
+    exu = pytest.importorskip("exudyn")
+    exu.config.printToConsole = False
+    script = tmp_path / "model.py"
+    script.write_text(texts("exudyn", arm(forces=[*SPRINGS, *LOADS]))[".py"], encoding="utf-8")
+    model = runpy.run_path(str(script))
+    mbs = model["mbs"]
+    settings = exu.SimulationSettings()
+    static, solver = exu.MainSolverStatic(), exu.MainSolverImplicitSecondOrder()
+    assert static.InitializeSolver(mbs, settings)
+    static.ComputeNewtonJacobian(mbs, settings)
+    n = static.GetODE2size()
+    rows = static.GetSystemJacobian()[n:, :n]
+    assert solver.InitializeSolver(mbs, settings)
+    solver.ComputeMassMatrix(mbs)
+    solver.ComputeODE2RHS(mbs)
+    M, f = solver.GetSystemMassMatrix()[:n, :n], solver.GetSystemResidual()[:n]
+    # one way is free at rest: along it, mass times acceleration is force
+    *_, free = np.linalg.svd(rows)
+    rank = np.linalg.matrix_rank(rows)
+    kept = free[rank:].T
+    acceleration = kept @ np.linalg.solve(kept.T @ M @ kept, kept.T @ f)
+    node = mbs.GetNode(model["nodes"]["arm"])
+    reference = np.array(node["referenceCoordinates"][3:]) + node["initialCoordinates"][3:]
+    # p'' = 0.5 G' omega' of a turn about y at rest: e0 = cos, e2 = sin of half the angle
+    e0, e2 = reference[0], reference[2]
+    found = 2.0 * (e0 * acceleration[5] - e2 * acceleration[3])
+    assert found == pytest.approx(start(springs=True, loads=True), rel=1e-7)
+    rigid = mbs.GetObject(model["bodies"]["arm"])
+    about = cloud(np.array(ORIGIN))
+    expected = [about[k] for k in ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))]
+    np.testing.assert_allclose(rigid["inertia"], expected, atol=1e-14)
+    spring, clock = (mbs.GetObject(model["forces"][name]) for name in ("spring", "clock"))
+    assert (spring["damping"], clock["damping"]) == (5.0, 0.25)
+
+
+def test_pinocchio_begins_to_turn():
+    pin = pytest.importorskip("pinocchio")
+    found = texts("urdf", arm(forces=[*SPRINGS, *LOADS]))
+    model = pin.buildModelFromXML(found[".urdf"])
+    model.gravity.linear = GRAVITY
+    q = np.array(json.loads(found[".constraints.json"])["start"]["coordinates"]["pin"])
+    zero = np.zeros(1)
+    acceleration = pin.aba(model, model.createData(), q, zero, zero)
+    assert acceleration[0] == pytest.approx(start(springs=False, loads=False), rel=1e-12)
+    inertia = model.inertias[1]
+    np.testing.assert_allclose(inertia.inertia, cloud(CENTER), atol=1e-14)
+    assert "Left out: gravity [1.0, 0.5, -9.80665] m/s^2, force 'spring' (spr" in found[".urdf"]
+
+
+@pytest.mark.parametrize("to", ["mjcf", "exudyn", "urdf"])
+def test_the_file_of_a_case_without_masses_has_none(to):
+    """Gravity alone moves nothing: the file is that of the mechanism without."""
+    plain = replace(arm(), bodies=[Body("arm", ORIGIN, TURNED)], gravity=(0.0, 0.0, 0.0))
+    falling = replace(plain, gravity=(0.0, 0.0, -9.8))
+    assert texts(to, falling) == texts(to, plain)
+    for text in written(cases.load("rssr"), adapters.writer(to)).values():
+        assert "Left out" not in text
+
+
+def test_joints_that_carry_backwards_have_springs_of_the_same_sign():
+    """The tree goes from ground to the joint's first body."""
+    mj = importlib.import_module("mujoco")
+    mechanism = arm()
+    pin = replace(mechanism.joint("pin"), i="arm", j="ground")
+    spring = TorsionSpringDamper("clock", "pin", 7.0, 0.25, -0.5)
+    text = texts("mjcf", replace(mechanism, joints=[pin], forces=[spring]))[".xml"]
+    model = mj.MjModel.from_xml_string(text)
+    data = mj.MjData(model)
+    mj.mj_resetDataKeyframe(model, data, model.key("start").id)
+    mj.mj_forward(model, data)
+    # the joint's angle is that of ground relative to the arm
+    assert data.qpos[0] == pytest.approx(-ANGLE)
+    assert data.qfrc_spring[0] == pytest.approx(7.0 * (ANGLE + 0.5))

@@ -1,0 +1,271 @@
+"""Masses and loads in case files: units, what is refused, and what is written."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from kincheck.core.case.case import Case, Sweep, Truth
+from kincheck.core.case.io.case_file import load_case
+from kincheck.core.case.io.case_writer import case_text
+from kincheck.core.case.io.coordinates import with_all_coordinates
+from kincheck.core.cli.main import main
+from kincheck.core.mechanism.body import Body
+from kincheck.core.mechanism.loads import Force, SpringDamper, Torque, TorsionSpringDamper
+
+from ..support.case_texts import complains, write
+from ..support.loaded import loaded
+
+PLAIN = """
+schema = "kincheck-case/1"
+name = "loaded"
+source = "made up for this test"
+[units]
+length = "mm"
+angle = "deg"
+[joints.pin]
+type = "revolute"
+bodies = ["ground", "arm"]
+point = [0.0, 0.0, 0.0]
+axis = [0.0, 1.0, 0.0]
+[points.tip]
+body = "arm"
+position = [300.0, 0.0, 0.0]
+[drivers.turn]
+type = "joint_angle"
+joint = "pin"
+[sweep]
+driver = "turn"
+start = 0.0
+stop = 30.0
+steps = 3
+[bodies.arm]
+"""
+MASS = """mass = 2.5
+center_of_mass = [150.0, 0.0, 0.0]
+inertia = [250.0, 7300.0, 7400.0, 3.0, -20.0, 0.125]
+"""
+FORCES = """
+[forces.spring]
+type = "spring_damper"
+bodies = ["ground", "arm"]
+points = [[100.0, 0.0, 300.0], [100.0, 0.0, 0.0]]
+stiffness = 25.3
+damping = 1.7
+free_length = 290.1
+[forces.clock]
+type = "torsion_spring_damper"
+joint = "pin"
+stiffness = 900.0
+damping = 18.0
+free_angle = -45.0
+[forces.push]
+type = "force"
+body = "arm"
+point = [300.0, 0.0, 0.0]
+vector = [0.0, 0.0, -40.0]
+frame = "body"
+[forces.twist]
+type = "torque"
+body = "arm"
+vector = [0.0, 700.5, 0.0]
+"""
+ALL = PLAIN.replace("[units]", "gravity = [0.0, 0.0, -9806.65]\n[units]") + MASS + FORCES
+
+
+def test_units_of_a_file_in_millimetres_and_degrees(tmp_path: Path):
+    """kg, s and N are the same everywhere; each number is that of the file in SI, rounded once."""
+    mechanism = load_case(write(tmp_path, ALL)).mechanism
+    assert mechanism.gravity == (0.0, 0.0, -9.80665)
+    arm = mechanism.body("arm")
+    assert (arm.mass, arm.center_of_mass) == (2.5, (0.15, 0.0, 0.0))
+    assert arm.inertia == (2.5e-4, 7.3e-3, 7.4e-3, 3e-6, -2e-5, 1.25e-7)
+    assert mechanism.force("spring") == SpringDamper(
+        *("spring", "ground", "arm"),
+        points=((0.1, 0.0, 0.3), (0.1, 0.0, 0.0)),
+        stiffness=25300.0,
+        damping=1700.0,
+        free_length=0.2901,
+    )
+    clock = mechanism.force("clock")
+    assert isinstance(clock, TorsionSpringDamper)
+    per_radian = 180.0 / np.pi
+    np.testing.assert_allclose(
+        [clock.stiffness, clock.damping, clock.free_angle],
+        [0.9 * per_radian, 0.018 * per_radian, -np.pi / 4],
+        rtol=1e-15,
+    )
+    assert mechanism.force("push") == Force(
+        "push", "arm", (0.3, 0.0, 0.0), (0.0, 0.0, -40.0), "body"
+    )
+    assert mechanism.force("twist") == Torque("twist", "arm", (0.0, 0.7005, 0.0))
+
+
+def test_numbers_in_si_are_taken_as_they_are(tmp_path: Path):
+    in_si = ALL.replace('length = "mm"\nangle = "deg"', "")
+    mechanism = load_case(write(tmp_path, in_si)).mechanism
+    assert mechanism.gravity == (0.0, 0.0, -9806.65)
+    assert mechanism.body("arm").inertia == (250.0, 7300.0, 7400.0, 3.0, -20.0, 0.125)
+    assert mechanism.force("clock") == TorsionSpringDamper("clock", "pin", 900.0, 18.0, -45.0)
+
+
+def test_what_is_left_out(tmp_path: Path):
+    """A mass is a point at the body's origin, a spring is as long as at design."""
+    short = ALL.replace(MASS, "mass = 2.5\norigin = [10.0, 0.0, 0.0]\n")
+    short = short.replace("free_length = 290.1\n", "").replace("damping = 1.7\n", "")
+    mechanism = load_case(write(tmp_path, short)).mechanism
+    assert mechanism.body("arm") == Body("arm", (0.01, 0.0, 0.0), mass=2.5)
+    spring = mechanism.force("spring")
+    assert isinstance(spring, SpringDamper)
+    assert (spring.damping, spring.free_length) == (0.0, 0.3)
+
+
+WRONG = {
+    "negative mass": ("mass = 2.5", "mass = -1", ["bodies.arm.mass", "found -1", "not negative"]),
+    "mass that is no number": ("mass = 2.5", "mass = nan", ["bodies.arm.mass", "nan"]),
+    "centre of two": ("[150.0, 0.0, 0.0]", "[1, 2]", ["bodies.arm.center_of_mass", "[x, y, z]"]),
+    "inertia of three": (
+        "[250.0, 7300.0, 7400.0, 3.0, -20.0, 0.125]",
+        "[1, 1, 1]",
+        ["bodies.arm.inertia", "six numbers [Ixx, Iyy, Izz, Ixy, Iyz, Ixz]"],
+    ),
+    "inertia that breaks the triangle": (
+        "[250.0, 7300.0, 7400.0, ",
+        "[250.0, 7300.0, 17400.0, ",
+        ["bodies.arm.inertia", "17400.0", "triangle inequality", " kg mm^2, "],
+    ),
+    "negative inertia": (
+        "[250.0, 73",
+        "[-250.0, 73",
+        ["bodies.arm.inertia", "not positive definite", " kg mm^2, "],
+    ),
+    "inertia without mass": (
+        "mass = 2.5",
+        "mass = 0",
+        ["bodies.arm.inertia", "has an inertia, but no mass"],
+    ),
+    "gravity of one": ("[0.0, 0.0, -9806.65]", "-9806.65", ["gravity", "three numbers"]),
+    "infinite gravity": ("-9806.65", "inf", ["gravity[2]", "inf"]),
+    "unknown type": ('"torque"', '"torqe"', ["forces.twist.type", "did you mean 'torque'?"]),
+    "no type": ('type = "torque"', "", ["forces.twist.type", "missing"]),
+    "unknown key": ("damping = 1.7", "dampin = 1.7", ["forces.spring.dampin", "'damping'"]),
+    "no stiffness": ("stiffness = 25.3", "", ["forces.spring.stiffness", "missing"]),
+    "negative stiffness": ("= 25.3", "= -2", ["forces.spring.stiffness", "found -2"]),
+    "negative damping": ("= 18.0", "= -2.0", ["forces.clock.damping", "not negative"]),
+    "negative length": ("= 290.1", "= -2.0", ["forces.spring.free_length", "not negative"]),
+    "one point": (
+        "[[100.0, 0.0, 300.0], [100.0, 0.0, 0.0]]",
+        "[100.0, 0.0, 300.0]",
+        ["forces.spring.points", "two points"],
+    ),
+    "spring of no length": (
+        "[[100.0, 0.0, 300.0], ",
+        "[[100.0, 0.0, 0.0], ",
+        ["forces.spring.points", "coincide at x = 100.0 mm, y = 0.0 mm", "two ends"],
+    ),
+    "spring on one body": (
+        'bodies = ["ground", "arm"]\npoints',
+        'bodies = ["arm", "arm"]\npoints',
+        ["forces.spring.bodies", "two different bodies"],
+    ),
+    "spring on an unknown body": (
+        'bodies = ["ground", "arm"]\npoints',
+        'bodies = ["ground", "amr"]\npoints',
+        ["forces.spring.bodies", "did you mean 'arm'?"],
+    ),
+    "unknown joint": ('"pin"\nstiff', '"pn"\nstiff', ["forces.clock.joint", "mean 'pin'?"]),
+    "unknown body": ('"arm"\nvector', '"am"\nvector', ["forces.twist.body", "mean 'arm'?"]),
+    "unknown frame": ('frame = "body"', 'frame = "local"', ["forces.push.frame", '"global" or']),
+    "vector of four": ("[0.0, 700.5, 0.0]", "[0, 1, 2, 3]", ["forces.twist.vector", "[x, y, z]"]),
+    "no table": ("[forces.twist]", "[forces]\ntwist = 3\n[x]", ["x", "unknown key"]),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_wrong_loads_are_one_message(name: str, tmp_path: Path):
+    old, new, fragments = WRONG[name]
+    assert ALL.count(old) == 1
+    complains(write(tmp_path, ALL.replace(old, new)), fragments)
+
+
+def test_a_joint_that_does_not_turn_has_no_torsion_spring(tmp_path: Path):
+    rail = '[joints.rod]\ntype = "spherical"\nbodies = ["ground", "arm"]\npoint = [0, 0, 0]\n'
+    text = ALL.replace('joint = "pin"\nstiff', 'joint = "rod"\nstiff') + rail
+    complains(write(tmp_path, text), ["forces.clock.joint", "has no rotation"])
+
+
+def test_wrong_loads_are_exit_status_2(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    file = write(tmp_path, ALL.replace("mass = 2.5", "mass = -2.5"))
+    assert main(["run", str(file), "--engine", "native"]) == 2
+    assert "bodies.arm.mass: found -2.5" in capsys.readouterr().err
+
+
+def of(mechanism) -> Case:
+    sweep = Sweep(mechanism.drivers[0].name, np.linspace(0.0, 0.25, 3))
+    return with_all_coordinates(
+        Case(mechanism.name, "made up", Truth.CONSENSUS_ONLY, mechanism, sweep, ())
+    )
+
+
+def test_a_written_file_has_no_key_of_loads_without_loads():
+    plain = replace(
+        loaded(),
+        bodies=[Body("crank"), Body("slider", (2.0, 0.5, 0.0)), Body("wall", fixed=True)],
+        forces=(),
+        gravity=(0.0, 0.0, 0.0),
+    )
+    text = case_text(of(plain))
+    assert not any(word in text for word in ("mass", "inertia", "gravity", "forces"))
+
+
+number = st.floats(-1e6, 1e6).map(lambda x: x if abs(x) > 1e-90 else 0.0)
+size = number.map(abs)
+vector = st.tuples(number, number, number)
+
+
+@st.composite
+def inertia(draw):
+    """Return the inertia of a cloud of points, which is that of a rigid body."""
+    points = np.array(
+        draw(st.lists(st.tuples(*3 * [st.integers(-99, 99)]), min_size=4, max_size=6))
+    )
+    points = np.vstack([points, np.eye(3)])
+    matrix = (points**2).sum() * np.eye(3) - points.T @ points
+    return tuple(float(matrix[at]) for at in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)))
+
+
+@settings(max_examples=20, deadline=None, suppress_health_check=list(HealthCheck))
+@given(st.data())
+def test_what_is_written_reads_as_the_same(tmp_path: Path, data: st.DataObject):
+    draw = data.draw
+    mass = draw(size)
+    body = {"mass": mass, "center_of_mass": draw(vector)}
+    if mass and draw(st.booleans()):
+        body["inertia"] = draw(inertia())
+    frame = draw(st.sampled_from(["global", "body"]))
+    bodies = [replace(loaded().bodies[0], inertia=None, center_of_mass=None, mass=0.0)]
+    bodies = [replace(bodies[0], **body), *loaded().bodies[1:]]
+    forces = draw(
+        st.lists(
+            st.sampled_from(
+                [
+                    SpringDamper(
+                        *("s", "slider", "crank"),
+                        (draw(vector), (0.5, 0.25, 2e6)),
+                        draw(size),
+                        draw(size),
+                        draw(st.none() | size),
+                    ),
+                    TorsionSpringDamper("t", "pin", draw(size), draw(size), draw(number)),
+                    Force("f", "crank", draw(vector), draw(vector), frame),
+                    Torque("a name of two", "ground", draw(vector), frame),
+                ]
+            ),
+            unique_by=lambda each: each.name,
+        )
+    )
+    written = replace(loaded(), bodies=bodies, gravity=draw(vector), forces=forces)
+    read = load_case(write(tmp_path, case_text(of(written)))).mechanism
+    assert read == written

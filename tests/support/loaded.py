@@ -1,0 +1,49 @@
+"""A mechanism with every kind of load: a crank and slider beside the origin."""
+
+from kincheck.core.joints import Distance, Revolute, Translational
+from kincheck.core.mechanism.body import Body
+from kincheck.core.mechanism.drivers import JointAngle, PointCoordinate
+from kincheck.core.mechanism.loads import Force, SpringDamper, Torque, TorsionSpringDamper
+from kincheck.core.mechanism.mechanism import Mechanism, Point
+
+INERTIA = (0.5, 0.75, 1.0, 0.0625, -0.03125, 0.125)
+GRAVITY = (0.5, 0.0, -9.75)
+
+
+def loaded(driver=None) -> Mechanism:
+    """Return a slider-crank in space with masses, gravity and four force elements; all numbers are
+    exact in binary.
+    """
+    return Mechanism(
+        name="loaded",
+        bodies=[
+            Body("crank", mass=2.0, center_of_mass=(0.125, 0.0, 0.25), inertia=INERTIA),
+            Body("slider", (2.0, 0.5, 0.0), mass=3.5),
+            Body("wall", fixed=True),
+        ],
+        joints=[
+            Revolute("pin", "ground", "crank", point=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0)),
+            Translational("rail", "wall", "slider", point=(2.0, 0.5, 0.0), axis=(1.0, 0.0, 0.0)),
+            Distance("rod", "crank", "slider", points=((0.0, 0.5, 0.0), (2.0, 0.5, 0.0))),
+        ],
+        points=[Point("tip", "slider", (2.0, 0.5, 0.25))],
+        drivers=[driver or JointAngle("turn", "pin")],
+        gravity=GRAVITY,
+        forces=[
+            SpringDamper(
+                *("spring", "wall", "slider"),
+                points=((4.0, 0.5, 0.0), (2.0, 0.5, 0.0)),
+                stiffness=800.0,
+                damping=16.0,
+                free_length=1.75,
+            ),
+            TorsionSpringDamper("clock", "pin", stiffness=4.0, damping=0.5, free_angle=-0.25),
+            Force("push", "slider", (2.25, 0.5, 0.0), (-8.0, 0.0, 1.0), "body"),
+            Torque("twist", "crank", (0.0, 0.0, 3.0)),
+        ],
+    )
+
+
+def pushed() -> Mechanism:
+    """Return the same, driven at its tip."""
+    return loaded(PointCoordinate("push_tip", "tip", (1.0, 0.0, 0.0)))
