@@ -51,7 +51,7 @@ IMPORTS = {
     "mechanism": ". joints",
     "kinematics/formulation": ". primitives program joints mechanism",
     "kinematics/forces": ". primitives joints mechanism kinematics/formulation",
-    "kinematics/structure": ". joints mechanism kinematics/formulation",
+    "kinematics/structure": ". primitives joints mechanism kinematics/formulation",
     "kinematics/compiled": (
         ". primitives program program/llvm mechanism kinematics/formulation kinematics/structure"
     ),
@@ -86,14 +86,14 @@ IMPORTS = {
     ),
     "case/models/hardpoints/templates": "joints mechanism",
     "case": (
-        ". joints mechanism kinematics/formulation kinematics/structure kinematics/compiled "
-        "kinematics"
+        ". joints mechanism kinematics/formulation kinematics/structure "
+        "kinematics/compiled kinematics"
     ),
     "case/suspension": ". mechanism case",
     "case/measures": ". joints mechanism case",
     "case/io": ". joints mechanism kinematics case case/suspension case/measures",
     "case/models/hardpoints": (
-        ". mechanism case/models/hardpoints/templates case case/suspension case/io"
+        ". joints mechanism case/models/hardpoints/templates case case/suspension case/io"
     ),
     "case/variation": ". joints mechanism kinematics case case/io",
     "case/models/mjcf": ". joints mechanism kinematics case case/io",
@@ -106,8 +106,11 @@ IMPORTS = {
     "report": ". joints mechanism case case/io harness history history/regression",
     "studies/stress/truth": ". program joints mechanism kinematics case",
     "studies/stress/families": ". joints mechanism case case/io studies/stress/truth",
-    "studies": ". program joints mechanism kinematics case case/io harness",
-    "studies/joint_check": ". primitives program joints mechanism kinematics case harness report",
+    "studies": ". program joints mechanism kinematics case case/io harness report",
+    "studies/joint_check": ". primitives program joints mechanism kinematics case harness studies",
+    "studies/engine_check": (
+        ". primitives joints case harness harness/workers studies studies/joint_check"
+    ),
     "studies/tolerance": (
         ". program program/llvm mechanism kinematics case case/io case/variation harness "
         "harness/workers history report"
@@ -125,11 +128,11 @@ IMPORTS = {
     "cli": (
         ". program program/llvm joints kinematics case case/io case/models/hardpoints "
         "case/variation case/models harness harness/workers history history/regression "
-        "report studies/stress/families studies studies/joint_check studies/tolerance "
-        "studies/stress studies/paper studies/diagnosis studies/bench"
+        "report studies/stress/families studies studies/joint_check studies/engine_check "
+        "studies/tolerance studies/stress studies/paper studies/diagnosis studies/bench"
     ),
     "__init__": ". joints mechanism kinematics case case/io harness studies/joint_check",
-    "kincheck": "case case/io harness harness/workers cli __init__",
+    "kincheck": "case case/io harness harness/workers studies cli __init__",
 }
 """Folder of core: the folders it imports besides itself, whenever the import runs."""
 
