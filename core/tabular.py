@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any, TypeAlias
 
 from .dataset import Dataset
 
-if TYPE_CHECKING:
-    import matplotlib.figure
-    import pandas  # pyright: ignore[reportMissingTypeStubs]
-    import xarray
+# These libraries are optional, and a type checker may not find them.
+DataFrame: TypeAlias = Any
+XarrayDataset: TypeAlias = Any
+Figure: TypeAlias = Any
 
 
 class Tabular:
@@ -42,7 +42,7 @@ class Tabular:
 
         return to_dict(self, self.dataset)
 
-    def to_dataframe(self) -> pandas.DataFrame:
+    def to_dataframe(self) -> DataFrame:
         """Return a pandas table. The units of its columns are in `attrs["units"]`.
 
         Raises:
@@ -52,7 +52,7 @@ class Tabular:
 
         return to_dataframe(self.dataset())
 
-    def to_xarray(self) -> xarray.Dataset:
+    def to_xarray(self) -> XarrayDataset:
         """Return an xarray dataset. The unit of a variable is in its `attrs["units"]`.
 
         Raises:
@@ -62,7 +62,7 @@ class Tabular:
 
         return to_xarray(self.dataset(), self.summary())
 
-    def plot(self, *names: str) -> matplotlib.figure.Figure:
+    def plot(self, *names: str) -> Figure:
         """Draw the curves with matplotlib, one diagram for each variable, and return the figure.
 
         Args:

@@ -36,7 +36,8 @@ class DartModel(TreeModel):
     def __init__(self, dart: Any, case: Case) -> None:
         self.parts, self.transform = dart.dynamics, dart.math.Isometry3
         self.skeleton = self.parts.Skeleton("mechanism")
-        self.nodes, self.joints = [None], [None]
+        self.nodes: list[Any] = [None]
+        self.joints: list[Any] = [None]
         super().__init__(case)
 
     def add_link(self, parent: int, link: Link, offset: Array) -> None:

@@ -12,6 +12,7 @@ import importlib.metadata
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...core.case.case import Case
 from ...core.trajectory import Array
@@ -51,7 +52,8 @@ class DrakeModel(TreeModel):
         self.shift = load("pydrake.math").RigidTransform
         self.plant = plant.MultibodyPlant(0.0)
         self.world, self.kind = self.plant.world_frame(), self.tree.JacobianWrtVariable.kV
-        self.bodies, self.joints = [self.plant.world_body()], [None]
+        self.bodies: list[Any] = [self.plant.world_body()]
+        self.joints: list[Any] = [None]  # the world has none
         self.zero = np.zeros(3)
         super().__init__(case)
 
@@ -85,7 +87,9 @@ class DrakeModel(TreeModel):
         balls = [joint for joint in self.joints if joint and joint.num_velocities() == 6]
         self.balls = [slice(at, at + 4) for at in (each.position_start() for each in balls)]
         idle = [each.velocity_start() + k for each in balls for k in (3, 4, 5)]
-        self.turning = np.setdiff1d(np.arange(self.plant.num_velocities()), idle)
+        self.turning: NDArray[np.intp] = np.setdiff1d(
+            np.arange(int(self.plant.num_velocities())), idle
+        )
         # of rows and unknowns in a Jacobian, whose columns Drake stores one after another
         self.chosen = ROWS[:, None] + len(ROWS) * self.turning
         self.places = {int(full): k for k, full in enumerate(self.turning)}

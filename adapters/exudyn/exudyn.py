@@ -79,7 +79,11 @@ class Exudyn(ProjectionEngine):
         )
         pose = {"ComputeAlgebraicEquations": residual, "ComputeNewtonJacobian": (own, empty, 1)}
         return floor_of(
-            self, solved, model.unknowns, pose, {"ComputeNewtonJacobian (rates)": (own, empty, 2)}
+            self.name,
+            solved,
+            model.unknowns,
+            pose,
+            {"ComputeNewtonJacobian (rates)": (own, empty, 2)},
         )
 
 

@@ -76,7 +76,7 @@ class MuJoCo(ProjectionEngine):
 
         pose = calls("mj_kinematics", "mj_comPos", "mj_tendon", "mj_makeConstraint")
         return floor_of(
-            self, trajectory, model.m.nv, pose, calls("mj_comVel", "mj_referenceConstraint")
+            self.name, trajectory, model.m.nv, pose, calls("mj_comVel", "mj_referenceConstraint")
         )
 
 

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.harness.engine import Engine, Floor
+from ...core.harness.engine import Floor
 from ...core.trajectory import Trajectory
 
 # Rounds of calls; the fastest one counts, so that interruptions do not. A round is long against the
@@ -28,7 +28,7 @@ Call = Callable[[], Any]
 
 
 def floor_of(
-    engine: Engine,
+    engine: str,
     solved: Trajectory,
     unknowns: int,
     pose: Mapping[str, tuple[Call, Call, int]],
@@ -37,6 +37,7 @@ def floor_of(
     """Return the floor of Newton's method with the iterations of a solved trajectory.
 
     Args:
+        engine: name of the engine.
         pose: calls for the residual and Jacobian of a pose: by name, on the case's model, on the
             smallest, and how many.
         rates: further calls once a sample, for velocities and accelerations.
@@ -59,7 +60,7 @@ def floor_of(
         for name, (call, least, each) in {**pose, **solve, **rates}.items()
     }
     counted = (
-        f"{engine.name}: {poses:.3g} poses ({', '.join([*pose, *solve])}) and once"
+        f"{engine}: {poses:.3g} poses ({', '.join([*pose, *solve])}) and once"
         f" {', '.join(rates)}; the fastest of {ROUNDS} rounds, less the same calls on the smallest"
         " model"
     )

@@ -15,7 +15,7 @@ from ...core.harness.engine import Floor
 from ...core.joints import Translational
 from ...core.mechanism.drivers import PointCoordinate
 from ...core.mechanism.mechanism import GROUND, Body, Mechanism, Point
-from .compiled_floor import floor_of
+from .compiled_floor import Call, floor_of
 from .length_scaling import in_own_frame
 from .loop_closures import CLOSURES
 from .projection_engine import ProjectionEngine
@@ -61,17 +61,20 @@ class TreeEngine(ProjectionEngine):
         # the same Python, the smallest model
         least.moving, least.wanted = least.moving * n, least.moving * wanted
         zeros = np.zeros(model.unknowns), np.zeros(least.unknowns)
-        pose = {
+        pose: dict[str, tuple[Call, Call, int]] = {
             f"placements and Jacobians of {n} frames": (model.observe, least.observe, 1),
         }
-        rates = {
+        own, empty = zeros
+        rates: dict[str, tuple[Call, Call, int]] = {
             f"accelerations of {n} frames": (
-                *(partial(m.observe_rates, v) for m, v in zip((model, least), zeros, strict=True)),
+                partial(model.observe_rates, own),
+                partial(least.observe_rates, empty),
                 1,
             ),
             f"motions of {wanted} points": (
-                *(partial(m.points, v, v) for m, v in zip((model, least), zeros, strict=True)),
+                partial(model.points, own, own),
+                partial(least.points, empty, empty),
                 1,
             ),
         }
-        return floor_of(self, solved, model.unknowns, pose, rates)
+        return floor_of(self.name, solved, model.unknowns, pose, rates)

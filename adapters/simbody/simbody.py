@@ -78,7 +78,7 @@ class Simbody(TreeEngine):
             calcStationJacobian=points,
             calcBiasForStationJacobian=points,
         )
-        return floor_of(self, solved, model.unknowns, pose, rates)
+        return floor_of(self.name, solved, model.unknowns, pose, rates)
 
 
 def _calls(of: SimbodyModel) -> Mapping[str, Call]:

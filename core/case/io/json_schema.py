@@ -25,7 +25,8 @@ from .schema import (
     joint_keys,
     motion_keys,
 )
-from .suspension import SuspensionKeys, output_keys
+from .suspension import output_keys
+from .suspension_table import SuspensionKeys
 
 Keys: TypeAlias = type[msgspec.Struct]
 Tables: TypeAlias = Mapping[str, Keys | Mapping[str, Keys]]
