@@ -112,8 +112,8 @@ IMPORTS = {
         ". primitives joints case harness harness/workers studies studies/joint_check"
     ),
     "studies/tolerance": (
-        ". program program/llvm mechanism kinematics case case/io case/variation harness "
-        "harness/workers history report"
+        ". program program/llvm mechanism kinematics case case/io case/variation "
+        "harness harness/workers history report"
     ),
     "studies/stress": (
         ". joints mechanism kinematics case case/io harness harness/workers report "
@@ -128,8 +128,9 @@ IMPORTS = {
     "cli": (
         ". program program/llvm joints kinematics case case/io case/models/hardpoints "
         "case/variation case/models harness harness/workers history history/regression "
-        "report studies/stress/families studies studies/joint_check studies/engine_check "
-        "studies/tolerance studies/stress studies/paper studies/diagnosis studies/bench"
+        "report studies/stress/families studies studies/joint_check "
+        "studies/engine_check studies/tolerance studies/stress studies/paper "
+        "studies/diagnosis studies/bench"
     ),
     "__init__": ". joints mechanism kinematics case case/io harness studies/joint_check",
     "kincheck": "case case/io harness harness/workers studies cli __init__",
