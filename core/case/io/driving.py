@@ -16,10 +16,11 @@ from ...mechanism.motions import ROUNDED_TIME, Absolute, Measure, Motion
 from ...trajectory import Array
 from ..case import TIME, Sweep
 from ..units import SECOND, Unit, plain
+from .class_keys import driver_keys, motion_keys, own_fields
 from .document import explained, fault, join, shown
 from .reference import Convert, read_grid
 from .reference_samples import ReferenceKeys
-from .schema import MOST_SAMPLES, CaseKeys, SweepKeys, driver_keys, motion_keys, own_fields
+from .schema import MOST_SAMPLES, CaseKeys, SweepKeys
 from .typed_tables import class_of, typed
 
 DRIVERS: Mapping[str, type[Driver]] = {
