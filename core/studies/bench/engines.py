@@ -185,7 +185,7 @@ def _measure_work(
             entering[f"{engine.name} {engine.mode}", each.entry.setting] = each
     detailed = any(isinstance(engine, NativeEngine) for engine in engines)
     if detailed:
-        for each in contestants(case, native_breakdown.LEVELS, tol):
+        for each in contestants(case, native_breakdown.levels(case), tol):
             entering["levels", each.entry.setting] = each
     work: dict[tuple[str, str], Work] = {
         key: each.work for key, each in entering.items() if each.work is not None
