@@ -38,6 +38,7 @@ KINDS = {
     "fixed": "WeldJoint",
     "free": "FreeJoint",
 }
+NONE = (0.0, 0.0, 0.0)
 # A joint's coordinates in the order of OpenSim.
 COORDINATES = {
     "slide": [""],
@@ -57,11 +58,12 @@ def write(
         KincheckError: a joint has no counterpart here, or a name cannot be used.
     """
     require_known(mechanism, "OpenSim")
-    model = _Model(at_start(mechanism, way))
+    model = _Model(at_start(mechanism, way), mechanism.gravity if mechanism.has_loads else NONE)
     at = ", ".join(f"{name} = {value!r}" for name, value in start.items())
-    masses = loads.LOADED if mechanism.has_loads else loads.PLAIN
-    note = NOTE.format(masses, at and f" ({at})", loads.left_out(mechanism, (), True))
-    model.root.insert(0, ET.Comment(note))
+    facts = (loads.PLAIN, "")
+    if mechanism.has_loads:
+        facts = (loads.LOADED, loads.left_out(mechanism, (), True))
+    model.root.insert(0, ET.Comment(NOTE.format(facts[0], at and f" ({at})", facts[1])))
     sets = [["Body"], [*KINDS.values()], ["Coordinate"], ["Marker"], [*TIES]]
     return {".osim": document(model.root, sets, reserved=[GROUND])}
 
@@ -77,12 +79,12 @@ TIES = (
 class _Model:
     """The document during its construction; the mechanism is at its start."""
 
-    def __init__(self, mechanism: Mechanism) -> None:
+    def __init__(self, mechanism: Mechanism, gravity: Vector) -> None:
         self.tree = hung(mechanism)
         self.root = ET.Element("OpenSimDocument", Version="40000")
         model = ET.SubElement(self.root, "Model", name=_name(mechanism.name))
         ET.SubElement(model, "Ground", name=GROUND)
-        _text(model, "gravity", numbers(mechanism.gravity))
+        _text(model, "gravity", numbers(gravity))
         bodies, joints, constraints, markers = (
             ET.SubElement(ET.SubElement(model, kind, name=kind.lower()), "objects")
             for kind in ("BodySet", "JointSet", "ConstraintSet", "MarkerSet")

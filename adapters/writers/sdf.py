@@ -49,9 +49,10 @@ def write(
     require_known(mechanism, "SDF")
     model = _Model(at_start(mechanism, way))
     at = ", ".join(f"{name} = {value!r}" for name, value in start.items())
-    masses = loads.LOADED if mechanism.has_loads else loads.PLAIN
-    left_out = loads.left_out(mechanism, (), False)
-    model.root.insert(0, ET.Comment(NOTE.format(masses, at and f" ({at})", left_out)))
+    facts = (loads.PLAIN, "")
+    if mechanism.has_loads:
+        facts = (loads.LOADED, loads.left_out(mechanism, (), False))
+    model.root.insert(0, ET.Comment(NOTE.format(facts[0], at and f" ({at})", facts[1])))
     kinds = (["link", "frame", "joint", "drake:ball_constraint"],)
     return {".sdf": document(model.root, kinds, reserved=[WORLD])}
 
