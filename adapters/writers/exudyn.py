@@ -54,13 +54,19 @@ def write(
     """A .py file; see `Writer`. Initial coordinates are the end of the way.
 
     Raises:
-        KincheckError: a joint has no counterpart in Exudyn.
+        KincheckError: a joint or coupler has no counterpart in Exudyn.
     """
     for joint in mechanism.joints:
         if type(joint) not in CHAINS and type(joint) is not j.Distance:
             raise KincheckError(
                 f"{joint} has no counterpart in Exudyn here; write an equivalent of known joints"
                 " instead"
+            )
+    for coupler in mechanism.couplers:
+        if coupler.curve:
+            raise KincheckError(
+                f"{coupler} has no counterpart in Exudyn, whose objects keep linear relations"
+                " only; export MJCF or URDF instead"
             )
     return {".py": _Script(*_spelled_out(mechanism, way)).text(start)}
 

@@ -15,7 +15,7 @@ from enum import StrEnum
 from typing import Any, Never
 
 from ... import primitives as p
-from ...algebra import ZERO, Vec3, vec
+from ...algebra import ZERO, Scalar, Vec3, vec
 from ...errors import SolveError
 from ...joints import Attachment, AxialJoint, Joint
 from ...joints.base import unit
@@ -43,11 +43,35 @@ class Constraint:
 
 @dataclass(frozen=True)
 class Relation:
-    """A linear row: the weighted sum of coordinates is the drive's value (zero unless driven)."""
+    """A row of coordinates: their weighted sum is the drive's value (zero unless driven).
+
+    Attributes:
+        curve: coefficients of a polynomial in the last coordinate, the constant first, that is
+            added to the sum; empty for a linear row.
+    """
 
     owner: str
-    weights: Mapping[str, float]
+    weights: Mapping[str, Scalar]
     drive: Drive = field(default_factory=Drive)
+    curve: Sequence[Scalar] = ()
+
+    def value(self, x: Sequence[Scalar]) -> Scalar:
+        """Return the residual at values of the coordinates."""
+        linear = sum((k * each for k, each in zip(self.weights.values(), x, strict=True)), 0.0)
+        return linear + _polynomial(self.curve, x[-1]) - self.drive.c
+
+    def slopes(self, x: Sequence[Scalar]) -> dict[str, Scalar]:
+        """Return the derivatives by the coordinates."""
+        found = dict(self.weights)
+        if self.curve:
+            last = [*found][-1]
+            found[last] = found[last] + _polynomial(_derived(self.curve), x[-1])
+        return found
+
+    def gamma(self, x: Sequence[Scalar], rates: Sequence[Scalar]) -> Scalar:
+        """Return the right-hand side of the accelerations at values and rates."""
+        bend = _polynomial(_derived(_derived(self.curve)), x[-1])
+        return self.drive.c_tt - bend * (rates[-1] * rates[-1])
 
 
 @dataclass(frozen=True)
@@ -176,13 +200,8 @@ def constraints(
         composed = joint.scaled(1.0 / frame.unit).primitives(i, j)
         found += [Constraint(joint.name, primitive, joint.i, joint.j) for primitive in composed]
     for coupler in mechanism.couplers:
-        found.append(
-            _relation(
-                coupler.name,
-                {f"{joint}.{freedom}": k for joint, freedom, k in coupler.terms},
-                frame,
-            )
-        )
+        weights = {f"{joint}.{freedom}": k for joint, freedom, k in coupler.terms}
+        found.append(_relation(coupler.name, weights, frame, coupler.curve))
     found += [
         _driven(mechanism, frame, each, drives.get(each.name, Drive()), mixed)
         for each in mechanism.drivers
@@ -228,15 +247,32 @@ def _axial(
     return found + [_relation(joint.name, each, frame) for each in weights]
 
 
-def _relation(owner: str, weights: Mapping[str, float], frame: Frames) -> Relation:
+def _relation(
+    owner: str, weights: Mapping[str, float], frame: Frames, curve: Sequence[float] = ()
+) -> Relation:
     """Convert weights from metres and radians to units and radians, with the largest at one."""
-    scaled = {
-        name: k * (frame.unit if name.endswith(".translation") else 1.0)
-        for name, k in weights.items()
-    }
+    units = [frame.unit if name.endswith(".translation") else 1.0 for name in weights]
+    scaled = [k * unit for k, unit in zip(weights.values(), units, strict=True)]
     # a traced lead is known only later
-    largest = max(abs(k) for k in scaled.values() if hasattr(k, "__abs__"))
-    return Relation(owner, {name: k / largest for name, k in scaled.items()})
+    largest = max(abs(k) for k in scaled if hasattr(k, "__abs__"))
+    return Relation(
+        owner,
+        {name: k / largest for name, k in zip(weights, scaled, strict=True)},
+        curve=tuple(c * units[-1] ** k / largest for k, c in enumerate(curve)),
+    )
+
+
+def _polynomial(coefficients: Sequence[Scalar], x: Scalar) -> Scalar:
+    """Return the value of a polynomial, the constant first."""
+    found: Scalar = 0.0
+    for c in reversed(coefficients):
+        found = c + x * found
+    return found
+
+
+def _derived(coefficients: Sequence[Scalar]) -> Sequence[Scalar]:
+    """Return the coefficients of the derivative of a polynomial."""
+    return [float(k) * c for k, c in enumerate(coefficients)][1:]
 
 
 def _driven(
