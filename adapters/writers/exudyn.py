@@ -62,12 +62,8 @@ def write(
                 f"{joint} has no counterpart in Exudyn here; write an equivalent of known joints"
                 " instead"
             )
-    for coupler in mechanism.couplers:
-        if coupler.curve:
-            raise KincheckError(
-                f"{coupler} has no counterpart in Exudyn, whose objects keep linear relations"
-                " only; export MJCF or URDF instead"
-            )
+    if curved := next((each for each in mechanism.couplers if each.curve), None):
+        raise KincheckError(f"{curved} has no counterpart in Exudyn; export MJCF or URDF instead")
     return {".py": _Script(*_spelled_out(mechanism, way)).text(start)}
 
 

@@ -72,5 +72,9 @@ class Polynomial(Coupler):
 
     @property
     def curve(self) -> tuple[float, ...]:
-        """Minus the coefficients, without the linear one, which is a weight."""
+        """Minus the coefficients, without the linear one, which is a weight; empty for a line
+        through zero.
+        """
+        if not any(c for k, c in enumerate(self.coefficients) if k != 1):
+            return ()
         return tuple(0.0 if k == 1 else -c for k, c in enumerate(self.coefficients))

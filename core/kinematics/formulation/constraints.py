@@ -10,12 +10,12 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any, Never
 
 from ... import primitives as p
-from ...algebra import ZERO, Scalar, Vec3, vec
+from ...algebra import ZERO, Vec3, vec
 from ...errors import SolveError
 from ...joints import Attachment, AxialJoint, Joint
 from ...joints.base import unit
@@ -23,6 +23,7 @@ from ...mechanism.drivers import Driver, JointDriver, PointCoordinate
 from ...mechanism.mechanism import GROUND, Mechanism
 from ...mechanism.topology import spanning_tree
 from ...primitives.base import Drive
+from .relation import Relation as Relation
 
 
 @dataclass(frozen=True)
@@ -39,39 +40,6 @@ class Constraint:
     i: str
     j: str
     coordinate: str = ""
-
-
-@dataclass(frozen=True)
-class Relation:
-    """A row of coordinates: their weighted sum is the drive's value (zero unless driven).
-
-    Attributes:
-        curve: coefficients of a polynomial in the last coordinate, the constant first, that is
-            added to the sum; empty for a linear row.
-    """
-
-    owner: str
-    weights: Mapping[str, Scalar]
-    drive: Drive = field(default_factory=Drive)
-    curve: Sequence[Scalar] = ()
-
-    def value(self, x: Sequence[Scalar]) -> Scalar:
-        """Return the residual at values of the coordinates."""
-        linear = sum((k * each for k, each in zip(self.weights.values(), x, strict=True)), 0.0)
-        return linear + _polynomial(self.curve, x[-1]) - self.drive.c
-
-    def slopes(self, x: Sequence[Scalar]) -> dict[str, Scalar]:
-        """Return the derivatives by the coordinates."""
-        found = dict(self.weights)
-        if self.curve:
-            last = [*found][-1]
-            found[last] = found[last] + _polynomial(_derived(self.curve), x[-1])
-        return found
-
-    def gamma(self, x: Sequence[Scalar], rates: Sequence[Scalar]) -> Scalar:
-        """Return the right-hand side of the accelerations at values and rates."""
-        bend = _polynomial(_derived(_derived(self.curve)), x[-1])
-        return self.drive.c_tt - bend * (rates[-1] * rates[-1])
 
 
 @dataclass(frozen=True)
@@ -260,19 +228,6 @@ def _relation(
         {name: k / largest for name, k in zip(weights, scaled, strict=True)},
         curve=tuple(c * units[-1] ** k / largest for k, c in enumerate(curve)),
     )
-
-
-def _polynomial(coefficients: Sequence[Scalar], x: Scalar) -> Scalar:
-    """Return the value of a polynomial, the constant first."""
-    found: Scalar = 0.0
-    for c in reversed(coefficients):
-        found = c + x * found
-    return found
-
-
-def _derived(coefficients: Sequence[Scalar]) -> Sequence[Scalar]:
-    """Return the coefficients of the derivative of a polynomial."""
-    return [float(k) * c for k, c in enumerate(coefficients)][1:]
 
 
 def _driven(
