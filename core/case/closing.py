@@ -21,7 +21,7 @@ def within_digits(case: Case, tolerance: float, why: str, carrying: Collection[s
 
     Args:
         why: origin of the tolerance, for the note.
-        carrying: joints that keep their rows where others can close the loops.
+        carrying: joints with all their rows, as long as others can close the loops.
 
     Raises:
         CaseError: the rows are redundant at the start, but do not hold along the motion.

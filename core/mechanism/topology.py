@@ -42,7 +42,7 @@ def spanning_tree(mechanism: Mechanism, first: Collection[str] = ()) -> Spanning
     such joints only is free.
 
     Args:
-        first: further joints that are taken as driven ones are.
+        first: further joints, taken as driven ones are.
     """
     named = {*first} | {
         driver.joint for driver in mechanism.drivers if isinstance(driver, JointDriver)

@@ -127,7 +127,7 @@ def reduce_rows(
     points, lines, planes and orientations, keep theirs.
 
     Args:
-        carrying: joints that carry bodies, and keep their rows where others can close the loops.
+        carrying: joints with all their rows, as long as others can close the loops.
     """
     bare = replace(mechanism, drivers=())
     frame = frames(bare)

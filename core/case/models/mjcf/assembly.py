@@ -1,8 +1,8 @@
-"""Assembly of a model: its start, projected onto the equalities that close its loops.
+"""Assembly of a model: its start, projected onto the equalities of its loops.
 
 Files have six to nine digits, keyframes fewer, and polynomial couplings may have offsets: the start
 is open. Joint coordinates move by the shortest way until it is closed; far away by damped steps, as
-in `kinematics.assembly`, near by Newton's, without directions that are weak within the digits.
+in `kinematics.assembly`, near by Newton's, without directions weak within the digits.
 """
 
 from __future__ import annotations
@@ -41,11 +41,12 @@ class Assembled:
     """A model in its closed start.
 
     Attributes:
-        free: motions that the equalities leave, orthonormal, by the unknowns of `Pose`, shape
+        free: motions left by the equalities, orthonormal, by the unknowns of `Pose`, shape
             (freedoms, unknowns).
         pose: the tree itself, for its columns.
+        size: largest extent [m].
         digits: gaps up to this are those of the file.
-        start: where it starts, in words.
+        start: origin of the start, in words.
         notes: how it was closed.
     """
 
@@ -53,9 +54,15 @@ class Assembled:
     equalities: Sequence[Equality]
     free: Array
     pose: Pose
+    size: float
     digits: Digits
     start: str
     notes: tuple[str, ...]
+
+    @property
+    def exact(self) -> bool:
+        """Whether the file has all digits, so that redundant rows are so to round-off."""
+        return self.digits.tolerance <= CLOSED * self.size
 
 
 def assemble(
@@ -68,7 +75,7 @@ def assemble(
     """Return the model in the start, closed.
 
     Args:
-        driven: joints that are driven or held; they stay if the closures let them.
+        driven: driven and held joints; they stay if the closures let them.
 
     Raises:
         CaseError: the start is too far open, or no pose near it closes.
@@ -106,7 +113,7 @@ def assemble(
     # of the tree in this pose, whose changes since qpos0 it knows itself
     rows = Closing(posed, closing.size, digits).rows(settled)[1]
     free = closing.null(rows)
-    return Assembled(tree, posed, free, settled, digits, start.text, tuple(notes))
+    return Assembled(tree, posed, free, settled, closing.size, digits, start.text, tuple(notes))
 
 
 def size_of(pose: Pose, equalities: Sequence[Equality]) -> float:
@@ -120,8 +127,8 @@ def size_of(pose: Pose, equalities: Sequence[Equality]) -> float:
 
 
 def _closed(closing: Closing, start: Pose, at_rest: Sequence[Collection[str]]) -> Pose:
-    """Return the nearest closed pose that is found, with the first of some sets of joints at
-    rest that lets it close.
+    """Return the nearest closed pose found, with the first possible one of some sets of joints
+    at rest.
     """
     found = start
     for given in dict.fromkeys(at_rest):
@@ -177,7 +184,7 @@ def _settled(each: Equality, pose: Pose) -> Equality:
 
 
 def _note(start: Start, closing: Closing, pose: Pose, opened: float, left: float) -> str:
-    """Return what the assembly did: the gap, and how far each joint moved."""
+    """Return the note on the assembly: the gap, and how far each joint moved."""
     moves = sorted(_moves(start.pose, pose), key=lambda each: -each[0])
     told = [text for size, text in moves if size > 1e-3 * moves[0][0]]
     widest = closing.widest(start.pose).element

@@ -1,4 +1,4 @@
-"""The attributes that MJCF has, of the elements that are read; from MuJoCo's own schema
+"""The attributes of MJCF for the elements read here; from MuJoCo's own schema
 (mj_printSchema, MuJoCo 4.0).
 """
 

@@ -30,7 +30,7 @@ class Closing:
 
     @property
     def weak(self) -> float:
-        """Singular values below this are those of rows that are redundant within the digits."""
+        """Singular values below this belong to rows redundant within the digits."""
         return max(ROUND_OFF, ADDED_UP * self.digits.tolerance / self.size)
 
     def gap(self, pose: Pose) -> float:
@@ -38,8 +38,8 @@ class Closing:
         return float(np.abs(self._gaps(pose)).max(initial=0.0))
 
     def apart(self, pose: Pose) -> float:
-        """Return the largest gap of what closes loops [m], angles at arms of the size; offsets of
-        coupled coordinates are meant, and do not count.
+        """Return the largest gap of connects, welds and rods [m], angles at arms of the size;
+        offsets of coupled coordinates are meant, and do not count.
         """
         found = 0.0
         for each in self.equalities:
@@ -89,7 +89,7 @@ class Closing:
         return np.concatenate(residuals), np.concatenate(slopes)
 
     def metres(self, pose: Pose) -> Array:
-        """Return the size for unknowns that are lengths, else one, shape (n,)."""
+        """Return the size for lengths among the unknowns, else one, shape (n,)."""
         found = np.ones(pose.unknowns)
         for joint in pose.tree.chain:
             columns = pose.columns[joint.name]
@@ -112,7 +112,7 @@ class Closing:
         return (apart / np.linalg.norm(apart) @ (along_j - along_i))[None]
 
     def null(self, rows: Array) -> Array:
-        """Return an orthonormal basis of the motions that rows leave, shape (freedoms, n)."""
+        """Return an orthonormal basis of the motions left by rows, shape (freedoms, n)."""
         _, sizes, right = np.linalg.svd(rows, full_matrices=True)
         return right[int((sizes > self.weak).sum()) :]
 

@@ -19,7 +19,7 @@ _NUMBER = re.compile(r"[-+]?0*\.?0*([0-9][0-9.]*)(?:[eE][-+]?[0-9]+)?")
 
 @dataclass(frozen=True)
 class Digits:
-    """Tolerance of gaps that the digits of a file leave [m], and its origin in words."""
+    """Tolerance of gaps left by the digits of a file [m], and its origin in words."""
 
     tolerance: float
     why: str

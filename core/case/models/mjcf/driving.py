@@ -30,8 +30,8 @@ class Driving:
     Attributes:
         driven: by joint, its coordinates in the model, reference included [rad or m]; the first
             one is swept, the others follow it.
-        held: hinges and slides that keep their coordinate in the start.
-        fixed: balls, and otherwise free bodies, that keep their place.
+        held: hinges and slides with their coordinate in the start.
+        fixed: balls, and otherwise free bodies, at their place in the start.
     """
 
     driven: Mapping[str, Array]
@@ -40,7 +40,7 @@ class Driving:
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Hinges and slides that are driven, the swept one first."""
+        """Driven and held hinges and slides, the swept one first."""
         return (*self.driven, *self.held)
 
 

@@ -52,12 +52,12 @@ class Relation:
 
     @property
     def joints(self) -> set[str]:
-        """The joints that it ties to one another, or locks."""
+        """The joints it ties to one another, or locks."""
         return {*(self.weights if self.linear else (*self.driven, *self.driving))}
 
     @property
     def weights(self) -> dict[str, float]:
-        """Of a linear relation, the weights of the sum that is constant; without zeros."""
+        """Of a linear relation, the weights of the constant sum; without zeros."""
         found = dict(self.driven)
         for joint, weight in self.driving.items():
             found[joint] = found.get(joint, 0.0) - self.coefficients[1] * weight
@@ -243,7 +243,7 @@ def _tendons(root: Element) -> dict[str, Element]:
 
 
 def _coefficients(element: Element) -> tuple[float, ...]:
-    """Return five coefficients; what is left out of polycoef keeps its default."""
+    """Return five coefficients; omitted ones of polycoef have their defaults."""
     found = element.numbers("polycoef", (1, 2, 3, 4, 5), (0.0, 1.0))
     return (*found, *(0.0, 1.0, 0.0, 0.0, 0.0)[len(found) :])
 

@@ -1,4 +1,4 @@
-"""Elements that stand for others: <include> for those of a file beside, <replicate> for copies."""
+"""Elements in place of others: <include> for those of a file beside, <replicate> for copies."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Expansion:
 
     Attributes:
         root: file of the model; includes are beside it or below.
-        taken: files that were included, each of which may be once.
+        taken: included files; each may be included once.
         bytes: how many were read.
         elements: how many there are.
     """
@@ -34,8 +34,8 @@ class Expansion:
         """Return the elements in one, expanded at any depth.
 
         Raises:
-            CaseError: a file that is missing, elsewhere or taken twice, a replicate that makes no
-                sense, or too much of either.
+            CaseError: a file is missing, elsewhere or taken twice, a replicate makes no sense, or
+                there is too much of either.
         """
         if depth > DEEPEST:
             raise around.fault(

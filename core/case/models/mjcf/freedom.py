@@ -1,6 +1,6 @@
-"""Degrees of freedom of a model in its start, and what drives and holds them.
+"""Degrees of freedom of a model in its start, driven and held.
 
-They are counted by the motions that the equalities leave to the joints' coordinates, so the count
+They are counted by the motions left by the equalities to the joints' coordinates, so the count
 is the same whatever is held or driven.
 """
 
@@ -25,7 +25,7 @@ AT_REST = 1e-6
 
 
 class Freedom:
-    """The motions of a model that nothing has taken so far.
+    """The motions of a model not driven or held so far.
 
     Attributes:
         dof: their number at the beginning.
@@ -33,7 +33,7 @@ class Freedom:
     """
 
     def __init__(self, model: Assembled, spins: Mapping[str, Array]) -> None:
-        """Begin with the motions that the equalities leave, without the spins of rods.
+        """Begin with the motions left by the equalities, without the spins of rods.
 
         Args:
             spins: by ball or free joint, the axis about which its rod turns freely, shape (3,).
@@ -46,7 +46,7 @@ class Freedom:
 
     @property
     def left(self) -> int:
-        """Number of motions that are left."""
+        """Number of motions left."""
         return len(self._free)
 
     def moves(self, joint: str) -> int:
@@ -110,7 +110,7 @@ def taken(
 
 
 def _candidates(root: Element, model: Assembled, driving: Driving) -> list[tuple[str, str]]:
-    """Return the joints that can be held, with their types, the first ones first."""
+    """Return the joints to hold, with their types, the first ones first."""
     actuated = {each.attributes.get("joint") for each in root.below() if each.tag in _ACTUATORS}
     order = {"free": 0, "hinge": 1, "slide": 1, "ball": 3}
     named = [*driving.joints, *driving.fixed]
@@ -158,7 +158,7 @@ def _undriven(
 
 
 def _listed(root: Element, model: Assembled, driving: Driving, freedom: Freedom) -> str:
-    """Return the joints that can be held, completely, by their kinds."""
+    """Return the complete list of joints to hold, by their kinds."""
     loose = [
         (name, kind)
         for name, kind in _candidates(root, model, driving)

@@ -100,14 +100,14 @@ def parts_of(
 
 
 def _closure(connect: Connect, name: str) -> Joint:
-    """Return the joint of a connect or weld; what is left of its gap is divided."""
+    """Return the joint of a connect or weld; a remaining gap is divided."""
     p, q = connect.points
     kind = Spherical if connect.turns is None else Fixed
     return kind(name, connect.i, connect.j, coordinates(0.5 * (p + q) if p != q else p))
 
 
 def _locked(equalities: Sequence[Equality]) -> set[str]:
-    """Return the joints that relations lock: alone, or by others that are locked."""
+    """Return the joints locked by relations, alone or by other locked ones."""
     relations = [each for each in equalities if isinstance(each, Relation)]
     found: set[str] = set()
     while new := {

@@ -1,4 +1,4 @@
-"""A pose of a model's tree: where the coordinates of its joints put its bodies, and the slopes."""
+"""A pose of a model's tree: places of its bodies by coordinates of its joints, and slopes."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ class Pose:
         """Return the derivatives of a point of a body and of its turn by the unknowns, global.
 
         Args:
-            point: where it is now.
+            point: its present position, global [m].
 
         Returns:
             Two arrays of shape (3, unknowns).
@@ -161,7 +161,7 @@ def _motion(joint: ModelJoint, value: Value) -> Place:
 
 
 def _about(point: Vec3, turn: Quat, shift: Vec3 = ZERO) -> Place:
-    """Return the displacement that turns about a point, and then shifts."""
+    """Return a turn about a point, followed by a shift."""
     return Place(point - Place(ZERO, turn).direction(point) + shift, turn)
 
 

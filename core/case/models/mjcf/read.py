@@ -53,7 +53,7 @@ def read_mjcf(file: Path, text: str, supplied: Supplied) -> Case:
     of joints, and the rotations of bodies.
 
     Raises:
-        CaseError: not a model that can be read, or the options do not say how it moves.
+        CaseError: not a readable model, or the options do not say how it moves.
     """
     root = parse_xml(file, text)
     _require_model(root)
@@ -79,12 +79,12 @@ def read_mjcf(file: Path, text: str, supplied: Supplied) -> Case:
 
 
 def _digits(root: Element, size: float, closure: float | None) -> Digits:
-    """Return the tolerance that the user gave, or that of the file."""
+    """Return the user's tolerance, or the file's own."""
     return digits_of(root, size) if closure is None else Digits(closure, "--closure")
 
 
 def _case(file: Path, root: Element, model: Assembled, driving: Driving, parts: Parts) -> Case:
-    """Return the case of the parts, without rows that are redundant within the digits."""
+    """Return the case of the parts, without rows redundant within the digits."""
     tree, digits = model.tree, model.digits
     points = _points(tree, parts)
     bodies = [
@@ -103,8 +103,11 @@ def _case(file: Path, root: Element, model: Assembled, driving: Driving, parts: 
     )
     sweep = _sweep(tree, driving)
     case = Case(file.stem, source, Truth.CONSENSUS_ONLY, mechanism, sweep, (), assembly=model.notes)
-    case = within_digits(case, digits.tolerance, digits.why, [*tree.joints])
-    if (dof := degrees_of_freedom(case.mechanism)) != len(drivers):
+    dof = degrees_of_freedom(mechanism)
+    if dof != len(drivers) or not model.exact:
+        case = within_digits(case, digits.tolerance, digits.why, [*tree.joints])
+        dof = degrees_of_freedom(case.mechanism)
+    if dof != len(drivers):
         raise fault(
             file,
             "",
@@ -129,7 +132,7 @@ def _sweep(tree: Tree, driving: Driving) -> Sweep:
 
 
 def _require_model(root: Element) -> None:
-    """Refuse what is no model, or stands for parts that are elsewhere."""
+    """Refuse other documents, and elements in place of parts elsewhere."""
     if root.tag != "mujoco":
         raise root.fault("found another document, expected a model <mujoco>; give an MJCF file")
     for element in root.children:
@@ -150,7 +153,7 @@ def _driver(parts: Parts, joint: str) -> JointDriver:
 
 
 def _points(tree: Tree, parts: Parts) -> list[Point]:
-    """The origins of the bodies of the file that move, and the sites on them."""
+    """The origins of the moving bodies of the file, and the sites on them."""
     moving = [name for name in parts.bodies if name not in parts.fixed]
     points = [
         Point(name, name, coordinates(parts.bodies[name].at))

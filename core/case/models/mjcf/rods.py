@@ -1,4 +1,4 @@
-"""Rods between two balls: bodies of a model that turn about themselves, which nothing drives."""
+"""Rods between two balls: bodies of a model with a turn about themselves, driven by nothing."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ON_LINE = 1e-9
 
 @dataclass(frozen=True)
 class End:
-    """A point on a body that is held there, and leaves the body its turning.
+    """A point of a body held there, but free to turn.
 
     Attributes:
         other: body it is held by.
@@ -36,11 +36,11 @@ class End:
 
 @dataclass(frozen=True)
 class Spin:
-    """A body that turns freely about a line.
+    """A body with a free turn about a line.
 
     Attributes:
-        joint: ball or free joint that carries it.
-        ends: where it is held, two of them apart.
+        joint: its ball or free joint.
+        ends: its held points, two of them apart.
         is_rod: whether it can be left out for a distance between the bodies at its ends.
     """
 
@@ -67,7 +67,7 @@ class Spin:
         return Distance(self.joint.name, first.other, second.other, points)
 
     def lock(self, name: str) -> PerpendicularAxes:
-        """Return a joint that keeps the body from turning about the line, against its first end."""
+        """Return a joint against the turn about the line, with the body of the first end."""
         f, g, _ = triad(coordinates(self.arm))
         return PerpendicularAxes(
             name, self.ends[0].other, self.joint.inner, (coordinates(f), coordinates(g))
@@ -75,10 +75,10 @@ class Spin:
 
 
 def spins(tree: Tree, equalities: Sequence[Equality], fixed: Collection[str]) -> Mapping[str, Spin]:
-    """Return the bodies that turn about a line, by their joints' names.
+    """Return the bodies free to turn about a line, by their joints' names.
 
     Args:
-        fixed: joints and bodies that are held.
+        fixed: held joints and bodies.
     """
     ends = _ends(tree, equalities)
     found: dict[str, Spin] = {}
@@ -108,7 +108,7 @@ def spins(tree: Tree, equalities: Sequence[Equality], fixed: Collection[str]) ->
 
 
 def _ends(tree: Tree, equalities: Sequence[Equality]) -> dict[str, list[End] | None]:
-    """Return where each body is held; None if something keeps it from turning."""
+    """Return the held points of each body; None if something keeps it from turning."""
     found: dict[str, list[End] | None] = {name: [] for name in tree.moving}
 
     def hold(body: str, end: End | None) -> None:

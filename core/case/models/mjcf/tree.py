@@ -55,15 +55,15 @@ class ModelJoint:
 
 @dataclass
 class Tree:
-    """What a model's worldbody holds.
+    """Content of a model's worldbody.
 
     Attributes:
         places: of all bodies of the file, global.
         carriers: by body of the file, the body of the mechanism it belongs to.
-        moving: bodies of the mechanism that move, with their places; the massless ones of chains
+        moving: moving bodies of the mechanism, with their places; the massless ones of chains
             too.
         massless: the names of those.
-        free: by name, of the joint or of its body, bodies that no joint holds.
+        free: by name, of the joint or of its body, bodies held by no joint.
         chain: all joints, free ones too, in the order of MuJoCo's coordinates: outer ones first.
         sites: by name, the body of the mechanism they are on, and their global places.
         names: of all bodies of the file that have one.
