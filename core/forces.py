@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,3 +80,30 @@ class Forces:
     power: Array
     largest_power: Array
     message: str = ""
+
+    def account(self) -> dict[str, Any]:
+        """Return facts for the record: the power missing, as a part of the largest, and the joints
+        whose reaction is not wholly determined, with the determined directions.
+        """
+        known = np.isfinite(self.power)
+        largest = float(self.largest_power[known].max(initial=0.0))
+        missing = float(np.abs(self.power[known]).max(initial=0.0))
+        counts = {name: each.determined() for name, each in self.joints.items()}
+        return {
+            "power_missing": missing / largest if largest else 0.0,
+            "determined_directions": {
+                name: {"force": force, "moment": moment, "wrench": wrench}
+                for name, (force, moment, wrench) in counts.items()
+                if wrench < 6
+            },
+        }
+
+
+def no_forces_at(times: Array) -> str:
+    """Return the message on samples at singular poses, by their times [s]; empty for none."""
+    if not times.size:
+        return ""
+    return (
+        f"no forces at {times.size} samples, the first at time {float(times[0]):.9g}: the pose is"
+        " singular, and rigid bodies determine no finite force there; leave these samples out"
+    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Protocol
@@ -9,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ...core.trajectory import Array
-from .frame_constraints import Frame
+from .frame_constraints import Condition, Frame
 
 
 class Coordinates(Protocol):
@@ -28,9 +29,11 @@ class BodyFrame:
     """A frame of a body as the simulator last reported it; see `frame_constraints.Frame`.
 
     Attributes:
+        body: number of the body.
         handle: of the simulator; None for a frame of the ground, which never moves.
     """
 
+    body: int
     handle: Any
     position: Array
     rotation: Array = field(default_factory=lambda: np.eye(3))
@@ -82,3 +85,17 @@ class DrivenPoint:
 
     def bias(self) -> Any:
         return self.k @ self.frame.acceleration[:3]
+
+
+def by_frame(condition: Condition, frames: Sequence[BodyFrame]) -> list[Array]:
+    """Return the derivative of a condition's rows by the twist of each of its frames at the frame's
+    point, each of shape (rows, 6): what multipliers of one exert there.
+    """
+    kept, found = [frame.jacobian for frame in frames], list[Array]()
+    for moved in frames:
+        for frame in frames:
+            frame.jacobian = np.eye(6) if frame is moved else np.zeros((6, 6))
+        found.append(np.atleast_2d(condition.rows()[1]))
+    for frame, jacobian in zip(frames, kept, strict=True):
+        frame.jacobian = jacobian
+    return found

@@ -149,13 +149,10 @@ class ForceRows:
     def _arm(self, joint: Joint, body: str) -> Array:
         """Return the arm from a body's internal origin to the joint's point [units], (n, 3).
 
-        The point is the one that the second body carries; that body's origin where there is none.
+        The point is the one that the second body carries.
         """
         lanes = self.lanes
-        position = next(
-            iter(joint.points_on(joint.j)),
-            lanes.mechanism.body(joint.j).origin if joint.j in self.formulation.columns else None,
-        ) or (0.0, 0.0, 0.0)
+        position = lanes.mechanism.reaction_point(joint)
         held = lanes.poses.get(joint.j, GROUND_POSE)
         origins, seen = lanes.frame.origins, lanes.poses.get(body, GROUND_POSE)
         carried = held.u + held.swing(lanes.frame.arm(joint.j, position)) - seen.u

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SolveError, unknown
-from ...forces import Forces, Reaction
+from ...forces import Forces, Reaction, no_forces_at
 from ...joints.base import Joint
 from ...mechanism.drivers import Driver
 from ...mechanism.mechanism import Mechanism
@@ -49,26 +49,10 @@ def with_forces(
         motion.iterations,
         motion.residual,
         "; ".join(filter(None, (motion.message, found.message))),
-        {**motion.details, "forces": _account(found)},
+        {**motion.details, "forces": found.account()},
         {name: motion.bodies[name] for name in bodies},
         found,
     )
-
-
-def _account(found: Forces) -> dict[str, Any]:
-    """Return the facts of the forces for the record."""
-    known = np.isfinite(found.power)
-    largest = float(found.largest_power[known].max(initial=0.0))
-    missing = float(np.abs(found.power[known]).max(initial=0.0))
-    counts = {name: each.determined() for name, each in found.joints.items()}
-    return {
-        "power_missing": missing / largest if largest else 0.0,
-        "determined_directions": {
-            name: {"force": force, "moment": moment, "wrench": wrench}
-            for name, (force, moment, wrench) in counts.items()
-            if wrench < 6
-        },
-    }
 
 
 def forces_of(
@@ -107,7 +91,7 @@ def forces_of(
         {name: spread(elements[name], ill=False) for name in wanted.elements},
         spread(power),
         spread(largest),
-        _said(singular, lanes.times),
+        no_forces_at(lanes.times[singular]),
     )
 
 
@@ -147,13 +131,3 @@ class _Spread:
         shown = np.where(keep.reshape(-1, *(1,) * (values.ndim - 1)), values, np.nan)
         found[self.solved] = shown
         return found
-
-
-def _said(singular: Lanes, times: Array) -> str:
-    if not singular.any():
-        return ""
-    at = float(times[int(np.flatnonzero(singular)[0])])
-    return (
-        f"no forces at {int(singular.sum())} samples, the first at time {at:.9g}: the pose is"
-        " singular, and rigid bodies determine no finite force there; leave these samples out"
-    )
