@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from ...core.mechanism.loads import (
 )
 from ...core.mechanism.mechanism import Mechanism, Vector
 from ...core.trajectory import Array
-from .frame_constraints import Frame
+from .frame_constraints import FrameOnBody
 
 
 def places(each: ForceElement, mechanism: Mechanism) -> Sequence[tuple[str, Vector]]:
@@ -37,13 +37,6 @@ def places(each: ForceElement, mechanism: Mechanism) -> Sequence[tuple[str, Vect
     assert isinstance(each, Torque)
     body = each.body
     return [(body, (0.0, 0.0, 0.0) if mechanism.is_fixed(body) else mechanism.body(body).origin)]
-
-
-class FrameOnBody(Frame, Protocol):
-    """A frame that tells the number of its body."""
-
-    @property
-    def body(self) -> int: ...
 
 
 @dataclass(frozen=True, eq=False)

@@ -129,5 +129,5 @@ def _solve(J: Array, demand: Array) -> _Solved:
     u, sizes, vh = np.linalg.svd(J, full_matrices=True)
     if rows < unknowns or sizes[-1] <= RANK_TOLERANCE * sizes[0]:
         return _Solved(np.full(rows, np.nan), np.zeros((rows, 0)), True)
-    multipliers, null = np.asarray(u[:, :unknowns] @ ((vh @ demand) / sizes)), u[:, unknowns:]
-    return _Solved(multipliers, null, False)
+    multipliers = np.asarray(u[:, :unknowns] @ ((vh @ demand) / sizes), dtype=np.float64)
+    return _Solved(multipliers, u[:, unknowns:], False)

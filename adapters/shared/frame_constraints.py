@@ -64,6 +64,13 @@ class Frame(Protocol):
         ...
 
 
+class FrameOnBody(Frame, Protocol):
+    """A frame that tells the number of its body."""
+
+    @property
+    def body(self) -> int: ...
+
+
 class Vector(Protocol):
     """A vector that moves with the mechanism."""
 

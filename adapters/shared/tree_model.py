@@ -81,9 +81,8 @@ class TreeModel(TreeSimulator):
                 cut = (*cut, branch.joint)
                 branch = Branch(GROUND, branch.child, None)
             self.carry(mechanism, branch)
-        named = self._named(mechanism)
         for joint in cut:
-            self.close(joint, ends_of(mechanism, joint), joint.name in named)
+            self.close(joint, ends_of(mechanism, joint), joint.name in self._named(mechanism))
         for coupler in mechanism.couplers:
             self.relate(coupler.terms)
         for driver in mechanism.drivers:
@@ -139,7 +138,7 @@ class TreeModel(TreeSimulator):
     def _named(self, mechanism: Mechanism) -> set[str]:
         """Return the joints whose coordinates count: driven, coupled, and of torsional springs."""
         found = {name for coupler in mechanism.couplers for name in coupler.joints}
-        found |= {driver.joint for driver in mechanism.drivers if isinstance(driver, JointDriver)}
+        found |= {each.joint for each in mechanism.drivers if isinstance(each, JointDriver)}
         springs = mechanism.forces if self.loaded else ()
         return found | {f.joint for f in springs if isinstance(f, TorsionSpringDamper)}
 
@@ -259,7 +258,6 @@ class TreeModel(TreeSimulator):
         return self.forces.dynamics(v, a)
 
     def look(self, frame: BodyFrame) -> None:
-        """Read a frame's place, Jacobian, velocity and acceleration."""
         if frame.handle is not None:
             frame.position, frame.rotation = self.placement(frame.handle)
             frame.jacobian = self.slope(frame.handle)
@@ -280,16 +278,15 @@ class TreeModel(TreeSimulator):
     def exerted(self) -> list[RowWrench]:
         """Return what the multipliers of conditions between frames exert."""
         found = [
-            RowWrench(self._rows(condition), frame.body, frame.position, row)
+            RowWrench(self._rows(condition), frame.body, frame.position, wrenches)
             for _, condition, frames in self.tied
-            for frame, row in zip(frames, by_frame(condition, frames), strict=True)
+            for frame, wrenches in zip(frames, by_frame(condition, frames), strict=True)
         ]
-        for each in self.conditions:
-            if isinstance(each, DrivenPoint):
-                pull = np.concatenate([each.k, np.zeros(3)])[None]
-                frame: Any = each.frame
-                found.append(RowWrench(self._rows(each), frame.body, frame.position, pull))
-        return found
+        return found + [
+            RowWrench(self._rows(each), each.frame.body, each.frame.position, each.pull)
+            for each in self.conditions
+            if isinstance(each, DrivenPoint)
+        ]
 
     def coordinate_rows(self) -> dict[int, list[tuple[str, str]]]:
         """Return the rows of coordinates, and joint and freedom of each."""
@@ -299,6 +296,5 @@ class TreeModel(TreeSimulator):
         }
 
     def coordinate_weight(self, row: int, joint: str, freedom: str) -> float:
-        """Return the weight of a joint's coordinate in a row."""
         body, sign = self.coordinates[joint, freedom]
         return sign * float(self.J[row, self.coordinate(body)[1]])

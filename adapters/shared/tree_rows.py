@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ...core.trajectory import Array
-from .frame_constraints import Condition, Frame
+from .frame_constraints import Condition, FrameOnBody
 
 
 class Coordinates(Protocol):
@@ -75,10 +75,15 @@ class Linear:
 class DrivenPoint:
     """The displacement since design of a point along the fixed direction k [m]."""
 
-    frame: Frame
+    frame: FrameOnBody
     k: Array
     design: Array
     n = 1
+
+    @property
+    def pull(self) -> Array:
+        """What a multiplier of one exerts at the point, shape (1, 6)."""
+        return np.concatenate([self.k, np.zeros(3)])[None]
 
     def rows(self) -> tuple[Any, Array]:
         return self.k @ (self.frame.position - self.design), self.k @ self.frame.jacobian[:3]
