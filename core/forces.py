@@ -81,10 +81,9 @@ class Forces:
     largest_power: Array
     message: str = ""
 
-    @property
-    def facts(self) -> dict[str, Any]:
-        """The balance of power, and how many directions of force, moment and wrench are determined
-        at joints where not all are: for the record.
+    def account(self) -> dict[str, Any]:
+        """Return facts for the record: the power missing, as a part of the largest, and the joints
+        whose reaction is not wholly determined, with the determined directions.
         """
         known = np.isfinite(self.power)
         largest = float(self.largest_power[known].max(initial=0.0))
@@ -98,3 +97,13 @@ class Forces:
                 if wrench < 6
             },
         }
+
+
+def no_forces_at(times: Array) -> str:
+    """Return the message on samples at singular poses, by their times [s]; empty for none."""
+    if not times.size:
+        return ""
+    return (
+        f"no forces at {times.size} samples, the first at time {float(times[0]):.9g}: the pose is"
+        " singular, and rigid bodies determine no finite force there; leave these samples out"
+    )

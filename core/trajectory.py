@@ -153,7 +153,9 @@ class Trajectory(Tabular):
     def facts(self) -> Mapping[str, Any]:
         """The details, and the facts of the forces if there are any."""
         return (
-            self.details if self.forces is None else {"forces": self.forces.facts, **self.details}
+            self.details
+            if self.forces is None
+            else {"forces": self.forces.account(), **self.details}
         )
 
     def summary(self) -> str:

@@ -6,14 +6,17 @@ DART's own constraints live in the velocities of its time steps, and have no res
 from __future__ import annotations
 
 import importlib
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
 
 import numpy as np
 
 from ...core.case.case import Case
+from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
 from ..shared.joint_chains import Link
 from ..shared.tree_engine import TreeEngine
+from ..shared.tree_forces import NO_MASS, Mass, mass_properties
 from ..shared.tree_model import TreeModel
 
 # DART has what turns above what shifts.
@@ -32,6 +35,13 @@ class Dart(TreeEngine):
 
 class DartModel(TreeModel):
     """The tree in DART: a body node and its joint for each link, a simple frame for each frame."""
+
+    computed_by: ClassVar[Mapping[str, str]] = {
+        "inverse dynamics": "computeInverseDynamics",
+        "reactions of tree joints": "computeInverseDynamics: getBodyForce",
+        "reactions of cut joints": "rows by getWorldJacobian",
+        "force elements": "of the adapter, by frames of DART",
+    }
 
     def __init__(self, dart: Any, case: Case) -> None:
         self.parts, self.transform = dart.dynamics, dart.math.Isometry3
@@ -110,3 +120,25 @@ class DartModel(TreeModel):
             np.concatenate([frame.getLinearVelocity(), frame.getAngularVelocity()]),
             np.concatenate([frame.getLinearAcceleration(), frame.getAngularAcceleration()]),
         )
+
+    def set_loads(self, gravity: Vector, masses: Sequence[Mass]) -> None:
+        # DART warns of bodies without mass or inertia
+        for node in self.nodes[1:]:
+            node.setInertia(self.parts.Inertia(NO_MASS, np.zeros(3), NO_MASS * np.eye(3)))
+        for each in masses:
+            link: int = each.frame.body
+            mass, center, inertia = mass_properties(each.body, self.origin[link])
+            about_center = inertia if inertia.any() else NO_MASS * np.eye(3)
+            self.nodes[link].setInertia(self.parts.Inertia(mass, center, about_center))
+        self.skeleton.setGravity(np.array(gravity))
+
+    def inverse_dynamics(self, v: Array, a: Array) -> Array:
+        self.rate(v, a)
+        self.skeleton.computeInverseDynamics()
+        return np.array(self.skeleton.getForces())
+
+    def passed_on(self, body: int, point: Array) -> Array:
+        node = self.nodes[body]
+        pose = node.getWorldTransform()
+        moment, force = (pose.rotation() @ part for part in np.split(node.getBodyForce(), 2))
+        return np.concatenate([force, moment + np.cross(pose.translation() - point, force)])

@@ -9,15 +9,18 @@ from __future__ import annotations
 
 import importlib
 import importlib.metadata
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core.case.case import Case
+from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
 from ..shared.joint_chains import Link
 from ..shared.tree_engine import TreeEngine
+from ..shared.tree_forces import Mass, mass_properties
 from ..shared.tree_model import TreeModel
 
 # Drake has what turns above what shifts.
@@ -44,7 +47,18 @@ class DrakeModel(TreeModel):
     Attributes:
         turning: places of the velocities that are unknowns: all but the displacements of balls.
         balls: where in Drake's positions a ball has its quaternion.
+        inertias: of bodies, by their numbers.
     """
+
+    recursion = False
+    computed_by: ClassVar[Mapping[str, str]] = {
+        "inverse dynamics": "CalcInverseDynamics",
+        "reactions of tree joints": (
+            "Newton and Euler, of the adapter, by velocities and accelerations of Drake's bodies"
+        ),
+        "reactions of cut joints": "rows by CalcJacobianSpatialVelocity",
+        "force elements": "of the adapter, by frames of Drake",
+    }
 
     def __init__(self, case: Case) -> None:
         load = importlib.import_module
@@ -54,12 +68,15 @@ class DrakeModel(TreeModel):
         self.world, self.kind = self.plant.world_frame(), self.tree.JacobianWrtVariable.kV
         self.bodies: list[Any] = [self.plant.world_body()]
         self.joints: list[Any] = [None]  # the world has none
+        self.inertias: list[tuple[int, Any]] = []
         self.zero = np.zeros(3)
         super().__init__(case)
 
     def add_link(self, parent: int, link: Link, offset: Array) -> None:
         tree, n, axis = self.tree, len(self.bodies), np.array(link.axis)
-        inertia = tree.SpatialInertia(1.0, np.zeros(3), tree.UnitInertia(1.0, 1.0, 1.0))
+        # without forces masses play no part, but Drake asks for them
+        whole = tree.SpatialInertia(1.0, np.zeros(3), tree.UnitInertia(1.0, 1.0, 1.0))
+        inertia = tree.SpatialInertia.Zero() if self.loaded else whole
         body = self.plant.AddRigidBody(f"body {n}", inertia)
         ends = f"joint {n}", self._frame(parent, offset), body.body_frame()
         match link.move:
@@ -84,6 +101,8 @@ class DrakeModel(TreeModel):
     def finish(self) -> None:
         self.plant.Finalize()
         self.context = self.plant.CreateDefaultContext()
+        for number, inertia in self.inertias:
+            self.bodies[number].SetSpatialInertiaInBodyFrame(self.context, inertia)
         balls = [joint for joint in self.joints if joint and joint.num_velocities() == 6]
         self.balls = [slice(at, at + 4) for at in (each.position_start() for each in balls)]
         idle = [each.velocity_start() + k for each in balls for k in (3, 4, 5)]
@@ -142,3 +161,22 @@ class DrakeModel(TreeModel):
         ).get_coeffs()[ROWS]
         # with accelerations of the coordinates for the few output points only
         return velocity, bias + self.slope(handle) @ self.a if self.a.any() else bias
+
+    def set_loads(self, gravity: Vector, masses: Sequence[Mass]) -> None:
+        tree = self.tree
+        self.plant.mutable_gravity_field().set_gravity_vector(np.array(gravity))
+        for each in masses:
+            link: int = each.frame.body
+            mass, c, central = mass_properties(each.body, self.origin[link])
+            about_origin = central / mass + (c @ c) * np.eye(3) - np.outer(c, c)
+            entries = about_origin[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+            # bodies are checked already, with an allowance for the digits of tables
+            whole = tree.SpatialInertia(mass, c, tree.UnitInertia(*entries), True)
+            self.inertias.append((link, whole))
+
+    def inverse_dynamics(self, v: Array, a: Array) -> Array:
+        self.rate(v, a)
+        forces = self.tree.MultibodyForces(self.plant)
+        self.plant.CalcForceElementsContribution(self.context, forces)  # of gravity
+        found = self.plant.CalcInverseDynamics(self.context, self.full(a), forces)
+        return np.array(found)[self.turning]

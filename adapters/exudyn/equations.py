@@ -19,9 +19,10 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from ...core import joints
-from ...core.mechanism.mechanism import GROUND, Mechanism
+from ...core.mechanism.mechanism import GROUND, Body, Mechanism
 from ...core.trajectory import Array
 from ..shared.poses import frame_along, middle
+from ..shared.tree_forces import mass_properties
 
 # Constrained axes of a generic joint.
 X, Y, Z, ABOUT_X, ABOUT_Y, ABOUT_Z = range(6)
@@ -60,7 +61,8 @@ class Equations:
         values: the number of drivers and further unknowns.
     """
 
-    def __init__(self, mbs: Any, items: Any, mechanism: Mechanism) -> None:
+    def __init__(self, mbs: Any, items: Any, mechanism: Mechanism, *, loaded: bool = False) -> None:
+        self.loaded = loaded
         self.mbs, self.items, self.mechanism = mbs, items, mechanism
         self.ground = int(mbs.AddObject(items.ObjectGround()))
         self.bodies = {GROUND: (self.ground, np.zeros(3))}
@@ -84,12 +86,19 @@ class Equations:
             node = self.mbs.AddNode(
                 self.items.NodeRigidBodyEP(referenceCoordinates=[*origin, *NO_ROTATION])
             )
-            # Exudyn asks for a mass and inertias; kinematics does not depend on them.
-            rigid = self.items.ObjectRigidBody(
-                mass=1.0, inertia=[1.0, 1.0, 1.0, 0.0, 0.0, 0.0], nodeNumber=node
-            )
+            rigid = self.items.ObjectRigidBody(**self._inertial(body, origin), nodeNumber=node)
             self.bodies[body.name] = int(self.mbs.AddObject(rigid)), origin
             self.nodes.append(node)
+
+    def _inertial(self, body: Body, origin: Array) -> dict[str, Any]:
+        """Return mass, centre of mass, and inertia about the node as Exudyn has them."""
+        if not self.loaded:
+            # Exudyn asks for a mass and inertias; kinematics does not depend on them.
+            return {"mass": 1.0, "inertia": [1.0, 1.0, 1.0, 0.0, 0.0, 0.0]}
+        mass, c, central = mass_properties(body, origin)
+        about_node = central + mass * ((c @ c) * np.eye(3) - np.outer(c, c))
+        entries = about_node[[0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]]
+        return {"mass": mass, "centerOfMass": c, "inertia": [*entries]}
 
     def marker(
         self, body: str, position: Sequence[float] | Array, rotation: Array | None = None

@@ -20,10 +20,12 @@ from ...core.errors import SolveError
 from ...core.harness.engine import Floor
 from ...core.trajectory import Array
 from ..shared.compiled_floor import floor_of
+from ..shared.force_solution import Dynamics
 from ..shared.length_scaling import in_own_frame
 from ..shared.projection_engine import ProjectionEngine
 from .equations import NO_ROTATION, turned
 from .joint_objects import JOINTS
+from .loads import COMPUTED_BY, Loads
 from .rows import Rows
 
 # Changes of the coordinates per step of the differences of the Jacobian, the speed being one [units
@@ -116,7 +118,10 @@ class ExudynModel:
         exu.config.printToConsole = False
         self.container: Any = exu.SystemContainer()  # owns the system and must live as long
         self.mbs: Any = self.container.AddSystem()
-        rows = Rows(self.mbs, importlib.import_module("exudyn.itemInterface"), case.mechanism)
+        items: Any = importlib.import_module("exudyn.itemInterface")
+        rows = Rows(self.mbs, items, case.mechanism, loaded=bool(case.forces))
+        kinds = exu.OutputVariableType
+        self.loads = Loads(rows, case, kinds) if case.forces else None
         self.mbs.Assemble()
 
         self.settings: Any = exu.SimulationSettings()
@@ -155,7 +160,6 @@ class ExudynModel:
         ]
         self.wanted = [(number, position - origin) for (number, origin), position in points]
         self.ground = rows.ground
-        kinds = exu.OutputVariableType
         self.rotation = kinds.RotationMatrix
         self.output_types = kinds.Position, kinds.Velocity, kinds.Acceleration
         self.details = {"rows": len(self.target)}
@@ -265,3 +269,9 @@ class ExudynModel:
             self.mbs.GetObjectOutputBody(body, kind, arm) for kind in self.output_types
         )
         return position, velocity, acceleration
+
+    computed_by = COMPUTED_BY
+
+    def dynamics(self, v: Array, a: Array) -> Dynamics:
+        assert self.loads is not None
+        return self.loads.dynamics(self, self.jacobian(), v, a)

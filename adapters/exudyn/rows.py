@@ -16,14 +16,21 @@ from .joint_objects import DRIVERS, JOINTS
 
 
 class Rows(Equations):
-    """The equations of all joints, couplers and drivers of a mechanism."""
+    """The equations of all joints, couplers and drivers of a mechanism.
 
-    def __init__(self, mbs: Any, items: Any, mechanism: Mechanism) -> None:
-        super().__init__(mbs, items, mechanism)
+    Attributes:
+        owned: the rows of each joint.
+    """
+
+    def __init__(self, mbs: Any, items: Any, mechanism: Mechanism, *, loaded: bool = False) -> None:
+        super().__init__(mbs, items, mechanism, loaded=loaded)
+        self.owned: dict[str, slice] = {}
         for joint in mechanism.joints:
+            first = len(self.rows)
             JOINTS[type(joint)](self, joint)
             for relation in joint.relations if isinstance(joint, joints.AxialJoint) else ():
                 self.relate([(joint.name, freedom, weight) for freedom, weight in relation.items()])
+            self.owned[joint.name] = slice(first, len(self.rows))
         for coupler in mechanism.couplers:
             if coupler.curve:
                 self.curve(coupler.terms, coupler.curve)

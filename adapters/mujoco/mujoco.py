@@ -15,6 +15,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -26,8 +27,10 @@ from ...core.harness.engine import Floor
 from ...core.mechanism.drivers import JointDriver, PointCoordinate
 from ...core.trajectory import Array
 from ..shared.compiled_floor import floor_of
+from ..shared.force_solution import Dynamics
 from ..shared.length_scaling import in_own_frame
 from ..shared.projection_engine import ProjectionEngine
+from .forces import COMPUTED_BY, LoadedMuJoCo
 from .spec import JOINTS, Equality, Sketch, coordinate
 
 ROWS = {"connect": 3, "weld": 6, "tendon": 1, "joint": 1}
@@ -98,6 +101,7 @@ class MuJoCoModel:
             point.name: sketch.site(sketch.bodies[point.body], point.position)
             for point in mechanism.points
         }
+        loaded = LoadedMuJoCo(mj, case, sketch) if case.forces else None
         self.mj, self.m = mj, sketch.spec.compile()
         self.d = mj.MjData(self.m)
         self.watched = [int(sites[name].id) for name in case.points]
@@ -108,6 +112,11 @@ class MuJoCoModel:
             np.arange(len(self.closures)), [ROWS[each.kind] for each in self.closures]
         )
         self.n = len(self.owner)
+        if loaded:
+            ends = np.cumsum([ROWS[each.kind] for each in self.closures]).tolist()
+            rows = [slice(a, b) for a, b in pairwise([0, *ends])]
+            loaded.bind(self.m, self.d, self.closures, rows)
+        self.loaded = loaded
         owners = [self.closures[k] for k in self.owner]
         self.tendons = [
             (row, *each.ends) for row, each in enumerate(owners) if each.kind == "tendon"
@@ -222,6 +231,12 @@ class MuJoCoModel:
             (np.array(self.d.site_xpos[site]), J @ v, J @ a + self.slope_rate(site) @ v)
             for site, J in zip(self.watched, map(self.slope, self.watched), strict=True)
         ]
+
+    computed_by = COMPUTED_BY
+
+    def dynamics(self, v: Array, a: Array) -> Dynamics:
+        assert self.loaded is not None
+        return self.loaded.dynamics(self.A, v, a)
 
     def gap(self, closure: Equality) -> Array | float:
         """Residual of an equality that MuJoCo leaves out: of a weld only between parts of one rigid

@@ -43,7 +43,12 @@ def coordinate(joint: str, name: str) -> str:
 @dataclass(frozen=True, slots=True)
 class Equality:
     """An equality constraint and the two sites it ties (their ids are known once the spec is
-    compiled); length of a tendon [m]; the joint it follows by a polynomial, and this.
+    compiled), the first on the joint's first body; length of a tendon [m].
+
+    Attributes:
+        follows, curve: the joint it follows by a polynomial, and this.
+        joint: that it closes; empty for a relation.
+        terms: joint and freedom of the coordinates that a relation ties.
     """
 
     kind: str
@@ -51,6 +56,8 @@ class Equality:
     length: float = 0.0
     follows: str = ""
     curve: tuple[float, ...] = ()
+    joint: str = ""
+    terms: tuple[tuple[str, str], ...] = ()
 
 
 class Sketch:
@@ -75,6 +82,7 @@ class Sketch:
         self.relations: list[str] = []  # what ties coordinates to one another
         # of a joint's coordinate: minus where it moves the joint's first body
         self.signs: dict[str, float] = {}
+        self.children: dict[str, str] = {}  # joint of the tree -> the body that it carries
         tree = spanning_tree(mechanism)
         for branch in tree.branches:
             body = self.bodies[branch.child] = self.body(self.bodies[branch.parent])
@@ -83,7 +91,9 @@ class Sketch:
                 # a body that turns about its middle is predicted best by a tangent
                 x, y, z = middle(mechanism, mechanism.body(branch.child)).tolist()
                 self.attach(body, free((x, y, z)))
-            elif branch.child == branch.joint.j:
+                continue
+            self.children[branch.joint.name] = branch.child
+            if branch.child == branch.joint.j:
                 self.carry(body, branch.joint, self.links(branch.joint))
             else:
                 self.carry(body, branch.joint, self.links(branch.joint)[::-1], sign=-1.0)
@@ -162,7 +172,7 @@ class Sketch:
             self.means[joint.name] = (
                 f"{kind} to an auxiliary body that carries the joint's slides and hinges"
             )
-        self.join(kind, i, j, point)
+        self.join(joint.name, kind, i, j, point)
 
     def span(self, rod: Distance, i: Any, j: Any) -> None:
         """Keep the rod's points on bodies i and j at its length."""
@@ -174,14 +184,15 @@ class Sketch:
         # the length is that at design plus a polynomial of another tendon; there is none, which
         # leaves its constant
         equality.data = [rod.rod_length - rod.design_distance, *[0.0] * (len(equality.data) - 1)]
-        self.closures.append(Equality("tendon", ends, rod.rod_length))
+        self.closures.append(Equality("tendon", ends, rod.rod_length, rod.name))
 
     def relate(self, terms: Iterable[tuple[str, str, float]]) -> None:
         """Keep the weighted sum of two coordinates (joint, freedom, weight) at zero."""
+        terms = list(terms)
         one, other, factor = dependence(
             (coordinate(joint, freedom), weight) for joint, freedom, weight in terms
         )
-        self.follow(one, other, [0.0, factor])
+        self.follow(one, other, [0.0, factor], terms)
         self.relations.append(f"joint equality: {one} = {factor:.9g} {other}")
 
     def bend(self, coupler: Coupler) -> None:
@@ -190,30 +201,42 @@ class Sketch:
         one, other = (coordinate(joint, freedom) for joint, freedom, _ in coupler.terms)
         driven, driving = (self.signs[joint] for joint in coupler.joints)
         coefficients = polynomial_in_tree(weight, coupler.curve, driven, driving)
-        self.follow(one, other, coefficients, bent=True)
+        self.follow(one, other, coefficients, coupler.terms, bent=True)
         self.relations.append(f"joint equality: {one} is a polynomial of {other}")
 
     def follow(
-        self, one: str, other: str, coefficients: Sequence[float], *, bent: bool = False
+        self,
+        one: str,
+        other: str,
+        coefficients: Sequence[float],
+        terms: Iterable[tuple[str, str, float]],
+        *,
+        bent: bool = False,
     ) -> None:
-        """Keep a coordinate at a polynomial of another, the constant first."""
+        """Keep a coordinate at a polynomial of another, the constant first.
+
+        Args:
+            terms: joint, freedom and weight of both.
+        """
+        tied = tuple((joint, freedom) for joint, freedom, _ in terms)
         equality = self.spec.add_equality(type=self.mj.mjtEq.mjEQ_JOINT, name1=one, name2=other)
         equality.objtype = self.mj.mjtObj.mjOBJ_JOINT
         data = [*coefficients, *[0.0] * len(equality.data)]
         equality.data = data[: len(equality.data)]
         self.closures.append(
-            Equality("joint", follows=other, curve=tuple(coefficients))
+            Equality("joint", follows=other, curve=tuple(coefficients), terms=tied)
             if bent
-            else Equality("joint")
+            else Equality("joint", terms=tied)
         )
 
-    def join(self, kind: str, i: Any, j: Any, position: Sequence[float]) -> None:
-        """Tie two bodies at a position. The default data stays: it holds the scale of a weld's
-        rotation rows.
+    def join(self, joint: str, kind: str, i: Any, j: Any, position: Sequence[float]) -> None:
+        """Tie two bodies of a joint at a position.
+
+        The default data stays: it holds the scale of a weld's rotation rows.
         """
         ends = self.site(i, position), self.site(j, position)
         equality = {"connect": self.mj.mjtEq.mjEQ_CONNECT, "weld": self.mj.mjtEq.mjEQ_WELD}[kind]
         self.spec.add_equality(
             type=equality, name1=ends[0].name, name2=ends[1].name, objtype=self.mj.mjtObj.mjOBJ_SITE
         )
-        self.closures.append(Equality(kind, ends))
+        self.closures.append(Equality(kind, ends, joint=joint))

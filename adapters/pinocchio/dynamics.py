@@ -120,6 +120,8 @@ class Dynamics:
 class _Model(PinocchioModel):
     """The mechanism with masses, and its loops as rigid constraints."""
 
+    gives_forces = False
+
     def __init__(self, pin: Any, case: Case, steps: int) -> None:
         self.loops: list[tuple[Any, int, int, Vector]] = []
         self.hung: dict[str, tuple[int, Vector, type[Joint]]] = {}

@@ -10,14 +10,17 @@ classical acceleration of a frame. `loop_closures` makes the rows of any joint o
 from __future__ import annotations
 
 import importlib
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
 
 import numpy as np
 
 from ...core.case.case import Case
+from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
 from ..shared.joint_chains import Link
 from ..shared.tree_engine import TreeEngine
+from ..shared.tree_forces import Mass, mass_properties
 from ..shared.tree_model import TreeModel
 
 
@@ -40,6 +43,13 @@ class Pinocchio(TreeEngine):
 
 class PinocchioModel(TreeModel):
     """The tree in Pinocchio: a joint for each link, an operational frame for each frame."""
+
+    computed_by: ClassVar[Mapping[str, str]] = {
+        "inverse dynamics": "rnea",
+        "reactions of tree joints": "rnea: data.f",
+        "reactions of cut joints": "rows by getFrameJacobian",
+        "force elements": "of the adapter, by frames of Pinocchio",
+    }
 
     def __init__(self, pin: Any, case: Case) -> None:
         self.pin, self.model, self.axes = pin, pin.Model(), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
@@ -102,3 +112,19 @@ class PinocchioModel(TreeModel):
             self.pin.getFrameVelocity(*given).vector,
             self.pin.getFrameClassicalAcceleration(*given).vector,
         )
+
+    def set_loads(self, gravity: Vector, masses: Sequence[Mass]) -> None:
+        pin, at_origin = self.pin, self.pin.SE3.Identity()
+        for each in masses:
+            link: int = each.frame.body
+            inertia = pin.Inertia(*mass_properties(each.body, self.origin[link]))
+            self.model.appendBodyToJoint(link, inertia, at_origin)
+        self.model.gravity.linear = np.array(gravity)
+
+    def inverse_dynamics(self, v: Array, a: Array) -> Array:
+        self.rate(v, a)
+        return np.array(self.pin.rnea(self.model, self.data, self.q, v, a))
+
+    def passed_on(self, body: int, point: Array) -> Array:
+        wrench = self.data.oMi[body].act(self.data.f[body])
+        return np.concatenate([wrench.linear, wrench.angular - np.cross(point, wrench.linear)])

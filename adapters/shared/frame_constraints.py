@@ -64,6 +64,13 @@ class Frame(Protocol):
         ...
 
 
+class FrameOnBody(Frame, Protocol):
+    """A frame that tells the number of its body."""
+
+    @property
+    def body(self) -> int: ...
+
+
 class Vector(Protocol):
     """A vector that moves with the mechanism."""
 
@@ -100,13 +107,13 @@ class Direction:
 
     def placed(self) -> tuple[Array, Array]:
         x = self.frame.rotation @ self.a0
-        return x, -_skew(x) @ self.frame.jacobian[3:]
+        return x, -skew(x) @ self.frame.jacobian[3:]
 
     def moving(self) -> tuple[Array, Array, Array]:
         x, w, alpha = (
             self.frame.rotation @ self.a0,
-            _skew(self.frame.velocity[3:]),
-            _skew(self.frame.acceleration[3:]),
+            skew(self.frame.velocity[3:]),
+            skew(self.frame.acceleration[3:]),
         )
         return x, w @ x, alpha @ x + w @ (w @ x)
 
@@ -228,7 +235,7 @@ class Thread:
         return self.slide.bias() - self.p * (h @ (self.j.acceleration - self.i.acceleration)[3:])
 
 
-def _skew(a: Array) -> Array:
+def skew(a: Array) -> Array:
     """Return the matrix of the vector product a × , shape (3, 3)."""
     x, y, z = a.tolist()
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

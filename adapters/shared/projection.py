@@ -28,6 +28,7 @@ from ...core.kinematics import (
 from ...core.mechanism.drivers import Driver
 from ...core.mechanism.motions import Path, outwards
 from ...core.trajectory import PointMotion, Trajectory, largest_found
+from .force_solution import ForceModel, solved_forces
 from .length_scaling import GLOBAL, OwnFrame
 from .pose_solver import LOST, STUCK, PoseSolver, Sample
 from .projection_model import ProjectionModel
@@ -188,6 +189,7 @@ class Walk(PoseSolver):
         times, n = path.times, len(path.times)
         motion = np.full((3, n, len(points), 3), np.nan)
         iterations, residual = np.zeros(n, dtype=np.int64), np.zeros(n)
+        samples = dict[int, Sample]()
         solved, messages = np.zeros(n, dtype=np.bool_), list[str]()
         origin, message = self.start(path, begin)
         if origin is None:
@@ -205,6 +207,7 @@ class Walk(PoseSolver):
                     last = float(times[k])
                     motion[:, k] = at.rows
                     iterations[k], residual[k], solved[k] = at.iterations, at.residual, True
+                    samples[int(k)] = at
         unit = self.frame.unit
         position, velocity, acceleration = (
             self.frame.back(motion[0]),
@@ -223,6 +226,11 @@ class Walk(PoseSolver):
             "origin": [*self.frame.origin],
             **details,
         }
+        forces = None
+        if self.case.forces and isinstance(self.model, ForceModel):
+            forces = solved_forces(self.model, self.case, samples, unit)
+            messages += filter(None, [forces.message])
+            facts["forces"] = {**forces.account(), "computed_by": dict(self.model.computed_by)}
         return Trajectory(
             moves,
             solved,
@@ -230,4 +238,5 @@ class Walk(PoseSolver):
             largest_found(unit * residual[solved]),
             "; ".join(messages),
             facts,
+            forces=forces,
         )

@@ -87,11 +87,12 @@ class ProjectionEngine(ABC):
         """
         own = in_own_frame(case)
         # The model has no names: numbers of another mechanism would be taken for those of this one.
-        if (own.mechanism, own.points) != (model.case.mechanism, model.case.points):
+        built = model.case
+        if (own.mechanism, own.points, own.forces) != (built.mechanism, built.points, built.forces):
             raise SolveError(
                 f"case {case.name!r}: this model of {self.title} was built for another mechanism,"
-                f" other points or another length of the sweep (case {model.case.name!r}); build a"
-                " model for this case"
+                f" other points, other forces or another length of the sweep (case {built.name!r});"
+                " build a model for this case"
             )
         return solve_by_projection(
             model, case, tol, model.details, self.corrections, own_frame(case)

@@ -13,9 +13,8 @@ simulator's data, which `placement`, `slope` and `motion` read, frame by frame.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -24,49 +23,63 @@ from ...core.case.case import Case
 from ...core.joints import Fixed, Joint
 from ...core.joints.base import unit
 from ...core.mechanism.drivers import JointDriver, PointCoordinate
+from ...core.mechanism.loads import TorsionSpringDamper
 from ...core.mechanism.mechanism import GROUND, Mechanism, Vector
 from ...core.mechanism.topology import Branch, SpanningTree, spanning_tree
 from ...core.trajectory import Array
+from .force_solution import Dynamics
 from .frame_constraints import Condition
 from .joint_chains import CHAINS, Link, free, relations
 from .loop_closures import CLOSURES, ends_of
 from .poses import middle
-from .tree_rows import BodyFrame, Curved, DrivenPoint, Linear
+from .tree_forces import TreeForces
+from .tree_reactions import RowWrench
+from .tree_rows import BodyFrame, Curved, DrivenPoint, Linear, Terms, by_frame
+from .tree_simulator import TreeSimulator
 
 
-class TreeModel(ABC):
+class TreeModel(TreeSimulator):
     """The mechanism in a simulator; a `ProjectionModel`. Rows: those of joints, then of couplers,
     then one a driver.
 
     Attributes:
-        q: the configuration, never changed in place.
-        v: the velocity last set.
         origin: of each body, global at design [m].
         carrier: name of a body of the mechanism -> number of its body here.
         coordinates: joint and freedom -> body that moves by this coordinate, and its sign.
         conditions: all rows, the drivers' last.
         closures: name of a cut joint -> its rows, in words.
+        parents: number of the body that carries each body; the ground carries itself.
+        branch_of: joint of the tree -> number of the body that it carries, and minus where that is
+            the joint's first.
+        tied: conditions between frames, their joint and the frames.
+        related: rows of coordinates, and joint, freedom and weight of the terms.
+        forces: None unless outputs of the case read forces.
     """
 
-    q: Array
-    v: Array
+    gives_forces: ClassVar[bool] = True
 
     def __init__(self, case: Case) -> None:
         self.case = case
         mechanism, tree = case.mechanism, spanning_tree(case.mechanism)
-        fixed = (GROUND, *(body.name for body in mechanism.bodies if body.fixed))
-        self.carrier = dict.fromkeys(fixed, 0)
+        self.carrier = {GROUND: 0} | {body.name: 0 for body in mechanism.bodies if body.fixed}
         self.origin = [np.zeros(3)]
         self.coordinates: dict[tuple[str, str], tuple[int, int]] = {}
         self.conditions: list[Condition] = []
         self.closures: dict[str, str] = {}
         self.frames: list[BodyFrame] = []
+        self.parents = [0]
+        self.branch_of: dict[str, tuple[int, int]] = {}
+        self.tied: list[tuple[str, Condition, tuple[BodyFrame, BodyFrame]]] = []
+        self.related: list[tuple[Condition, Terms]] = []
+        self.loaded = self.gives_forces and bool(case.forces)
+        cut = tree.cut
         for branch in self.branches(mechanism, tree):
+            if self.loaded and isinstance(branch.joint, Fixed):  # see `tree_forces`
+                cut = (*cut, branch.joint)
+                branch = Branch(GROUND, branch.child, None)
             self.carry(mechanism, branch)
-        named = {name for coupler in mechanism.couplers for name in coupler.joints}
-        named |= {driver.joint for driver in mechanism.drivers if isinstance(driver, JointDriver)}
-        for joint in tree.cut:
-            self.close(joint, ends_of(mechanism, joint), joint.name in named)
+        for joint in cut:
+            self.close(joint, ends_of(mechanism, joint), joint.name in self._named(mechanism))
         for coupler in mechanism.couplers:
             self.relate(coupler.terms, coupler.curve)
         for driver in mechanism.drivers:
@@ -77,8 +90,13 @@ class TreeModel(ABC):
             elif isinstance(driver, JointDriver):
                 self.relate([(driver.joint, driver.freedom, 1.0)])
         conditioned = len(self.frames)
-        wanted = [mechanism.point(name) for name in case.points]
-        self.wanted = [self.add_frame(self.carrier[each.body], each.position) for each in wanted]
+        self.forces = TreeForces(self) if self.loaded else None
+        if self.forces:
+            self.set_loads(mechanism.gravity, self.forces.masses)
+        self.wanted = [
+            self.add_frame(self.carrier[each.body], each.position)
+            for each in map(mechanism.point, case.points)
+        ]
         self.finish()
         for frame in self.frames:
             frame.jacobian = np.zeros((6, self.unknowns))
@@ -90,67 +108,6 @@ class TreeModel(ABC):
         self.J = np.zeros((ends[-1], self.unknowns))
         self.columns = np.eye(ends[-1])[:, ends[-1] - len(mechanism.drivers) :]
         self.reset()
-
-    # what a simulator gives
-
-    @abstractmethod
-    def add_link(self, parent: int, link: Link, offset: Array) -> None:
-        """Add a body that moves by a link against its parent, at an offset from its origin [m]."""
-
-    @abstractmethod
-    def make_frame(self, body: int, offset: Array) -> Any:
-        """Return a handle of a frame of a body other than the ground, at an offset from its origin
-        [m].
-        """
-
-    @abstractmethod
-    def finish(self) -> None:
-        """Make the model ready to be solved: no link and no frame follows."""
-
-    @property
-    @abstractmethod
-    def unknowns(self) -> int:
-        """The number of velocities."""
-
-    @abstractmethod
-    def coordinate(self, body: int) -> tuple[int, int]:
-        """Return the places of a slide's or hinge's coordinate in q and in v."""
-
-    @abstractmethod
-    def design(self) -> Array:
-        """Return the configuration at design: of slides and hinges, zero."""
-
-    @abstractmethod
-    def moved(self, dx: Array) -> Array:
-        """Return the configuration q advanced by dx, shape (unknowns,)."""
-
-    @abstractmethod
-    def place(self) -> None:
-        """Update the simulator's poses and Jacobians to q."""
-
-    @abstractmethod
-    def rate(self, v: Array, a: Array) -> None:
-        """Update the simulator's velocities and accelerations to v and a, at the q last placed."""
-
-    @abstractmethod
-    def placement(self, handle: Any) -> tuple[Array, Array]:
-        """Return the position of a frame [m], shape (3,), and the rotation since design, shape
-        (3, 3).
-        """
-
-    @abstractmethod
-    def slope(self, handle: Any) -> Array:
-        """Return the Jacobian of a frame's point over that of its rotation, global axes, shape
-        (6, unknowns).
-        """
-
-    @abstractmethod
-    def motion(self, handle: Any) -> tuple[Array, Array]:
-        """Return velocity and acceleration of a frame's point, over the angular ones, global axes,
-        each of shape (6,).
-
-        With no accelerations of the coordinates, the acceleration is Jdot v.
-        """
 
     # what a simulator may do in another way
 
@@ -170,9 +127,19 @@ class TreeModel(ABC):
             i, closure = self.add_joint(i, joint, ends[0], 1), CLOSURES[Fixed]
             copied = f"on a copy of {joint.j!r}: "
         self.closures[joint.name] = copied + closure.text
-        self.conditions += closure.conditions(joint, *map(self.add_frame, (i, j), ends))
+        i_frame, j_frame = map(self.add_frame, (i, j), ends)
+        conditions = closure.conditions(joint, i_frame, j_frame)
+        self.conditions += conditions
+        self.tied += [(joint.name, each, (i_frame, j_frame)) for each in conditions]
 
     # the base's own
+
+    def _named(self, mechanism: Mechanism) -> set[str]:
+        """Return the joints whose coordinates count: driven, coupled, and of torsional springs."""
+        found = {name for coupler in mechanism.couplers for name in coupler.joints}
+        found |= {each.joint for each in mechanism.drivers if isinstance(each, JointDriver)}
+        springs = mechanism.forces if self.loaded else ()
+        return found | {f.joint for f in springs if isinstance(f, TorsionSpringDamper)}
 
     def bodies_of(self, joint: Joint) -> tuple[int, int]:
         """Return the numbers of a joint's first and second body."""
@@ -189,6 +156,7 @@ class TreeModel(ABC):
             sign = 1 if joint.j == branch.child else -1
             P = ends_of(mechanism, joint)[0]
             self.carrier[branch.child] = self.add_joint(at, joint, P, sign)
+            self.branch_of[joint.name] = self.carrier[branch.child], sign
 
     def add_joint(self, at: int, joint: Joint, P: Vector, sign: int) -> int:
         """Add the links and the relations of a joint on a body; return the number of the last body.
@@ -204,6 +172,7 @@ class TreeModel(ABC):
         """Add links in the order of the sign; return the number of the last body."""
         for link in links[::sign]:
             self.add_link(at, link, np.array(link.point) - self.origin[at])
+            self.parents.append(at)
             at = len(self.origin)
             self.origin.append(np.array(link.point))
             if link.name:
@@ -213,10 +182,10 @@ class TreeModel(ABC):
     def add_frame(self, body: int, at: Vector) -> BodyFrame:
         """Add a frame to a body, at a point, global at design [m]."""
         handle = self.make_frame(body, np.array(at) - self.origin[body]) if body else None
-        self.frames.append(BodyFrame(handle, np.array(at)))
+        self.frames.append(BodyFrame(body, handle, np.array(at)))
         return self.frames[-1]
 
-    def relate(self, terms: Iterable[tuple[str, str, float]], curve: Sequence[float] = ()) -> None:
+    def relate(self, terms: Terms, curve: Sequence[float] = ()) -> None:
         """Add the row of a weighted sum of coordinates: joint, freedom and weight of its terms.
 
         Args:
@@ -226,6 +195,7 @@ class TreeModel(ABC):
         weights = np.array([sign * weight for _, sign, weight in moved])
         row = Linear(self, [body for body, _, _ in moved], weights)
         self.conditions.append(Curved(row, Polynomial(curve), moved[-1][1]) if curve else row)
+        self.related.append((self.conditions[-1], terms))
 
     @property
     def details(self) -> Mapping[str, Any]:
@@ -285,3 +255,45 @@ class TreeModel(ABC):
                 frame.position, frame.rotation = self.placement(frame.handle)
                 frame.velocity, frame.acceleration = self.motion(frame.handle)
         return [(each.position, each.velocity[:3], each.acceleration[:3]) for each in self.wanted]
+
+    # forces; see `tree_forces.LoadedTree`
+
+    def dynamics(self, v: Array, a: Array) -> Dynamics:
+        assert self.forces is not None
+        return self.forces.dynamics(v, a)
+
+    def angle(self, joint: str) -> float:
+        """Return a joint's angle [rad], zero at design."""
+        body, sign = self.coordinates[joint, "rotation"]
+        return sign * float(self.q[self.coordinate(body)[0]])
+
+    def rows_of(self, joint: str) -> list[slice]:
+        """Return the rows of a cut joint."""
+        return [self._rows(each) for name, each, _ in self.tied if name == joint]
+
+    def _rows(self, condition: Condition) -> slice:
+        return self.slices[self.conditions.index(condition)]
+
+    def exerted(self) -> list[RowWrench]:
+        """Return what the multipliers of conditions between frames exert."""
+        found = [
+            RowWrench(self._rows(condition), frame.body, frame.position, wrenches)
+            for _, condition, frames in self.tied
+            for frame, wrenches in zip(frames, by_frame(condition, frames), strict=True)
+        ]
+        return found + [
+            RowWrench(self._rows(each), each.frame.body, each.frame.position, each.pull)
+            for each in self.conditions
+            if isinstance(each, DrivenPoint)
+        ]
+
+    def coordinate_rows(self) -> dict[int, list[tuple[str, str]]]:
+        """Return the rows of coordinates, and joint and freedom of each."""
+        return {
+            self._rows(row).start: [(joint, freedom) for joint, freedom, _ in terms]
+            for row, terms in self.related
+        }
+
+    def coordinate_weight(self, row: int, joint: str, freedom: str) -> float:
+        body, sign = self.coordinates[joint, freedom]
+        return sign * float(self.J[row, self.coordinate(body)[1]])

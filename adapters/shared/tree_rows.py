@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
 from ...core.trajectory import Array
-from .frame_constraints import Frame
+from .frame_constraints import Condition, FrameOnBody
+
+Terms: TypeAlias = Sequence[tuple[str, str, float]]
+"""Joint, freedom and weight of coordinates in a sum."""
 
 
 class Coordinates(Protocol):
@@ -31,9 +35,11 @@ class BodyFrame:
     """A frame of a body as the simulator last reported it; see `frame_constraints.Frame`.
 
     Attributes:
+        body: number of the body.
         handle: of the simulator; None for a frame of the ground, which never moves.
     """
 
+    body: int
     handle: Any
     position: Array
     rotation: Array = field(default_factory=lambda: np.eye(3))
@@ -106,13 +112,32 @@ class Curved:
 class DrivenPoint:
     """The displacement since design of a point along the fixed direction k [m]."""
 
-    frame: Frame
+    frame: FrameOnBody
     k: Array
     design: Array
     n = 1
+
+    @property
+    def pull(self) -> Array:
+        """What a multiplier of one exerts at the point, shape (1, 6)."""
+        return np.concatenate([self.k, np.zeros(3)])[None]
 
     def rows(self) -> tuple[Any, Array]:
         return self.k @ (self.frame.position - self.design), self.k @ self.frame.jacobian[:3]
 
     def bias(self) -> Any:
         return self.k @ self.frame.acceleration[:3]
+
+
+def by_frame(condition: Condition, frames: Sequence[BodyFrame]) -> list[Array]:
+    """Return the derivative of a condition's rows by the twist of each of its frames at the frame's
+    point, each of shape (rows, 6): what multipliers of one exert there.
+    """
+    kept, found = [frame.jacobian for frame in frames], list[Array]()
+    for moved in frames:
+        for frame in frames:
+            frame.jacobian = np.eye(6) if frame is moved else np.zeros((6, 6))
+        found.append(np.atleast_2d(condition.rows()[1]))
+    for frame, jacobian in zip(frames, kept, strict=True):
+        frame.jacobian = jacobian
+    return found

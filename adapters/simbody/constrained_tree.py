@@ -9,7 +9,6 @@ a name with a blank. Its limits of coordinates play no part: they act on its for
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from math import atan2, hypot
 from typing import Any
 
 import numpy as np
@@ -21,7 +20,9 @@ from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
 from ..shared.joint_chains import CHAINS, Link, dependence, end_of_loop, relations
 from ..shared.opensim_frames import orientation
+from ..shared.tree_forces import NO_MASS
 from ..shared.tree_model import TreeModel
+from ..shared.tree_rows import Terms
 
 NO_TURN = (0.0, 0.0, 0.0)
 
@@ -35,12 +36,15 @@ class ConstrainedTree(TreeModel):
         model: OpenSim's model, which owns all the rest.
         bodies: of OpenSim, by their numbers; the first is the ground.
         moves: joint of OpenSim that carries each body after the ground.
+        constraints: what each of OpenSim's constraints keeps: the name of a cut joint, or joint and
+            freedom of the coordinates of a relation.
     """
 
     def __init__(self, o: Any, case: Case) -> None:
         self.o, self.model = o, o.Model()
         self.bodies = [self.model.getGround()]
         self.moves: list[Any] = []
+        self.constraints: list[tuple[int, str | list[tuple[str, str]]]] = []
         super().__init__(case)
 
     def add_link(self, parent: int, link: Link, offset: Array) -> None:
@@ -48,7 +52,8 @@ class ConstrainedTree(TreeModel):
         joint = {"slide": o.SliderJoint, "hinge": o.PinJoint, "ball": o.BallJoint}[link.move]
         axes = self.vector(orientation(link.move, link.axis))
         # kinematics does not depend on masses, but OpenSim asks for them
-        body = o.Body(f"body_{number}", 1.0, o.Vec3(0.0), o.Inertia(1.0, 1.0, 1.0))
+        mass = NO_MASS if self.loaded else 1.0
+        body = o.Body(f"body_{number}", mass, o.Vec3(0.0), o.Inertia(mass, mass, mass))
         move = joint(
             f"joint_{number}",
             self.bodies[parent],
@@ -85,21 +90,20 @@ class ConstrainedTree(TreeModel):
         )
         none = self.vector(NO_TURN)
         if isinstance(joint, Distance):
-            constraint = o.ConstantDistanceConstraint(*at_i, *at_j, joint.rod_length)
+            rows, constraint = 1, o.ConstantDistanceConstraint(*at_i, *at_j, joint.rod_length)
         elif isinstance(joint, Inline):
             body, P = at_i
             along = self.vector(unit(joint.axis))
-            constraint = o.PointOnLineConstraint(body, along, P, *at_j)
+            rows, constraint = 2, o.PointOnLineConstraint(body, along, P, *at_j)
         elif turns:
-            constraint = o.PointConstraint(*at_i, *at_j)
+            rows, constraint = 3, o.PointConstraint(*at_i, *at_j)
         else:
-            constraint = o.WeldConstraint("weld", *at_i, none, *at_j, none)
-        self.constrain(constraint)
+            rows, constraint = 6, o.WeldConstraint("weld", *at_i, none, *at_j, none)
+        self.constrain(constraint, rows, joint.name)
         moved = f", on a body that {' and '.join(each.move for each in links)} move on {joint.i!r}"
         self.closures[joint.name] = constraint.getConcreteClassName() + (moved if links else "")
 
-    def relate(self, terms: Iterable[tuple[str, str, float]], curve: Sequence[float] = ()) -> None:
-        terms = list(terms)
+    def relate(self, terms: Terms, curve: Sequence[float] = ()) -> None:
         if len(terms) == 1 or curve:  # a driver's, or a polynomial
             super().relate(terms, curve)
             return
@@ -111,10 +115,11 @@ class ConstrainedTree(TreeModel):
         coupler.setIndependentCoordinateNames(names)
         coupler.setDependentCoordinateName(coordinate_name(one))
         coupler.setFunction(o.LinearFunction(factor, 0.0))
-        self.constrain(coupler)
+        self.constrain(coupler, 1, [(joint, freedom) for joint, freedom, _ in terms])
 
-    def constrain(self, constraint: Any) -> None:
-        """Add a constraint under a name of its own."""
+    def constrain(self, constraint: Any, rows: int, keeps: str | list[tuple[str, str]]) -> None:
+        """Add a constraint of so many rows under a name of its own."""
+        self.constraints.append((rows, keeps))
         constraint.setName(f"constraint_{self.model.getNumConstraints()}")
         self.model.addConstraint(constraint)
 

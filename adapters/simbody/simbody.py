@@ -25,7 +25,7 @@ from ..shared.compiled_floor import Call, floor_of
 from ..shared.length_scaling import in_own_frame
 from ..shared.opensim_frames import euler_angles
 from ..shared.tree_engine import LEAST, TreeEngine
-from .constrained_tree import ConstrainedTree
+from .forces import LoadedSimbody
 from .rotations import UNTURNED, turned
 from .stations import Station
 
@@ -87,7 +87,7 @@ def _calls(of: SimbodyModel) -> Mapping[str, Call]:
     whole, matter, state, J, b = of.model, of.matter, of.state, of.matrix, of.column
     q, u = (of.o.Vector.createFromMat(np.zeros(n)) for n in (of.slots, of.unknowns))
     station = of.make_frame(1, np.zeros(3))
-    at = station.body.getMobilizedBodyIndex(), station.point
+    at = station.carrier.getMobilizedBodyIndex(), station.point
     return {
         "realizePosition": lambda: (state.setQ(q), whole.realizePosition(state)),
         "realizeVelocity": lambda: (state.setU(u), whole.realizeVelocity(state)),
@@ -126,7 +126,7 @@ class Constraints:
         return self.of.column.to_numpy()
 
 
-class SimbodyModel(ConstrainedTree):
+class SimbodyModel(LoadedSimbody):
     """The constrained tree in Simbody's state.
 
     The configuration q has the coordinates of slides and hinges at the places that Simbody has for
@@ -197,7 +197,7 @@ class SimbodyModel(ConstrainedTree):
         return self.make_frame(body, np.array(at) - self.origin[body])
 
     def make_frame(self, body: int, offset: Array) -> Station:
-        return Station(self, self.bodies[body], self.vector(offset))
+        return Station(self, body, self.bodies[body], self.vector(offset))
 
     def placement(self, handle: Station) -> tuple[Array, Array]:
         return handle.position, handle.rotation

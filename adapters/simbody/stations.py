@@ -29,25 +29,27 @@ class Station:
     """A point of a body and the body's axes; see `frame_constraints.Frame`.
 
     Attributes:
-        body: of OpenSim.
+        body: number of the body.
+        carrier: the body of OpenSim.
         point: in the axes of the body [m].
     """
 
     of: Solved
-    body: Any
+    body: int
+    carrier: Any
     point: Any
 
     @cached_property
     def _place(self) -> tuple[Any, Any, Any]:
-        return self.of.state, self.body.getMobilizedBodyIndex(), self.point
+        return self.of.state, self.carrier.getMobilizedBodyIndex(), self.point
 
     @property
     def position(self) -> Array:
-        return self.body.findStationLocationInGround(self.of.state, self.point).to_numpy()
+        return self.carrier.findStationLocationInGround(self.of.state, self.point).to_numpy()
 
     @property
     def rotation(self) -> Array:
-        R = self.body.getTransformInGround(self.of.state).R()
+        R = self.carrier.getTransformInGround(self.of.state).R()
         return np.array([[R.get(i, j) for j in range(3)] for i in range(3)])
 
     @property
@@ -58,7 +60,7 @@ class Station:
 
     @property
     def velocity(self) -> Array:
-        turn = self.body.getAngularVelocityInGround(self.of.state)
+        turn = self.carrier.getAngularVelocityInGround(self.of.state)
         return np.concatenate((self._speed(), turn.to_numpy()))
 
     @property
@@ -75,4 +77,4 @@ class Station:
         return self.position, self._speed(), bias + matrix.to_numpy() @ self.of.a
 
     def _speed(self) -> Array:
-        return self.body.findStationVelocityInGround(self.of.state, self.point).to_numpy()
+        return self.carrier.findStationVelocityInGround(self.of.state, self.point).to_numpy()

@@ -198,6 +198,14 @@ class Mechanism:
         """Return the force element of this name."""
         return self._named["forces"][name]
 
+    def reaction_point(self, joint: Joint) -> Vector:
+        """Return the point of a joint's reaction, which its second body carries, global at design
+        [m]: the joint's own, or else the origin of the second body, or of the first if the second
+        is fixed.
+        """
+        free = joint.i if self.is_fixed(joint.j) else joint.j
+        return next(iter(joint.points_on(joint.j)), None) or self.body(free).origin
+
     @property
     def has_loads(self) -> bool:
         """Whether a body has mass or a force element acts: otherwise all forces are zero."""

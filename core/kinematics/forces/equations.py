@@ -121,15 +121,11 @@ class ForceEquations:
     def _arm(self, joint: Joint, body: str) -> Vec3:
         """Return the arm from a body's internal origin to the joint's point, turned [units].
 
-        The point is the one that the second body carries; that body's origin where there is none.
+        The point is the one that the second body carries.
         """
         held = self.at.poses.get(joint.j, GROUND_POSE)
         frame = self.states.frame
-        position = next(
-            iter(joint.points_on(joint.j)),
-            self.mechanism.body(joint.j).origin if joint.j in self.formulation.columns else None,
-        ) or (0.0, 0.0, 0.0)
-        arm = frame.arm(joint.j, position)
+        arm = frame.arm(joint.j, self.mechanism.reaction_point(joint))
         if body == joint.j:
             return held.turn(arm)
         seen = self.at.poses.get(body, GROUND_POSE)

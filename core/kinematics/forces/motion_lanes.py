@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from ...algebra import ZERO, angle_about, cross, quat, vec
 from ...errors import SolveError
 from ...joints.base import unit
+from ...mechanism.drivers import JointDriver
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path
 from ...primitives.base import GROUND_POSE, Pose, Twist
@@ -78,24 +80,45 @@ class MotionLanes:
         return BodyStates(self.frame, self.poses, twists, accelerations)
 
     def angle(self, name: str) -> Array:
-        """Return the angle of a joint over the samples [rad], continuous, zero at design."""
+        """Return the angle of a joint over the samples [rad], continuous, zero at design.
+
+        That of a driven joint, or of one geared to it, is exact. Others are followed by their rates
+        from the sample nearest to the design, which must be within half a turn of it.
+        """
+        known = self._driven.get((name, "rotation"))
+        if known is not None:
+            return known
         joint: Any = self.mechanism.joint(name)
         i, j = (self.poses.get(body, GROUND_POSE) for body in joint.bodies)
-        found = angle_about(vec([*unit(joint.axis)]), i.q.conjugate() * j.q)
-        angle: Array = found + np.zeros(self.n)
-        if not self.n:
-            return angle
-        axis = i.turn(vec([*unit(joint.axis)]))
-        rate: Array = axis @ (self.at.spin(joint.j) - self.at.spin(joint.i)) + np.zeros(self.n)
+        axis = vec([*unit(joint.axis)])
         order = np.argsort(self.times, kind="stable")
-        turned, rate = angle[order], rate[order]
-        # between coarse samples an angle is known up to turns: its rates tell how many
-        about = 0.5 * (rate[1:] + rate[:-1]) * np.diff(self.times[order])
-        turns = np.round((about - np.diff(turned)) / (2.0 * np.pi))
-        turned[1:] += 2.0 * np.pi * np.cumsum(turns)
-        # the sample nearest to the design is within half a turn of it
+        angle: Array = (angle_about(axis, i.q.conjugate() * j.q) + np.zeros(self.n))[order]
+        spin = self.at.spin(joint.j) - self.at.spin(joint.i)
+        along = self.at.turned(joint.i, [*unit(joint.axis)])
+        rate: Array = (along @ spin + np.zeros(self.n))[order]
+        expected = 0.5 * (rate[1:] + rate[:-1]) * np.diff(self.times[order])
+        jumps: Array = np.round((expected - np.diff(angle)) / (2.0 * np.pi))
+        turned = angle.copy()
+        turned[1:] += 2.0 * np.pi * np.cumsum(jumps)
         nearest = float(turned[int(np.argmin(np.abs(self.times[order])))])
-        turned = turned - 2.0 * np.pi * round(nearest / (2.0 * np.pi))
         continuous = np.empty(self.n)
-        continuous[order] = turned
+        continuous[order] = turned - 2.0 * np.pi * round(nearest / (2.0 * np.pi))
         return continuous
+
+    @cached_property
+    def _driven(self) -> Mapping[tuple[str, str], Array]:
+        """Coordinates that drivers give, directly or by couplers: joint and freedom -> value."""
+        found: dict[tuple[str, str], Array] = {
+            (each.joint, each.freedom): self.values[each.name]
+            for each in self.mechanism.drivers
+            if isinstance(each, JointDriver)
+        }
+        for _ in self.mechanism.couplers:  # a chain is as long as their number
+            for coupler in self.mechanism.couplers:
+                if coupler.curve:  # not linear: its joints are followed by their rates
+                    continue
+                terms = coupler.terms
+                for (one, freedom, a), (other, its, b) in (terms, terms[::-1]):
+                    if (one, freedom) in found:
+                        found.setdefault((other, its), -a / b * found[one, freedom])
+        return found

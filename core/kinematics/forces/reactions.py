@@ -13,7 +13,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ...forces import Forces, Reaction
+from ...forces import Forces, Reaction, no_forces_at
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path
 from ...trajectory import Array, Trajectory
@@ -85,7 +85,7 @@ def forces_of(
         {name: spread(elements[name], ill=False) for name in wanted.elements},
         spread(table.sum(axis=0)),
         spread(np.abs(table).max(axis=0, initial=0.0)),
-        _said(singular, lanes.times),
+        no_forces_at(lanes.times[singular]),
     )
 
 
@@ -102,13 +102,3 @@ class _Spread:
         shown = np.where(keep.reshape(-1, *(1,) * (values.ndim - 1)), values, np.nan)
         found[self.solved] = shown
         return found
-
-
-def _said(singular: Lanes, times: Array) -> str:
-    if not singular.any():
-        return ""
-    at = float(times[int(np.flatnonzero(singular)[0])])
-    return (
-        f"no forces at {int(singular.sum())} samples, the first at time {at:.9g}: the pose is"
-        " singular, and rigid bodies determine no finite force there; leave these samples out"
-    )

@@ -1,0 +1,186 @@
+"""Masses, gravity and force elements as objects of Exudyn, and forces by them; private to its
+adapter.
+
+Exudyn computes the mass matrix, the right-hand side with its own loads and connectors, and the
+Jacobian of all rows, which are joints. A torsional spring-damper follows any number of turns by an
+unknown of its own, and acts by two torques that the adapter sets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...core.case.case import Case
+from ...core.joints import Joint
+from ...core.joints.base import unit
+from ...core.mechanism.loads import Axes, Force, SpringDamper, Torque, TorsionSpringDamper
+from ...core.trajectory import Array
+from ..shared.force_solution import Dynamics
+from ..shared.frame_constraints import skew
+from .rows import Rows
+
+COMPUTED_BY = {
+    "inverse dynamics": "ComputeMassMatrix, ComputeODE2RHS with LoadMassProportional",
+    "reactions of joints": "rows of ComputeNewtonJacobian",
+    "force elements": (
+        "ObjectConnectorSpringDamper, LoadForceVector, LoadTorqueVector; torques of torsional"
+        " springs are set by the adapter"
+    ),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Twister:
+    """A torsional spring-damper at work: its value's place among the unknowns of the rows, a marker
+    on the joint's first body with z along the axis, and its torques on both bodies.
+    """
+
+    given: TorsionSpringDamper
+    value: int
+    marker: int
+    torques: Sequence[tuple[int, float]]
+
+
+class Loads:
+    """The loads of a case in an Exudyn system, added before the system is assembled."""
+
+    def __init__(self, rows: Rows, case: Case, kinds: Any) -> None:
+        self.rows, self.mbs, self.items, self.kinds = rows, rows.mbs, rows.items, kinds
+        self.case, self.mechanism = case, case.mechanism
+        self.springs: dict[str, int] = {}
+        self.twisters: list[Twister] = []
+        self.amounts: dict[str, float] = {}
+        for body in self.mechanism.moving:
+            marker = self.items.MarkerBodyMass(bodyNumber=rows.bodies[body.name][0])
+            self.mbs.AddLoad(
+                self.items.LoadMassProportional(
+                    markerNumber=self.mbs.AddMarker(marker), loadVector=[*self.mechanism.gravity]
+                )
+            )
+        for each in self.mechanism.forces:
+            self._add(each)
+
+    def _add(self, each: Any) -> None:
+        rows, items = self.rows, self.items
+        if isinstance(each, SpringDamper):
+            ends = [rows.marker(*end) for end in zip(each.bodies, each.points, strict=True)]
+            spring = items.ObjectConnectorSpringDamper(
+                markerNumbers=ends,
+                referenceLength=each.free_length,
+                stiffness=each.stiffness,
+                damping=each.damping,
+            )
+            self.springs[each.name] = int(self.mbs.AddObject(spring))
+        elif isinstance(each, TorsionSpringDamper):
+            self.twisters.append(self._twister(each))
+        else:
+            assert isinstance(each, Force | Torque)
+            self.amounts[each.name] = float(np.linalg.norm(each.vector))
+            if self.mechanism.is_fixed(each.body):
+                return
+            _, origin = rows.bodies[each.body]
+            point, kind = (
+                (each.point, items.LoadForceVector)
+                if isinstance(each, Force)
+                else (origin, items.LoadTorqueVector)
+            )
+            self.mbs.AddLoad(
+                kind(
+                    markerNumber=rows.marker(each.body, point),
+                    loadVector=[*each.vector],
+                    bodyFixed=each.frame is Axes.BODY,
+                )
+            )
+
+    def _twister(self, each: TorsionSpringDamper) -> Twister:
+        rows, joint = self.rows, self.mechanism.joint(each.joint)
+        place: Any = joint
+        value = rows.unknown()
+        rows.follow(rows.coordinate(each.joint, "rotation"), value)
+        torques = [
+            (int(self.mbs.AddLoad(self.items.LoadTorqueVector(markerNumber=marker))), sign)
+            for body, marker, sign in zip(
+                joint.bodies, rows.markers(joint, place.point), (-1.0, 1.0), strict=True
+            )
+            if not self.mechanism.is_fixed(body)
+        ]
+        return Twister(each, value, rows.marker(joint.i, place.point), torques)
+
+    def dynamics(self, model: Any, J: Array, v: Array, a: Array) -> Dynamics:
+        """Return the forces; see `force_solution.ForceModel`.
+
+        Args:
+            model: in Exudyn; see `exudyn.ExudynModel`.
+            J: of all rows.
+        """
+        n, solver = model.coordinates, model.solver
+        model.state.SetODE2Coordinates_t(v[:n])
+        amounts = dict(self.amounts)
+        for each in self.twisters:
+            amounts[each.given.name] = self._twist(each, model, v)
+        solver.ComputeMassMatrix(self.mbs)
+        mass = np.array(solver.GetSystemMassMatrix())[:n, :n]
+        solver.ComputeODE2RHS(self.mbs)
+        demand = np.zeros(len(v))
+        demand[:n] = mass @ a[:n] - np.array(solver.GetSystemResidual())[:n]
+        for name, number in self.springs.items():
+            force = self.mbs.GetObjectOutput(number, self.kinds.ForceLocal)
+            amounts[name] = float(np.atleast_1d(force)[0])
+        wanted = set(self.case.forces)
+        reactions = {
+            joint.name: (np.zeros(6), self._on_second(joint, J))
+            for joint in self.mechanism.joints
+            if joint.name in wanted
+        }
+        return Dynamics(demand, reactions, amounts)
+
+    def _twist(self, each: Twister, model: Any, v: Array) -> float:
+        """Set the torques of a torsional spring-damper; return that on the second body."""
+        given, place = each.given, model.coordinates + each.value - len(self.mechanism.drivers)
+        joint: Any = self.mechanism.joint(given.joint)
+        elastic = given.stiffness * (float(model.x[place]) - given.free_angle)
+        amount = -(elastic + given.damping * float(v[place]))
+        A = np.array(self.mbs.GetMarkerOutput(each.marker, self.kinds.RotationMatrix))
+        axis = A.reshape(3, 3) @ np.array([*unit(joint.axis)])
+        for load, sign in each.torques:
+            self.mbs.SetLoadParameter(load, "loadVector", [*(sign * amount * axis)])
+        return amount
+
+    def _on_second(self, joint: Joint, J: Array) -> Array:
+        """Return what the multipliers of a joint's own rows exert on its second body, about the
+        joint's point, shape (6, rows).
+        """
+        number, origin = self.rows.bodies[joint.j]
+        arm = np.array(self.mechanism.reaction_point(joint)) - origin
+        point = self._position(number, arm)
+        fixed = self.mechanism.is_fixed(joint.j)
+        body, sign = (joint.i, -1.0) if fixed else (joint.j, 1.0)
+        k = [each.name for each in self.mechanism.moving].index(body)
+        found, own = np.zeros((6, len(J))), self.rows.owned[joint.name]
+        columns = J[own, 7 * k : 7 * k + 7]
+        found[:, own] = sign * (columns @ self._rates(body, point)).T
+        return found
+
+    def _position(self, number: int, arm: Array) -> Array:
+        if number == self.rows.ground:
+            return arm
+        return np.array(self.mbs.GetObjectOutputBody(number, self.kinds.Position, arm))
+
+    def _rates(self, body: str, point: Array) -> Array:
+        """Return the rates of a body's node by its twist at a point, shape (7, 6)."""
+        number, _ = self.rows.bodies[body]
+        node = self.mbs.GetObject(number)["nodeNumber"]
+        x = np.array(self.mbs.GetNodeOutput(node, self.kinds.Coordinates)) + np.array(
+            self.mbs.GetNodeParameter(node, "referenceCoordinates")
+        )
+        e0, e = x[3], x[4:]
+        found = np.zeros((7, 6))
+        found[:3, :3] = np.eye(3)
+        found[:3, 3:] = skew(point - x[:3])  # w x (origin - point)
+        found[3, 3:] = -0.5 * e
+        found[4:, 3:] = 0.5 * (e0 * np.eye(3) - skew(e))  # w x e
+        return found

@@ -1,0 +1,208 @@
+"""Forces in a tree of links: inverse dynamics of the simulator, rows and force elements on its
+bodies; see `tree_reactions`.
+
+In a model that gives forces every body of the mechanism is a body of the simulator: a fixed joint
+closes a loop of a free body. So the simulator's recursion and rows tell the bodies apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+
+from ...core.case.case import Case
+from ...core.mechanism.body import Body, inertia_matrix
+from ...core.mechanism.loads import TorsionSpringDamper
+from ...core.mechanism.mechanism import Vector
+from ...core.trajectory import Array
+from .force_elements import Element, axis_of, places
+from .force_solution import Dynamics
+from .tree_reactions import (
+    Carried,
+    Cut,
+    RowWrench,
+    Site,
+    about_origin,
+    carried_by,
+    from_origin,
+    of_relations,
+)
+
+# For simulators that refuse bodies without mass: it changes no force, and its inverse is finite.
+NO_MASS = 1e-100
+
+
+class LoadedTree(Protocol):
+    """What forces need of a model; see `tree_model.TreeModel`.
+
+    Attributes:
+        parents: number of the body that carries each body.
+        branch_of: joint of the tree -> number of the body that it carries, and its sign.
+    """
+
+    case: Case
+    recursion: ClassVar[bool]
+    carrier: dict[str, Any]
+    parents: list[int]
+    branch_of: dict[str, tuple[int, int]]
+
+    def add_frame(self, body: Any, at: Vector) -> Any: ...
+
+    def look(self, frame: Any) -> None:
+        """Read a frame's place, Jacobian, velocity and acceleration."""
+        ...
+
+    def jacobian(self) -> Array: ...
+    def inverse_dynamics(self, v: Array, a: Array) -> Array: ...
+    def passed_on(self, body: int, point: Array) -> Array: ...
+
+    def angle(self, joint: str) -> float:
+        """Return a joint's angle [rad], zero at design."""
+        ...
+
+    def exerted(self) -> Sequence[RowWrench]:
+        """Return what the multipliers of rows between bodies exert."""
+        ...
+
+    def rows_of(self, joint: str) -> Sequence[slice]:
+        """Return the rows of a cut joint."""
+        ...
+
+    def coordinate_rows(self) -> Mapping[int, Sequence[tuple[str, str]]]:
+        """Return the rows of coordinates, and joint and freedom of each coordinate."""
+        ...
+
+    def coordinate_weight(self, row: int, joint: str, freedom: str) -> float:
+        """Return the weight of a joint's coordinate in a row."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Mass:
+    """A body with mass, and a frame at its centre of mass."""
+
+    body: Body
+    frame: Any
+
+
+class TreeForces:
+    """Frames of joints, masses and force elements of a model, and the forces by them."""
+
+    def __init__(self, model: LoadedTree) -> None:
+        self.model, mechanism = model, model.case.mechanism
+        self.gravity = np.array(mechanism.gravity)
+        self.frames: list[Any] = []
+        self.elements = [self._element(each) for each in mechanism.forces]
+        self.masses = [
+            Mass(
+                body,
+                self._frame(body.name, body.center_of_mass or body.origin),
+            )
+            for body in mechanism.moving
+            if body.mass > 0.0
+        ]
+        wanted = set(model.case.forces)
+        self.points = {
+            joint.name: self._frame(joint.j, mechanism.reaction_point(joint))
+            for joint in mechanism.joints
+            if joint.name in wanted
+        }
+
+    def _frame(self, body: str, at: Vector) -> Any:
+        self.frames.append(self.model.add_frame(self.model.carrier[body], at))
+        return self.frames[-1]
+
+    def _element(self, each: Any) -> Element:
+        mechanism, model = self.model.case.mechanism, self.model
+        frames = [self._frame(body, at) for body, at in places(each, mechanism)]
+        turning = isinstance(each, TorsionSpringDamper)
+        return Element(
+            each,
+            frames,
+            axis_of(each, mechanism),
+            (lambda: model.angle(each.joint)) if turning else lambda: 0.0,
+        )
+
+    @cached_property
+    def sites(self) -> list[Site]:
+        """The wanted joints."""
+        model, found = self.model, list[Site]()
+        for name, frame in self.points.items():
+            joint = model.case.mechanism.joint(name)
+            if name in model.branch_of:
+                body, sign = model.branch_of[name]
+                kind = Carried(carried_by(body, model.parents), sign)
+            else:
+                kind = Cut(model.carrier[joint.j], model.rows_of(name))
+            found.append(Site(joint, frame, kind))
+        return found
+
+    @cached_property
+    def shares(self) -> Mapping[str, Sequence[tuple[int, str]]]:
+        """The rows and freedoms of each joint's coordinates."""
+        return of_relations(self.model.case.mechanism, self.model.coordinate_rows())
+
+    def dynamics(self, v: Array, a: Array) -> Dynamics:
+        """Return the forces at velocities and accelerations; see `force_solution.ForceModel`."""
+        model = self.model
+        demand, bodies = model.inverse_dynamics(v, a), len(model.parents)
+        for frame in self.frames:
+            model.look(frame)
+        amounts, loads = dict[str, float](), np.zeros((bodies, 6))
+        for element in self.elements:
+            amounts[element.given.name], wrenches = element.at_work()
+            for frame, wrench in zip(element.frames, wrenches, strict=True):
+                demand = demand - frame.jacobian.T @ wrench
+                loads[frame.body] += about_origin(frame.position, wrench[None])[:, 0]
+        exerted = np.zeros((bodies, 6, len(model.jacobian())))
+        for each in model.exerted():
+            exerted[each.body][:, each.rows] += about_origin(each.point, each.wrenches)
+        passed_on, reactions = self._passed_on(bodies), dict[str, tuple[Array, Array]]()
+        for site in self.sites:
+            name = site.joint.name
+            alone, by_multiplier = site.reaction(passed_on, exerted, loads)
+            for row, freedom in self.shares[name]:
+                weight = model.coordinate_weight(row, name, freedom)
+                by_multiplier[:, row] -= weight * site.along(freedom)
+            reactions[name] = alone, by_multiplier
+        return Dynamics(demand, reactions, amounts)
+
+    def _passed_on(self, bodies: int) -> Callable[[int, Array], Array]:
+        """Return what gives the wrench that the joint of a body passes on, about a point: the
+        simulator's own recursion, or else Newton and Euler from the simulator's accelerations.
+        """
+        if self.model.recursion:
+            return self.model.passed_on
+        each = np.zeros((bodies, 6))
+        for mass in self.masses:
+            wrench = demand_of(mass.body, mass.frame, self.gravity)
+            each[mass.frame.body] += about_origin(mass.frame.position, wrench[None])[:, 0]
+
+        def passed_on(body: int, point: Array) -> Array:
+            total: Array = each[carried_by(body, self.model.parents)].sum(axis=0)
+            return from_origin(point) @ total
+
+        return passed_on
+
+
+def demand_of(body: Body, frame: Any, gravity: Array) -> Array:
+    """Return m (a - g) over I wdot + w x I w, about the centre of mass, where the frame is."""
+    force = body.mass * (frame.acceleration[:3] - gravity)
+    if body.inertia is None:
+        return np.concatenate([force, np.zeros(3)])
+    inertia = frame.rotation @ inertia_matrix(body.inertia) @ frame.rotation.T
+    w, w_t = frame.velocity[3:], frame.acceleration[3:]
+    return np.concatenate([force, inertia @ w_t + np.cross(w, inertia @ w)])
+
+
+def mass_properties(body: Body, origin: Array) -> tuple[float, Array, Array]:
+    """Return mass, centre of mass from an origin, and inertia about that centre, shape (3, 3), at
+    design.
+    """
+    center = np.array(body.center_of_mass or body.origin) - origin
+    inertia = np.zeros((3, 3)) if body.inertia is None else inertia_matrix(body.inertia)
+    return body.mass, center, inertia

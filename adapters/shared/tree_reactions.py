@@ -1,0 +1,141 @@
+"""Reactions of the joints of a tree whose loops are closed by rows.
+
+A simulator's recursion gives the wrench that a joint of the tree passes on to all that it carries.
+Rows, drivers, couplers and force elements act on what is carried too: their wrenches are taken from
+it. A cut joint exerts the wrenches of its own rows. What drivers and couplers do along a joint's
+coordinate is no part of its reaction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...core.joints import Joint
+from ...core.joints.base import unit
+from ...core.mechanism.mechanism import Mechanism
+from ...core.trajectory import Array
+from .frame_constraints import Frame, skew
+
+
+@dataclass(frozen=True, eq=False)
+class RowWrench:
+    """What multipliers of one exert on a body.
+
+    Attributes:
+        rows: their places.
+        body: number of the body.
+        point: of it, global.
+        wrenches: of each row, force over moment about the point, shape (rows, 6).
+    """
+
+    rows: slice
+    body: int
+    point: Array
+    wrenches: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Carried:
+    """A joint of the tree.
+
+    Attributes:
+        bodies: numbers of all bodies that it carries, its own first.
+        sign: minus where that body is the joint's first.
+    """
+
+    bodies: list[int]
+    sign: int
+
+
+@dataclass(frozen=True, eq=False)
+class Cut:
+    """A joint that closes a loop.
+
+    Attributes:
+        second: number of its second body.
+        rows: its own.
+    """
+
+    second: int
+    rows: Collection[slice]
+
+
+@dataclass(frozen=True, eq=False)
+class Site:
+    """A joint whose reaction is wanted, and a frame at its point on its second body."""
+
+    joint: Joint
+    frame: Frame
+    kind: Carried | Cut
+
+    def reaction(
+        self, passed_on: Callable[[int, Array], Array], exerted: Array, loads: Array
+    ) -> tuple[Array, Array]:
+        """Return the wrench on the second body without multipliers, shape (6,), and its derivative
+        by them, shape (6, rows); the coordinate's share is still in it.
+
+        Args:
+            passed_on: gives what the joint of a body passes on to it and all that it carries, about
+                a point.
+            exerted: on each body by multipliers of one, about the origin, shape (bodies, 6, rows).
+            loads: of force elements on each body, about the origin, shape (bodies, 6).
+        """
+        kind, to_point = self.kind, from_origin(self.frame.position)
+        if isinstance(kind, Cut):
+            by_multiplier = np.zeros(exerted.shape[1:])
+            for rows in kind.rows:
+                by_multiplier[:, rows] = exerted[kind.second][:, rows]
+            return np.zeros(6), to_point @ by_multiplier
+        total = passed_on(kind.bodies[0], self.frame.position)
+        alone = total - to_point @ loads[kind.bodies].sum(axis=0)
+        by_multiplier = to_point @ exerted[kind.bodies].sum(axis=0)
+        return kind.sign * alone, -kind.sign * by_multiplier
+
+    def along(self, freedom: str) -> Array:
+        """Return the wrench of a unit force or torque of a coordinate on the second body."""
+        joint: Any = self.joint
+        h, none = self.frame.rotation @ np.array([*unit(joint.axis)]), np.zeros(3)
+        return np.concatenate([h, none] if freedom == "translation" else [none, h])
+
+
+def about_origin(point: Array, wrenches: Array) -> Array:
+    """Return wrenches about a point, shape (n, 6), as columns about the origin, shape (6, n)."""
+    return np.vstack([wrenches[:, :3].T, wrenches[:, 3:].T + skew(point) @ wrenches[:, :3].T])
+
+
+def from_origin(point: Array) -> Array:
+    """Return the matrix that takes wrenches about the origin to those about a point."""
+    found = np.eye(6)
+    found[3:, :3] = -skew(point)
+    return found
+
+
+def carried_by(body: int, parents: Sequence[int]) -> list[int]:
+    """Return a body of a tree and all that it carries; parents are numbered before children."""
+    found = [body]
+    for child in range(body + 1, len(parents)):
+        if parents[child] in found:
+            found.append(child)
+    return found
+
+
+def of_relations(
+    mechanism: Mechanism, rows: Mapping[int, Sequence[tuple[str, str]]]
+) -> dict[str, list[tuple[int, str]]]:
+    """Return, by joint, the rows and freedoms of its coordinates that are no part of its reaction.
+
+    Args:
+        rows: joint and freedom of the coordinates in each row. A row of one joint alone, with two
+            of them, is the joint's own (a screw).
+    """
+    found: dict[str, list[tuple[int, str]]] = {joint.name: [] for joint in mechanism.joints}
+    for row, terms in rows.items():
+        if len(terms) > 1 and len({joint for joint, _ in terms}) == 1:
+            continue
+        for joint, freedom in terms:
+            found[joint].append((row, freedom))
+    return found

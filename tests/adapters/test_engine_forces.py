@@ -1,0 +1,235 @@
+"""Forces of every engine: against closed forms, the native engine, and with planted mistakes."""
+
+from dataclasses import replace
+from functools import cache
+from pkgutil import resolve_name
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from kincheck import adapters, cases
+from kincheck.core.joints import Fixed, Gear, RackPinion, Revolute, Translational
+from kincheck.core.mechanism.body import Body
+from kincheck.core.mechanism.drivers import JointAngle
+from kincheck.core.mechanism.loads import TorsionSpringDamper
+from kincheck.core.mechanism.mechanism import GROUND, Mechanism
+
+from ..support.engine_forces import Beside, beside, force_case, pushed, values
+from ..support.loads import loaded
+from .test_closures import TYPES, crank_only, on_crank
+
+ENGINES = ["exudyn", "mujoco", "pinocchio", "dart", "drake", "simbody"]
+# Of the largest force. Exudyn has no acceleration: it is a difference of Jacobians.
+AGREE = dict.fromkeys(ENGINES, 1e-12) | {"exudyn": 1e-9}
+
+
+def here(engine):
+    if adapters.engine(engine).version() is None:
+        pytest.skip(f"{engine} is not installed")
+    return engine
+
+
+@cache
+def specimen(kind, bodies):
+    """A joint of that kind in a loop, with masses and force elements of all types, and its forces
+    by the native engine.
+    """
+    case = force_case(pushed(loaded(on_crank(kind, *bodies))), (-0.3, 0.0, 0.2), rate=2.0)
+    return case, values(case, "native")[0]
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("bodies", [("A", "B"), ("B", "A")])
+@pytest.mark.parametrize("kind", TYPES)
+def test_reactions_of_every_joint_are_those_of_the_native_engine(kind, bodies, engine):
+    case, native = specimen(kind, bodies)
+    found, solution = values(case, here(engine))
+    compared = Beside(native, found)
+    assert compared.same_missing
+    assert compared.worst <= AGREE[engine]
+    assert solution.details["forces"]["power_missing"] <= 1e-10
+    assert solution.details["forces"]["computed_by"]
+
+
+@pytest.mark.parametrize("engine", ["mujoco", "pinocchio"])
+@pytest.mark.parametrize("kind", TYPES)
+def test_cut_joints_have_the_reactions_of_tree_joints(kind, engine, monkeypatch):
+    adapter = {"mujoco": "mujoco.spec", "pinocchio": "shared.tree_model"}[here(engine)]
+    monkeypatch.setattr(f"kincheck.adapters.{adapter}.spanning_tree", crank_only)
+    case, native = specimen(kind, ("A", "B"))
+    compared = Beside(native, values(case, engine)[0])
+    assert compared.same_missing
+    assert compared.worst <= AGREE[engine]
+
+
+def pendulum(length=0.75, at=(0.0, 0.0, 0.0)):
+    """A pendulum about y, its mass beside the hinge along x at design; gravity along -z."""
+    x, y, z = at
+    body = Body("arm", at, mass=2.0, center_of_mass=(x + length, y, z), inertia=(1, 1, 1, 0, 0, 0))
+    hinge = Revolute("hinge", GROUND, "arm", point=at, axis=(0.0, -1.0, 0.0))
+    return Mechanism(
+        *("pendulum", [body], [hinge]),
+        drivers=[JointAngle("swing", "hinge")],
+        gravity=(0.0, 0.0, -10.0),
+    )
+
+
+@pytest.mark.parametrize("engine", ["native", *ENGINES])
+@pytest.mark.parametrize(("length", "at"), [(0.75, (0.0, 0.0, 0.0)), (96.0, (1e3, 0.0, -5e2))])
+def test_pendulum(engine, length, at):
+    """F = m (a - g); the torque lifts the mass."""
+    angle, rate = np.array([-0.5, 0.0, 1.0]), 3.0
+    case = force_case(pendulum(length, at), angle, rate)
+    found = values(case, here(engine))[0]
+    m, g = 2.0, 10.0
+    pull = -m * length * rate**2
+    expected = np.zeros((7, 3))
+    expected[0], expected[2] = pull * np.cos(angle), pull * np.sin(angle) + m * g
+    expected[6] = m * g * length * np.cos(angle)
+    largest = np.abs(expected).max()
+    np.testing.assert_allclose(found, expected, rtol=0, atol=AGREE.get(engine, 1e-12) * largest)
+
+
+def geared():
+    """Two wheels in mesh, a rack on the second, and a plate welded to the rack."""
+    bodies = [
+        Body("pinion"),
+        Body("wheel", (0.5, 0.0, 0.0)),
+        Body("rack", (0.5, 0.25, 0.0)),
+        Body("plate", (0.5, 0.5, 0.25)),
+        Body("foot", (0.0, 0.5, 0.0)),
+    ]
+    along, y = {"point": (0.5, 0.25, 0.0), "axis": (1.0, 0.0, 0.0)}, (0.0, 0.0, 1.0)
+    return Mechanism(
+        "geared",
+        bodies,
+        [
+            Revolute("first", GROUND, "pinion", point=(0.0, 0.0, 0.0), axis=y),
+            Revolute("second", "wheel", GROUND, point=(0.5, 0.0, 0.0), axis=y),
+            Translational("guide", GROUND, "rack", **along),
+            Fixed("weld", "plate", "rack"),
+            Fixed("anchor", "foot", GROUND),
+        ],
+        drivers=[JointAngle("turn", "first")],
+        couplers=[
+            Gear("mesh", ("first", "second"), ratio=2.0),
+            RackPinion("teeth", ("second", "guide"), radius=-0.25),
+        ],
+    )
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_gears_racks_and_welds(engine):
+    case = force_case(pushed(loaded(geared())), (-0.4, 0.0, 7.0), rate=2.0)
+    compared = beside(case, here(engine))
+    assert compared.same_missing
+    assert compared.worst <= AGREE[engine]
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("name", ["four_bar", "bennett", "mcpherson_strut"])
+def test_redundant_rows_leave_the_same_undetermined(name, engine):
+    case = cases.load(name)
+    few = case.sweep.values[:: len(case.sweep.values) // 4]
+    mechanism = loaded(case.mechanism)
+    judged = force_case(mechanism, few, case.sweep.rate)
+    compared = beside(replace(judged, sweep=replace(case.sweep, values=few)), here(engine))
+    assert compared.same_missing
+    assert np.isnan(compared.native).any() == (name != "mcpherson_strut")
+    assert compared.worst <= AGREE[engine]
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_springs_on_cut_joints_count_turns(engine):
+    """The hinge that closes the loop turns round twice; its spring is wound up."""
+    case = cases.load("four_bar")
+    spring = TorsionSpringDamper("clock", "crank_pin", 2.0, damping=0.3, free_angle=0.2)
+    mechanism = replace(loaded(case.mechanism), forces=[spring])
+    judged = force_case(mechanism, np.linspace(0.0, 9.0, 19), case.sweep.rate, names=["crank_pin"])
+    compared = beside(judged, here(engine))
+    assert compared.worst <= AGREE[engine]
+    assert np.ptp(compared.native[-1]) > 2.0 * 2.0 * np.pi
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_model_without_outputs_of_forces_has_none(engine):
+    plain, given = cases.load("mcpherson_suspension"), adapters.engine(here(engine))
+    case = replace(plain, mechanism=loaded(plain.mechanism))
+    found = given.solve(given.build(case), case, 1e-12)
+    bare = given.solve(given.build(plain), plain, 1e-12)
+    assert found.forces is None
+    assert found.details == bare.details
+    for name, motion in bare.points.items():
+        np.testing.assert_array_equal(found.points[name].acceleration, motion.acceleration)
+
+
+# Mistakes
+
+
+def still(right):
+    """Newton and Euler without w x I w."""
+
+    def mistaken(body, frame, gravity):
+        seen = SimpleNamespace(acceleration=frame.acceleration, rotation=frame.rotation)
+        seen.velocity = np.zeros(6)
+        return right(body, seen, gravity)
+
+    return mistaken
+
+
+def upwards(right):
+    return lambda self, gravity, masses: right(self, tuple(-g for g in gravity), masses)
+
+
+def other_axes(right):
+    """Products of inertia with the other sign."""
+
+    def mistaken(body, origin):
+        mass, center, inertia = right(body, origin)
+        return mass, center, 2.0 * np.diag(np.diag(inertia)) - inertia
+
+    return mistaken
+
+
+def unshared(right):
+    return lambda mechanism, rows: {joint.name: [] for joint in mechanism.joints}
+
+
+MISTAKES = {
+    "gravity upwards, pinocchio": ("pinocchio.pinocchio.PinocchioModel.set_loads", upwards),
+    "gravity upwards, mujoco": ("mujoco.forces.LoadedMuJoCo._set_loads", upwards),
+    "gravity upwards, dart": ("dart.dart.DartModel.set_loads", upwards),
+    "gravity upwards, drake": ("drake.drake.DrakeModel.set_loads", upwards),
+    "gravity upwards, simbody": ("simbody.forces.LoadedSimbody.set_loads", upwards),
+    "no gyroscopic term, drake": ("shared.tree_forces.demand_of", still),
+    "no gyroscopic term, simbody": ("shared.tree_forces.demand_of", still),
+    "inertia in other axes, pinocchio": ("pinocchio.pinocchio.mass_properties", other_axes),
+    "inertia in other axes, mujoco": ("mujoco.forces.mass_properties", other_axes),
+    "inertia in other axes, exudyn": ("exudyn.equations.mass_properties", other_axes),
+    "moment about the origin, pinocchio": (
+        "shared.tree_reactions.from_origin",
+        lambda right: lambda point: right(0.0 * point),
+    ),
+    "moment about the origin, exudyn": (
+        "exudyn.loads.Loads._rates",
+        lambda right: lambda self, body, point: right(self, body, 0.0 * point),
+    ),
+    "reaction on the first body, mujoco": (
+        "shared.tree_reactions.Site.reaction",
+        lambda right: lambda self, *given: tuple(-each for each in right(self, *given)),
+    ),
+    "driver's torque in the reaction, pinocchio": ("shared.tree_forces.of_relations", unshared),
+    "inertia at the body's frame, mujoco": (
+        "mujoco.forces.mass_properties",
+        lambda right: lambda body, origin: (body.mass, *right(body, np.array(body.origin))[1:]),
+    ),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_planted_mistake_is_found(mistake, monkeypatch):
+    engine, (where, wrong) = here(mistake.split(", ")[1]), MISTAKES[mistake]
+    case, native = specimen("universal", ("A", "B"))
+    target = f"kincheck.adapters.{where}"
+    monkeypatch.setattr(target, wrong(resolve_name(target)))
+    assert Beside(native, values(case, engine)[0]).worst > 1e-4
