@@ -31,7 +31,7 @@ The folders:
     compiled         one mechanism as compiled programs: request, programs, model, samples
     continuation     the walk along a path, step halving, singular poses, curves by arc length
     by_components    large mechanisms, component by component
-    forces           reactions and efforts from a solved motion
+    forces           the equations of forces, and the forces of a solved motion
     sparse           large mechanisms without small components, as a sparse system
     assembly         closed poses from estimates and random starts
     diagnosis        rank, conditioning and screws at a pose

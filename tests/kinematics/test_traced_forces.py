@@ -5,10 +5,11 @@ import pytest
 from kincheck import cases
 from kincheck.core import solve
 from kincheck.core.joints import Gear, Revolute, Screw
-from kincheck.core.kinematics import Method, NativeSolver, Style, with_forces
+from kincheck.core.kinematics import Method, NativeSolver, Style, solver_selection, with_forces
+from kincheck.core.kinematics.compiled.force_table import ForceTable
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.forces.wanted import wanted_forces
-from kincheck.core.kinematics.solver_selection import ONE_PROGRAM, prepare
+from kincheck.core.kinematics.solver_selection import prepare
 from kincheck.core.mechanism import motions
 from kincheck.core.mechanism.body import Body
 from kincheck.core.mechanism.drivers import JointAngle
@@ -144,8 +145,9 @@ def test_samples_beyond_a_lock_up_have_no_forces():
     assert found.facts["forces"]["power_missing"] <= 1e-13
 
 
-def test_large_mechanisms_have_forces_by_their_motion():
-    mechanism = loaded(chain(ONE_PROGRAM // 2))
+def test_large_mechanisms_have_forces_by_their_motion(monkeypatch):
+    monkeypatch.setattr(solver_selection, "ONE_PROGRAM", 2)
+    mechanism = loaded(chain(2, lean=0.31))  # known to no cache
     path = motions.Path({"turn": motions.Ramp(1.0)}, np.array([0.1, 0.2]))
     request = Request(("turn",), (), forces=wanted_forces(mechanism, ["turn"]))
     found = prepare(mechanism, request, path)(1e-12)
@@ -166,3 +168,18 @@ def test_a_case_is_asked_for_no_more_than_its_forces():
     every = solve(mechanism, "stroke", case.sweep.values[::40], forces=True).details["program"]
     without = solve(mechanism, "stroke", case.sweep.values[::40]).details["program"]
     assert without["outputs"]["flops"] < program < every["outputs"]["flops"]
+
+
+def test_rows_that_are_nearly_singular_leave_it_to_singular_values():
+    mechanism = loaded(cases.load("rssr").mechanism)
+    wanted = wanted_forces(mechanism, [])
+    power, own = {"power": slice(0, 2)}, {"force sigma": slice(2, 3)}
+    regular = ForceTable(mechanism, wanted, power, 1.0)
+    table = np.array([[0.0, 1.0, 0.5], [0.0, 1.0, 1e-7], [np.nan] * 3])
+    assert regular.read(table, 1e-5) is not None
+    assert regular.read(table, 1e-7) is None
+    assert regular.read(table, np.nan) is None
+    assert ForceTable(mechanism, wanted, power | own, 1.0).read(table, 1.0) is None
+    # rows that are chosen of more may be nearly singular where all of them are not
+    chosen = ForceTable(mechanism, wanted, power | {"redundant": slice(3, 5)}, 1.0)
+    assert chosen.read(np.zeros((3, 5)), 1e-5) is None

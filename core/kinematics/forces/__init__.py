@@ -1,1 +1,1 @@
-"""Forces of a solved motion: inverse dynamics, reactions of joints and efforts of drivers."""
+"""Forces: inverse dynamics, reactions of joints and efforts of drivers."""
