@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from ...core.case.case import Case
+from ...core.errors import SolveError
 from ...core.mechanism.drivers import JointDriver
 from ...core.trajectory import Array, Trajectory
 from ..shared.joint_equivalents import jointed
@@ -54,6 +55,9 @@ class Assembly:
 
     def unsupported(self, case: Case) -> str | None:
         """Return the joint or driver that has no counterpart here, or None."""
+        for coupler in case.mechanism.couplers:
+            if coupler.curve:
+                return f"{coupler}: OpenSim's assembler gets no polynomial from this adapter"
         return Simbody().unsupported(case)
 
     def efforts(self) -> Mapping[str, Assembly]:
@@ -80,6 +84,11 @@ class _Assembled(SimbodyModel):
         super().__init__(o, case)
         self.accuracy, self.start = accuracy, start_of(self, case)
         joints = [each for each in case.mechanism.drivers if isinstance(each, JointDriver)]
+        if len(self.conditions) > len(joints) + (self.state.getNQErr() > 0):
+            raise SolveError(
+                f"case {case.name!r}: a joint closes a loop of one body with itself, of which"
+                " Simbody's assembler knows nothing; use the projection mode"
+            )
         driven = [self.coordinates[each.joint, each.freedom] for each in joints]
         self.driven = [(self.moves[body - 1].get_coordinates(0), sign) for body, sign in driven]
 
