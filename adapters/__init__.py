@@ -25,6 +25,7 @@ SIMULATIONS = {
     "exudyn-alpha": ("exudyn.solvers", "generalized_alpha"),
     "exudyn-static": ("exudyn.solvers", "static"),
     "exudyn-static-modified": ("exudyn.solvers", "static_modified"),
+    "simbody": ("simbody.assembly", "Assembly"),
 }
 """Name on the command line -> module and what makes the engine: simulate mode. A simulator's bare
 name is its recommended solver.

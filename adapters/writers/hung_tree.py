@@ -75,11 +75,17 @@ class Tree:
 
 
 def require_known(mechanism: Mechanism, title: str) -> None:
-    """Refuse joints without a counterpart.
+    """Refuse joints and couplers without a counterpart.
 
     Raises:
-        KincheckError: a joint is neither a chain nor a distance.
+        KincheckError: a joint is neither a chain nor a distance, or a coupler is not linear.
     """
+    for coupler in mechanism.couplers:
+        if coupler.curve:
+            raise KincheckError(
+                f"{coupler} has no counterpart in {title} here, whose coordinates begin at the"
+                " start; write MJCF or URDF instead"
+            )
     for joint in mechanism.joints:
         if type(joint) not in CHAINS and type(joint) is not Distance:
             raise KincheckError(

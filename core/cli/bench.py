@@ -60,7 +60,7 @@ def add(commands: Any) -> None:
         nargs="+",
         default=[STRUT],
         metavar="CASE",
-        help=f"built-in names, or paths to case files; default: {STRUT}",
+        help=f"built-in names, or paths to case files; all: every built-in case; default: {STRUT}",
     )
     add_joint_types(engines)
     engines.add_argument(
@@ -80,11 +80,12 @@ def add(commands: Any) -> None:
     engines.add_argument(
         "--parts",
         nargs="+",
-        choices=("work", "batch", "study", "size", "processes"),
-        default=["work", "batch", "study", "size", "processes"],
+        choices=("work", "loop", "batch", "study", "size", "processes"),
+        default=["work", "loop", "batch", "study", "size", "processes"],
         help=(
-            "work against precision; cost against batch size, of a study by threads, and against"
-            " mechanism size; first use and memory; default: all"
+            "work against precision; whole loops as multiples of Pinocchio's; cost against batch"
+            " size, of a study by threads, and against mechanism size; first use and memory;"
+            " default: all"
         ),
     )
     formulation = benchmarks.add_parser(
@@ -144,7 +145,8 @@ def _measured(options: argparse.Namespace, house: House, *, formulation: bool) -
         return _with_one_thread(options.command, THREADS)
     problems = _destinations(options, bench_engines.NAME)
     unread: dict[str, str] = {}
-    cases = {name: found for name in options.cases for found in house.find_cases([name], unread)}
+    names = house.cases() if [*options.cases] == ["all"] else options.cases
+    cases = {name: found for name in names for found in house.find_cases([name], unread)}
     problems += unread.values()
     engines = [
         engine

@@ -43,6 +43,7 @@ STRUT = {
     "exudyn-alpha": (1e-15, 2e-7, 6e-4),
     "exudyn-static": (5e-13, None, None),
     "exudyn-static-modified": (2e-12, None, None),
+    "simbody": (2e-15, None, None),
 }
 
 

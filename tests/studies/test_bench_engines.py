@@ -19,7 +19,7 @@ from kincheck.core.harness.engine import Floor
 from kincheck.core.harness.provenance import THREADS
 from kincheck.core.harness.record import Outcome
 from kincheck.core.report.sections import page
-from kincheck.core.studies.bench import engines, precision, rounds
+from kincheck.core.studies.bench import engines, loop_times, precision, rounds
 from kincheck.core.studies.bench.diagrams import precision_diagram
 from kincheck.core.studies.bench.engines_report import report
 from kincheck.core.studies.paper import formulation
@@ -351,3 +351,36 @@ def test_bad_options_are_named(tmp_path, capsys):
     ):
         assert main.main(["bench", "engines", *options]) == 2
         assert said in capsys.readouterr().err
+
+
+def test_loops_are_ratios_to_one_engine_over_the_cases_that_both_solve(monkeypatch):
+    """A made-up clock: every call of an engine takes its own time."""
+    now = [0.0]
+    monkeypatch.setattr(rounds, "perf_counter", lambda: now[0])
+
+    def taking(seconds):
+        def answer(case):
+            now[0] += seconds * (1.0 if case.name == "short" else 3.0)
+            return solution(case)
+
+        return answer
+
+    two = [crank("short"), crank("long")]
+    found = loop_times.measure_loops(
+        two,
+        [
+            Fake("slow", answer=taking(0.4)),
+            Fake("pinocchio", answer=taking(0.1)),
+            Fake("unable", refusal="no"),
+            Fake("missing", installed=None),
+        ],
+        TOL,
+        2,
+        lambda what: None,
+    )
+    slow, base = found
+    assert (slow.engine, base.engine) == ("slow", "pinocchio")
+    assert (slow.base, slow.cases) == ("pinocchio", 2)
+    assert [slow.lower, slow.ratio, slow.upper, base.ratio] == pytest.approx([4.0] * 3 + [1.0])
+    samples = len(two[0].sweep.values)
+    assert base.us_per_sample == pytest.approx(1e6 * 0.2 / samples)

@@ -27,6 +27,31 @@ def cells(us: Spread | None) -> tuple[str, str]:
     )
 
 
+def loops(found: Bench) -> Section:
+    """Whole loops of the engines against each other, over all cases."""
+    rows = [
+        (
+            each.engine,
+            each.loop,
+            str(each.cases),
+            number(each.us_per_sample),
+            number(each.ratio),
+            f"{number(each.lower)} … {number(each.upper)}",
+        )
+        for each in found.loops
+    ]
+    base = found.loops[0].base
+    notes = (
+        (
+            "Projection at full effort, warm, engines taking turns on each case. µs a sample:"
+            f" median over the cases. The ratio is to {base} on the same case: median and extremes"
+            " over the cases."
+        ),
+    )
+    headings = ("engine", "loop", "cases", "µs", f"times\n{base}", "from … to")
+    return Section("Whole loops by engine", [], notes, headings, 2, rows)
+
+
 def batches(found: Bench) -> Section:
     """Cost against batch size."""
     rows = [

@@ -21,6 +21,7 @@ from ...report.figure_data import Effort
 from ..paper.formulation import Formulation
 from . import native_breakdown, scaling
 from .batch import Batch, measure_batches
+from .loop_times import LoopTime, measure_loops
 from .peak import Peak, prepare
 from .precision import (
     Contestant,
@@ -40,9 +41,9 @@ from .size import Size, measure_sizes
 from .study_throughput import StudyRate, measure_studies
 
 NAME = "bench"
-PARTS = ("work", "batch", "study", "size", "processes")
-"""What may be measured: work against precision, cost of batches, of a study, and against mechanism
-size, first use and memory.
+PARTS = ("work", "loop", "batch", "study", "size", "processes")
+"""What may be measured: work against precision, whole loops by engine, cost of batches, of a study,
+and against mechanism size, first use and memory.
 """
 
 # Sizes of chain and ring as one sparse system. A round of them takes seconds, which few
@@ -85,6 +86,7 @@ class Bench(msgspec.Struct, frozen=True, kw_only=True):
     floors: list[FloorOf] = []
     levels: list[Entry] = []
     rates: list[Rate] = []
+    loops: list[LoopTime] = []
     batches: list[Batch] = []
     studies: list[StudyRate] = []
     sizes: list[Size] = []
@@ -129,6 +131,8 @@ def measure(
             _measure_work(case, engines, tol, rounds, peak, add, tell)
     name, first = next(iter(true.items()))
     projections = [engine for engine in engines if engine.mode == "projection"]
+    if "loop" in parts:
+        add("loops", measure_loops(true.values(), projections, tol, rounds, tell))
     if "batch" in parts:
         tell(f"{first.name}: batches of variants")
         add("batches", measure_batches(first, tol, rounds, peak))

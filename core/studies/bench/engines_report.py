@@ -50,6 +50,7 @@ def report(found: Bench) -> Report:
     for case in dict.fromkeys(entry.case for entry in found.levels):
         sections.append(_levels(found, case))
     sections += [_rates(found)] if found.rates else []
+    sections += [cost.loops(found)] if found.loops else []
     sections += [cost.batches(found)] if found.batches else []
     sections += [cost.studies(found)] if found.studies else []
     sections += [

@@ -1,0 +1,128 @@
+"""Simbody in simulate mode: the assembler of Simbody, by OpenSim's `AssemblySolver`.
+
+At every sample the assembler starts from the pose of the sample before. It minimizes the weighted
+squares of what violates the constraints and of the driven coordinates' distances from their values;
+with as many drivers as degrees of freedom both come to zero. It has no velocities.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ...core.case.case import Case
+from ...core.errors import SolveError
+from ...core.mechanism.drivers import JointDriver
+from ...core.trajectory import Array, Trajectory
+from ..shared.joint_equivalents import jointed
+from ..shared.simulation import Leg, SimulatedPose, SimulationEndedError, simulated, start_of
+from .simbody import Simbody, SimbodyModel, opensim
+
+# Of constraints, beside 1 of a driven coordinate. With an infinite weight, which is OpenSim's own,
+# the optimizer refuses mechanisms whose rows are redundant.
+WEIGHT = 1e3
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """Simbody's assembler, pose after pose.
+
+    Attributes:
+        accuracy: of the assembler.
+    """
+
+    accuracy: float = 1e-12
+    name = "simbody"
+    mode = "simulate"
+    loop = "python"
+
+    @property
+    def settings(self) -> Mapping[str, Any]:
+        """Solver, accuracy and weights."""
+        return {
+            "solver": "AssemblySolver, from the pose of the sample before",
+            "accuracy": self.accuracy,
+            "weights": f"constraints {WEIGHT:g}, driven coordinates 1",
+            "rods": "bodies between a cross and a ball",
+        }
+
+    def version(self) -> str | None:
+        """Return the version of OpenSim's package, or None if the import fails."""
+        return Simbody().version()
+
+    def unsupported(self, case: Case) -> str | None:
+        """Return the joint or driver that has no counterpart here, or None."""
+        for coupler in case.mechanism.couplers:
+            if coupler.curve:
+                return f"{coupler}: OpenSim's assembler gets no polynomial from this adapter"
+        return Simbody().unsupported(case)
+
+    def efforts(self) -> Mapping[str, Assembly]:
+        """Return the efforts by the accuracy."""
+        return {f"accuracy {x:g}": replace(self, accuracy=x) for x in (1e-3, 1e-6, 1e-9, 1e-12)}
+
+    def floor(self, case: Case) -> None:
+        """Return None: its iterations are its own."""
+
+    def build(self, case: Case) -> _Assembled:
+        """Return OpenSim's model and its start."""
+        case = replace(case, mechanism=jointed(case.mechanism))
+        return _Assembled(opensim(), case, self.accuracy)
+
+    def solve(self, model: _Assembled, case: Case, tol: float) -> Trajectory:
+        """All samples that can be assembled; see `Engine.solve`."""
+        return simulated(case, model.start, model.run, model.details)
+
+
+class _Assembled(SimbodyModel):
+    """The constrained tree, driven by its coordinates."""
+
+    def __init__(self, o: Any, case: Case, accuracy: float) -> None:
+        super().__init__(o, case)
+        self.accuracy, self.start = accuracy, start_of(self, case)
+        joints = [each for each in case.mechanism.drivers if isinstance(each, JointDriver)]
+        if len(self.conditions) > len(joints) + (self.state.getNQErr() > 0):
+            raise SolveError(
+                f"case {case.name!r}: a joint closes a loop of one body with itself, of which"
+                " Simbody's assembler knows nothing; use the projection mode"
+            )
+        driven = [self.coordinates[each.joint, each.freedom] for each in joints]
+        self.driven = [(self.moves[body - 1].get_coordinates(0), sign) for body, sign in driven]
+
+    def run(self, leg: Leg) -> Iterator[SimulatedPose]:
+        """Yield the poses of a leg."""
+        self.restore(self.start.configuration)
+        self.place()
+        for values in leg.drive(leg.times)[0].T:
+            yield self.assembled(values)
+
+    def assembled(self, values: Array) -> SimulatedPose:
+        """Return the pose at values of the drivers."""
+        o, state = self.o, self.state
+        references = o.SimTKArrayCoordinateReference()
+        for (coordinate, sign), value in zip(self.driven, values.tolist(), strict=True):
+            reference = o.CoordinateReference(coordinate.getName(), o.Constant(sign * value))
+            reference.setWeight(1.0)
+            references.push_back(reference)
+            coordinate.setValue(state, sign * value, False)
+        solver = o.AssemblySolver(self.model, references)
+        solver.setAccuracy(self.accuracy)
+        solver.setConstraintWeight(WEIGHT)
+        try:
+            solver.assemble(state)
+        except RuntimeError as error:
+            first = str(error).strip().splitlines()[0]
+            raise SimulationEndedError(f"Simbody's assembler fails: {first}") from error
+        self.model.realizePosition(state)
+        gaps = [
+            coordinate.getValue(state) - sign * value
+            for (coordinate, sign), value in zip(self.driven, values.tolist(), strict=True)
+        ]
+        stations: list[Any] = self.wanted
+        points = np.full((3, len(stations), 3), np.nan)
+        points[0] = [station.position for station in stations]
+        violated = np.abs([*state.getQErr().to_numpy(), *gaps]).max(initial=0.0)
+        return SimulatedPose(points, float(violated), 1)
