@@ -159,3 +159,38 @@ def test_what_a_table_covers_is_told_to_the_rounding_of_its_times(tmp_path: Path
         ("= 2.0", "= 0.7"),
     )
     assert load_case(write(tmp_path, push)).sweep.path.times[-1] > 3.0
+
+
+CURVED = """schema = "kincheck-case/1"
+name = "knee"
+source = "test"
+units = {length = "mm", angle = "deg"}
+bodies = {carriage = {}, shank = {}}
+[joints]
+slide = {type = "translational", bodies = ["ground", "carriage"], point = [0, 0, 0], axis = [1, 0, 0]}
+flex = {type = "revolute", bodies = ["carriage", "shank"], point = [0, 0, 0], axis = [0, 1, 0]}
+[couplers]
+knee = {type = "polynomial", joints = ["slide", "flex"], coefficients = [0, 0.2, -0.006, 2e-5, 1e-7]}
+[points.pin]
+body = "carriage"
+position = [0, 0, 0]
+[drivers.flex]
+type = "joint_angle"
+joint = "flex"
+[sweep]
+driver = "flex"
+start = 0
+stop = 90
+steps = 7
+"""  # noqa: E501
+
+
+def test_a_polynomial_is_in_the_units_of_the_file(tmp_path: Path):
+    """Millimetres by powers of degrees, between the freedoms that the joints have."""
+    case = load_case(write(tmp_path, CURVED))
+    (knee,) = case.mechanism.couplers
+    assert knee.freedoms == ("translation", "rotation")
+    turn = np.linspace(0.0, 90.0, 7)
+    shift = np.polynomial.Polynomial([0, 0.2, -0.006, 2e-5, 1e-7])(turn) / 1000.0
+    found = Native().solve(Native().build(case), case, 1e-12)
+    assert found.points["pin"].position[:, 0] == pytest.approx(shift, abs=1e-15)

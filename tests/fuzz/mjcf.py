@@ -1,5 +1,5 @@
-"""MJCF models; what the command line says of them, --drive and --hold, stands in a comment of the
-input.
+"""MJCF models; what the command line says of them, --drive, --hold and --start, stands in a comment
+of the input.
 """
 
 import re
@@ -44,6 +44,15 @@ WORDS = (
         "compiler",
         "drive",
         "hold",
+        "rest",
+        "keyframe:k",
+        "out0=0.2",
+        "key",
+        "qpos",
+        "include",
+        "replicate",
+        "fromto",
+        "count",
         "model",
         "world",
         "main",
@@ -79,23 +88,37 @@ ROD = b"""<mujoco model="drive in:0:0.5:5 hold "><worldbody><body name="a"><join
 <equality><connect body1="rod" body2="a" anchor="-3 -4.9 -2.2"/>
 <weld body1="a" body2="world" active="false"/></equality></mujoco>"""  # noqa: E501
 
+CURVED = b"""<mujoco model="drive in:0:0.5:5 hold rest keyframe:k out0=0.2 "><worldbody><body name="f"><freejoint/>
+<body name="a"><joint name="in" axis="0 0 1"/><site name="s" type="box" fromto="0 0 0 1 1 0"/></body>
+<replicate count="2" offset="1 0 0" euler="0 0 30"><body name="b"><joint name="out" axis="0 0 1" type="slide"/>
+<body name="c" pos="1 0 0"><joint name="end" type="ball"/><site name="t" pos="0 0 1.001"/></body></body></replicate>
+</body></worldbody><equality><joint joint1="in" joint2="out0" polycoef="0.1 1 0.2 -0.3 0.1"/></equality>
+<keyframe><key name="k" qpos="0 0 0 1 0 0 0 0.1 0 1 0 0 0 0 1 0 0 0"/></keyframe></mujoco>"""  # noqa: E501
+
 
 def one(data: bytes) -> None:
     """Read one input with what it says itself."""
     drive, hold = found.groups() if (found := SAID.search(data)) else (b"", b"")
-    names = tuple(name.decode("latin-1") for name in hold.split())
-    said = Supplied(drive=(drive.decode("latin-1"),) if drive else (), hold=names)
+    names = [name.decode("latin-1") for name in hold.split()]
+    start = tuple(name for name in names if "=" in name or name.startswith("keyframe:"))
+    said = Supplied(
+        drive=(drive.decode("latin-1"),) if drive else (),
+        hold=tuple(name for name in names if name not in start and name != "rest"),
+        hold_rest="rest" in names,
+        start=start,
+    )
     read_or_refused(lambda: load(written("model.xml", data), said))
 
 
 def seeds() -> list[bytes]:
-    """A gripper, a linkage, sliders and a rod."""
+    """A gripper, a linkage, sliders, a rod, and copies on curves from a keyframe."""
     gripper = (Path(__file__).parent.parent / "data" / "mjcf" / "robotiq_2f85.xml").read_bytes()
     springs = b"right_driver_joint:0:0.8:17 hold right_spring_link_joint left_spring_link_joint "
     return [
         FOUR_BAR,
         SLIDERS,
         ROD,
+        CURVED,
         re.sub(rb'model="[^"]*"', b'model="drive ' + springs + b'"', gripper, count=1),
     ]
 

@@ -14,7 +14,8 @@ import numpy as np
 from ...errors import CaseError
 from ...joints import Coupler
 from ...mechanism.body import Body
-from ...mechanism.motions import Absolute
+from ...mechanism.drivers import JointDriver
+from ...mechanism.motions import Absolute, Motion, Table
 from ..case import MARKER, TIME, Case, Output
 from ..measures import Measure, key_of, own_keys
 from ..suspension import PerTravel, SuspensionOutput
@@ -63,7 +64,11 @@ def case_text(case: Case, comments: Sequence[str] = ()) -> str:
         lines += _table("drivers", driver.name, {"type": driver.type, **_own(driver)})
         motion = case.sweep.motions.get(driver.name)
         if motion is not None:
-            moved = motion.motion if isinstance(motion, Absolute) else motion
+            moved = motion
+            if isinstance(motion, Absolute):
+                # a joint's coordinate is zero at design in a case file
+                design = motion.design if isinstance(driver, JointDriver) else 0.0
+                moved = _shifted(motion.motion, design)
             lines += _table(
                 f"drivers.{_key(driver.name)}", "motion", {"type": moved.type, **_own(moved)}
             )
@@ -80,8 +85,18 @@ def case_text(case: Case, comments: Sequence[str] = ()) -> str:
     return "\n".join(lines) + "\n"
 
 
+def _shifted(motion: Motion, by: float) -> Motion:
+    """Return a motion with smaller values; only tables stand at other values than zero."""
+    if by and isinstance(motion, Table):
+        return Table(motion.times, tuple(x - by for x in motion.values))
+    return motion
+
+
 def _sweep(case: Case) -> Mapping[str, Any]:
     sweep, values = case.sweep, case.sweep.values
+    swept = [each for each in case.mechanism.drivers if each.name == sweep.driver]
+    if swept and isinstance(swept[0], JointDriver) and sweep.design:
+        values = sweep.change
     start, stop = float(values[0]), float(values[-1])
     # of start + k * step, once in the file's units and once here
     rounding = 4.0 * np.spacing(np.abs(values).max())

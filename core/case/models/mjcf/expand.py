@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from ....algebra import ZERO, vec
 from ...io.case_file import LARGEST_FILE
 from ...io.document import read_text, shown
 from .attributes import KNOWN, WRITE_OUT
 from .elements import DEEPEST, Element, parse_xml
+from .frames import Compiler, Place, euler_turn, read_compiler
 
 MOST_INCLUDES, MOST_COPIES, MOST_ELEMENTS = 100, 1_000, 200_000
 
@@ -20,12 +22,14 @@ class Expansion:
 
     Attributes:
         root: file of the model; includes are beside it or below.
+        compiler: how the model writes angles; without it, copies are not made yet.
         taken: included files; each may be included once.
         bytes: how many were read.
         elements: how many there are.
     """
 
     root: Path
+    compiler: Compiler | None = None
     taken: set[Path] = field(default_factory=set[Path])
     bytes: int = 0
     elements: int = 0
@@ -47,9 +51,9 @@ class Expansion:
             match child.tag:
                 case "include":
                     found += self.children(self._included(child), depth + 1)
-                case "replicate":
+                case "replicate" if self.compiler is not None:
                     inside = self.children(child, depth + 1)
-                    found += self._copies(child, inside)
+                    found += self._copies(child, inside, self.compiler)
                 case _:
                     found.append(replace(child, children=self.children(child, depth + 1)))
             self.elements += 1
@@ -87,8 +91,14 @@ class Expansion:
         self.bytes += len(text)
         return parse_xml(file, text)
 
-    def _copies(self, element: Element, inside: list[Element]) -> Iterator[Element]:
-        """Yield the copies in frames, each placed in the one before, with names of their own."""
+    def _copies(
+        self, element: Element, inside: list[Element], compiler: Compiler
+    ) -> Iterator[Element]:
+        """Yield the copies in frames, with names of their own.
+
+        Each is at the offset from the one before, in that one's axes; its Euler angles are as many
+        times the given ones as there are copies before it (measured: MuJoCo 4.0).
+        """
         element.require_known(KNOWN["replicate"])
         text = element.attributes.get("count", "")
         if not (text.isascii() and text.isdigit() and 0 < int(text[:9]) <= MOST_COPIES):
@@ -102,28 +112,19 @@ class Expansion:
         self.elements += count * sum(1 + sum(1 for _ in each.below()) for each in inside)
         if self.elements > MOST_ELEMENTS:
             raise element.fault(f"makes more than {MOST_ELEMENTS} elements; lower its count")
-        digits = len(str(count - 1))
+        digits, at = len(str(count - 1)), ZERO
         for k in range(count):
-            # frames in frames would nest as deep as there are copies
+            place = Place(at, euler_turn([k * angle for angle in turn], compiler))
             named = [_renamed(each, f"{separator}{k:0{digits}}") for each in inside]
-            yield replace(
-                element,
-                tag="frame",
-                attributes={
-                    COPY: f"{k}",
-                    **_attributes("pos", offset),
-                    **_attributes("euler", turn),
-                },
-                children=named,
-            )
+            attributes = {"pos": _numbers(place.at), "quat": _numbers(place.turn)}
+            if "childclass" in element.attributes:
+                attributes["childclass"] = element.attributes["childclass"]
+            yield replace(element, tag="frame", attributes=attributes, children=named)
+            at = place.point(vec(offset))
 
 
-COPY = "copy"
-"""Attribute of the frame of a copy: how often its place is applied. MJCF itself has none such."""
-
-
-def _attributes(name: str, numbers: tuple[float, ...]) -> dict[str, str]:
-    return {name: " ".join(map(repr, numbers))} if any(numbers) else {}
+def _numbers(values: Iterable[float]) -> str:
+    return " ".join(repr(float(x)) for x in values)
 
 
 def _renamed(element: Element, suffix: str) -> Element:
@@ -140,6 +141,7 @@ def expanded(file: Path, root: Element) -> Element:
     """Return the model without includes and replicates.
 
     Raises:
-        CaseError: see `Expansion.children`.
+        CaseError: see `Expansion.children`, and the settings of the compiler.
     """
-    return replace(root, children=Expansion(file.resolve()).children(root))
+    whole = replace(root, children=Expansion(file.resolve()).children(root))
+    return replace(whole, children=Expansion(file.resolve(), read_compiler(whole)).children(whole))

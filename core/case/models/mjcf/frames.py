@@ -145,11 +145,7 @@ def read_place(element: Element, compiler: Compiler) -> Place:
 def _orientation(element: Element, name: str, compiler: Compiler) -> Quat:
     numbers = element.numbers(name, ({"quat": 4, "axisangle": 4, "xyaxes": 6}.get(name, 3),))
     if name == "euler":
-        found = IDENTITY
-        for letter, value in zip(compiler.sequence, numbers, strict=True):
-            one = _about(_AXES[letter.lower()], compiler.angle(value))
-            found = found * one if letter.islower() else one * found
-        return found
+        return euler_turn(numbers, compiler)
     if name == "quat":
         _nonzero(element, name, numbers)
         return unit_quaternion(quat(numbers))
@@ -161,6 +157,15 @@ def _orientation(element: Element, name: str, compiler: Compiler) -> Quat:
     y = vec(numbers[3:])
     y = _nonzero(element, name, (*(y - (x @ y) * x),))
     return _of_axes(x, y, cross(x, y))
+
+
+def euler_turn(angles: Sequence[float], compiler: Compiler) -> Quat:
+    """Return the turn of three Euler angles as the model writes them."""
+    found = IDENTITY
+    for letter, value in zip(compiler.sequence, angles, strict=True):
+        one = _about(_AXES[letter.lower()], compiler.angle(value))
+        found = found * one if letter.islower() else one * found
+    return found
 
 
 def _nonzero(element: Element, name: str, numbers: Sequence[float]) -> Vec3:

@@ -17,7 +17,6 @@ from ...io.document import shown
 from .attributes import DYNAMIC, IN_BODY, KNOWN, MAKE_BODIES, WRITE_OUT
 from .classes import MAIN, Classes
 from .elements import Element
-from .expand import COPY
 from .frames import HERE, Compiler, Place, joint_axis, read_place
 
 WORLD = "world"
@@ -111,13 +110,8 @@ class Tree:
                 self.count(f"{element.tag}s" if element.tag != "inertial" else "inertia")
 
     def _frame(self, element: Element, around: Place) -> Place:
-        """Return the place of a frame; one of a copy lies as often in itself as the copy says."""
-        copies = element.attributes.get(COPY)
-        element.require_known(KNOWN["frame"] if copies is None else (COPY, *KNOWN["frame"]))
-        step = read_place(element, self.compiler)
-        for _ in range(1 if copies is None else int(copies)):
-            around = around.then(step)
-        return around
+        element.require_known(KNOWN["frame"])
+        return around.then(read_place(element, self.compiler))
 
     def _joints_in(
         self, around: Element, place: Place, childclass: str
