@@ -347,7 +347,7 @@ DRIVES = {
         Supplied(drive=DRIVEN.drive, hold=("right_driver_joint",)),
         ["--hold", "which is driven"],
     ),
-    "units": (Supplied(units="mm"), ["--units", "MJCF model", "--drive, --hold"]),
+    "units": (Supplied(units="mm"), ["--units", "a model", "--drive, --hold"]),
 }
 
 

@@ -12,7 +12,7 @@ from ..io.reader_options import NOTHING, Supplied
 CASE_FILES = (".toml", ".json")
 TABLES = (".csv", ".tsv")
 ADAMS_FILES = (".sub", ".tpl", ".asy", ".hpt")
-MODELS = (".xml", ".mjcf")
+MODELS = (".xml", ".mjcf", ".urdf", ".sdf", ".world")
 SUFFIXES = (*CASE_FILES, *TABLES, *ADAMS_FILES, *MODELS)
 """Suffixes of names that are files, whether they exist or not."""
 
@@ -21,7 +21,7 @@ CASE, CHRONO, ADAMS, TABLE, MODEL = (
     "Project Chrono suspension",
     "Adams/Car hardpoints",
     "hardpoint table",
-    "MJCF model",
+    "model",
 )
 HARDPOINTS = (CHRONO, ADAMS, TABLE)
 _OPTIONS = {
@@ -61,9 +61,9 @@ def load(file: Path, supplied: Supplied = NOTHING) -> Case:
             "found a file name with control characters, expected printable ones; rename the file",
         )
     if kind == MODEL:
-        from .mjcf.read import read_mjcf
+        from .xml_models import read_model
 
-        return read_mjcf(file, text, supplied)
+        return read_model(file, text, supplied)
     from .hardpoints.adams import read_adams
     from .hardpoints.chrono import read_chrono
     from .hardpoints.plain import read_plain

@@ -4,7 +4,9 @@ others held.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 
 from ....algebra import Quat
 from ....errors import remedy
@@ -49,6 +51,24 @@ def read_mjcf(file: Path, text: str, supplied: Supplied) -> Case:
     """
     root = parse_xml(file, text)
     _require_model(root)
+    model = root.attributes.get("model", file.stem)
+    described = f"MJCF model {model!r} of {file.name}, from its pose qpos0"
+    return case_of(file, root, supplied, described)
+
+
+def case_of(
+    file: Path,
+    root: Element,
+    supplied: Supplied,
+    described: str,
+    left_out: Mapping[str, int] = MappingProxyType({}),
+) -> Case:
+    """Return the case of a document; see `read_mjcf`.
+
+    Args:
+        described: what was read, for the source of the case.
+        left_out: number of items of the file that are not in the document, by name.
+    """
     tree = read_tree(root, read_classes(root), read_compiler(root))
     if not tree.moving:
         raise root.fault("has no body with a joint, expected a mechanism; give a model that moves")
@@ -80,12 +100,9 @@ def read_mjcf(file: Path, text: str, supplied: Supplied) -> Case:
     dof = degrees_of_freedom(mechanism)
     if driving.joint is None or dof != len(drivers):
         raise undriven(file, root, tree, driving, dof)
-    others = [*parts.left_out, *(f"{what} ({count})" for what, count in tree.left_out.items())]
-    model = root.attributes.get("model", file.stem)
-    source = (
-        f"MJCF model {model!r} of {file.name}, from its pose"
-        f" qpos0{LEFT_OUT}{', '.join(others) or 'nothing'}"
-    )
+    counted = {**tree.left_out, **left_out}
+    others = [*parts.left_out, *(f"{what} ({count})" for what, count in counted.items())]
+    source = f"{described}{LEFT_OUT}{', '.join(others) or 'nothing'}"
     sweep = Sweep(driving.joint, driving.values, design=tree.joints[driving.joint].ref)
     return with_all_motions(Case(file.stem, source, Truth.CONSENSUS_ONLY, mechanism, sweep, ()))
 
