@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any, cast
 
 import numpy as np
@@ -14,7 +14,7 @@ import numpy as np
 from ...errors import LONGEST_NAME, CaseError, brief
 from ...joints import Coupler
 from ...mechanism.body import Body
-from ...mechanism.motions import Absolute
+from ...mechanism.motions import Absolute, Motion, Table
 from ...trajectory import Array
 from ..case import MARKER, TIME, Case, Output
 from ..measures import Measure, key_of, own_keys
@@ -74,7 +74,7 @@ def case_text(case: Case, comments: Sequence[str] = ()) -> str:
         lines += _table("drivers", driver.name, {"type": driver.type, **_own(driver)})
         motion = case.sweep.motions.get(driver.name)
         if motion is not None:
-            moved = motion.motion if isinstance(motion, Absolute) else motion
+            moved = _from_design(motion, mechanism.design_value(driver.name))
             lines += _table(
                 f"drivers.{_key(driver.name)}", "motion", {"type": moved.type, **_own(moved)}
             )
@@ -93,6 +93,24 @@ def case_text(case: Case, comments: Sequence[str] = ()) -> str:
     if reference:
         lines += ["", "[reference]", *_keys(reference)]
     return "\n".join(lines) + "\n"
+
+
+def _from_design(motion: Motion, design: float) -> Motion:
+    """Return a motion as a case file has it: of values whose design value is the given one.
+
+    Raises:
+        CaseError: it has another one, and is no table, whose values can be shifted.
+    """
+    if not isinstance(motion, Absolute):
+        return motion
+    if (shift := motion.design - design) == 0.0:
+        return motion.motion
+    if not isinstance(motion.motion, Table):
+        raise CaseError(
+            f"a {motion.motion.type} motion of values that are {motion.design!r} at design,"
+            f" expected {design!r} as in a case file; give a table"
+        )
+    return replace(motion.motion, values=tuple(x - shift for x in motion.motion.values))
 
 
 def _short(text: str) -> str:

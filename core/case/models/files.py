@@ -24,6 +24,20 @@ CASE, CHRONO, ADAMS, TABLE, MODEL = (
     "model",
 )
 HARDPOINTS = (CHRONO, ADAMS, TABLE)
+UNREAD = {
+    ".yaml": "is beside a URDF of the same name; give that file, NAME.urdf",
+    ".yml": "is beside a URDF of the same name; give that file, NAME.urdf",
+    ".xacro": "holds macros; expand them: xacro FILE > robot.urdf",
+    **dict.fromkeys(
+        (".usd", ".usda", ".usdc", ".usdz"),
+        "cannot be read; write the model out as MJCF, URDF or SDF from the program that made it",
+    ),
+    **dict.fromkeys(
+        (".step", ".stp", ".stl", ".obj", ".dae", ".iges"),
+        "holds shapes, which say nothing of joints; give the model that names it",
+    ),
+}
+"""Files that people have beside their models, and what to do, by suffix."""
 _OPTIONS = {
     CASE: ("closure",),
     MODEL: ("drive", "hold"),
@@ -41,6 +55,8 @@ def load(file: Path, supplied: Supplied = NOTHING) -> Case:
         CaseError: the file is unreadable, inconsistent or incomplete, or an option is not for such
             files.
     """
+    if advice := UNREAD.get(file.suffix.lower()):
+        raise fault(file, "", f"found a {file.suffix} file, which {advice}")
     kind = kind_of(file, supplied)
     for option in supplied.given:
         if option not in _OPTIONS[kind]:

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from types import MappingProxyType
 
 from ....algebra import Quat
 from ....errors import remedy
@@ -61,18 +60,19 @@ def case_of(
     root: Element,
     supplied: Supplied,
     described: str,
-    left_out: Mapping[str, int] = MappingProxyType({}),
+    left_out: Mapping[str, int] | None = None,
 ) -> Case:
     """Return the case of a document; see `read_mjcf`.
 
     Args:
         described: what was read, for the source of the case.
-        left_out: number of items of the file that are not in the document, by name.
+        left_out: number of omitted items of the file, by name; None to count those of the
+            document.
     """
     tree = read_tree(root, read_classes(root), read_compiler(root))
     if not tree.moving:
         raise root.fault("has no body with a joint, expected a mechanism; give a model that moves")
-    for section in root.only(*_LEFT_OUT):
+    for section in root.only(*_LEFT_OUT) if left_out is None else ():
         for element in section.children:
             tree.count(f"{section.tag}: {element.tag}")
     driving = read_driving(file, tree, supplied)
@@ -100,7 +100,7 @@ def case_of(
     dof = degrees_of_freedom(mechanism)
     if driving.joint is None or dof != len(drivers):
         raise undriven(file, root, tree, driving, dof)
-    counted = {**tree.left_out, **left_out}
+    counted = tree.left_out if left_out is None else left_out
     others = [*parts.left_out, *(f"{what} ({count})" for what, count in counted.items())]
     source = f"{described}{LEFT_OUT}{', '.join(others) or 'nothing'}"
     sweep = Sweep(driving.joint, driving.values, design=tree.joints[driving.joint].ref)

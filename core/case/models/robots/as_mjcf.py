@@ -9,29 +9,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from ....algebra import Quat, Vec3
 from ..mjcf.elements import DEEPEST, Element
 from ..mjcf.frames import HERE, Place, unit_quaternion
 from ..mjcf.tree import WORLD
-from .robot import Connection, Loop, Move, Robot
+from .robot import Connection, Described, Loop, Move, Robot
 from .tree import spanned
 
 FIXED = ("world", "ground")
 """Names of a fixed link at the origin that stands for the world."""
 # Readers refuse smaller numbers, which are the rounding of zeros.
 _ZERO = 1e-100
-
-
-@dataclass(frozen=True, eq=False)
-class Translated(Element):
-    """An element made of another one, which messages name."""
-
-    origin: Element | None = None
-
-    def __str__(self) -> str:
-        return str(self.origin)
 
 
 def as_mjcf(robot: Robot) -> Element:
@@ -122,7 +111,7 @@ class _Writer:
         """Return an element that messages call by its origin."""
         source = origin.element if isinstance(origin, Connection) else origin
         children = [] if children is None else children
-        return Translated(source.file, tag, attributes, source.line, children, origin=source)
+        return Described(source.file, tag, attributes, source.line, children, words=str(source))
 
     def body(self, name: str, outer: str, inside: list[Element], origin: Element) -> None:
         """Add a body to another one, or to the world."""
@@ -158,13 +147,12 @@ class _Writer:
         """Add a joint that closes a loop."""
         joint = loop.joint
         outer, inner = joint.links
-        moves, ball = joint.moves, False
-        if moves and moves[-1].kind == "ball":  # a common point leaves the same free
-            *first, last = moves
-            moves, ball, point = tuple(first), True, last.point
-        else:
-            point = joint.moves[-1].point if joint.moves else self.places[inner].at
+        moves, ball = joint.moves, bool(joint.moves) and joint.moves[-1].kind == "ball"
+        if ball:  # a common point leaves the same free
+            moves = moves[:-1]
+        closure = joint.name
         if moves:
+            closure = f"{joint.name}.closure"
             name = self.unused(f"{joint.name}.copy")
             place = loop.frames[0] if loop.frames else self.places[inner]
             self.places[name] = place
@@ -179,13 +167,14 @@ class _Writer:
         if loop.frames is None:
             attributes = {"body1": self.names[outer], "body2": self.names[inner]}
             if ball:
-                attributes["anchor"] = _text(Place(point).seen_from(self.places[outer]).at)
+                center = Place(joint.moves[-1].point)
+                attributes["anchor"] = _text(center.seen_from(self.places[outer]).at)
         else:
             names = [self.unused(f"{joint.name}.{each}") for each in ("parent", "child")]
             for site, link, place in zip(names, (outer, inner), loop.frames, strict=True):
                 self.site(site, link, place, joint.element)
             attributes = {"site1": names[0], "site2": names[1]}
-        self.equalities.append(self.element(tag, {"name": joint.name, **attributes}, joint))
+        self.equalities.append(self.element(tag, {"name": closure, **attributes}, joint))
 
     def relate(self) -> None:
         """Add rods, couplings and joints that follow others."""

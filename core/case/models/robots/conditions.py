@@ -18,8 +18,8 @@ from ....algebra import Vec3, X, Y, Z, cross, vec
 from ....errors import CaseError, remedy
 from ....joints.base import triad
 from ....mechanism.mechanism import Vector
-from ...io.document import fault, shown
-from .robot import Connection, Coupling, Loop, Move, Robot, Rod
+from ...io.document import shown
+from .robot import Connection, Coupling, Described, Loop, Move, Robot, Rod
 
 # Rounding of what an export writes, relative to the size of the numbers.
 OPEN = 1e-9
@@ -75,7 +75,8 @@ def add_constraints(file: Path, found: ConstraintsFile, robot: Robot) -> None:
         if each.kind == "linear":
             name = each.joint if each.joint not in names else f"{each.joint}.{k}"
             names.add(name)
-            robot.couplings.append(Coupling(name, each.weights, robot.root))
+            element = Described(file, "", {}, 1, words=f"constraints: joint {each.joint!r}")
+            robot.couplings.append(Coupling(name, each.weights, element))
 
 
 class _Group:
@@ -85,6 +86,7 @@ class _Group:
         self, file: Path, name: str, conditions: Sequence[Condition], robot: Robot
     ) -> None:
         self.file, self.name, self.robot = file, name, robot
+        self.element = Described(file, "", {}, 1, words=f"constraints: joint {name!r}")
         self.by_kind: Mapping[str, list[Condition]] = {
             kind: [each for each in conditions if each.kind == kind]
             for kind in ("coincident", "distance", "offset", "directions")
@@ -97,9 +99,7 @@ class _Group:
 
     def fault(self, problem: str) -> CaseError:
         """Return the error of the group."""
-        return fault(
-            self.file, f"constraints: joint {self.name!r}", f"{problem}; export the case anew"
-        )
+        return self.element.fault(f"{problem}; export the case anew")
 
     def link(self, name: str) -> str:
         """Return a name of a link."""
@@ -143,7 +143,7 @@ class _Group:
             Move(move.kind, name, move.point, move.axis)
             for move, name in zip(moves, names, strict=False)
         )
-        self.robot.loops.append(Loop(Connection(self.name, self.links, named, self.robot.root)))
+        self.robot.loops.append(Loop(Connection(self.name, self.links, named, self.element)))
 
     def add_distance(self) -> None:
         """Add a rod; with an offset across a hinge on its first link."""
@@ -152,14 +152,14 @@ class _Group:
         apart = q - p
         self.require_zero(math.sqrt(apart @ apart) - rod.value, rod.value)
         if not self.by_kind["offset"]:
-            self.robot.rods.append(Rod(self.name, self.links, (p, q), self.robot.root))
+            self.robot.rods.append(Rod(self.name, self.links, (p, q), self.element))
             return
         (across,) = self.by_kind["offset"]
         moves = (
             Move("hinge", self.name, p, self.axis(across.x)),
             Move("ball", f"{self.name}.ball", q, X),
         )
-        self.robot.loops.append(Loop(Connection(self.name, self.links, moves, self.robot.root)))
+        self.robot.loops.append(Loop(Connection(self.name, self.links, moves, self.element)))
 
     def slides(self) -> list[Move]:
         """Return the slides that offsets leave; none with a common point."""

@@ -15,6 +15,20 @@ from ..mjcf.frames import Place
 Kind: TypeAlias = Literal["hinge", "slide", "ball"]
 
 
+@dataclass(frozen=True, eq=False)
+class Described(Element):
+    """An element that stands for something else, which messages name.
+
+    Attributes:
+        words: its place in the file.
+    """
+
+    words: str = ""
+
+    def __str__(self) -> str:
+        return self.words
+
+
 @dataclass(frozen=True)
 class Move:
     """One freedom of a joint, or the three of a ball.

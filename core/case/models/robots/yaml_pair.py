@@ -18,7 +18,7 @@ import msgspec
 from ....algebra import X
 from ....errors import remedy
 from ...io.document import fault, shown
-from .robot import Connection, Loop, Move, Robot
+from .robot import Connection, Described, Loop, Move, Robot
 
 INSTALL = "pip install 'kincheck[yaml]'"
 _UNIVERSAL = re.compile(r"UJOINT_([XYZ])([XYZ])")
@@ -89,18 +89,24 @@ def add_pairs(file: Path, pairs: PairedFile, robot: Robot) -> None:
     Raises:
         CaseError: a name is not a link, or not a joint.
     """
-    for name, kind in zip(pairs.closed_loop, pairs.type, strict=True):
-        for link in name:
-            if link not in robot.links:
+    # as in Pinocchio, a joint has a frame too: that of its link
+    frames = {joint.name: joint.links[1] for joint in robot.joints} | {
+        name: name for name in robot.links
+    }
+    for names, kind in zip(pairs.closed_loop, pairs.type, strict=True):
+        for name in names:
+            if name not in frames:
                 raise fault(
                     file,
                     "closed_loop",
-                    f"found {shown(link)}, expected a link; {remedy(link, robot.links)}",
+                    f"found {shown(name)}, expected a link or joint; {remedy(name, frames)}",
                 )
-        places = robot.links[name[0]], robot.links[name[1]]
-        title = f"{name[0]} = {name[1]}"
+        first, second = (frames[name] for name in names)
+        places = robot.links[first], robot.links[second]
+        title = f"{names[0]} = {names[1]}"
         moves = (Move("ball", title, places[0].at, X),) if kind.lower() == "3d" else ()
-        robot.loops.append(Loop(Connection(title, name, moves, robot.root), places))
+        element = Described(file, "", {}, 1, words=f"closed_loop: {title}")
+        robot.loops.append(Loop(Connection(title, (first, second), moves, element), places))
     coordinates = {move.name for joint in robot.joints for move in joint.moves}
     robot.actuated += [name for name in pairs.name_mot if name in coordinates]
 
