@@ -23,10 +23,10 @@ WORDS = (
     *("multiplier", "offset", "joint", "type", "name", "closed_loop", "joint_name", "joint_type"),
     *("UJOINT_XY", "SPHERICAL", "6d", "3d", "coincident", "distance", "directions", "linear"),
 )
-FOUR_BAR = b"""<robot name="drive A:0:0.5:5 hold "><link name="base"/><link name="a"><visual/></link>
+FOUR_BAR = b"""<robot name="drive A:0:0.5:5 hold "><link name="base"/><link name="a"><visual><geometry><sphere radius="1"/></geometry></visual></link>
 <link name="b"/><link name="c"/><link name="tip"/>
 <joint name="A" type="continuous"><parent link="base"/><child link="a"/><axis xyz="0 1 0"/></joint>
-<joint name="B" type="revolute"><parent link="a"/><child link="b"/><origin xyz="0 0 2"/><axis xyz="0 1 0"/><limit/></joint>
+<joint name="B" type="revolute"><parent link="a"/><child link="b"/><origin xyz="0 0 2"/><axis xyz="0 1 0"/><limit lower="-9" upper="9" effort="1" velocity="1"/></joint>
 <joint name="D" type="continuous"><parent link="base"/><child link="c"/><origin xyz="4 0 0" rpy="0 0.5 0"/><axis xyz="0 1 0"/></joint>
 <joint name="t" type="fixed"><parent link="b"/><child link="tip"/><origin xyz="2 0 1" rpy="1 2 3"/></joint>
 <constraint name="C" type="spherical"><parent link="b"/><parent_origin xyz="4 0 0"/><child link="c"/><child_origin xyz="-0.958851077208406 0 1.7551651237807455"/></constraint>

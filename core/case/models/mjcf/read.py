@@ -110,7 +110,10 @@ def case_of(
 def _require_model(root: Element) -> None:
     """Refuse what is no model, or stands for parts that are elsewhere."""
     if root.tag != "mujoco":
-        raise root.fault("found another document, expected a model <mujoco>; give an MJCF file")
+        raise root.fault(
+            "found another document, expected a model <mujoco>, <robot> or <sdf>; give a file of"
+            " MJCF, URDF or SDF"
+        )
     for element in root.children:
         if element.tag in MAKE_BODIES:
             raise element.fault(f"cannot be read, because {MAKE_BODIES[element.tag]}; {WRITE_OUT}")
