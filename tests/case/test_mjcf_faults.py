@@ -269,7 +269,7 @@ def test_no_document_types(tmp_path, head, fragments):
     [
         ("", ["line 1", "no element found"]),
         (GRIPPER.read_text()[:3000], ["not valid XML"]),
-        ("<scene name='a'/>", ["<robot> 'a'", "expected a model <mujoco>"]),
+        ("<scene name='a'/>", ["<scene> 'a'", "expected a model <mujoco>"]),
         ("<mujoco><worldbody/></mujoco>", ["no body with a joint"]),
         ("<mujoco>" + "<a>" * 300 + "</a>" * 300 + "</mujoco>", ["nested more than 200 deep"]),
         ("<mujoco>&bomb;</mujoco>", ["undefined entity"]),
