@@ -1,3 +1,3 @@
-"""Robots of URDF and SDF: links and joints, with their loops, as elements of MJCF, which one reader
-makes a case of.
+"""Readers of URDF and SDF: links, joints and loops, translated to elements of MJCF, from which its
+reader makes a case.
 """

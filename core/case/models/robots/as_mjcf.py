@@ -1,8 +1,8 @@
-"""A robot as elements of MJCF, whose reader knows all that can be said of its motion.
+"""A robot as elements of MJCF: one reader makes the case of either.
 
-A link is a body; one without freedoms of its own is part of the body around it, and a site, for it
-is a frame that is looked at. A joint that closes a loop moves a massless copy on its first link,
-which is welded to the second one: so it can be driven, held and compared like any other.
+A link is a body. A link without freedoms of its own is part of the body around it, and a site, so
+its position is an output. A joint of a loop moves a massless copy on its first link, welded to its
+second link: it can be driven, held and compared like a joint of the tree.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from .robot import Connection, Described, Loop, Move, Robot
 from .tree import spanned
 
 FIXED = ("world", "ground")
-"""Names of a fixed link at the origin that stands for the world."""
+"""Names of a fixed link at the origin, which is the world."""
 # Readers refuse smaller numbers, which are the rounding of zeros.
 _ZERO = 1e-100
 
@@ -108,7 +108,7 @@ class _Writer:
         origin: Element | Connection,
         children: list[Element] | None = None,
     ) -> Element:
-        """Return an element that messages call by its origin."""
+        """Return an element; messages name its origin."""
         source = origin.element if isinstance(origin, Connection) else origin
         children = [] if children is None else children
         return Described(source.file, tag, attributes, source.line, children, words=str(source))
@@ -144,7 +144,7 @@ class _Writer:
         return self.element("joint", attributes, joint)
 
     def close(self, loop: Loop) -> None:
-        """Add a joint that closes a loop."""
+        """Add a joint of a loop."""
         joint = loop.joint
         outer, inner = joint.links
         moves, ball = joint.moves, bool(joint.moves) and joint.moves[-1].kind == "ball"
@@ -177,7 +177,7 @@ class _Writer:
         self.equalities.append(self.element(tag, {"name": closure, **attributes}, joint))
 
     def relate(self) -> None:
-        """Add rods, couplings and joints that follow others."""
+        """Add rods, couplings and mimics."""
         for rod in self.robot.rods:
             ends = [self.unused(f"{rod.name}.{each}") for each in ("parent", "child")]
             for name, link, point in zip(ends, rod.links, rod.points, strict=True):
@@ -205,7 +205,7 @@ class _Writer:
         self.equalities.append(self.element("tendon", {"name": name, "tendon1": key}, origin))
 
     def unused(self, wanted: str) -> str:
-        """Return a name for what the file does not name."""
+        """Return a name unlike all links and frames."""
         while wanted in self.copies or wanted in self.robot.frames:
             wanted += "'"
         self.copies.add(wanted)
@@ -215,7 +215,7 @@ class _Writer:
 def fitted(here: Place, there: Place, moves: Sequence[Move]) -> Place:
     """Return the first frame of a loop, moved by the joint's own freedoms to the second one.
 
-    What is left between both is the gap of the loop.
+    The rest between both is the gap of the loop.
     """
     kinds = [move.kind for move in moves]
     at, turn = here.at, here.turn

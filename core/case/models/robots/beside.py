@@ -1,4 +1,4 @@
-"""Files beside a URDF that close its loops: NAME.constraints.json, as `kincheck export` writes it,
+"""Files beside a URDF, with its loops: NAME.constraints.json, as `kincheck export` writes it,
 and NAME.yaml of example-parallel-robots (github.com/Gepetto/example-parallel-robots).
 """
 
@@ -26,7 +26,7 @@ SCHEMA = "kincheck-constraints/1"
 
 @dataclass(frozen=True)
 class Beside:
-    """What the files beside a URDF say.
+    """Content of the files beside a URDF.
 
     Attributes:
         types: types of joints in place of those of the URDF; letters for a universal joint.

@@ -1,8 +1,8 @@
 """Conditions of NAME.constraints.json, as `kincheck export --to urdf` writes them, as joints.
 
-All conditions of a joint together say which freedoms it leaves: directions held by `offset` leave
-slides across them, and pairs of `directions` leave turns. A joint is then a chain of slides and
-turns, in the pose of the file, where every condition holds.
+All conditions of a joint together give its freedoms: `offset` leaves slides across its direction,
+and pairs of `directions` leave turns. The joint is a chain of slides and turns from the zero pose,
+in which all conditions hold.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from ....mechanism.mechanism import Vector
 from ...io.document import shown
 from .robot import Connection, Coupling, Described, Loop, Move, Robot, Rod
 
-# Rounding of what an export writes, relative to the size of the numbers.
+# Rounding of exported numbers, relative to the size of the numbers.
 OPEN = 1e-9
 
 
@@ -53,7 +53,7 @@ class Condition(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class ConstraintsFile(msgspec.Struct, frozen=True):
-    """The file; what else is in it is for people."""
+    """The file; its other keys are for people."""
 
     constraints: list[Condition]
 
@@ -126,7 +126,7 @@ class _Group:
         return (1.0 / length) * found
 
     def require_zero(self, residual: float, scale: float) -> None:
-        """Refuse a condition that does not hold in the pose of the file."""
+        """Refuse a condition with a residual in the zero pose."""
         if abs(residual) > OPEN * max(1.0, scale):
             raise self.fault(
                 f"is open by {residual:.3g} in the zero pose, expected a condition that holds there"
@@ -162,7 +162,7 @@ class _Group:
         self.robot.loops.append(Loop(Connection(self.name, self.links, moves, self.element)))
 
     def slides(self) -> list[Move]:
-        """Return the slides that offsets leave; none with a common point."""
+        """Return the slides left by offsets; none with a common point."""
         for each in self.by_kind["coincident"]:
             apart = self.point(each.j) - self.point(each.i)
             self.require_zero(math.sqrt(apart @ apart), 1.0)
@@ -185,7 +185,7 @@ class _Group:
         return [Move("slide", "", self.pivot, axis) for axis in free]
 
     def turns(self) -> list[Move]:
-        """Return the turns that pairs of directions leave."""
+        """Return the turns left by pairs of directions."""
         pairs: list[tuple[Vec3, Vec3]] = []
         for each in self.by_kind["directions"]:
             x, y = self.axis(each.x), self.axis(each.y)

@@ -1,6 +1,4 @@
-"""A robot: links, joints between them, and conditions that close loops, all global in its zero
-pose.
-"""
+"""A robot: links, joints and closures of loops, all global in its zero pose."""
 
 from __future__ import annotations
 
@@ -17,7 +15,7 @@ Kind: TypeAlias = Literal["hinge", "slide", "ball"]
 
 @dataclass(frozen=True, eq=False)
 class Described(Element):
-    """An element that stands for something else, which messages name.
+    """An element with its own words in messages, such as the place of its origin.
 
     Attributes:
         words: its place in the file.
@@ -73,11 +71,11 @@ class Connection:
 
 @dataclass(frozen=True)
 class Loop:
-    """A joint that closes a loop, between a frame of each link.
+    """A joint of a loop, between a frame of each link.
 
     Attributes:
-        frames: on the first link behind the freedoms, and on the second one; None where the joint
-            holds as the links are placed.
+        frames: on the first link behind the freedoms, and on the second one; None for a joint
+            without a gap in the zero pose.
     """
 
     joint: Connection
@@ -96,7 +94,7 @@ class Rod:
 
 @dataclass(frozen=True)
 class Coupling:
-    """A weighted sum of coordinates that stays zero [rad, m]."""
+    """A weighted sum of coordinates, constantly zero [rad, m]."""
 
     name: str
     weights: Mapping[str, float]
@@ -124,11 +122,11 @@ class Robot:
     Attributes:
         format: the file's, for messages and notes: "URDF robot".
         links: places of the links.
-        fixed: links that are part of the world.
+        fixed: links of the world.
         frames: names of places on links, for outputs: link and place.
         actuated: coordinates with a motor.
         left_out: number of omitted items, by name.
-        beside: names of the files beside this one that were read.
+        beside: names of the files read beside this one.
     """
 
     format: str

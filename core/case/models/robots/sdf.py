@@ -11,9 +11,10 @@ from ..mjcf.elements import Element
 from ..mjcf.frames import HERE, Place
 from .robot import Connection, Coupling, Mimic, Move, Robot
 from .sdf_frames import MODEL, SCOPE, Frames, flag, text_of
-from .urdf import MOST_LINKS
 from .values import direction, numbers_of, only_child, require_children
 
+# Three for each body that other models may have.
+MOST_FRAMES = 6_000
 TYPES = (
     *("revolute", "continuous", "prismatic", "fixed", "ball"),
     *("universal", "revolute2", "screw"),
@@ -41,7 +42,7 @@ def read_sdf(root: Element) -> Robot:
     """Return the robot of a document: all models in it, and their worlds.
 
     Raises:
-        CaseError: models that are elsewhere, unknown frames, or a joint that cannot be read.
+        CaseError: included models, unknown frames, or an unknown joint.
     """
     robot = Robot("SDF model", root)
     top = [*root.only("model"), *root.only("world")]
@@ -58,12 +59,12 @@ def read_sdf(root: Element) -> Robot:
     for world in root.only("world"):
         frames.read(world, "")
     short = _Short(frames)
+    if len(frames.found) > MOST_FRAMES:
+        raise root.fault(
+            f"found {len(frames.found)} links, joints and frames, expected {MOST_FRAMES} at most;"
+            " take out those that are not looked at"
+        )
     for full, framed in frames.links.items():
-        if len(robot.links) >= MOST_LINKS:
-            raise framed.element.fault(
-                f"found more than the {MOST_LINKS} links that are read, expected fewer; take out"
-                " those that are not looked at"
-            )
         require_children(framed.element, IN_LINK)
         name = short(full)
         robot.links[name] = frames.place(framed.element, full)
@@ -79,8 +80,7 @@ def read_sdf(root: Element) -> Robot:
         for child in framed.element.only(*_COUNTED):
             robot.count(child.tag)
         frames.place(framed.element, full)
-    if any(frames.joints):
-        _joints(robot, frames, _version(root))
+    _joints(robot, frames, short, _version(root))
     for full, framed in frames.found.items():
         if framed.element.tag == "frame":
             link = frames.link(framed.element, framed.attached)
@@ -112,8 +112,7 @@ class _Short:
         return full.removeprefix(self.prefix)
 
 
-def _joints(robot: Robot, frames: Frames, version: tuple[int, ...]) -> None:
-    short = _Short(frames)
+def _joints(robot: Robot, frames: Frames, short: _Short, version: tuple[int, ...]) -> None:
     world = "world"
     while world in robot.links:
         world += "'"
@@ -136,6 +135,7 @@ def _joints(robot: Robot, frames: Frames, version: tuple[int, ...]) -> None:
         links = ends[0], ends[1]
         joint = _joint(robot, frames, full, short(full), links, place, version)
         robot.joints.append(joint)
+        _mimics(robot, frames, short, full, joint.moves)
 
 
 def _joint(
@@ -183,7 +183,6 @@ def _joint(
             robot.couplings.append(Coupling(f"{name}.thread", weights, element))
         case _:
             found = ()
-    _mimics(robot, frames, full, found)
     return Connection(name, links, found, element)
 
 
@@ -209,9 +208,9 @@ def _axis(frames: Frames, full: str, tag: str, place: Place, version: tuple[int,
     return place.direction(direction(axis if xyz is None else xyz, numbers))
 
 
-def _mimics(robot: Robot, frames: Frames, full: str, moves: Sequence[Move]) -> None:
-    """Add the relations of axes that follow others."""
-    framed, short = frames.joints[full], _Short(frames)
+def _mimics(robot: Robot, frames: Frames, short: _Short, full: str, moves: Sequence[Move]) -> None:
+    """Add the mimics of the axes."""
+    framed = frames.joints[full]
     for tag, move in zip(("axis", "axis2"), moves, strict=False):
         axis = only_child(framed.element, tag)
         mimic = None if axis is None else only_child(axis, "mimic")

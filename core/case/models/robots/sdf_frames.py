@@ -1,7 +1,7 @@
 """Places of links, joints and frames of an SDF model, which may be given in each other.
 
-A pose is in the frame that `relative_to` names. Without it, the pose of a link or a nested model is
-in the model's frame, that of a joint in its child, and that of a frame in what it is attached to.
+A pose is in the frame named by `relative_to`. Without it, the pose of a link or a nested model is
+in the model's frame, a joint's pose in its child, and a frame's pose in its `attached_to`.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ SCOPE = "::"
 
 @dataclass(frozen=True)
 class Framed:
-    """What has a frame.
+    """An element with a frame.
 
     Attributes:
         scope: full name of the model around it; empty for the world.
-        default: full name of what its pose is in, unless it says so.
-        attached: full name of what it moves with; empty for a link, or the world.
+        default: full name of the base of its pose without relative_to.
+        attached: full name of the frame it moves with; empty for a link, or the world.
     """
 
     element: Element
@@ -46,6 +46,7 @@ class Frames:
     links: dict[str, Framed] = field(default_factory=dict[str, Framed])
     joints: dict[str, Framed] = field(default_factory=dict[str, Framed])
     models: dict[str, Framed] = field(default_factory=dict[str, Framed])
+    static: set[str] = field(default_factory=set[str])
     _places: dict[str, Place] = field(default_factory=lambda: {"": HERE})
 
     def read(self, around: Element, scope: str, depth: int = 0) -> None:
@@ -62,6 +63,8 @@ class Frames:
         for element in around.only("model"):
             full = self._add(element, scope, scope)
             self.models[full] = self.found[full]
+            if flag(only_child(element, "static")):
+                self.static.add(full)
             self.read(element, full, depth + 1)
         for element in around.only("joint"):
             child = self.within(element, scope, text_of(element, "child"))
@@ -127,14 +130,14 @@ class Frames:
         return self._places[full]
 
     def _base(self, full: str) -> str:
-        """Return what the pose of a frame is in."""
+        """Return the base of the pose of a frame."""
         framed = self.found[full]
         pose = only_child(framed.element, "pose")
         given = pose.attributes.get("relative_to", "") if pose is not None else ""
         return self.within(framed.element, framed.scope, given) if given else framed.default
 
     def link(self, element: Element, full: str) -> str:
-        """Return the link that a frame moves with; empty for the world.
+        """Return the link of a frame; empty for the world.
 
         Raises:
             CaseError: there is none.
@@ -149,7 +152,7 @@ class Frames:
         )
 
     def _canonical(self, model: str) -> str:
-        """Return the link that a model's frame moves with: the one it names, or its first."""
+        """Return the link of a model's frame: its canonical one, or its first."""
         element = self.found[model].element
         if name := element.attributes.get("canonical_link", ""):
             return joined(model, name)
@@ -162,10 +165,10 @@ class Frames:
         return first
 
     def still(self, full: str) -> bool:
-        """Return whether a link is in a model that is static, or in one inside such a model."""
+        """Return whether a link is in a static model, or in a model inside it."""
         scope = self.found[full].scope
         while scope:
-            if flag(only_child(self.found[scope].element, "static")):
+            if scope in self.static:
                 return True
             scope = self.found[scope].scope
         return False

@@ -13,9 +13,9 @@ from .robot import Connection, Loop, Robot
 def spanned(robot: Robot) -> tuple[list[Connection], list[Loop]]:
     """Return the joints of the tree, outer ones first, and the loops.
 
-    The tree begins at the fixed links, then at links that are no joint's second one; the joints of
-    a link are taken in the order of the file, so that it hangs on the first one that it is second
-    in. A joint that leads from its second link to its first is reversed.
+    The tree begins at the fixed links, then at links without a joint above them. It takes the
+    joints of a link in the order of the file. A joint from its second link to its first is
+    reversed.
     """
     of_link: dict[str, list[Connection]] = {name: [] for name in robot.links}
     for joint in robot.joints:

@@ -1,4 +1,4 @@
-"""URDF: a tree of links, and what closes its loops: <constraint> elements, or a file beside it.
+"""URDF: a tree of links, and its loops: <constraint> elements, or a file beside it.
 
 Two forms of <constraint> are read, which are no part of URDF yet: the one proposed to urdfdom
 (github.com/ros/urdfdom/pull/264), with parent, child, parent_origin, child_origin and parent_axis,
@@ -52,14 +52,14 @@ CLOSING: Mapping[str, Sequence[Kind]] = {
     "ball": ("ball",),
     "position": ("ball",),
 }
-"""Freedoms that a <constraint> leaves, by its type; a link that is cut in two is fixed."""
+"""Freedoms of a <constraint>, by its type; `link` joins the halves of a link."""
 
 
 def read_urdf(file: Path, root: Element) -> Robot:
     """Return the robot of a document.
 
     Raises:
-        CaseError: no tree of links, or a condition that cannot be read.
+        CaseError: no tree of links, or an unknown joint or condition.
     """
     robot = Robot("URDF robot", root)
     for child in root.children:
@@ -144,7 +144,7 @@ def _joints(robot: Robot) -> dict[str, Element]:
 
 
 def _link(robot: Robot, element: Element, tag: str, *more: str) -> str:
-    """Return the link that a child element names."""
+    """Return the link named by a child element."""
     for each in (tag, *more):
         if (child := only_child(element, each)) is not None:
             return named(child, "link", required(child, "link"), robot.elements, "link")
@@ -191,7 +191,7 @@ def _connection(robot: Robot, name: str, element: Element, other: str | None) ->
     """Return a joint.
 
     Args:
-        other: type that a file beside gives it.
+        other: type from a file beside.
     """
     links = _link(robot, element, "parent"), _link(robot, element, "child")
     place = robot.links[links[1]]

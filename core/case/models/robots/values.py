@@ -79,10 +79,10 @@ def only_child(element: Element, tag: str) -> Element | None:
 
 
 def required(element: Element, name: str, known: Sequence[str] = ()) -> str:
-    """Return an attribute that must be there.
+    """Return a required attribute.
 
     Args:
-        known: other attributes that the element may have.
+        known: other attributes of the element.
 
     Raises:
         CaseError: it is missing or empty, or another one is unknown.
@@ -95,7 +95,7 @@ def required(element: Element, name: str, known: Sequence[str] = ()) -> str:
 
 
 def named(element: Element, key: str, name: str, known: Collection[str], what: str) -> str:
-    """Return a name that must be among the known ones.
+    """Return a name, one of the known ones.
 
     Raises:
         CaseError: it is not.

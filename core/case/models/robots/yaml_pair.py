@@ -26,7 +26,7 @@ _TYPES = {"SPHERICAL": "spherical", "FIXED": "fixed"}
 
 
 class PairedFile(msgspec.Struct, frozen=True):
-    """The file; other keys are for programs that control the robot."""
+    """The file; its other keys are for control programs."""
 
     closed_loop: list[tuple[str, str]] = []
     type: list[str] = []
