@@ -113,7 +113,7 @@ def _samples(
     """Return the samples in the file's unit: an even grid, or those of the reference."""
     if sweep.at is None:
         for key, expected in _EVEN.items():
-            if key not in written:
+            if written.get(key) is None:
                 problem = f"missing, expected {expected}; add the key {key!r}"
                 raise fault(
                     file,
@@ -124,7 +124,7 @@ def _samples(
         _check_even(file, sweep, written)
         return np.linspace(sweep.start or 0.0, sweep.stop or 0.0, sweep.steps or 1).tolist()
     for key in _EVEN:
-        if key in written:
+        if written.get(key) is not None:
             problem = f"found {shown(written[key])} beside at = {shown(sweep.at)}, expected one"
             raise fault(file, join("sweep", key), f"{problem}; remove {key} or at")
     if reference is None:
