@@ -8,7 +8,7 @@ a name with a blank. Its limits of coordinates play no part: they act on its for
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from math import atan2, hypot
 from typing import Any
 
@@ -97,10 +97,10 @@ class ConstrainedTree(TreeModel):
         moved = f", on a body that {' and '.join(each.move for each in links)} move on {joint.i!r}"
         self.closures[joint.name] = constraint.getConcreteClassName() + (moved if links else "")
 
-    def relate(self, terms: Iterable[tuple[str, str, float]]) -> None:
+    def relate(self, terms: Iterable[tuple[str, str, float]], curve: Sequence[float] = ()) -> None:
         terms = list(terms)
-        if len(terms) == 1:  # a driver's
-            super().relate(terms)
+        if len(terms) == 1 or curve:  # a driver's, or a polynomial
+            super().relate(terms, curve)
             return
         o, coupler = self.o, self.o.CoordinateCouplerConstraint()
         moved = [(self.coordinates[joint, freedom], weight) for joint, freedom, weight in terms]

@@ -210,6 +210,10 @@ def assert_read(found, mechanism, path, elsewhere):
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("to", READERS)
 def test_a_written_model_closes_where_the_native_engine_says(to, name, elsewhere, tmp_path):
+    if (to, name) == ("exudyn", "polynomial"):
+        with pytest.raises(KincheckError, match="has no counterpart in Exudyn"):
+            reading(to, name, tmp_path, elsewhere)
+        return
     found, path = reading(to, name, tmp_path, elsewhere)
     assert_read(found, CASES[name].mechanism, path, elsewhere)
 

@@ -127,6 +127,11 @@ def _urdf(texts, mechanism, folder):
                         for name, weight in each["weights"].items()
                     )
                 ]
+            case "polynomial":
+                driven, driving = (
+                    q[model.idx_qs[model.getJointId(each[name])]] for name in ("driven", "driving")
+                )
+                return [driven - np.polynomial.Polynomial(each["coefficients"])(driving)]
 
     def residuals(q):
         pin.framesForwardKinematics(model, data, q)

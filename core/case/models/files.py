@@ -40,7 +40,7 @@ UNREAD = {
 """Files that people have beside their models, and what to do, by suffix."""
 _OPTIONS = {
     CASE: ("closure",),
-    MODEL: ("drive", "hold"),
+    MODEL: ("drive", "hold", "hold-rest", "start", "closure"),
     **dict.fromkeys(
         HARDPOINTS,
         ("template", "units", "axes", "travel", "names", "wheel-radius", "wheelbase", "axle"),

@@ -7,7 +7,7 @@ from pathlib import Path
 from ..case import Case
 from ..io.reader_options import Supplied
 from .mjcf.elements import parse_xml
-from .mjcf.read import case_of, read_mjcf
+from .mjcf.read import Document, case_of, read_mjcf
 
 
 def read_model(file: Path, text: str, supplied: Supplied) -> Case:
@@ -32,5 +32,6 @@ def read_model(file: Path, text: str, supplied: Supplied) -> Case:
 
     name = root.attributes.get("name", file.stem)
     beside = f" with {', '.join(robot.beside)}" if robot.beside else ""
-    described = f"{robot.format} {name!r} of {file.name}{beside}, from its zero pose"
-    return case_of(file, as_mjcf(robot), supplied, described, robot.left_out)
+    described = f"{robot.format} {name!r} of {file.name}{beside}"
+    document = Document(described, as_mjcf(robot), root, robot.left_out)
+    return case_of(file, document, supplied)

@@ -67,6 +67,12 @@ def read_compiler(root: Element) -> Compiler:
             raise element.fault(
                 f"eulerseq: found {shown(sequence)}, expected three of x, y, z, X, Y, Z; correct it"
             )
+        if element.attributes.get("coordinate") == "global":
+            raise element.fault(
+                "coordinate: found 'global', which MuJoCo does not read any more (since 2.3.4),"
+                " expected local coordinates; convert the model by MuJoCo 2.3.3 or older, whose"
+                " mj_saveLastXML writes local ones, and give that file"
+            )
         element.choice("coordinate", ("local",), "local")
         align = (
             element.choice("alignfree", ("true", "false"), "true" if found.align else "false")
@@ -122,6 +128,11 @@ def read_place(element: Element, compiler: Compiler) -> Place:
         CaseError: several orientations, or one that is none: zero or parallel axes, a zero
             quaternion.
     """
+    if "fromto" in element.attributes:  # of a site; its z axis points from the second to the first
+        numbers = element.numbers("fromto", (6,))
+        first, second = vec(numbers[:3]), vec(numbers[3:])
+        axis = _nonzero(element, "fromto", (*(first - second),))
+        return Place(0.5 * (first + second), _z_towards(axis))
     at = vec(element.numbers("pos", (3,), (0.0, 0.0, 0.0)))
     given = [name for name in ORIENTATION if name in element.attributes]
     if len(given) > 1:
