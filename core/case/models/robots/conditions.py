@@ -19,7 +19,7 @@ from ....errors import CaseError, remedy
 from ....joints.base import triad
 from ....mechanism.mechanism import Vector
 from ...io.document import shown
-from .robot import Connection, Coupling, Described, Loop, Move, Robot, Rod
+from .robot import Connection, Coupling, Described, Loop, Mimic, Move, Robot, Rod
 
 # Rounding of exported numbers, relative to the size of the numbers.
 OPEN = 1e-9
@@ -50,6 +50,9 @@ class Condition(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     y: Along | None = None
     value: float = 0.0
     weights: dict[str, float] = {}
+    driven: str = ""
+    driving: str = ""
+    coefficients: list[float] = []
 
 
 class ConstraintsFile(msgspec.Struct, frozen=True):
@@ -66,17 +69,22 @@ def add_constraints(file: Path, found: ConstraintsFile, robot: Robot) -> None:
     """
     groups: dict[str, list[Condition]] = {}
     for each in found.constraints:
-        if each.kind != "linear":
+        if each.kind not in ("linear", "polynomial"):
             groups.setdefault(each.joint, []).append(each)
     for name, conditions in groups.items():
         _Group(file, name, conditions, robot).add()
     names = {*groups}
     for k, each in enumerate(found.constraints, 1):
+        if each.kind not in ("linear", "polynomial"):
+            continue
+        name = each.joint if each.joint not in names else f"{each.joint}.{k}"
+        names.add(name)
+        element = Described(file, "", {}, 1, words=f"constraints: joint {each.joint!r}")
         if each.kind == "linear":
-            name = each.joint if each.joint not in names else f"{each.joint}.{k}"
-            names.add(name)
-            element = Described(file, "", {}, 1, words=f"constraints: joint {each.joint!r}")
             robot.couplings.append(Coupling(name, each.weights, element))
+        else:
+            pair = each.driven, each.driving
+            robot.mimics.append(Mimic(name, pair, each.coefficients, element))
 
 
 class _Group:
