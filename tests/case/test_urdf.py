@@ -7,12 +7,16 @@ import numpy as np
 import pytest
 from kincheck import adapters, cases
 from kincheck.core.algebra import X, Y, Z
+from kincheck.core.case.case import Case, Sweep, Truth
 from kincheck.core.case.io.model_writer import written
 from kincheck.core.case.io.reader_options import LEFT_OUT, Supplied
 from kincheck.core.case.models.files import load
 from kincheck.core.case.models.mjcf.elements import parse_xml
 from kincheck.core.case.models.robots.urdf import read_urdf
 from kincheck.core.errors import CaseError
+from kincheck.core.joints import Polynomial, Revolute
+from kincheck.core.mechanism.drivers import JointAngle
+from kincheck.core.mechanism.mechanism import Body, Mechanism
 
 from ..fuzz import urdf as seeds
 from ..support.exported_again import by_joints, same_motion
@@ -175,6 +179,22 @@ def test_an_export_is_read_back_and_moves_alike(name: str, tmp_path: Path):
         file,
         Supplied(drive=(f"{swept}:0:0.02:2",), hold=tuple(h for h in held if f'"{h}"' in known)),
     )
+    assert same_motion(case, again) < EXACT
+
+
+def test_a_polynomial_coupling_is_read_back(tmp_path: Path):
+    pins = [
+        Revolute("A", "ground", "a", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+        Revolute("B", "ground", "b", (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
+    ]
+    coupling = Polynomial("P", ("B", "A"), (0.0, 0.5, 0.2, -0.1, 0.05))
+    mechanism = Mechanism("m", [Body("a"), Body("b")], pins, [], [JointAngle("A", "A")], [coupling])
+    sweep = Sweep("A", np.linspace(0.0, 1.0, 3))
+    case = Case("m", "made up for this test", Truth.CONSENSUS_ONLY, mechanism, sweep, ())
+    texts = written(case, adapters.writer("urdf"))
+    file = robot(tmp_path, texts[".urdf"], constraints_json=texts[".constraints.json"])
+    again = load(file, Supplied(drive=("A:0:1:3",)))
+    assert [each.type for each in again.mechanism.couplers] == ["polynomial"]
     assert same_motion(case, again) < EXACT
 
 
