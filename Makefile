@@ -47,7 +47,7 @@ lock: .venv/ready
 
 # An hour on each reader.
 fuzz: .venv/ready
-	for reader in casefile hardpoints mjcf reference results; do nice $(BIN)/python -m tests.fuzz $$reader --seconds 3600 || exit 1; done
+	for reader in casefile hardpoints mjcf reference results sdf urdf; do nice $(BIN)/python -m tests.fuzz $$reader --seconds 3600 || exit 1; done
 
 clean:
 	rm -rf .venv build report *.egg-info

@@ -13,6 +13,7 @@ COMMANDS = (
     "bench",
     "check_joint",
     "check_engine",
+    "import_",
     "export",
     "reference",
     "explain",
@@ -23,4 +24,9 @@ COMMANDS = (
     "report",
     "stress",
 )
-"""Modules of the commands, in the order of the help."""
+"""Modules of the commands, in the order of the help; see `command_name`."""
+
+
+def command_name(module: str) -> str:
+    """Return the name of a command on the command line: check-joint, import."""
+    return module.rstrip("_").replace("_", "-")

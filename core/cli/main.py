@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 from ..errors import KincheckError
 from ..harness.interrupts import Terminated, listening, status_of, words_of
 from ..version import VERSION
-from . import COMMANDS
+from . import COMMANDS, command_name
 
 if TYPE_CHECKING:
     from .registry import House
@@ -153,7 +153,7 @@ def _parser(argv: Sequence[str]) -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"kincheck {VERSION}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
-    named = [name for name in COMMANDS if argv and argv[0] == name.replace("_", "-")]
+    named = [name for name in COMMANDS if argv and argv[0] == command_name(name)]
     for name in named or COMMANDS:
         importlib.import_module(f".{name}", __package__).add(commands)
     return parser

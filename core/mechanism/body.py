@@ -22,6 +22,9 @@ Inertia: TypeAlias = tuple[float, float, float, float, float, float]
 SIX_NUMBERS = "six numbers [Ixx, Iyy, Izz, Ixy, Iyz, Ixz]"
 # Tables print about six digits: the roundings of three moments break the rule by a few 1e-6.
 DIGITS = 1e-5
+# Four Euler parameters that were divided by their length have length one to a few roundings; what
+# is written and read again stays the same number.
+NORMALISED = 4.0 * float(np.finfo(np.float64).eps)
 
 
 def inertia_matrix(inertia: Inertia) -> Array:
@@ -115,7 +118,9 @@ class Body:
                 f"body {self.name!r}: euler_parameters {[*p]} have length {length:.6g}, expected"
                 " four numbers of length 1; e0 = sqrt(1 - e1^2 - e2^2 - e3^2)"
             )
-        object.__setattr__(self, "euler_parameters", tuple(e / length for e in p))
+        if abs(length - 1.0) > NORMALISED:
+            p = tuple(e / length for e in p)
+        object.__setattr__(self, "euler_parameters", p)
         if self.mass != 0.0 or self.center_of_mass is not None or self.inertia is not None:
             self._check_mass()
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from ..fuzz import casefile, fuzzing, hardpoints, keeping, mjcf, reference, results
+from ..fuzz import casefile, fuzzing, hardpoints, keeping, mjcf, reference, results, sdf, urdf
 
 READERS = {
     "casefile": casefile,
@@ -17,6 +17,8 @@ READERS = {
     "mjcf": mjcf,
     "reference": reference,
     "results": results,
+    "sdf": sdf,
+    "urdf": urdf,
 }
 # Inputs of a random choice of changes, the same in every run; the fuzzers try millions.
 CHANGES = 40

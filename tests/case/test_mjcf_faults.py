@@ -265,7 +265,7 @@ def test_no_document_types(tmp_path, head, fragments):
     [
         ("", ["line 1", "no element found"]),
         (GRIPPER.read_text()[:3000], ["not valid XML"]),
-        ("<robot name='a'/>", ["<robot> 'a'", "expected a model <mujoco>"]),
+        ("<scene name='a'/>", ["<scene> 'a'", "expected a model <mujoco>"]),
         ("<mujoco><worldbody/></mujoco>", ["no body with a joint"]),
         ("<mujoco>" + "<a>" * 300 + "</a>" * 300 + "</mujoco>", ["nested more than 200 deep"]),
         ("<mujoco>&bomb;</mujoco>", ["undefined entity"]),
@@ -343,7 +343,7 @@ DRIVES = {
         Supplied(drive=DRIVEN.drive, hold=("right_driver_joint",)),
         ["--hold", "which is driven"],
     ),
-    "units": (Supplied(units="mm"), ["--units", "MJCF model", "--drive, --hold"]),
+    "units": (Supplied(units="mm"), ["--units", "a model", "--drive, --hold"]),
 }
 
 

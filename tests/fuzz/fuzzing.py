@@ -8,7 +8,11 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-from kincheck.core.errors import KincheckError
+from kincheck.core.case.case import Case
+from kincheck.core.case.io.case_writer import case_text
+from kincheck.core.errors import CaseError, KincheckError
+
+from ..support.written_again import written_again
 
 _MEMORY = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
 _TEMPORARY = tempfile.TemporaryDirectory(
@@ -30,10 +34,10 @@ def written(name: str, data: bytes) -> Path:
 
 def read_or_refused(read: Callable[[], object]) -> None:
     """Let a reader take an input, or refuse it: one line that names the file, what was found, and a
-    remedy. All else is a crash.
+    remedy. All else is a crash. A case is written, and read again as the same.
     """
     try:
-        read()
+        found = read()
     except KincheckError as error:
         message = str(error)
         message.encode()
@@ -41,6 +45,13 @@ def read_or_refused(read: Callable[[], object]) -> None:
         assert message.isprintable(), f"not printable: {message!r}"
         assert len(message) < LONGEST_MESSAGE, f"{len(message)} characters: {message[:300]!r}"
         assert "; " in message, f"no remedy: {message!r}"
+        return
+    if isinstance(found, Case):
+        try:
+            case_text(found)
+        except CaseError:  # samples on no even grid, names that are too long
+            return
+        written_again(found, FOLDER)
 
 
 def changing(

@@ -114,7 +114,7 @@ def load_case(path: str | Path, closure: float | None = None) -> Case:
 
 def _within_digits(case: Case, keys: ClosureKeys, closure: float | None) -> Case:
     """Return the case without rows that are redundant within its tolerance, if it has one."""
-    why = "--closure"
+    case, why = replace(case, assembly=keys.notes), "--closure"
     if closure is None and keys.tolerance is not None:
         closure, why = LENGTHS[case.length_unit](keys.tolerance), "[closure] tolerance"
     if closure is None:

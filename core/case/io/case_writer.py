@@ -6,21 +6,23 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any, cast
 
 import numpy as np
 
-from ...errors import CaseError
+from ...errors import LONGEST_NAME, CaseError, brief
 from ...joints import Coupler
 from ...mechanism.body import Body
-from ...mechanism.drivers import JointDriver
 from ...mechanism.motions import Absolute, Motion, Table
+from ...trajectory import Array
 from ..case import MARKER, TIME, Case, Output
 from ..measures import Measure, key_of, own_keys
 from ..suspension import PerTravel, SuspensionOutput
 from .class_keys import own_fields
 from .coordinates import AXES
+from .document import LONGEST_TEXT
+from .reference_writer import reason_against, reference_table
 from .schema import SCHEMA
 from .suspension_writer import suspension_output, suspension_tables
 
@@ -29,18 +31,26 @@ PLAIN = Body("plain")
 
 
 def case_text(case: Case, comments: Sequence[str] = ()) -> str:
-    """Return the text of a case file that reads as the same case without its reference; samples
-    agree to the last place.
+    """Return the text of a case file that reads as the same case; samples agree to the last place.
+
+    Values of a joint's driver are relative to the design, whatever they are in the case. A
+    reference that rows cannot hold is left out, and a comment says why.
 
     Args:
         comments: lines at the top.
 
     Raises:
-        CaseError: no case file can express the case: samples on no even grid, or outputs of
-            several axles.
+        CaseError: no case file can express the case: samples on no even grid, outputs of several
+            axles, or names and texts beyond their limits.
     """
+    values = _values(case)
+    reference = reference_table(case, values)
     lines = [f"# {line}" for line in comments]
-    lines += _keys({"schema": SCHEMA, "name": case.name, "source": case.source})
+    if case.reference and not reference:
+        lines += [f"# The reference is left out, because {reason_against(case)}."]
+    lines += _keys({"schema": SCHEMA, "name": case.name, "source": _short(case.source)})
+    if reference:
+        lines += _keys({"truth": str(case.truth)})
     mechanism = case.mechanism
     if any(mechanism.gravity):
         lines += _keys({"gravity": mechanism.gravity})
@@ -64,49 +74,76 @@ def case_text(case: Case, comments: Sequence[str] = ()) -> str:
         lines += _table("drivers", driver.name, {"type": driver.type, **_own(driver)})
         motion = case.sweep.motions.get(driver.name)
         if motion is not None:
-            moved = motion
-            if isinstance(motion, Absolute):
-                # a joint's coordinate is zero at design in a case file
-                design = motion.design if isinstance(driver, JointDriver) else 0.0
-                moved = _shifted(motion.motion, design)
+            moved = _from_design(motion, mechanism.design_value(driver.name))
             lines += _table(
                 f"drivers.{_key(driver.name)}", "motion", {"type": moved.type, **_own(moved)}
             )
     for force in mechanism.forces:
         ends = {"bodies": force.bodies} if len(force.bodies) == 2 else {}
         lines += _table("forces", force.name, {"type": force.type, **ends, **_own(force)})
-    lines += ["", "[sweep]", *_keys(_sweep(case))]
+    lines += ["", "[sweep]", *_keys(_sweep(case, values, own_grid=bool(reference)))]
+    if case.assembly:
+        lines += ["", "[closure]", *_keys({"notes": case.assembly})]
     for name, keys in suspension_tables(case).items():
         lines += ["", f"[{name}]", *_keys(keys)]
     for output in case.outputs:
         if isinstance(output, PerTravel):  # follows from the output before it
             continue
         lines += _table("outputs", output.name, dict(_output(case, output)))
+    if reference:
+        lines += ["", "[reference]", *_keys(reference)]
     return "\n".join(lines) + "\n"
 
 
-def _shifted(motion: Motion, by: float) -> Motion:
-    """Return a motion with smaller values; only tables stand at other values than zero."""
-    if by and isinstance(motion, Table):
-        return Table(motion.times, tuple(x - by for x in motion.values))
-    return motion
+def _from_design(motion: Motion, design: float) -> Motion:
+    """Return a motion as a case file has it: of values whose design value is the given one.
 
-
-def _sweep(case: Case) -> Mapping[str, Any]:
-    sweep, values = case.sweep, case.sweep.values
-    swept = [each for each in case.mechanism.drivers if each.name == sweep.driver]
-    if swept and isinstance(swept[0], JointDriver) and sweep.design:
-        values = sweep.change
-    start, stop = float(values[0]), float(values[-1])
-    # of start + k * step, once in the file's units and once here
-    rounding = 4.0 * np.spacing(np.abs(values).max())
-    if not (np.abs(np.linspace(start, stop, len(values)) - values) <= rounding).all():
+    Raises:
+        CaseError: it has another one, and is no table, whose values can be shifted.
+    """
+    if not isinstance(motion, Absolute):
+        return motion
+    if (shift := motion.design - design) == 0.0:
+        return motion.motion
+    if not isinstance(motion.motion, Table):
         raise CaseError(
-            f"case {case.name!r}: its samples are no even grid, which is all that [sweep] can say;"
-            " give an even one"
+            f"a {motion.motion.type} motion of values that are {motion.design!r} at design,"
+            f" expected {design!r} as in a case file; give a table"
         )
+    return replace(motion.motion, values=tuple(x - shift for x in motion.motion.values))
+
+
+def _short(text: str) -> str:
+    """Return a text within the limit of a case file, marked where it is cut."""
+    return text if len(text) <= LONGEST_TEXT else f"{text[: LONGEST_TEXT - 6]} [...]"
+
+
+def _values(case: Case) -> Array:
+    """Return the swept values as a case file has them, shape (n,)."""
+    sweep = case.sweep
+    if sweep.driver == TIME:
+        return sweep.values
+    return sweep.values - (sweep.design - case.mechanism.design_value(sweep.driver))
+
+
+def _sweep(case: Case, values: Array, *, own_grid: bool) -> Mapping[str, Any]:
+    """Return the keys of [sweep].
+
+    Args:
+        own_grid: there is a reference, whose samples an uneven grid can be.
+    """
+    sweep, start, stop = case.sweep, float(values[0]), float(values[-1])
     rate = {} if sweep.driver == TIME else {"rate": sweep.rate}
-    return {"driver": sweep.driver, "start": start, "stop": stop, "steps": len(values), **rate}
+    # of start + k * step, once in the file's units and once here
+    rounding = 4.0 * np.spacing(np.abs([*sweep.values, *values]).max())
+    if (np.abs(np.linspace(start, stop, len(values)) - values) <= rounding).all():
+        return {"driver": sweep.driver, "start": start, "stop": stop, "steps": len(values), **rate}
+    if own_grid and case.origin and not case.origin.grid:
+        return {"driver": sweep.driver, "at": "reference", **rate}
+    raise CaseError(
+        f"case {case.name!r}: its samples are no even grid, which is all that [sweep] can say;"
+        " give an even one"
+    )
 
 
 def _output(case: Case, output: Any) -> Iterator[tuple[str, Any]]:
@@ -149,7 +186,12 @@ def _keys(values: Mapping[str, Any]) -> list[str]:
 
 
 def _key(name: str) -> str:
-    """Bare where TOML allows it."""
+    """Return a name as a key, bare where TOML allows it."""
+    if not (name and name.isprintable() and len(name) <= LONGEST_NAME):
+        raise CaseError(
+            f"name {brief(name)!r}: found {len(name)} characters, expected 1 to {LONGEST_NAME}"
+            " printable ones, which a case file can hold; rename it"
+        )
     return (
         name
         if name.replace("_", "a").replace("-", "a").isalnum() and name.isascii()

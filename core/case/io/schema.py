@@ -61,6 +61,7 @@ left out. `kincheck list --joints` prints all types with their keys.
     [closure]            (tolerance) [length]: rows that are redundant within it, because points and
                          axes have few digits, are left out, with a note; strict without it;
                          --closure of the command line stands above it
+                         (notes) = [...]: on how the start was closed before this file was written
     [outputs.NAME]       (type) = "coordinate": point, component = "x", "y" or "z", or direction
                          type = "distance": points = [A, B]
                          type = "joint_angle" or "joint_displacement": joint
@@ -220,6 +221,7 @@ class ClosureKeys(msgspec.Struct, forbid_unknown_fields=True):
     tolerance: Annotated[float, Meta(gt=0.0, description="a length greater than zero")] | None = (
         None
     )
+    notes: Annotated[tuple[str, ...], Meta(description="a list of texts")] = ()
 
 
 class ToleranceKeys(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):

@@ -12,7 +12,7 @@ from ..io.reader_options import NOTHING, Supplied
 CASE_FILES = (".toml", ".json")
 TABLES = (".csv", ".tsv")
 ADAMS_FILES = (".sub", ".tpl", ".asy", ".hpt")
-MODELS = (".xml", ".mjcf")
+MODELS = (".xml", ".mjcf", ".urdf", ".sdf", ".world")
 SUFFIXES = (*CASE_FILES, *TABLES, *ADAMS_FILES, *MODELS)
 """Suffixes of names that are files, whether they exist or not."""
 
@@ -21,9 +21,23 @@ CASE, CHRONO, ADAMS, TABLE, MODEL = (
     "Project Chrono suspension",
     "Adams/Car hardpoints",
     "hardpoint table",
-    "MJCF model",
+    "model",
 )
 HARDPOINTS = (CHRONO, ADAMS, TABLE)
+UNREAD = {
+    ".yaml": "is beside a URDF of the same name; give that file, NAME.urdf",
+    ".yml": "is beside a URDF of the same name; give that file, NAME.urdf",
+    ".xacro": "holds macros; expand them: xacro FILE > robot.urdf",
+    **dict.fromkeys(
+        (".usd", ".usda", ".usdc", ".usdz"),
+        "cannot be read; write the model out as MJCF, URDF or SDF from the program that made it",
+    ),
+    **dict.fromkeys(
+        (".step", ".stp", ".stl", ".obj", ".dae", ".iges"),
+        "holds shapes, which say nothing of joints; give the model that names it",
+    ),
+}
+"""Files that people have beside their models, and what to do, by suffix."""
 _OPTIONS = {
     CASE: ("closure",),
     MODEL: ("drive", "hold", "hold-rest", "start", "closure"),
@@ -41,6 +55,8 @@ def load(file: Path, supplied: Supplied = NOTHING) -> Case:
         CaseError: the file is unreadable, inconsistent or incomplete, or an option is not for such
             files.
     """
+    if advice := UNREAD.get(file.suffix.lower()):
+        raise fault(file, "", f"found a {file.suffix} file, which {advice}")
     kind = kind_of(file, supplied)
     for option in supplied.given:
         if option not in _OPTIONS[kind]:
@@ -61,9 +77,9 @@ def load(file: Path, supplied: Supplied = NOTHING) -> Case:
             "found a file name with control characters, expected printable ones; rename the file",
         )
     if kind == MODEL:
-        from .mjcf.read import read_mjcf
+        from .xml_models import read_model
 
-        return read_mjcf(file, text, supplied)
+        return read_model(file, text, supplied)
     from .hardpoints.adams import read_adams
     from .hardpoints.chrono import read_chrono
     from .hardpoints.plain import read_plain

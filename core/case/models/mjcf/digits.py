@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import statistics
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from .attributes import ORIENTATION
@@ -13,7 +14,9 @@ from .elements import Element
 FEWEST = 6
 # Gaps and angles, relative to the size, that numbers of six digits leave.
 COARSEST, FINEST = 1e-5, 1e-12
-_PLACES = ("pos", "axis", "anchor", "relpose", "fromto", *ORIENTATION)
+_PLACES = ("pos", "axis", "anchor", "relpose", "fromto", *ORIENTATION, "xyz", "rpy")
+# Elements of SDF, whose texts are places.
+_TEXTS = ("pose", "xyz")
 _NUMBER = re.compile(r"[-+]?0*\.?0*([0-9][0-9.]*)(?:[eE][-+]?[0-9]+)?")
 
 
@@ -34,14 +37,21 @@ def digits_of(root: Element, size: float) -> Digits:
     counts = [
         count
         for element in root.below()
-        for name in _PLACES
-        for text in element.attributes.get(name, "").split()
+        for text in _numbers(element)
         if (count := _significant(text)) >= FEWEST
     ]
     digits = int(statistics.median(counts)) if counts else FEWEST
     # the last digit, ten times: gaps of several places add up
     tolerance = size * min(COARSEST, max(FINEST, 10.0 ** (1 - digits)))
     return Digits(tolerance, f"the file's digits, {digits}: {tolerance:.2g} m")
+
+
+def _numbers(element: Element) -> Iterator[str]:
+    """Yield the numbers of the places in an element."""
+    for name in _PLACES:
+        yield from element.attributes.get(name, "").split()
+    if element.tag in _TEXTS:
+        yield from element.text.split()
 
 
 def _significant(text: str) -> int:

@@ -22,13 +22,19 @@ DEEPEST = 200
 
 @dataclass(frozen=True, eq=False)
 class Element:
-    """An element: its tag, its attributes, the elements in it, and the line it starts in."""
+    """An element: its tag, its attributes, the elements and texts in it, and its first line."""
 
     file: Path
     tag: str
     attributes: Mapping[str, str]
     line: int
     children: Sequence[Element] = field(default_factory=list["Element"])
+    texts: list[str] = field(default_factory=list[str])
+
+    @property
+    def text(self) -> str:
+        """The text in the element, without its ends."""
+        return "".join(self.texts).strip()
 
     def __str__(self) -> str:
         name = self.attributes.get("name")
@@ -48,12 +54,13 @@ class Element:
             yield child
             yield from child.below()
 
-    def require_known(self, known: Sequence[str]) -> None:
+    def require_known(self, known: Sequence[str], format_name: str = "MJCF") -> None:
         """Refuse unknown attributes."""
         for name in self.attributes:
             if name not in known:
                 raise self.fault(
-                    f"found the attribute {shown(name)}, which MJCF does not have here;"
+                    f"found the attribute {shown(name)}, which {format_name} does not have"
+                    " here;"
                     f" {remedy(name, known)}"
                 )
 
@@ -123,6 +130,10 @@ def parse_xml(file: Path, text: str) -> Element:
         inside.append(children)
         open_.append(element)
 
+    def text_in(part: str) -> None:
+        if open_:
+            open_[-1].texts.append(part)
+
     def end(_: str) -> None:
         open_.pop()
         inside.pop()
@@ -138,6 +149,7 @@ def parse_xml(file: Path, text: str) -> Element:
 
     parser.StartElementHandler = start
     parser.EndElementHandler = end
+    parser.CharacterDataHandler = text_in
     parser.StartDoctypeDeclHandler = refuse
     try:
         parser.Parse(text.encode("utf-8"), True)

@@ -4,6 +4,8 @@ others held.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 from ....algebra import Quat
@@ -59,23 +61,47 @@ def read_mjcf(file: Path, text: str, supplied: Supplied) -> Case:
     _require_model(root)
     root = expanded(file, root)
     _require_model(root)
+    model = root.attributes.get("model", file.stem)
+    return case_of(file, Document(f"MJCF model {model!r} of {file.name}", root, root), supplied)
+
+
+@dataclass(frozen=True)
+class Document:
+    """A document of MJCF, as a file has it or as another format is translated to.
+
+    Attributes:
+        described: the model and its file, for the source of the case.
+        original: root of the file, whose numbers have its digits.
+        left_out: number of omitted items of the file, by name; None to count those of the
+            document.
+    """
+
+    described: str
+    root: Element
+    original: Element
+    left_out: Mapping[str, int] | None = None
+
+
+def case_of(file: Path, document: Document, supplied: Supplied) -> Case:
+    """Return the case of a document; see `read_mjcf`."""
+    root = document.root
     tree = read_tree(root, read_classes(root), read_compiler(root))
     if not tree.moving:
         raise root.fault("has no body with a joint, expected a mechanism; give a model that moves")
-    for section in root.only(*_LEFT_OUT):
+    for section in root.only(*_LEFT_OUT) if document.left_out is None else ():
         for element in section.children:
             tree.count(f"{section.tag}: {element.tag}")
     driving = read_driving(file, tree, supplied)
     equalities = [*read_equalities(root, tree)]
     require_coupled(equalities)
     start = read_start(file, root, tree, supplied.start)
-    digits = _digits(root, size_of(start.pose, equalities), supplied.closure)
+    digits = _digits(document.original, size_of(start.pose, equalities), supplied.closure)
     model = assemble(file, equalities, start, digits, driving.joints)
     free = spins(model.tree, model.equalities, driving.fixed)
     axes = {name: spin.axis for name, spin in free.items()}
     driving = taken(file, root, model, driving, axes, hold_rest=supplied.hold_rest)
     parts = parts_of(model.tree, model.equalities, driving, free)
-    return _case(file, root, model, driving, parts)
+    return _case(file, document, model, driving, parts)
 
 
 def _digits(root: Element, size: float, closure: float | None) -> Digits:
@@ -83,8 +109,8 @@ def _digits(root: Element, size: float, closure: float | None) -> Digits:
     return digits_of(root, size) if closure is None else Digits(closure, "--closure")
 
 
-def _case(file: Path, root: Element, model: Assembled, driving: Driving, parts: Parts) -> Case:
-    """Return the case of the parts, without rows redundant within the digits."""
+def _case(file: Path, document: Document, model: Assembled, driving: Driving, parts: Parts) -> Case:
+    """Return the case of the parts, without rows that are redundant within the digits."""
     tree, digits = model.tree, model.digits
     points = _points(tree, parts)
     bodies = [
@@ -95,12 +121,9 @@ def _case(file: Path, root: Element, model: Assembled, driving: Driving, parts: 
         drivers = [_driver(parts, name) for name in driving.joints]
         joints, couplers = list(parts.joints.values()), list(parts.couplers.values())
         mechanism = Mechanism(file.stem, bodies, joints, points, drivers, couplers)
-    others = [*parts.left_out, *(f"{what} ({count})" for what, count in tree.left_out.items())]
-    name = root.attributes.get("model", file.stem)
-    source = (
-        f"MJCF model {name!r} of {file.name}, from {model.start}"
-        f"{LEFT_OUT}{', '.join(others) or 'nothing'}"
-    )
+    counted = tree.left_out if document.left_out is None else document.left_out
+    others = [*parts.left_out, *(f"{what} ({count})" for what, count in counted.items())]
+    source = f"{document.described}, from {model.start}{LEFT_OUT}{', '.join(others) or 'nothing'}"
     sweep = _sweep(tree, driving)
     case = Case(file.stem, source, Truth.CONSENSUS_ONLY, mechanism, sweep, (), assembly=model.notes)
     dof = degrees_of_freedom(mechanism)
@@ -134,7 +157,10 @@ def _sweep(tree: Tree, driving: Driving) -> Sweep:
 def _require_model(root: Element) -> None:
     """Refuse other documents, and elements in place of parts elsewhere."""
     if root.tag != "mujoco":
-        raise root.fault("found another document, expected a model <mujoco>; give an MJCF file")
+        raise root.fault(
+            "found another document, expected a model <mujoco>, <robot> or <sdf>; give a file of"
+            " MJCF, URDF or SDF"
+        )
     for element in root.children:
         if element.tag in MAKE_BODIES:
             raise element.fault(f"cannot be read, because {MAKE_BODIES[element.tag]}; {WRITE_OUT}")

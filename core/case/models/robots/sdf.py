@@ -1,0 +1,234 @@
+"""SDF: links and joints as a graph, in which a link may be the child of several joints."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from ....algebra import Vec3, X
+from ...io.document import shown
+from ..mjcf.elements import Element
+from ..mjcf.frames import HERE, Place
+from .robot import Connection, Coupling, Mimic, Move, Robot
+from .sdf_frames import MODEL, SCOPE, Frames, flag, text_of
+from .values import direction, numbers_of, only_child, require_children
+
+# Three for each body that other models may have.
+MOST_FRAMES = 6_000
+TYPES = (
+    *("revolute", "continuous", "prismatic", "fixed", "ball"),
+    *("universal", "revolute2", "screw"),
+)
+IN_MODEL = (
+    *("link", "joint", "frame", "model", "pose", "static", "include", "plugin", "gripper"),
+    *("self_collide", "allow_auto_disable", "enable_wind"),
+)
+IN_LINK = (
+    *("pose", "inertial", "visual", "collision", "sensor", "light", "gravity", "kinematic"),
+    *("self_collide", "enable_wind", "velocity_decay", "must_be_base_link", "projector"),
+    *("audio_sink", "audio_source", "battery", "particle_emitter"),
+)
+IN_JOINT = (
+    *("parent", "child", "pose", "axis", "axis2", "physics", "sensor", "thread_pitch"),
+    *("screw_thread_pitch", "gearbox_ratio", "gearbox_reference_body"),
+)
+IN_AXIS = ("xyz", "limit", "dynamics", "mimic", "use_parent_model_frame", "initial_position")
+_COUNTED = ("inertial", "visual", "collision", "sensor", "light", "plugin")
+# Axes were in the model's frame before this version.
+_AXES_IN_JOINT = (1, 5)
+
+
+def read_sdf(root: Element) -> Robot:
+    """Return the robot of a document: all models in it, and their worlds.
+
+    Raises:
+        CaseError: included models, unknown frames, or an unknown joint.
+    """
+    robot = Robot("SDF model", root)
+    top = [*root.only("model"), *root.only("world")]
+    if not top:
+        raise root.fault("has no model, expected one; give a model that moves")
+    for element in root.below():
+        if element.tag == "include":
+            raise element.fault(
+                "takes a model from elsewhere, expected one whole file; write it out: gz sdf -p"
+                " FILE > flat.sdf"
+            )
+    frames = Frames()
+    frames.read(root, "")
+    for world in root.only("world"):
+        frames.read(world, "")
+    short = _Short(frames)
+    if len(frames.found) > MOST_FRAMES:
+        raise root.fault(
+            f"found {len(frames.found)} links, joints and frames, expected {MOST_FRAMES} at most;"
+            " take out those that are not looked at"
+        )
+    for full, framed in frames.links.items():
+        require_children(framed.element, IN_LINK)
+        name = short(full)
+        robot.links[name] = frames.place(framed.element, full)
+        robot.elements[name] = framed.element
+        if frames.still(full):
+            robot.fixed.add(name)
+        for child in framed.element.only(*_COUNTED):
+            robot.count(child.tag)
+    if not robot.links:
+        raise root.fault("has no link, expected a mechanism; give a model that moves")
+    for full, framed in frames.models.items():
+        require_children(framed.element, IN_MODEL)
+        for child in framed.element.only(*_COUNTED):
+            robot.count(child.tag)
+        frames.place(framed.element, full)
+    _joints(robot, frames, short, _version(root))
+    for full, framed in frames.found.items():
+        if framed.element.tag == "frame":
+            link = frames.link(framed.element, framed.attached)
+            if link:
+                place = frames.place(framed.element, full)
+                robot.frames[short(full)] = short(link), place
+    return robot
+
+
+def _version(root: Element) -> tuple[int, ...]:
+    try:
+        return tuple(map(int, root.attributes.get("version", "1.7").split(".")))
+    except ValueError:
+        raise root.fault(
+            f"version: found {shown(root.attributes['version'])}, expected a number such as 1.7;"
+            " correct it"
+        ) from None
+
+
+class _Short:
+    """Full names without the model, if there is only one at the top."""
+
+    def __init__(self, frames: Frames) -> None:
+        tops = [full for full, each in frames.models.items() if not each.scope]
+        outside = any(not each.scope for each in (*frames.links.values(), *frames.joints.values()))
+        self.prefix = f"{tops[0]}{SCOPE}" if len(tops) == 1 and not outside else ""
+
+    def __call__(self, full: str) -> str:
+        return full.removeprefix(self.prefix)
+
+
+def _joints(robot: Robot, frames: Frames, short: _Short, version: tuple[int, ...]) -> None:
+    world = "world"
+    while world in robot.links:
+        world += "'"
+    for full, framed in frames.joints.items():
+        element = framed.element
+        require_children(element, IN_JOINT)
+        ends: list[str] = []
+        for tag in ("parent", "child"):
+            name = text_of(element, tag)
+            link = frames.link(element, frames.within(element, framed.scope, name))
+            if not link and world not in robot.links:
+                robot.links[world], robot.elements[world] = HERE, robot.root
+                robot.fixed.add(world)
+            ends.append(short(link) if link else world)
+        if ends[0] == ends[1]:
+            raise element.fault(
+                f"joins {ends[0]!r} with itself, expected two links; correct parent or child"
+            )
+        place = frames.place(element, full)
+        links = ends[0], ends[1]
+        joint = _joint(robot, frames, full, short(full), links, place, version)
+        robot.joints.append(joint)
+        _mimics(robot, frames, short, full, joint.moves)
+
+
+def _joint(
+    robot: Robot,
+    frames: Frames,
+    full: str,
+    name: str,
+    links: tuple[str, str],
+    place: Place,
+    version: tuple[int, ...],
+) -> Connection:
+    element = frames.joints[full].element
+    kind = element.choice("type", TYPES, "")
+
+    def axis(tag: str = "axis") -> Vec3:
+        return _axis(frames, full, tag, place, version)
+
+    def moves(*each: tuple[str, str, Vec3]) -> tuple[Move, ...]:
+        return tuple(
+            Move("slide" if what == "slide" else "hinge", title, place.at, along)
+            for what, title, along in each
+        )
+
+    found: tuple[Move, ...]
+    match kind:
+        case "revolute" | "continuous":
+            found = moves(("hinge", name, axis()))
+        case "prismatic":
+            found = moves(("slide", name, axis()))
+        case "universal" | "revolute2":
+            found = moves(("hinge", f"{name}.1", axis()), ("hinge", f"{name}.2", axis("axis2")))
+        case "ball":
+            found = (Move("ball", name, place.at, X),)
+        case "screw":
+            pitch = only_child(element, "screw_thread_pitch")
+            if pitch is None:
+                raise element.fault(
+                    "<screw_thread_pitch>: missing, expected metres in a turn, as of SDF 1.10; give"
+                    " it in place of <thread_pitch>, whose sign and unit differ between simulators"
+                )
+            (lead,) = numbers_of(pitch, (1,))
+            turn, shift = f"{name}.rotation", f"{name}.translation"
+            found = moves(("slide", shift, axis()), ("hinge", turn, axis()))
+            weights = {shift: 1.0, turn: -lead / (2.0 * math.pi)}
+            robot.couplings.append(Coupling(f"{name}.thread", weights, element))
+        case _:
+            found = ()
+    return Connection(name, links, found, element)
+
+
+def _axis(frames: Frames, full: str, tag: str, place: Place, version: tuple[int, ...]) -> Vec3:
+    """Return an axis of a joint, global; z of the joint unless given."""
+    framed = frames.joints[full]
+    axis = only_child(framed.element, tag)
+    if axis is None:
+        raise framed.element.fault(f"<{tag}>: missing, expected an axis; add it")
+    require_children(axis, IN_AXIS)
+    xyz = only_child(axis, "xyz")
+    numbers: Sequence[float] = (0.0, 0.0, 1.0)
+    given = ""
+    if xyz is not None:
+        xyz.require_known(("expressed_in",), "SDF")
+        numbers = numbers_of(xyz, (3,), numbers)
+        given = xyz.attributes.get("expressed_in", "")
+    if flag(only_child(axis, "use_parent_model_frame")) or version < _AXES_IN_JOINT:
+        given = given or MODEL
+    if given:
+        base = frames.within(axis, framed.scope, given)
+        place = frames.place(axis, base)
+    return place.direction(direction(axis if xyz is None else xyz, numbers))
+
+
+def _mimics(robot: Robot, frames: Frames, short: _Short, full: str, moves: Sequence[Move]) -> None:
+    """Add the mimics of the axes."""
+    framed = frames.joints[full]
+    for tag, move in zip(("axis", "axis2"), moves, strict=False):
+        axis = only_child(framed.element, tag)
+        mimic = None if axis is None else only_child(axis, "mimic")
+        if mimic is None:
+            continue
+        leader = mimic.attributes.get("joint", "")
+        key = frames.within(mimic, framed.scope, leader)
+        if key not in frames.joints:
+            raise mimic.fault(f"joint: found {shown(leader)}, expected a joint; correct the name")
+        other = mimic.choice("axis", ("axis", "axis2"), "axis")
+        two = frames.joints[key].element.attributes.get("type") in ("universal", "revolute2")
+        name = f"{short(key)}.{1 + (other == 'axis2')}" if two else short(key)
+        values = {
+            each: numbers_of(child, (1,))[0] if (child := only_child(mimic, each)) else default
+            for each, default in (("multiplier", 1.0), ("offset", 0.0), ("reference", 0.0))
+        }
+        factor = values["multiplier"]
+        constant = values["offset"] - factor * values["reference"]
+        robot.mimics.append(
+            Mimic(f"{move.name}.mimic", (move.name, name), (constant, factor), mimic)
+        )

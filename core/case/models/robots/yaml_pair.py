@@ -1,0 +1,141 @@
+"""Loops of a URDF in a YAML file beside it, as example-parallel-robots has them.
+
+closed_loop: [[frame, frame], ...]     links of the URDF that coincide
+type: ["6d", "3d", ...]                all, or only the points
+name_mot: [joint, ...]                 joints with a motor
+joint_name: [joint, ...]               joints of another type than the URDF can say
+joint_type: [SPHERICAL, UJOINT_XY, FIXED, ...]
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from ....algebra import X
+from ....errors import remedy
+from ...io.document import fault, shown
+from .robot import Connection, Described, Loop, Move, Robot
+
+INSTALL = "pip install 'kincheck[yaml]'"
+_UNIVERSAL = re.compile(r"UJOINT_([XYZ])([XYZ])")
+_TYPES = {"SPHERICAL": "spherical", "FIXED": "fixed"}
+
+
+class PairedFile(msgspec.Struct, frozen=True):
+    """The file; its other keys are for control programs."""
+
+    closed_loop: list[tuple[str, str]] = []
+    type: list[str] = []
+    name_mot: list[str] = []
+    joint_name: list[str] = []
+    joint_type: list[str] = []
+
+
+def read_pairs(file: Path, text: str) -> PairedFile:
+    """Return the content of a file.
+
+    Raises:
+        CaseError: PyYAML is missing, or the text is no such file.
+    """
+    try:
+        found = msgspec.convert(_parsed(file, text), PairedFile)
+    except msgspec.ValidationError as error:
+        raise fault(
+            file,
+            "",
+            f"{error}, expected closed_loop, type, name_mot, joint_name and joint_type of"
+            " example-parallel-robots; correct it, or rename a file of another kind",
+        ) from None
+    for key, values, other, others in (
+        ("type", found.type, "closed_loop", found.closed_loop),
+        ("joint_type", found.joint_type, "joint_name", found.joint_name),
+    ):
+        if len(values) != len(others):
+            raise fault(
+                file,
+                key,
+                f"found {len(values)}, expected {len(others)}, one for each {other}; complete it",
+            )
+    for kind in found.joint_type:
+        if kind not in _TYPES and not _UNIVERSAL.fullmatch(kind):
+            known = (*_TYPES, "UJOINT_XY")
+            raise fault(
+                file,
+                "joint_type",
+                f"found {shown(kind)}, expected {', '.join(known)}, or other axes;"
+                f" {remedy(kind, known)}",
+            )
+    for kind in found.type:
+        if kind.lower() not in ("3d", "6d"):
+            raise fault(file, "type", f"found {shown(kind)}, expected 3d or 6d; correct it")
+    return found
+
+
+def types_of(pairs: PairedFile) -> dict[str, str]:
+    """Return the types of joints, by name; the letters of the axes for a universal joint."""
+    return {
+        name: _TYPES.get(kind, kind.removeprefix("UJOINT_"))
+        for name, kind in zip(pairs.joint_name, pairs.joint_type, strict=True)
+    }
+
+
+def add_pairs(file: Path, pairs: PairedFile, robot: Robot) -> None:
+    """Add the loops to a robot.
+
+    Raises:
+        CaseError: a name is not a link, or not a joint.
+    """
+    # as in Pinocchio, a joint has a frame too: that of its link
+    frames = {joint.name: joint.links[1] for joint in robot.joints} | {
+        name: name for name in robot.links
+    }
+    for names, kind in zip(pairs.closed_loop, pairs.type, strict=True):
+        for name in names:
+            if name not in frames:
+                raise fault(
+                    file,
+                    "closed_loop",
+                    f"found {shown(name)}, expected a link or joint; {remedy(name, frames)}",
+                )
+        first, second = (frames[name] for name in names)
+        places = robot.links[first], robot.links[second]
+        title = f"{names[0]} = {names[1]}"
+        moves = (Move("ball", title, places[0].at, X),) if kind.lower() == "3d" else ()
+        element = Described(file, "", {}, 1, words=f"closed_loop: {title}")
+        robot.loops.append(Loop(Connection(title, (first, second), moves, element), places))
+    coordinates = {move.name for joint in robot.joints for move in joint.moves}
+    robot.actuated += [name for name in pairs.name_mot if name in coordinates]
+
+
+def _parsed(file: Path, text: str) -> Any:
+    """Return the data of a YAML text: mappings, sequences and texts, without references.
+
+    Raises:
+        CaseError: PyYAML is missing, or the text is not valid.
+    """
+    try:
+        import yaml
+    except ImportError:
+        raise fault(
+            file, "", f"needs PyYAML, which is not installed; {INSTALL}, or move the file away"
+        ) from None
+
+    class Plain(yaml.BaseLoader):
+        """Makes texts of all scalars, and refuses references, which can multiply without end."""
+
+        def compose_node(self, parent: Any, index: Any) -> Any:
+            if self.check_event(yaml.AliasEvent):  # pyright: ignore[reportUnknownMemberType]
+                raise yaml.YAMLError("found a reference (*NAME), expected none")
+            return super().compose_node(parent, index)
+
+    try:
+        return yaml.load(text, Plain)
+    except RecursionError:
+        what = "nested too deeply"
+    except (yaml.YAMLError, ValueError) as error:
+        what = " ".join(str(error).split())
+    raise fault(file, "", f"not valid YAML: {what}; correct the syntax") from None

@@ -1,0 +1,172 @@
+"""What `kincheck import` writes: a case file that reads as the same case, whatever was read."""
+
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from kincheck import cases
+from kincheck.core.case.io.case_file import load_case
+from kincheck.core.case.io.case_writer import case_text
+from kincheck.core.case.io.reader_options import Supplied
+from kincheck.core.case.models.files import load
+from kincheck.core.case.models.hardpoints.sample_table import sample_table
+from kincheck.core.case.models.hardpoints.templates import TEMPLATES
+from kincheck.core.cli.main import main
+from kincheck.core.errors import CaseError
+
+from ..support.model_poses import solution
+from ..support.written_again import written_again
+
+GRIPPER = Path(__file__).parents[1] / "data" / "mjcf" / "robotiq_2f85.xml"
+CLOSING = Supplied(
+    drive=("right_driver_joint:0:0.8:17",),
+    hold=("right_spring_link_joint", "left_spring_link_joint"),
+)
+QUANTITIES = ("position", "velocity", "acceleration")
+
+
+@pytest.mark.parametrize("name", cases.names())
+def test_built_in_cases_are_written_whole(name: str, tmp_path: Path):
+    """Their references too, whose rows are exact."""
+    case = cases.load(name)
+    again = written_again(case, tmp_path)
+    assert again.truth is case.truth
+    assert again.reference.keys() == case.reference.keys()
+    for output, series in case.reference.items():
+        for quantity in QUANTITIES:
+            there, here = (getattr(each.reference[output], quantity) for each in (case, again))
+            assert (there is None) == (here is None)
+            assert there is None or np.array_equal(there, here, equal_nan=True)
+        assert again.reference[output].uncertainty == {} == series.uncertainty
+
+
+@pytest.mark.parametrize("template", TEMPLATES)
+@pytest.mark.parametrize("axle", [None, "steer"])
+def test_tables_are_written_whole(template: str, axle: str | None, tmp_path: Path):
+    file = tmp_path / "car.csv"
+    file.write_text(sample_table(TEMPLATES[template]))
+    try:
+        case = load(file, Supplied(travel="0.02:5", axle=axle))
+    except CaseError as error:
+        assert axle is not None
+        pytest.skip(f"no such axle: {error}")
+    written_again(case, tmp_path)
+
+
+def test_a_model_is_written_whole_and_moves_alike(tmp_path: Path):
+    case = load(GRIPPER, CLOSING)
+    there, here = solution(case), solution(written_again(case, tmp_path))
+    assert here.solved.all()
+    for name, motion in there.bodies.items():
+        assert np.array_equal(motion.r, here.bodies[name].r)
+        assert np.array_equal(motion.p, here.bodies[name].p)
+
+
+REFERRED = """<mujoco><compiler angle="radian"/><worldbody><body name="arm" euler="0.1 0.2 0.3">
+<joint name="hinge" axis="1 2 2" ref="0.4"/></body></worldbody></mujoco>"""
+
+
+def test_values_of_a_model_become_relative_to_its_pose(tmp_path: Path):
+    """A joint of a case file is zero at design, where the model's has its own reference."""
+    file = tmp_path / "model.xml"
+    file.write_text(REFERRED)
+    case = load(file, Supplied(drive=("hinge:0:1:5",)))
+    assert case.sweep.design == 0.4
+    again = written_again(case, tmp_path)
+    assert (again.sweep.values[0], again.sweep.values[-1]) == (-0.4, 0.6)
+    found = [solution(each).bodies["arm"].p for each in (case, again)]
+    assert np.abs(found[0] - found[1]).max() < 1e-15
+
+
+def crank(tmp_path: Path, *more: str):
+    """Return a case file with a line more at its end."""
+    file = tmp_path / "crank.toml"
+    file.write_text("\n".join([CRANK, *more]))
+    return load_case(file)
+
+
+CRANK = """schema = "kincheck-case/1"
+name = "crank"
+source = "made up for this test"
+truth = "closed_form"
+[bodies.arm]
+[joints.hinge]
+type = "revolute"
+bodies = ["ground", "arm"]
+point = [0.0, 0.0, 0.0]
+axis = [0.0, 0.0, 1.0]
+[points.tip]
+body = "arm"
+position = [1.0, 0.0, 0.0]
+[drivers.turn]
+type = "joint_angle"
+joint = "hinge"
+[outputs.x]
+point = "tip"
+component = "x"
+"""
+ROWS = "rows = [[0.0, 1.0], [0.1, 0.9950041652780258], [0.25, 0.9689124217106447]]"
+EVEN = '[sweep]\ndriver = "turn"\nstart = 0.0\nstop = 0.25\nsteps = 3\n'
+
+
+def test_a_sweep_at_the_samples_of_the_reference_stays_one(tmp_path: Path):
+    case = crank(tmp_path, '[sweep]\ndriver = "turn"\nat = "reference"', "[reference]", ROWS)
+    again = written_again(case, tmp_path)
+    assert np.array_equal(again.reference["x"].position, case.reference["x"].position)
+    assert 'at = "reference"' in case_text(case)
+    bare = replace(case, reference={}, origin=None)
+    with pytest.raises(CaseError, match=r"no even grid.*; give an even one"):
+        case_text(bare)
+
+
+def test_a_reference_on_a_grid_of_its_own_is_left_out_with_the_reason(tmp_path: Path):
+    rows = [[0.1 * k, float(f"{np.cos(0.1 * k):.6f}")] for k in range(6)]
+    case = crank(tmp_path, EVEN, "[reference]", f"rows = {rows}")
+    assert case.reference["x"].uncertainty
+    text = case_text(case)
+    assert text.startswith("# The reference is left out, because its values have uncertainties")
+    assert "reference" not in tomllib.loads(text)
+
+
+def test_notes_on_the_closure_are_kept(tmp_path: Path):
+    case = crank(tmp_path, EVEN, '[closure]\nnotes = ["the start was open by 1e-7 m"]')
+    assert case.assembly == ("the start was open by 1e-7 m",)
+    written_again(case, tmp_path)
+
+
+def test_what_a_case_file_cannot_hold_is_refused(tmp_path: Path):
+    file = tmp_path / "model.xml"
+    file.write_text(REFERRED.replace('"arm"', f'"{201 * "a"}"'))
+    case = load(file, Supplied(drive=("hinge:0:1:5",)))
+    with pytest.raises(CaseError, match=r"found 201 characters, expected 1 to 200.*; rename it"):
+        case_text(case)
+    source = case_text(replace(crank(tmp_path, EVEN), source=20_000 * "s"))
+    assert "ss [...]" in source
+
+
+def test_the_command_writes_a_file_that_runs(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    model, out = tmp_path / "model.xml", tmp_path / "case.toml"
+    model.write_text(REFERRED)
+    drive = ["--drive", "hinge:0:1:5"]
+    assert main(["import", str(model), *drive]) == 0
+    printed = capsys.readouterr()
+    assert printed.out.startswith("# Written by kincheck import from model.xml.\nschema =")
+    assert "left out: nothing" in printed.err
+    assert main(["import", *drive, "--out", str(out), str(model)]) == 0
+    assert capsys.readouterr().out == ""
+    assert out.read_text() == printed.out
+    assert solution(load_case(out)).solved.all()
+
+
+def test_the_command_takes_one_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    model = tmp_path / "model.xml"
+    model.write_text(REFERRED)
+    assert main(["import"]) == 2
+    assert "found 0 files, expected one" in capsys.readouterr().err
+    assert main(["import", str(model), "--out", str(tmp_path)]) == 2
+    assert "--out" in capsys.readouterr().err
+    # --hold takes several names, and gives the file back
+    assert main(["import", "--hold", "shin", str(model)]) == 2
+    assert "found 'shin', expected a joint" in capsys.readouterr().err

@@ -1,0 +1,198 @@
+"""SDF: places in frames of each other, and links that several joints hold, against closed forms."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from kincheck.core.case.io.reader_options import LEFT_OUT, Supplied
+from kincheck.core.case.models.files import load
+from kincheck.core.case.models.mjcf.elements import parse_xml
+from kincheck.core.case.models.robots.sdf import read_sdf
+from kincheck.core.errors import CaseError
+
+from ..fuzz import sdf as seeds
+from ..support.model_poses import coordinate, solution
+
+EXACT = 1e-13
+DRIVE = Supplied(drive=("A:0:0.5:5",))
+FOUR_BAR = seeds.FOUR_BAR.decode()
+TYPED = seeds.TYPED.decode()
+
+
+def model(folder: Path, text: str) -> Path:
+    file = folder / "model.sdf"
+    file.write_text(text)
+    return file
+
+
+def test_a_link_that_two_joints_hold_closes_a_loop(tmp_path: Path):
+    """A parallelogram of 2 and 4: the coupler does not turn, the crank and the rocker do alike."""
+    case = load(model(tmp_path, FOUR_BAR), DRIVE)
+    found = solution(case)
+    assert found.solved.all()
+    joint = case.mechanism.joint
+    for k, angle in enumerate(case.sweep.values):
+        turned = [coordinate(case.mechanism, found, joint(name), k) for name in "ADC"]
+        assert turned == pytest.approx([angle, angle, -angle], abs=EXACT)
+    # the whole model stands 1 m above the ground and is turned by 30 degrees about z
+    pin = 2.0 * np.sin(case.sweep.values)
+    expected = [np.cos(np.pi / 6) * pin, np.sin(np.pi / 6) * pin, 1 + 2 * np.cos(case.sweep.values)]
+    there = found.points["B"].position
+    assert np.allclose(there, np.transpose(expected), rtol=0, atol=EXACT)
+    assert {joint.name for joint in case.mechanism.joints} >= {"A", "B3", "C", "D"}
+    assert case.source.split(LEFT_OUT)[1] == "visual (1)"
+
+
+def test_the_joint_of_the_loop_can_be_driven(tmp_path: Path):
+    """It is a joint like any other."""
+    by_crank = solution(load(model(tmp_path, FOUR_BAR), DRIVE)).bodies["b"].r
+    by_loop = (
+        solution(load(model(tmp_path, FOUR_BAR), Supplied(drive=("C:0:-0.5:5",)))).bodies["b"].r
+    )
+    assert np.abs(by_crank - by_loop).max() < EXACT
+
+
+def test_all_types_of_joints_in_several_models(tmp_path: Path):
+    supplied = Supplied(
+        drive=("m::s:0:0.1:3",), hold=("m::u.1", "m::u.2", "m::ball", "m::w.rotation")
+    )
+    case = load(
+        model(tmp_path, TYPED.replace('<model name="n"><link name="base"/></model>', "")), supplied
+    )
+    types = {joint.name: joint.type for joint in case.mechanism.joints}
+    assert types == {
+        "m::s": "translational",
+        "m::u.1": "revolute",
+        "m::u.2": "revolute",
+        "m::ball": "fixed",  # held
+        "m::w.translation": "translational",
+        "m::w.rotation": "revolute",
+        "m::m": "revolute",
+    }
+    (thread,) = (each for each in case.mechanism.couplers if each.name == "m::w.thread")
+    assert thread.radius == pytest.approx(0.01 / (2 * np.pi))  # metres for a radian
+    found = solution(case)
+    assert found.solved.all()
+    turned = coordinate(case.mechanism, found, case.mechanism.joint("m::m"), 2)
+    assert turned == pytest.approx(0.2, abs=EXACT)
+
+
+def test_a_screw_advances_by_its_pitch_in_a_turn(tmp_path: Path):
+    text = """<sdf version="1.10"><model name="m"><link name="nut"/><joint name="w" type="screw">
+    <parent>world</parent><child>nut</child><axis/><screw_thread_pitch>0.01</screw_thread_pitch>
+    </joint></model></sdf>"""
+    case = load(model(tmp_path, text), Supplied(drive=("w.rotation:0:6.283185307179586:3",)))
+    assert solution(case).bodies["nut"].r[:, 2] == pytest.approx([0, 0.005, 0.01], abs=EXACT)
+
+
+def links(text: str, folder: Path):
+    file = folder / "model.sdf"
+    return read_sdf(parse_xml(file, text))
+
+
+AXES = {
+    "in the joint": ('<sdf version="1.7">', "", "<xyz>1 0 0</xyz>", (0, 1, 0)),
+    "in a link": ('<sdf version="1.7">', "", '<xyz expressed_in="a">1 0 0</xyz>', (0, 0, -1)),
+    "in the model": (
+        '<sdf version="1.7">',
+        "",
+        '<xyz expressed_in="__model__">1 0 0</xyz>',
+        (1, 0, 0),
+    ),
+    "in the world": ('<sdf version="1.7">', "", '<xyz expressed_in="world">1 0 0</xyz>', (1, 0, 0)),
+    "in the model, by a flag": (
+        '<sdf version="1.6">',
+        "<use_parent_model_frame>1</use_parent_model_frame>",
+        "<xyz>1 0 0</xyz>",
+        (1, 0, 0),
+    ),
+    "in the model, of old": ('<sdf version="1.4">', "", "<xyz>1 0 0</xyz>", (1, 0, 0)),
+    "in the joint, of a version of two digits": (
+        '<sdf version="1.10">',
+        "",
+        "<xyz>1 0 0</xyz>",
+        (0, 1, 0),
+    ),
+}
+
+
+@pytest.mark.parametrize(("root", "more", "xyz", "expected"), AXES.values(), ids=AXES)
+def test_an_axis_is_in_the_frame_it_says(root, more, xyz, expected, tmp_path: Path):
+    half = np.pi / 2
+    text = f"""{root}<model name="m"><link name="a"><pose>0 0 0 0 {half} 0</pose></link>
+    <link name="b"><pose>1 0 0 0 0 {half}</pose></link><joint name="j" type="revolute">
+    <parent>a</parent><child>b</child><axis>{xyz}{more}</axis></joint></model></sdf>"""
+    (joint,) = links(text, tmp_path).joints
+    assert [*joint.moves[0].axis] == pytest.approx(expected, abs=EXACT)
+    assert [*joint.moves[0].point] == pytest.approx((1, 0, 0), abs=EXACT)
+
+
+def test_links_without_a_joint_above_are_free(tmp_path: Path):
+    text = FOUR_BAR.replace("<parent>world</parent>", "<parent>base</parent>")
+    text = text.replace("<visual", '<visual name="w"/><visual', 1).replace(
+        '<link name="a">', '<link name="base"/><link name="a">', 1
+    )
+    with pytest.raises(CaseError, match="free bodies: base"):
+        load(model(tmp_path, text), DRIVE)
+    assert solution(
+        load(model(tmp_path, text), Supplied(DRIVE.template, drive=DRIVE.drive, hold=("base",)))
+    ).solved.all()
+
+
+FAULTS = {
+    "ring of frames": (
+        '<frame name="B2" attached_to="b"/>',
+        '<frame name="B2" attached_to="b"><pose relative_to="F"/></frame>'
+        '<frame name="F"><pose relative_to="B2"/></frame>',
+        "is given in itself by a ring",
+    ),
+    "attached to itself": (
+        '<frame name="B2" attached_to="b"/>',
+        '<frame name="B2" attached_to="B2"/>',
+        "in itself by a ring|attached to itself",
+    ),
+    "unknown frame": (
+        'relative_to="B"',
+        'relative_to="BB"',
+        "found the frame 'm::BB', expected another one; did you mean 'm::B'",
+    ),
+    "unknown link": ("<child>a</child>", "<child>aa</child>", "found the frame 'm::aa'"),
+    "no child": ("<child>a</child>", "", "<child>: missing, expected a name; add it"),
+    "one link": (
+        "<parent>a</parent><child>B2",
+        "<parent>b</parent><child>B2",
+        "joins 'b' with itself",
+    ),
+    "five numbers": ("4 0 0 0 0.3 0", "4 0 0 0 0.3", "expected 6 numbers; correct the text"),
+    "no axis": ("<axis><xyz>0 1 0</xyz></axis>", "", "<axis>: missing, expected an axis; add it"),
+    "zero axis": ("<xyz>0 1 0</xyz>", "<xyz>0 0 0</xyz>", "found zero, expected the direction"),
+    "unknown type": ('type="continuous"', 'type="gearbox"', "found 'gearbox', expected one of"),
+    "old screw": ('type="continuous"', 'type="screw"', "<screw_thread_pitch>: missing"),
+    "mistyped": (
+        "<parent>",
+        "<parant>x</parant><parent>",
+        "unknown in <joint>; did you mean 'parent'",
+    ),
+    "include": (
+        "</model>",
+        "<include><uri>x</uri></include></model>",
+        "takes a model from elsewhere.*; write it out",
+    ),
+    "twice": ('<frame name="B2"', '<frame name="a"', "found 'a' again"),
+    "version": ('version="1.9"', 'version="1.x"', "version: found '1.x'"),
+}
+
+
+@pytest.mark.parametrize(("old", "new", "said"), FAULTS.values(), ids=FAULTS)
+def test_a_fault_is_one_message(old: str, new: str, said: str, tmp_path: Path):
+    assert old in FOUR_BAR
+    file = model(tmp_path, FOUR_BAR.replace(old, new, 1))
+    with pytest.raises(CaseError, match=said) as caught:
+        load(file, DRIVE)
+    assert str(caught.value).startswith(f"{file}: line ")
+
+
+@pytest.mark.parametrize("text", ['<sdf version="1.7"/>', '<sdf><model name="m"/></sdf>'])
+def test_a_document_without_a_mechanism_is_told(text: str, tmp_path: Path):
+    with pytest.raises(CaseError, match=r"has no (model|link), expected"):
+        load(model(tmp_path, text), DRIVE)

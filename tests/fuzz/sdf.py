@@ -1,0 +1,54 @@
+"""SDF models; an attribute of the root says how they are driven."""
+
+import re
+
+from kincheck.core.case.io.reader_options import Supplied
+from kincheck.core.case.models.files import load
+from kincheck.core.case.models.robots.sdf import IN_AXIS, IN_JOINT, IN_LINK, IN_MODEL, TYPES
+
+from .fuzzing import changing, read_or_refused, written
+from .trees import changed_xml
+
+LONGEST = 4200
+DRIVEN = re.compile(rb'drive ([^ "]{1,40}) hold ([^">]{0,200})"')
+WORDS = (
+    *(*IN_MODEL, *IN_LINK, *IN_JOINT, *IN_AXIS, *TYPES),
+    *("relative_to", "attached_to", "expressed_in", "degrees", "rotation_format", "quat_xyzw"),
+    *("world", "__model__", "canonical_link", "sdf", "version", "1.4", "1.10", "true", "xyz"),
+    *("multiplier", "offset", "reference"),
+)
+FOUR_BAR = b"""<sdf version="1.9" said="drive A:0:0.5:5 hold "><model name="m"><pose degrees="true">0 0 1 0 0 30</pose>
+<link name="a"><visual name="v"/></link><link name="b"><pose relative_to="B"/></link>
+<link name="c"><pose>4 0 0 0 0.3 0</pose></link>
+<frame name="B" attached_to="a"><pose>0 0 2 0.1 0.2 0.3</pose></frame>
+<joint name="A" type="revolute"><parent>world</parent><child>a</child><axis><xyz>0 1 0</xyz></axis></joint>
+<joint name="B3" type="continuous"><parent>a</parent><child>B2</child><axis><xyz expressed_in="__model__">0 1 0</xyz></axis></joint>
+<frame name="B2" attached_to="b"/>
+<joint name="D" type="revolute"><parent>world</parent><child>c</child><axis><xyz>0 1 0</xyz></axis></joint>
+<joint name="C" type="revolute"><pose relative_to="__model__">4 0 2 0 0 0</pose><parent>c</parent><child>b</child><axis><xyz expressed_in="a">0 1 0</xyz></axis></joint>
+</model></sdf>"""  # noqa: E501
+TYPED = b"""<sdf version="1.11" said="drive m::s:0:0.1:3 hold m::u.1 m::u.2 m::ball m::w.rotation n::base">
+<world name="w"><model name="still"><static>1</static><link name="base"/></model><model name="m"><link name="a"/><link name="b"><pose>1 0 0 0 0 0</pose></link>
+<link name="c"><pose rotation_format="quat_xyzw">0 1 0 0 0 0.6 0.8</pose></link><link name="d"/><link name="e"/>
+<joint name="s" type="prismatic"><parent>world</parent><child>a</child><axis/></joint>
+<joint name="u" type="universal"><parent>a</parent><child>b</child><axis/><axis2><xyz>1 0 0</xyz></axis2></joint>
+<joint name="ball" type="ball"><parent>c</parent><child>a</child></joint>
+<joint name="w" type="screw"><parent>a</parent><child>d</child><axis/><screw_thread_pitch>0.01</screw_thread_pitch></joint>
+<joint name="m" type="revolute"><parent>d</parent><child>e</child><axis><mimic joint="s"><multiplier>2</multiplier></mimic></axis></joint>
+</model><model name="n"><link name="base"/></model></world></sdf>"""  # noqa: E501
+
+
+def one(data: bytes) -> None:
+    """Read one input with what it says itself."""
+    drive, hold = found.groups() if (found := DRIVEN.search(data)) else (b"", b"")
+    names = tuple(name.decode("latin-1") for name in hold.split())
+    supplied = Supplied(drive=(drive.decode("latin-1"),) if drive else (), hold=names)
+    read_or_refused(lambda: load(written("model.sdf", data), supplied))
+
+
+def seeds() -> list[bytes]:
+    """A four-bar whose last joint closes the loop, and all types of joints in several models."""
+    return [FOUR_BAR, TYPED]
+
+
+mutate = changing(changed_xml, words=WORDS)
