@@ -107,7 +107,7 @@ class Stepping:
 
     def build(self, case: Case) -> _Steps:
         """Return the compiled model with its settings and start."""
-        return _Steps(mujoco(), case, self)
+        return _Steps(mujoco(), MuJoCo().known(case), self)
 
     def solve(self, model: _Steps, case: Case, tol: float) -> Trajectory:
         """All samples that can be simulated, however far the constraints drift; see

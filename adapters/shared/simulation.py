@@ -131,7 +131,7 @@ def start_of(model: ProjectionModel, case: Case) -> Start:
         begin = begin.other
         origin, _ = walk.start(path, begin)
     if origin is None:
-        raise SolveError(f"case {case.name!r}: {message}")
+        raise SolveError(f"case {case.name!r}: {message}", walk.kind_at_start)
     notes += notes_on_start(begin, path)
     facts = {"start": begin.facts, **({"notes": notes} if notes else {})}
     nearest = [int(side[0]) for side in outwards(path.times, origin.t) if len(side)]
@@ -152,7 +152,8 @@ def start_of(model: ProjectionModel, case: Case) -> Start:
             )
     raise SolveError(
         f"case {case.name!r}: no sample next to the design can be reached; let the sweep come"
-        " nearer to it"
+        " nearer to it",
+        walk.lost.kind,
     )
 
 

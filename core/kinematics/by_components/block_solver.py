@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import SolveError
+from ...failures import FailureKind
 from ...mechanism.mechanism import Mechanism, Vector
 from ...trajectory import Array
 from ..compiled.compiled_model import CLOSED, Model, compile_model
@@ -168,7 +169,8 @@ class Cascade:
             raise SolveError(
                 f"mechanism {self.mechanism.name!r}: the component of {', '.join(worst.bodies)}"
                 f" does not close at the design position to {CLOSED:g} of its size; check points,"
-                " axes and lengths"
+                " axes and lengths",
+                FailureKind.NOT_CLOSED,
             )
         source, target = np.array(model.plan.carried).T
         lanes[target] = lanes[source]

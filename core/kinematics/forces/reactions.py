@@ -52,6 +52,7 @@ def with_forces(
         {**motion.details, "forces": _account(found)},
         {name: motion.bodies[name] for name in bodies},
         found,
+        failures=motion.failures,
     )
 
 
