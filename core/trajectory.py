@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Generic, TypeAlias, TypeVar
@@ -132,7 +132,7 @@ class Trajectory(Tabular):
         bodies: Mapping[str, BodyMotion] | None = None,
         forces: Forces | None = None,
         driven_by: Callable[[], Driving] | None = None,
-        failures: Iterable[FailureKind] = (),
+        failures: Sequence[FailureKind] = (),
     ) -> None:
         known = self.__dict__
         known["points"], known["solved"], known["iterations"] = points, solved, iterations
@@ -141,7 +141,7 @@ class Trajectory(Tabular):
         known["bodies"] = {} if bodies is None else bodies
         known["forces"] = forces
         known["driven_by"] = driven_by
-        known["failures"] = tuple(dict.fromkeys(failures))
+        known["failures"] = tuple(dict.fromkeys(failures)) if failures else ()
 
     def along(self, driven_by: Callable[[], Driving]) -> Trajectory:
         """Return the trajectory with its drivers."""

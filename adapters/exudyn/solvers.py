@@ -47,7 +47,7 @@ class Solver:
 
     @property
     def settings(self) -> Mapping[str, Any]:
-        """Settings that differ from Exudyn's defaults."""
+        """Settings other than Exudyn's defaults."""
         return {
             "solver": {
                 "static": "SolveStatic",
@@ -67,7 +67,7 @@ class Solver:
         }
 
     def version(self) -> str | None:
-        """Version of Exudyn, or None where it cannot be imported."""
+        """Version of Exudyn, or None if it cannot be imported."""
         return Exudyn().version()
 
     def unsupported(self, case: Case) -> str | None:

@@ -70,7 +70,7 @@ class Dynamics:
         }
 
     def version(self) -> str | None:
-        """Version of Pinocchio, or None where it cannot be imported."""
+        """Version of Pinocchio, or None if it cannot be imported."""
         return Pinocchio().version()
 
     def unsupported(self, case: Case) -> str | None:

@@ -31,7 +31,7 @@ LOST = PoseFailure(FailureKind.NOT_FOUND)
 
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """A solved pose with all data that the next step of the walk needs."""
+    """A solved pose with all data for the next step of the walk."""
 
     t: float
     c: Array  # of the drivers

@@ -2,8 +2,8 @@
 the samples.
 
 The loop walks from the design position outwards, both ways, with a tangent predictor. Convergence
-is judged here, by residual and finiteness, never by a simulator's own word; a step that does not
-converge, or converges to another assembly, is halved.
+is judged here, by residual and finiteness, never by a simulator's own word; a step without
+convergence, or to another assembly, is halved.
 """
 
 from __future__ import annotations
@@ -104,10 +104,10 @@ class Walk(PoseSolver):
     """The walk of a model along the motion of a case, sample by sample."""
 
     def advance(self, path: Path, start: Sample, t: float, step: float) -> tuple[Sample, bool]:
-        """Walk a path from start to time t, halving steps that fail; return the end, whether at t.
+        """Walk a path from start to time t, halving failed steps; return the end, whether at t.
 
         Args:
-            step: between samples; zero where all are one.
+            step: between samples; zero if all are one.
         """
         at, h = start, t - start.t
         while at.t != t:

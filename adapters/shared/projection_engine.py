@@ -24,15 +24,15 @@ DRIVERS = (JointAngle, JointDisplacement, PointCoordinate)
 
 @dataclass(frozen=True)
 class ProjectionEngine(ABC):
-    """An engine (see `Engine`) that makes a `ProjectionModel`, and the Newton walk solves it.
+    """An engine (see `Engine`) with a `ProjectionModel`, solved by the Newton walk.
 
     Attributes:
         corrections: Newton steps after the predictor, whatever residual they leave; None: as many
             as it takes.
         name: as on the command line, and of the simulator's Python package by default.
-        package: of the simulator, where it has another name.
+        package: of the simulator, if it has another name.
         title: as in a sentence.
-        joints: types that have a counterpart.
+        joints: types with a counterpart.
     """
 
     corrections: int | None = None
@@ -66,7 +66,7 @@ class ProjectionEngine(ABC):
             return None
 
     def version_of(self, simulator: Any) -> str | None:
-        """Return the version of the imported package; None where it is another package of that
+        """Return the version of the imported package; None if it is another package of this
         name.
         """
         return str(simulator.__version__)

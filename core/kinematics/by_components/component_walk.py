@@ -1,5 +1,5 @@
-"""The walk of a cascade along samples: many at once, on from the last one that every component
-accepts.
+"""The walk of a cascade along samples: many at once, on from the last one accepted by every
+component.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Keep = Callable[[Indices], None]
 
 
 class ComponentWalk(Walk):
-    """The walk over samples of a path, from the pose that the lanes are predicted from.
+    """The walk over samples of a path, from the pose before the lanes.
 
     Args:
         samples: numbers of the samples, in their order.
@@ -38,8 +38,8 @@ class ComponentWalk(Walk):
         tol: largest accepted residual.
 
     Attributes:
-        time: of the pose that the lanes are predicted from now [s].
-        sound, start: the last sound pose that they were predicted from, and its time.
+        time: of the pose before the lanes [s].
+        sound, start: the last sound pose before the lanes, and its time.
     """
 
     def __init__(
@@ -63,7 +63,7 @@ class ComponentWalk(Walk):
         return self.advance(0, len(self.samples))
 
     def follow(self, at: int, stop: int, parts: int) -> int:
-        """Follow as many samples at once as there are lanes, up to the first that fails."""
+        """Follow as many samples at once as there are lanes, up to the first failure."""
         lanes, ahead = self.lanes, self.samples[at : min(at + LANES, stop)]
         good = lanes.attempt_at([each[:, ahead] for each in self.given]) > 0.0
         accepted = len(ahead) if good.all() else int(good.argmin())
@@ -80,7 +80,7 @@ class ComponentWalk(Walk):
         return at + accepted
 
     def follow_part(self, at: int) -> PoseFailure | None:
-        """Follow the longest part that succeeds."""
+        """Follow the longest accepted part."""
         reached = part_of_step(
             self.time,
             float(self.times[self.samples[at]]),
@@ -94,8 +94,8 @@ class ComponentWalk(Walk):
         return None
 
     def _failure(self) -> PoseFailure:
-        """Return the failure of the shortest part: the component that is not solved, or the one
-        nearest to singular.
+        """Return the failure of the shortest part: its unsolved component, or the one nearest to
+        singular.
         """
         lanes, cascade = self.lanes, self.lanes.cascade
         closure, sigma = (lanes.each(name)[:, lanes.last] for name in ("closure", SIGMA))

@@ -1,5 +1,5 @@
 """Sweep a cascade: outwards from the design position, many samples as lanes, on from the last one
-that every component accepts.
+accepted by every component.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class CascadeSweep:
         self._outputs, self._still = self._places()
 
     def _places(self) -> tuple[dict[str, list[int]], dict[str, Sequence[float]]]:
-        """Rows of the world of everything wanted, by name; and what of it stands still."""
+        """Return the rows of the world for each wanted motion by name, and the motions at rest."""
         cascade, m = self.cascade, self.cascade.mechanism
         found, still = dict[str, list[int]](), dict[str, Sequence[float]]()
         for name in cascade.request.points:
@@ -101,7 +101,7 @@ class CascadeSweep:
 
     @cached_property
     def _sides(self) -> list[tuple[Indices, list[Array]]]:
-        """Of each side of the start the samples outwards, and what is given there."""
+        """The samples of each side of the start, outwards, and their inputs."""
         times = self.path.times
         return [
             (side, self._lanes.sampled(times[side], self.path))
@@ -129,8 +129,8 @@ class CascadeSweep:
     def _follow(
         self, times: Array, given: Sequence[Array], here: float, path: Path, keep: Keep, tol: float
     ) -> str:
-        """Follow the samples outwards, with what is given there, over singular poses too; empty, or
-        why they end.
+        """Follow the samples outwards, over singular poses too; return the message of the end, or
+        an empty text.
         """
         lanes, left, refused = self._lanes, np.arange(len(times)), list[int]()
 

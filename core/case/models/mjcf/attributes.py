@@ -1,4 +1,4 @@
-"""The attributes that MJCF has, of the elements that are read; from MuJoCo's own schema
+"""The attributes of the MJCF elements in use; from MuJoCo's own schema
 (mj_printSchema, MuJoCo 4.0).
 """
 

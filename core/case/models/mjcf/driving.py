@@ -30,8 +30,8 @@ class Driving:
     Attributes:
         joint: swept joint; None if not given.
         values: its coordinates in the model, reference included [rad or m].
-        held: hinges and slides that keep their coordinate in the pose of the file.
-        fixed: balls, and otherwise free bodies, that keep their place.
+        held: hinges and slides with the coordinate of the file.
+        fixed: balls, and otherwise free bodies, in their place.
     """
 
     joint: str | None
@@ -41,7 +41,7 @@ class Driving:
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Hinges and slides that are driven, the swept one first."""
+        """Return the driven hinges and slides, the swept one first."""
         return (*(() if self.joint is None else (self.joint,)), *self.held)
 
 

@@ -53,7 +53,7 @@ def read_compiler(root: Element) -> Compiler:
     """The settings of all <compiler> elements, the last of which counts.
 
     Raises:
-        CaseError: an unknown setting, or coordinates that MuJoCo does not read any more.
+        CaseError: an unknown setting, or coordinates no longer read by MuJoCo.
     """
     found = Compiler()
     for element in root.only("compiler"):
@@ -78,7 +78,7 @@ def read_compiler(root: Element) -> Compiler:
 
 @dataclass(frozen=True)
 class Place:
-    """Where a frame is, and how it is turned, in the frame around it or globally [m, -]."""
+    """Position and rotation of a frame, in the frame around it or globally [m, -]."""
 
     at: Vec3 = ZERO
     turn: Quat = IDENTITY
@@ -116,10 +116,10 @@ def coordinates(a: Vec3) -> Vector:
 
 
 def read_place(element: Element, compiler: Compiler) -> Place:
-    """The place that an element gives by pos and one kind of orientation.
+    """Return the place of an element by pos and one kind of orientation.
 
     Raises:
-        CaseError: several orientations, or one that is none: zero or parallel axes, a zero
+        CaseError: several orientations, or an invalid one: zero or parallel axes, a zero
             quaternion.
     """
     at = vec(element.numbers("pos", (3,), (0.0, 0.0, 0.0)))
@@ -170,7 +170,7 @@ def _about(axis: Vec3, angle: float) -> Quat:
 
 
 def _z_towards(axis: Vec3) -> Quat:
-    """The shortest turn of z towards the axis; half a turn about x where the axis is opposite."""
+    """The shortest turn of z towards the axis; half a turn about x if the axis is opposite."""
     normal = cross(Z, axis)
     sine = math.sqrt(normal @ normal)
     if sine < 1e-10:

@@ -45,7 +45,7 @@ def read_mjcf(file: Path, text: str, supplied: Supplied) -> Case:
     of joints, and the rotations of bodies.
 
     Raises:
-        CaseError: not a model that can be read, or the options do not say how it moves.
+        CaseError: not a readable model, or the options do not say how it moves.
     """
     root = parse_xml(file, text)
     _require_model(root)
@@ -91,7 +91,7 @@ def read_mjcf(file: Path, text: str, supplied: Supplied) -> Case:
 
 
 def _require_model(root: Element) -> None:
-    """Refuse what is no model, or stands for parts that are elsewhere."""
+    """Refuse a file without a model, or with parts in other files."""
     if root.tag != "mujoco":
         raise root.fault("found another document, expected a model <mujoco>; give an MJCF file")
     for element in root.children:
@@ -112,7 +112,7 @@ def _driver(parts: Parts, joint: str) -> JointDriver:
 
 
 def _points(tree: Tree, parts: Parts) -> list[Point]:
-    """The origins of the bodies of the file that move, and the sites on them."""
+    """Return the origins of the moving bodies of the file, and their sites."""
     moving = [name for name in parts.bodies if name not in parts.fixed]
     points = [
         Point(name, name, coordinates(parts.bodies[name].at))

@@ -46,18 +46,18 @@ class ModelJoint:
 
 @dataclass
 class Tree:
-    """What a model's worldbody holds.
+    """The contents of a model's worldbody.
 
     Attributes:
         places: of all bodies of the file, global.
         carriers: by body of the file, the body of the mechanism it belongs to.
-        moving: bodies of the mechanism that move, with their places; the massless ones of chains
+        moving: moving bodies of the mechanism, with their places; the massless ones of chains
             too.
         massless: the names of those.
-        free: by name, of the joint or of its body, bodies that no joint holds.
+        free: by name, of the joint or of its body, bodies without a joint.
         sites: by name, the body of the mechanism they are on, and their global places.
-        names: of all bodies of the file that have one.
-        left_out: how many there are of what has no meaning for kinematics, by what it is called.
+        names: of all bodies of the file with a name.
+        left_out: number of elements without meaning for kinematics, by tag.
     """
 
     classes: Classes
@@ -73,12 +73,12 @@ class Tree:
     names: set[str] = field(default_factory=set[str])
 
     def read(self, around: Element, place: Place, body: str, childclass: str) -> None:
-        """What is in a body, or in a frame of it; `place` is that of the body or frame, `body` one
+        """Read a body, or a frame of it; `place` is the place of the body or frame, `body` one
         of the mechanism.
 
         Raises:
-            CaseError: an element that is not known or makes bodies, a name given twice, a joint or
-                place that makes no sense.
+            CaseError: an unknown element or one with further bodies, a name given twice, an
+                invalid joint or place.
         """
         for element in around.children:
             if element.tag in MAKE_BODIES:
