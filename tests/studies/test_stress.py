@@ -158,10 +158,9 @@ def test_errors_are_refusals_and_crashes_are_never_right(case):
         failure = Failure(outcome, "free", kind=FailureKind.FREE)
         assert judged(one, case, None, failure).counts[verdict] == 5
     assert described_wrong(one, 3, free).counts[Verdict.REFUSED_RIGHTLY] == 3
-    assert described_wrong(one, 3, "odd").counts[Verdict.REFUSED_WRONGLY] == 3
+    assert described_wrong(one, 3, SolveError("odd")).counts[Verdict.REFUSED_WRONGLY] == 3
     assert (
-        described_wrong(Specimen("one", lambda: case), 3, "free").counts[Verdict.REFUSED_WRONGLY]
-        == 3
+        described_wrong(Specimen("one", lambda: case), 3, free).counts[Verdict.REFUSED_WRONGLY] == 3
     )
 
 
