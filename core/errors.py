@@ -6,6 +6,8 @@ import difflib
 from collections.abc import Callable, Iterable, Sequence
 from itertools import islice
 
+from .failures import FailureKind
+
 LONGEST_NAME = 200
 """Characters of a name that a message repeats; a longer one hides the rest of the message."""
 # A message that lists all names of a large file is not read. The search for a similar name is cubic
@@ -14,7 +16,13 @@ MOST_NAMED, MOST_SEARCHED = 50, 10_000
 
 
 class KincheckError(Exception):
-    """Base of all errors that kincheck raises on purpose."""
+    """Base of all errors that kincheck raises on purpose.
+
+    Attributes:
+        kind: of a failure with a kind of its own; None for any other.
+    """
+
+    kind: FailureKind | None = None
 
 
 class Phrase:
@@ -43,10 +51,12 @@ class MechanismError(KincheckError, ValueError):
         key: the faulty key of a case file ("joints.pivot.bodies"); empty if unknown.
     """
 
-    def __init__(self, message: str | Phrase, key: str = "") -> None:
+    def __init__(
+        self, message: str | Phrase, key: str = "", kind: FailureKind | None = None
+    ) -> None:
         super().__init__(str(message))
         self.phrase = message if isinstance(message, Phrase) else Phrase(message)
-        self.key = key
+        self.key, self.kind = key, kind
 
 
 class CaseError(KincheckError, ValueError):
@@ -55,6 +65,10 @@ class CaseError(KincheckError, ValueError):
 
 class SolveError(KincheckError, RuntimeError):
     """The mechanism cannot be solved as described: freedom left, contradiction, or no assembly."""
+
+    def __init__(self, message: str, kind: FailureKind | None = None) -> None:
+        super().__init__(message)
+        self.kind = kind
 
 
 def unknown(what: str, name: str, known: Iterable[str]) -> str:

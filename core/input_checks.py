@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from .errors import MechanismError, SolveError, unknown
+from .failures import FailureKind
 from .trajectory import Array
 
 SHORTEST = 1e-150
@@ -46,7 +47,8 @@ def require_finite(who: str, numbers: Sequence[Any], expected: str) -> None:
     """
     if not all(finite(number) or _of_later(number) for number in numbers):
         raise MechanismError(
-            f"{who} = {numbers if len(numbers) > 1 else numbers[0]} is not finite; give {expected}"
+            f"{who} = {numbers if len(numbers) > 1 else numbers[0]} is not finite; give {expected}",
+            kind=FailureKind.NOT_FINITE,
         )
 
 
@@ -65,7 +67,9 @@ def require_direction(who: str, numbers: Sequence[float]) -> None:
     """Raise MechanismError unless a vector has a direction: its squared length must be normal."""
     length = math.hypot(*numbers)
     if length == 0.0:
-        raise MechanismError(f"{who} is zero; give a direction of any other length")
+        raise MechanismError(
+            f"{who} is zero; give a direction of any other length", kind=FailureKind.NO_LENGTH
+        )
     if not SHORTEST <= length <= 1.0 / SHORTEST:
         raise MechanismError(
             f"{who} has length {length:.3g}, whose square is no number; give a direction of another"

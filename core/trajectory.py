@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from .dataset import Dataset, Variable
 from .driving import Driving, in_words
+from .failures import FailureKind
 from .forces import Forces
 from .tabular import Tabular
 
@@ -106,6 +107,7 @@ class Trajectory(Tabular):
         bodies: motion by body name, for engines and requests that give it.
         forces: reactions and efforts, for engines and requests that give them.
         driven_by: gives `drive`; None if the engine does not tell it.
+        failures: kinds of the failures in the message, each once.
     """
 
     points: Mapping[str, PointMotion]
@@ -117,6 +119,7 @@ class Trajectory(Tabular):
     bodies: Mapping[str, BodyMotion]
     forces: Forces | None
     driven_by: Callable[[], Driving] | None
+    failures: Sequence[FailureKind]
 
     def __init__(  # a frozen dataclass sets its fields by calls, which takes 3 us of a sweep's 25
         self,
@@ -129,6 +132,7 @@ class Trajectory(Tabular):
         bodies: Mapping[str, BodyMotion] | None = None,
         forces: Forces | None = None,
         driven_by: Callable[[], Driving] | None = None,
+        failures: Sequence[FailureKind] = (),
     ) -> None:
         known = self.__dict__
         known["points"], known["solved"], known["iterations"] = points, solved, iterations
@@ -137,6 +141,7 @@ class Trajectory(Tabular):
         known["bodies"] = {} if bodies is None else bodies
         known["forces"] = forces
         known["driven_by"] = driven_by
+        known["failures"] = tuple(dict.fromkeys(failures)) if failures else ()
 
     def along(self, driven_by: Callable[[], Driving]) -> Trajectory:
         """Return the trajectory with its drivers."""

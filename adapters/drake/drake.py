@@ -45,7 +45,7 @@ class DrakeModel(TreeModel):
     """The tree in Drake: a body and its joint for each link, a fixed offset frame for each frame.
 
     Attributes:
-        turning: places of the velocities that are unknowns: all but the displacements of balls.
+        turning: places of the unknown velocities: all but the displacements of balls.
         balls: where in Drake's positions a ball has its quaternion.
         inertias: of bodies, by their numbers.
     """

@@ -21,7 +21,6 @@ from ...core.harness.engine import Floor
 from ...core.trajectory import Array
 from ..shared.compiled_floor import floor_of
 from ..shared.force_solution import Dynamics
-from ..shared.length_scaling import in_own_frame
 from ..shared.projection_engine import ProjectionEngine
 from .equations import NO_ROTATION, turned
 from .joint_objects import JOINTS
@@ -58,9 +57,13 @@ class Exudyn(ProjectionEngine):
             ),
         }
 
+    def model_of(self, case: Case) -> ExudynModel:
+        """Return Exudyn's system of the case."""
+        return ExudynModel(case)
+
     def build(self, case: Case) -> ExudynModel:
-        """Return Exudyn's system of the case, at the design position."""
-        return ExudynModel(in_own_frame(case))
+        """Return Exudyn's system of the case in its own frame, at the design position."""
+        return self.model_of(self.own(case))
 
     def floor(self, case: Case) -> Floor:
         """Return the floor from the static solver's residual and Jacobian.

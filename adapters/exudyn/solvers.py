@@ -47,7 +47,7 @@ class Solver:
 
     @property
     def settings(self) -> Mapping[str, Any]:
-        """Settings that differ from Exudyn's defaults."""
+        """Settings other than Exudyn's defaults."""
         return {
             "solver": {
                 "static": "SolveStatic",
@@ -67,12 +67,12 @@ class Solver:
         }
 
     def version(self) -> str | None:
-        """Version of Exudyn, or None where it cannot be imported."""
+        """Version of Exudyn, or None if it cannot be imported."""
         return Exudyn().version()
 
     def unsupported(self, case: Case) -> str | None:
         """Return the joint, driver or grid of samples that has no counterpart here, or None."""
-        return Exudyn().unsupported(case) or limitation_of(case)
+        return Exudyn().unsupported(case) or limitation_of(Exudyn().known(case))
 
     def efforts(self) -> Mapping[str, Solver]:
         """Return the efforts by the tolerance of Newton, or by the number of steps."""
@@ -88,7 +88,7 @@ class Solver:
 
     def build(self, case: Case) -> _Solved:
         """Return Exudyn's system and its start."""
-        return _Solved(case, self)
+        return _Solved(Exudyn().known(case), self)
 
     def solve(self, model: _Solved, case: Case, tol: float) -> Trajectory:
         """Simulate all samples; Exudyn uses its own tolerance (see `settings`), not tol."""

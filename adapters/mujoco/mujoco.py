@@ -28,7 +28,6 @@ from ...core.mechanism.drivers import JointDriver, PointCoordinate
 from ...core.trajectory import Array
 from ..shared.compiled_floor import floor_of
 from ..shared.force_solution import Dynamics
-from ..shared.length_scaling import in_own_frame
 from ..shared.projection_engine import ProjectionEngine
 from .forces import COMPUTED_BY, LoadedMuJoCo
 from .spec import JOINTS, Equality, Sketch, coordinate
@@ -59,8 +58,12 @@ class MuJoCo(ProjectionEngine):
         }
 
     def build(self, case: Case) -> MuJoCoModel:
-        """Return the compiled model and its rows."""
-        model = MuJoCoModel(mujoco(), in_own_frame(case))
+        """Return the compiled model in its own frame, and its rows."""
+        return self.model_of(self.own(case))
+
+    def model_of(self, case: Case) -> MuJoCoModel:
+        """Return the compiled model of the case, and its rows."""
+        model = MuJoCoModel(mujoco(), case)
         model.m.eq_solref[:] = 0.0  # no spring and no damper: aref is minus Jdot v, to the last bit
         return model
 

@@ -3,7 +3,7 @@
 Every body frame lies on the global frame at design, so the geometry of a case enters as it stands.
 A joint is a chain of MuJoCo joints (see `joint_chains`). In the spanning tree it carries one of its
 bodies on the other. A cut joint carries an auxiliary body on its first body and closes its loop by
-one equality constraint with its second: a connect where the chain ends in a ball, else a weld; a
+one equality constraint with its second: a connect if the chain ends in a ball, else a weld; a
 distance is a tendon over two sites. These rows have full rank where the joint's own rows have; two
 connects on the axis of a revolute would not. So a joint has its coordinates wherever it stands, and
 what ties them to one another is a joint equality.
@@ -148,8 +148,8 @@ class Sketch:
             )
 
     def carry(self, body: Any, joint: Joint, links: Sequence[Link], sign: float = 1.0) -> None:
-        """Let a body move by a joint's links; the sign is minus where that body is the joint's
-        first.
+        """Let a body move by a joint's links; the sign is minus if it is the joint's first
+        body.
         """
         self.attach(body, links, joint.name)
         # it is that of all the joint's coordinates, so their relations need none

@@ -1,7 +1,7 @@
 """MuJoCo in simulate mode: `mj_step`, its constraints as soft as they are set.
 
-A driven coordinate has an armature beside which all that moves is nothing, and is set to its value,
-rate and force at every sample; a driver that is not steady, at every step. Velocities and
+A driven coordinate has an armature far above all masses, and is set to its value,
+rate and force at every sample; a driver with varying rate, at every step. Velocities and
 accelerations are MuJoCo's own, of `mj_forward` at the sample.
 """
 
@@ -43,8 +43,8 @@ class Stepping:
     """MuJoCo's time stepping: equal steps between the samples.
 
     Attributes:
-        kind: "default" leaves every setting of MuJoCo as it is; "stiff" has the hardest constraints
-            that are stable and its most accurate integrator; "projecting" sets every velocity to
+        kind: "default" leaves every setting of MuJoCo as it is; "stiff" has the hardest stable
+            constraints and its most accurate integrator; "projecting" sets every velocity to
             zero before each step, and springs and dampers to close a gap in one step: every step is
             then a Newton correction in the metric of the masses. It has no velocities.
         effort: steps between samples; of the default variant, a factor on the number that its own
@@ -63,7 +63,7 @@ class Stepping:
 
     @property
     def settings(self) -> Mapping[str, Any]:
-        """Settings that differ from MuJoCo's defaults."""
+        """Settings other than MuJoCo's defaults."""
         own: Mapping[str, Mapping[str, Any]] = {
             "default": {"timestep": f"at most 0.002 s / {self.effort}"},
             "stiff": {
@@ -107,10 +107,10 @@ class Stepping:
 
     def build(self, case: Case) -> _Steps:
         """Return the compiled model with its settings and start."""
-        return _Steps(mujoco(), case, self)
+        return _Steps(mujoco(), MuJoCo().known(case), self)
 
     def solve(self, model: _Steps, case: Case, tol: float) -> Trajectory:
-        """All samples that can be simulated, however far the constraints drift; see
+        """All samples in reach, however far the constraints drift; see
         `Engine.solve`.
         """
         with model.warnings():
@@ -128,7 +128,7 @@ def default() -> Stepping:
 
 
 def projecting() -> Stepping:
-    """Return the time stepping that projects."""
+    """Return the time stepping with projection."""
     return Stepping("mujoco-projecting", "projecting", 5)
 
 

@@ -70,13 +70,14 @@ class Dynamics:
         }
 
     def version(self) -> str | None:
-        """Version of Pinocchio, or None where it cannot be imported."""
+        """Version of Pinocchio, or None if it cannot be imported."""
         return Pinocchio().version()
 
     def unsupported(self, case: Case) -> str | None:
         """Return which joint or driver has no counterpart here, or None."""
         if (self.version() or "").startswith("3."):
             return "Pinocchio 3 calls its constraintDynamics in another way; install Pinocchio 4"
+        case = Pinocchio().known(case)
         for joint in case.mechanism.joints:
             if relations(joint):
                 return (
@@ -106,7 +107,7 @@ class Dynamics:
         """Return tree, constraints and start."""
         return _Model(
             importlib.import_module("pinocchio"),
-            replace(case, mechanism=jointed(case.mechanism)),
+            replace(case, mechanism=jointed(Pinocchio().known(case).mechanism)),
             self.steps,
         )
 

@@ -1,3 +1,3 @@
-"""Parts that several engines share: chains of joints, loop closures, frame constraints, the
+"""Parts shared by engines: chains of joints, loop closures, frame constraints, the
 projection walk.
 """

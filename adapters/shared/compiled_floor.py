@@ -1,10 +1,10 @@
 """A simulator's floor: the time of its compiled code for a sample, without the Python around it.
 
-Each call that the projection mode makes into the simulator is timed on the case's model and on the
+Each call of the projection mode into the simulator is timed on the case's model and on the
 smallest model there is; the difference is the compiled work, the rest is Python and its binding. A
-linear system is timed as LAPACK's LU of as many rows as there are unknowns, less that of one row,
-also where the adapter needs least squares. Nothing else counts: no residual test, no predictor, no
-copying. So a floor is below what any loop around these calls can reach, in whatever language.
+linear system is timed as LAPACK's LU of as many rows as there are unknowns, less the time of one
+row, also if the adapter needs least squares. Nothing else counts: no residual test, no predictor,
+no copying. So a floor is below what any loop around these calls can reach, in whatever language.
 """
 
 from __future__ import annotations
@@ -68,6 +68,6 @@ def floor_of(
 
 
 def microseconds(call: Call, least: Call) -> float:
-    """Return the time of a call less that on the smallest model [us]."""
+    """Return the time of a call less the time on the smallest model [us]."""
     fastest = [min(timeit.repeat(each, number=CALLS, repeat=ROUNDS)) for each in (call, least)]
     return max(0.0, 1e6 * (fastest[0] - fastest[1]) / CALLS)

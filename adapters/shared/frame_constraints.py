@@ -1,7 +1,7 @@
 """Conditions between two frames of a simulator: equations with their Jacobian and its rate.
 
-The frames sit at points of two bodies, with axes that are global at design. The motion that a
-simulator reports for them gives two kinds of moving vectors (w, alpha: angular velocity and
+The frames sit at points of two bodies, with global axes at design. Their motion in
+the simulator gives two kinds of moving vectors (w, alpha: angular velocity and
 acceleration of the body; J_w: its angular Jacobian)
 
                          vector x     Jacobian J_x    rate x'      bias b_x = x'' - J_x (coord.)''
@@ -32,7 +32,7 @@ from ...core.trajectory import Array
 
 
 class Frame(Protocol):
-    """A point of a body and axes that are global at design, in the simulator's current
+    """A point of a body and global axes at design, in the simulator's current
     configuration; global axes.
     """
 
@@ -59,7 +59,7 @@ class Frame(Protocol):
     @property
     def acceleration(self) -> Array:
         """The acceleration of the point [m/s^2] and the angular one [rad/s^2], shape (6,); Jdot v
-        where coordinates have none.
+        if coordinates have none.
         """
         ...
 
@@ -72,7 +72,7 @@ class FrameOnBody(Frame, Protocol):
 
 
 class Vector(Protocol):
-    """A vector that moves with the mechanism."""
+    """A vector moving with the mechanism."""
 
     def placed(self) -> tuple[Array, Array]:
         """Return x and J_x, shapes (3,) and (3, unknowns)."""
@@ -205,7 +205,7 @@ class Thread:
     j; other rows align the axes.
 
     The angle is known up to whole turns, and the displacement tells which: any number of turns,
-    without a counter. Its row is exact where the axes are parallel.
+    without a counter. Its row is exact for parallel axes.
     """
 
     i: Frame

@@ -1,14 +1,14 @@
 """Joints as chains of links, for simulators whose bodies hang on slides, hinges and balls.
 
 A chain leads from a joint's first body to its second; each link is carried by those before it, and
-points and axes are global at design. What the links leave free together is what the joint leaves
-free, so a chain makes a joint of a tree; with its last body tied to the joint's second body it
+points and axes are global at design. The links together leave the same motion as the
+joint, so a chain makes a joint of a tree; with its last body tied to the joint's second body it
 closes a loop. A joint whose point alone is bound ends in a ball.
 
 Two relations are beyond single links. A screw ties its slide to its hinge. A constant-velocity
-joint is two Hooke's joints in one point that bend alike: hinges n, m, m, n across the bisector b of
-the shafts, the outer angles equal and the inner ones too. Seen half a turn about b the rotation R =
-N(x) M(2y) N(x) is its inverse, so its axis is across b, and that is the joint's condition: R
+joint is two Hooke's joints in one point with equal bends: hinges n, m, m, n across the bisector b
+of the shafts, the outer angles equal and the inner ones too. Seen half a turn about b the rotation
+R = N(x) M(2y) N(x) is its inverse, so its axis is across b, which is the joint's condition: R
 carries the second shaft, which is the first one seen half a turn about b, without twist.
 """
 
@@ -48,7 +48,7 @@ class Link:
     Attributes:
         axis: unit vector, global at design [-]; without meaning for a ball.
         point: on the axis, or the ball's centre, global at design [m]; without meaning for a slide.
-        name: of its coordinate; that of the joint's freedom where a driver or a coupler may name
+        name: of its coordinate; the name of the joint's freedom if drivers and couplers may use
             it.
     """
 
@@ -171,7 +171,7 @@ def polynomial_in_tree(
 
 
 def end_of_loop(links: Sequence[Link], P: Vector) -> tuple[Sequence[Link], Vector, bool]:
-    """Return the links of a chain that closes a loop, and the point that ties its last body.
+    """Return the links of a chain for a loop, and the point of the tie to its last body.
 
     Returns:
         The links, the point (P, or the centre of a ball), and whether the bodies may turn about it:

@@ -1,8 +1,8 @@
-"""The same mechanism for simulators that drive and close by joints only.
+"""The same mechanism for simulators with drivers and closures by joints only.
 
 A driven coordinate of a point becomes that of a slide: three slides in line carry a ball at the
 point, the first one is driven. A rod between two points becomes a body between a universal joint
-and a ball. What each adds it takes away again, and the motion of every other body stays as it is.
+and a ball. Each adds as many freedoms as conditions; the motion of every other body stays.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ ALONG = 0.3
 def jointed(mechanism: Mechanism) -> Mechanism:
     """Return the mechanism with joint drivers only and without rods.
 
-    Rods whose length differs from the design stay. Bodies that are added have no mass.
+    Rods whose length differs from the design stay. Added bodies have no mass.
     """
     bodies, joints, drivers = list(mechanism.bodies), list[Joint](), list[Driver]()
     for joint in mechanism.joints:

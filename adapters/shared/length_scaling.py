@@ -26,7 +26,7 @@ class OwnFrame:
     """A unit of length and an origin.
 
     Attributes:
-        unit: a power of two, so that nothing is rounded [m].
+        unit: a power of two, because nothing is rounded then [m].
         origin: global [m].
     """
 

@@ -1,8 +1,8 @@
-"""Loop closures for simulators that have a tree of joints: a cut joint as conditions on two frames,
+"""Loop closures for simulators with a tree of joints: a cut joint as conditions on two frames,
 one on each body.
 
-No joint's own rows are redundant, so a loop has dependent rows only where its geometry makes them
-so (planar loops).
+No joint's own rows are redundant, so a loop has dependent rows only by its geometry (planar
+loops).
 """
 
 from __future__ import annotations

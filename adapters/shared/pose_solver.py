@@ -10,6 +10,7 @@ import numpy as np
 
 from ...core.case.case import Case, size
 from ...core.errors import SolveError
+from ...core.failures import FailureKind, PoseFailure
 from ...core.kinematics import ROUNDING
 from ...core.mechanism.motions import Path
 from ...core.trajectory import Array
@@ -24,18 +25,13 @@ RANK_TOLERANCE = 1e-9
 # are rows that contradict others.
 ARRIVED = 1e-6
 
-LOST = "Newton does not converge or jumps to another assembly"
-"""Reason for the end of a motion by default."""
-STUCK = (
-    "drivers cannot move: it is a dead centre, or the motions that joints leave contradict each"
-    " other"
-)
-"""Reason for the end of a motion at a pose that closes."""
+LOST = PoseFailure(FailureKind.NOT_FOUND)
+"""Failure of a pose without a known cause."""
 
 
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """A solved pose with all data that the next step of the walk needs."""
+    """A solved pose with all data for the next step of the walk."""
 
     t: float
     c: Array  # of the drivers
@@ -72,7 +68,7 @@ class PoseSolver:
         self.turns = np.array([driver.turns for driver in case.mechanism.drivers], dtype=np.bool_)
         self.units = np.where(self.turns, 1.0, frame.unit)[:, None]
         self.size = size(case) / frame.unit
-        self.lost = LOST  # why the last pose that was looked for was not found
+        self.lost = LOST  # failure of the last pose that was not found
         model.reset()
         model.residual(np.zeros(len(case.mechanism.drivers)))
         jacobian = model.jacobian()
@@ -92,7 +88,8 @@ class PoseSolver:
                 " coordinates of the simulator's model are left free by joints and drivers at the"
                 " design position; add a driver, or join what moves freely; if their number is"
                 " right a driver does not move it there (a lock-up): give the design in another"
-                " pose"
+                " pose",
+                FailureKind.FREE,
             )
 
     def linear(self, A: Array, b: Array) -> Array:
@@ -133,16 +130,9 @@ class PoseSolver:
             self.model.move(step)
             corrected += step
         if worst <= ROUNDING:
-            self.lost = (
-                f"the residual {worst:.3g} is rounding, and the tolerance {self.tol:.3g} is less;"
-                " allow more"
-            )
+            self.lost = PoseFailure(FailureKind.BELOW_ROUNDING, worst, self.tol)
         elif not self.square and np.abs(step).max() <= ARRIVED:
-            ends = "the motion ends, or joints contradict each other"
-            self.lost = (
-                f"no pose near there closes better than to {worst:.3g} of the mechanism's size:"
-                f" {ends}"
-            )
+            self.lost = PoseFailure(FailureKind.NO_POSE, worst, self.tol)
         return None
 
     def solve(self, path: Path, t: float) -> Sample | None:
@@ -161,7 +151,7 @@ class PoseSolver:
             return None
         # least squares would hide rates that no row set can meet (a driver pushed at a dead centre)
         if not (_met(jacobian, v, nu) and _met(jacobian, a, gamma)):
-            self.lost = STUCK
+            self.lost = PoseFailure(FailureKind.DEAD_CENTRE)
             return None
         position, velocity, acceleration = (
             np.array(each, dtype=float) for each in zip(*self.model.points(v, a), strict=True)

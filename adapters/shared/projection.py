@@ -2,8 +2,8 @@
 the samples.
 
 The loop walks from the design position outwards, both ways, with a tangent predictor. Convergence
-is judged here, by residual and finiteness, never by a simulator's own word; a step that does not
-converge, or converges to another assembly, is halved.
+is judged here, by residual and finiteness, never by a simulator's own word; a step without
+convergence, or to another assembly, is halved.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from ...core.case.case import Case
+from ...core.failures import FailureKind
 from ...core.joints import Joint
 from ...core.kinematics import (
     LONGEST_TURN,
@@ -30,7 +31,7 @@ from ...core.mechanism.motions import Path, outwards
 from ...core.trajectory import PointMotion, Trajectory, largest_found
 from .force_solution import ForceModel, solved_forces
 from .length_scaling import GLOBAL, OwnFrame
-from .pose_solver import LOST, STUCK, PoseSolver, Sample
+from .pose_solver import PoseSolver, Sample
 from .projection_model import ProjectionModel
 
 # Newton steps of the efforts of a projection, after one tangent predictor; none is Euler's method.
@@ -104,10 +105,10 @@ class Walk(PoseSolver):
     """The walk of a model along the motion of a case, sample by sample."""
 
     def advance(self, path: Path, start: Sample, t: float, step: float) -> tuple[Sample, bool]:
-        """Walk a path from start to time t, halving steps that fail; return the end, whether at t.
+        """Walk a path from start to time t, halving failed steps; return the end, whether at t.
 
         Args:
-            step: between samples; zero where all are one.
+            step: between samples; zero if all are one.
         """
         at, h = start, t - start.t
         while at.t != t:
@@ -150,15 +151,14 @@ class Walk(PoseSolver):
         self.model.reset()
         design = self.solve(begin.lead, 0.0) if begin.lead else self.solve(path, begin.time)
         if design is None:
-            if self.lost is STUCK:
-                return None, f"at the design position the {STUCK}"
-            return (
-                None,
-                (
-                    "no assembly at the design position:"
-                    f" {'the model does not close there' if self.lost is LOST else self.lost}"
-                ),
-            )
+            match self.lost.kind:
+                case FailureKind.DEAD_CENTRE:
+                    return None, f"at the design position the {self.lost}"
+                case FailureKind.NOT_FOUND:
+                    why = "the model does not close there"
+                case _:
+                    why = str(self.lost)
+            return None, f"no assembly at the design position: {why}"
         if begin.lead is None:
             return design, ""
         first, reached = self.advance(begin.lead, design, 1.0, 1.0)
@@ -184,6 +184,11 @@ class Walk(PoseSolver):
             ),
         )
 
+    @property
+    def kind_at_start(self) -> FailureKind:
+        """The kind of a failure of the start."""
+        return FailureKind.NOT_CLOSED if self.lost.kind is FailureKind.NOT_FOUND else self.lost.kind
+
     def trajectory(self, details: Mapping[str, Any], begin: Start) -> Trajectory:
         path, points = self.case.sweep.path, self.case.points
         times, n = path.times, len(path.times)
@@ -191,9 +196,11 @@ class Walk(PoseSolver):
         iterations, residual = np.zeros(n, dtype=np.int64), np.zeros(n)
         samples = dict[int, Sample]()
         solved, messages = np.zeros(n, dtype=np.bool_), list[str]()
+        failures = list[FailureKind]()
         origin, message = self.start(path, begin)
         if origin is None:
             messages.append(message)
+            failures.append(self.kind_at_start)
         else:
             step = float(np.abs(np.diff(times)).max()) if n > 1 else abs(float(times[0])) or 1.0
             for side in outwards(times, origin.t):
@@ -202,7 +209,8 @@ class Walk(PoseSolver):
                 for k in side:
                     at, reached = self.advance(path, at, float(times[k]), step)
                     if not reached:
-                        messages.append(path.ended(at.t, float(times[k]), last, self.lost))
+                        messages.append(path.ended(at.t, float(times[k]), last, str(self.lost)))
+                        failures.append(self.lost.kind)
                         break
                     last = float(times[k])
                     motion[:, k] = at.rows
@@ -239,4 +247,5 @@ class Walk(PoseSolver):
             "; ".join(messages),
             facts,
             forces=forces,
+            failures=failures,
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self
 
 from ...core.case.case import Case
@@ -13,6 +13,7 @@ from ...core.errors import SolveError
 from ...core.harness.engine import Floor
 from ...core.joints import Joint
 from ...core.mechanism.drivers import JointAngle, JointDisplacement, PointCoordinate
+from ...core.mechanism.equivalents import replaced_joints, with_equivalents
 from ...core.trajectory import Trajectory
 from .length_scaling import in_own_frame, own_frame
 from .projection import EFFORTS, solve_by_projection, without_counterpart
@@ -23,15 +24,15 @@ DRIVERS = (JointAngle, JointDisplacement, PointCoordinate)
 
 @dataclass(frozen=True)
 class ProjectionEngine(ABC):
-    """An engine (see `Engine`) that makes a `ProjectionModel`, and the Newton walk solves it.
+    """An engine (see `Engine`) with a `ProjectionModel`, solved by the Newton walk.
 
     Attributes:
         corrections: Newton steps after the predictor, whatever residual they leave; None: as many
             as it takes.
         name: as on the command line, and of the simulator's Python package by default.
-        package: of the simulator, where it has another name.
+        package: of the simulator, if it has another name.
         title: as in a sentence.
-        joints: types that have a counterpart.
+        joints: types with a counterpart.
     """
 
     corrections: int | None = None
@@ -65,18 +66,31 @@ class ProjectionEngine(ABC):
             return None
 
     def version_of(self, simulator: Any) -> str | None:
-        """Return the version of the imported package; None where it is another package of that
+        """Return the version of the imported package; None if it is another package of this
         name.
         """
         return str(simulator.__version__)
 
+    def known(self, case: Case) -> Case:
+        """Return the case with the equivalents of joints that have no counterpart here."""
+        found = with_equivalents(case.mechanism, self.joints)
+        return case if found is case.mechanism else replace(case, mechanism=found)
+
+    def own(self, case: Case) -> Case:
+        """Return the case as the simulator has it: known joints, in its own frame."""
+        return in_own_frame(self.known(case))
+
     def unsupported(self, case: Case) -> str | None:
-        """Return the joint or driver that has no counterpart here, or None."""
-        return without_counterpart(case, self.title, self.joints, DRIVERS)
+        """Return the joint or driver without a counterpart or an equivalent here, or None."""
+        return without_counterpart(self.known(case), self.title, self.joints, DRIVERS)
 
     @abstractmethod
+    def model_of(self, case: Case) -> ProjectionModel:
+        """Return the simulator's model of the case as it stands, at the design position."""
+
     def build(self, case: Case) -> ProjectionModel:
         """Return the simulator's model of the case in its own frame, at the design position."""
+        return self.model_of(self.own(case))
 
     def solve(self, model: ProjectionModel, case: Case, tol: float) -> Trajectory:
         """Solve all samples; see `Engine.solve`.
@@ -85,6 +99,8 @@ class ProjectionEngine(ABC):
             SolveError: the model was made of another mechanism, of other points, or of a sweep so
                 much longer or shorter that its unit of length differs.
         """
+        replaced = replaced_joints(case.mechanism, self.joints)
+        case = self.known(case)
         own = in_own_frame(case)
         # The model has no names: numbers of another mechanism would be taken for those of this one.
         built = model.case
@@ -94,9 +110,8 @@ class ProjectionEngine(ABC):
                 f" other points, other forces or another length of the sweep (case {built.name!r});"
                 " build a model for this case"
             )
-        return solve_by_projection(
-            model, case, tol, model.details, self.corrections, own_frame(case)
-        )
+        details = {**model.details, **({"equivalents": replaced} if replaced else {})}
+        return solve_by_projection(model, case, tol, details, self.corrections, own_frame(case))
 
     def efforts(self) -> Mapping[str, Self]:
         """Return the efforts by the number of Newton steps."""

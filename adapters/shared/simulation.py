@@ -1,10 +1,10 @@
 """Simulate mode, shared by the simulators: start, direction and acceptance of samples.
 
-A simulator starts at the sample nearest to the design that can be reached, in a pose and at rates
-that its projection model gives, because none of them checks its initial values, and goes from there
+A simulator starts at the sample in reach nearest to the design, in a pose and at rates of its
+projection model, because none of them checks its initial values, and goes from there
 in two legs. Backwards is the same motion seen in reverse: its own time still grows, rates change
-their sign and accelerations do not. What a simulator then reports is its own, soft constraints and
-drift included.
+their sign and accelerations do not. A simulator then reports its own motion, soft constraints
+and drift included.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ class Leg:
     reached.
 
     Attributes:
-        sign: -1 where the motion is seen in reverse.
+        sign: -1 if the motion is seen in reverse.
     """
 
     case: Case
@@ -99,7 +99,7 @@ class SimulatedPose:
 
     Attributes:
         points: position, velocity and acceleration of each of case.points, shape (3, points, 3);
-            NaN where it has none.
+            NaN if it has none.
         residual: the largest violation of its constraints [m or -].
         steps: from the sample before, of whatever kind its solver makes.
     """
@@ -131,7 +131,7 @@ def start_of(model: ProjectionModel, case: Case) -> Start:
         begin = begin.other
         origin, _ = walk.start(path, begin)
     if origin is None:
-        raise SolveError(f"case {case.name!r}: {message}")
+        raise SolveError(f"case {case.name!r}: {message}", walk.kind_at_start)
     notes += notes_on_start(begin, path)
     facts = {"start": begin.facts, **({"notes": notes} if notes else {})}
     nearest = [int(side[0]) for side in outwards(path.times, origin.t) if len(side)]
@@ -152,7 +152,8 @@ def start_of(model: ProjectionModel, case: Case) -> Start:
             )
     raise SolveError(
         f"case {case.name!r}: no sample next to the design can be reached; let the sweep come"
-        " nearer to it"
+        " nearer to it",
+        walk.lost.kind,
     )
 
 

@@ -16,7 +16,6 @@ from ...core.joints import Translational
 from ...core.mechanism.drivers import PointCoordinate
 from ...core.mechanism.mechanism import GROUND, Body, Mechanism, Point
 from .compiled_floor import Call, floor_of
-from .length_scaling import in_own_frame
 from .loop_closures import CLOSURES
 from .projection_engine import ProjectionEngine
 from .tree_model import TreeModel
@@ -51,7 +50,7 @@ class TreeEngine(ProjectionEngine):
 
     def build(self, case: Case) -> TreeModel:
         """Return the simulator's model of the case in its own frame, at the design position."""
-        return self.model_of(in_own_frame(case))
+        return self.model_of(self.own(case))
 
     def floor(self, case: Case) -> Floor:
         """Return the floor from all that a pose and its rates ask of the simulator."""

@@ -1,8 +1,8 @@
 """A mechanism as one tree of slides, hinges and balls, for simulators of generalized coordinates.
 
-The base owns the spanning tree, the joints as chains of links (`joint_chains`), the conditions that
-close loops (`loop_closures`), relations, couplers and drivers. A simulator adds links and frames
-and reports how they move. It knows a body by the number of the link that carries it; the ground is
+The base owns the spanning tree, the joints as chains of links (`joint_chains`), the conditions of
+loops (`loop_closures`), relations, couplers and drivers. A simulator adds links and frames
+and reports how they move. It knows a body by the number of its link; the ground is
 body 0. The axes of every body are global at design, and its origin is the point of its link there.
 
 A constructor prepares the simulator's empty model and then calls that of the base, which calls

@@ -22,7 +22,6 @@ from ...core.mechanism.drivers import PointCoordinate
 from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
 from ..shared.compiled_floor import Call, floor_of
-from ..shared.length_scaling import in_own_frame
 from ..shared.opensim_frames import euler_angles
 from ..shared.tree_engine import LEAST, TreeEngine
 from .forces import LoadedSimbody
@@ -61,7 +60,7 @@ class Simbody(TreeEngine):
 
     def floor(self, case: Case) -> Floor:
         """Return the floor from Simbody's stages and its calls for constraints and points."""
-        model = self.model_of(in_own_frame(case))
+        model = self.model_of(self.own(case))
         solved = self.solve(model, case, 1e-12)
         own = _calls(model)
         least = _calls(self.model_of(replace(case, mechanism=LEAST, outputs=())))

@@ -1,10 +1,10 @@
 """A mechanism as a Python script that builds it in Exudyn, of Exudyn's own objects only. Exudyn is
 not needed to write it.
 
-A moving body is a rigid-body node with Euler parameters, at the origin that the case gives it and
-parallel to the global axes at design, because Exudyn measures the angle of a joint from where its
-bodies are parallel. Joints are Exudyn's, mostly generic ones. What Exudyn has none for is spelled
-out with further bodies: a constant-velocity joint is four hinges of which two by two turn alike,
+A moving body is a rigid-body node with Euler parameters, at its origin in the case and
+parallel to the global axes at design, because Exudyn measures the angle of a joint from the pose of
+parallel bodies. Joints are Exudyn's, mostly generic ones. Other joints are spelled out
+with further bodies: a constant-velocity joint is four hinges of which two by two turn alike,
 and a cross whose axes a table has rounded off the right angle is a body on two hinges, because a
 generic joint would set them upright. Coordinates tied to one another are measured by relative
 markers. (Rows that follow further unknowns of a Newton loop, as in the adapter of Exudyn, are no
@@ -152,7 +152,7 @@ class _Script:
     def generic(
         self, joint: j.Joint, constrained: Sequence[int], axes: Array | None = None, **options: Any
     ) -> None:
-        """A generic joint that constrains these of x, y, z and the turns about them."""
+        """Add a generic joint with these of x, y, z and the turns about them constrained."""
         self.add(joint, "ObjectJointGeneric", axes, constrainedAxes=[*constrained], **options)
 
     def joint(self, joint: j.Joint) -> None:
@@ -227,7 +227,7 @@ class _Script:
 
 
 class _Code(str):
-    """Text that is already code."""
+    """Text of code."""
 
 
 def _text(value: Any) -> str:
@@ -242,7 +242,7 @@ def _text(value: Any) -> str:
 def _spelled_out(
     mechanism: Mechanism, way: Mapping[str, BodyMotion]
 ) -> tuple[Mechanism, Mapping[str, BodyMotion]]:
-    """The mechanism and its way with joints that Exudyn lacks as hinges between further bodies."""
+    """The mechanism and its way with joints unknown to Exudyn as hinges between further bodies."""
     placed, way = displacements(mechanism, way), dict(way)
     bodies, joints, couplers = [*mechanism.bodies], list[j.Joint](), [*mechanism.couplers]
     for joint in mechanism.joints:
@@ -291,7 +291,7 @@ def _to_be_spelled_out(joint: j.Joint) -> bool:
 
 
 def _motion(displacement: Displacement, P: Iterable[float]) -> BodyMotion:
-    """Of a body that is aligned at design with its origin at P."""
+    """Return the motion of a body aligned at design, with its origin at P."""
     r, p = (
         np.column_stack(np.broadcast_arrays(*values))
         for values in (displacement.of(vec([*P])), displacement.turn)

@@ -18,7 +18,7 @@ LOADED = f"Masses are in kg; {STAND_IN:g} kg and {STAND_IN:g} kg m^2 stand in fo
 
 
 def mass_of(body: Body) -> float:
-    """Return the mass of a body, or the number that stands in for it [kg]."""
+    """Return the mass of a body, or the number in its place [kg]."""
     return body.mass or STAND_IN
 
 
@@ -56,10 +56,10 @@ def inertia_at_origin(body: Body) -> Array:
 
 
 def left_out(mechanism: Mechanism, names: Collection[str], gravity: bool) -> str:
-    """Return a sentence on the loads that a format has no place for.
+    """Return a sentence on the loads without a place in a format.
 
     Args:
-        names: force elements that are in the file.
+        names: force elements in the file.
         gravity: whether the file has it.
     """
     missing = [str(each) for each in mechanism.forces if each.name not in names]

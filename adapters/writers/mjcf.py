@@ -1,11 +1,11 @@
 """A mechanism as MJCF, the XML of MuJoCo. MuJoCo is not needed to write it, and its own writer
 would keep six digits.
 
-A body is a <body> with the frame that the case gives it. A joint is a chain of MuJoCo joints (see
-`joint_chains`), in the tree or, if it closes a loop, on an auxiliary body that an equality ties to
-the second body; a distance is a tendon of constant length. Joint equalities tie coordinates to one
-another. Spring-dampers are tendons and attributes of joints; MJCF has no constant forces. Without
-masses in the mechanism, bodies have a unit mass and inertia.
+A body is a <body> with its frame in the case. A joint is a chain of MuJoCo joints (see
+`joint_chains`), in the tree or, if it closes a loop, on an auxiliary body tied to the second
+body by an equality; a distance is a tendon of constant length. Joint equalities tie
+coordinates to one another. Spring-dampers are tendons and attributes of joints; MJCF has
+no constant forces. Without masses in the mechanism, bodies have a unit mass and inertia.
 """
 
 from __future__ import annotations
@@ -140,7 +140,7 @@ class _Model:
         )
 
     def add_body(self, frame: Body, parent: str) -> None:
-        """A body on its parent, with that name and frame at design."""
+        """Add a body on its parent, with its name and frame at design."""
         carrier = self.frames[parent]
         turn = attitude(carrier).conjugate() * attitude(frame)
         at = {"pos": numbers(local(carrier, frame.origin)), "quat": numbers(turn)}
@@ -171,7 +171,7 @@ class _Model:
         return name
 
     def add_free(self, body: Body) -> None:
-        """A body that no joint carries: its coordinates are its pose."""
+        """Add a body without a joint: its coordinates are its pose."""
         name, motion = f"{body.name}.free", self.way[body.name]
         self.add_body(body, GROUND)
         ET.SubElement(self.elements[body.name], "freejoint", name=name)
@@ -203,7 +203,7 @@ class _Model:
             self.relate(relation)
 
     def close(self, joint: Joint) -> None:
-        """Express a joint that closes a loop by an equality."""
+        """Express a joint of a closed loop by an equality."""
         if isinstance(joint, Distance):
             self.add_tendon(joint.name, joint.bodies, joint.points)
             # its length may change by the constant of the polynomial, since design

@@ -1,10 +1,10 @@
-"""A mechanism as URDF, which knows trees only, and beside it a JSON file of the conditions that
-close its loops.
+"""A mechanism as URDF, which knows trees only, and beside it a JSON file of the conditions of
+its loops.
 
 Every link is parallel to the global axes at design, so axes and arms are the case's numbers, and
 has its origin in its joint's point. A joint is a chain of URDF's revolute and prismatic joints (see
-`joint_chains`). URDF has no ball joint; three hinges would lock at a quarter turn, so a body that
-no chain without a ball carries floats, and its joints are conditions (see `loop_closures`). Hinges
+`joint_chains`). URDF has no ball joint; three hinges would lock at a quarter turn, so a body
+without a chain free of balls floats, and its joints are conditions (see `loop_closures`). Hinges
 are "revolute", not "continuous", with limits beyond all reach: their coordinate is then the angle
 itself, which counts turns.
 """
@@ -167,7 +167,7 @@ class _Model:
                 self.weigh(body)
 
     def links(self, joint: Joint) -> list[Link] | None:
-        """A joint's chain, from its first body to its second; None where it has a ball or is
+        """A joint's chain, from its first body to its second; None if it has a ball or is
         none.
         """
         chain = CHAINS.get(type(joint))
@@ -206,7 +206,7 @@ class _Model:
         return [*(vec(P) - vec(self.origin[link]))]
 
     def add_free(self, body: Body) -> None:
-        """A body that no chain carries."""
+        """Add a body without a chain."""
         name = f"{body.name}.free"
         self.attach(body.name, GROUND, body.origin, name, "floating")
         e0, *e = (float(each[-1]) for each in self.placed[body.name].turn)
@@ -231,8 +231,8 @@ class _Model:
             self.relate(joint.name, relation)
 
     def close(self, joint: Joint, on_copy: bool) -> None:
-        """The conditions of a joint that is not in the tree; where its coordinates must count
-        turns, it moves a copy.
+        """Add the conditions of a joint outside the tree; if its coordinates must count turns, it
+        moves a copy.
         """
         (i, j), ends, closing = joint.bodies, ends_of(self.mechanism, joint), CLOSURES[type(joint)]
         if on_copy:

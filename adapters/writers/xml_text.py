@@ -1,4 +1,4 @@
-"""XML as writers write it: numbers that are read back as they were, names that are used once."""
+"""XML as writers write it: numbers without loss, names used once."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def numbers(values: Iterable[Any]) -> str:
 
 
 def link_names(joint: str, links: Sequence[Link]) -> list[str]:
-    """The names of a joint's coordinates: its own where it has one only, else JOINT.rotation,
+    """The names of a joint's coordinates: its own if it has one only, else JOINT.rotation,
     JOINT.slide2, ...
     """
     if len(links) == 1:
@@ -31,7 +31,7 @@ def document(root: ET.Element, kinds: Sequence[Sequence[str]], reserved: Sequenc
     Args:
         kinds: tags of elements whose names are known by them, those that share their names
             together.
-        reserved: names that the format keeps to itself.
+        reserved: names kept by the format itself.
 
     Raises:
         KincheckError: a name is used twice, or reserved, so that a reader would refuse or confuse

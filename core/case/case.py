@@ -128,8 +128,8 @@ class Origin:
         own: whether kincheck computed the reference.
         units: units of its columns, by name: the driver, then outputs.
         signs: sign convention of its outputs; empty if only the case's own axes apply.
-        grid: where it has values, if that is not at the samples of the sweep.
-        limits: by output, what is known of the error of its values, and why; none for exact ones.
+        grid: places of its values, if not the samples of the sweep.
+        limits: by output, the known error of its values, and its cause; none for exact ones.
     """
 
     citation: str

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..case.case import Case, Series
 from ..errors import KincheckError
+from ..failures import FailureKind
 from ..trajectory import QUANTITIES, Array, Trajectory
 from .compare import output_series
 from .engine import Engine
@@ -68,7 +69,7 @@ class Answer:
         outputs: by name, NaN at unsolved samples.
         solved: number of solved samples.
         iterations: sum over the solved samples.
-        residual, message, details: as of the trajectory.
+        residual, message, details, failures: as of the trajectory.
     """
 
     outputs: Mapping[str, Series]
@@ -77,15 +78,27 @@ class Answer:
     residual: float
     message: str
     details: dict[str, Any]
+    failures: Sequence[FailureKind] = ()
 
 
 @dataclass(frozen=True)
 class Failure:
-    """The reason for a missing answer, and the end of the engine's printed output."""
+    """The reason for a missing answer, and the end of the engine's printed output.
+
+    Attributes:
+        kind: of the error that the engine raised, if it is known.
+    """
 
     outcome: Outcome
     message: str
     printed: str = ""
+    kind: FailureKind | None = None
+
+    @staticmethod
+    def of(error: BaseException) -> Failure:
+        """Return the failure of an error that the engine raised."""
+        kind = error.kind if isinstance(error, KincheckError) else None
+        return Failure(Outcome.ERROR, said(error), kind=kind)
 
     @property
     def harmful(self) -> bool:
@@ -155,7 +168,7 @@ def attempt(pair: Pair, tell: Callable[[Facts], object] = lambda facts: None) ->
     except KeyboardInterrupt:
         raise
     except BaseException as error:  # simulators may raise anything; some raise SystemExit
-        return become(Failure(Outcome.ERROR, said(error)))
+        return become(Failure.of(error))
 
 
 def _solve(pair: Pair, seconds: dict[str, float]) -> Answer:
@@ -200,6 +213,7 @@ def _solve(pair: Pair, seconds: dict[str, float]) -> Answer:
         residual=float(trajectory.residual),
         message=bounded("; ".join(filter(None, (trajectory.message, why)))),
         details=plain(trajectory.facts),
+        failures=trajectory.failures,
     )
 
 

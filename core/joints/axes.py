@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from ..algebra import Scalar, Vec3, X, Y, Z, cross, root, vec, where_larger
 from ..errors import MechanismError
+from ..failures import FailureKind
 
 
 def unit(a: Sequence[Scalar]) -> Vec3:
@@ -26,7 +27,8 @@ def require_perpendicular(joint: object, axes: Sequence[Sequence[float]]) -> Non
     if abs(cosine) > ROUNDED_RIGHT_ANGLE:
         raise MechanismError(
             f"{joint}: the axes are not perpendicular, the cosine of their angle is {cosine:.3g}; "
-            "expected 0 up to rounding of the table; give the two axes of the cross"
+            "expected 0 up to rounding of the table; give the two axes of the cross",
+            kind=FailureKind.WRONG_ANGLE,
         )
 
 

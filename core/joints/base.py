@@ -239,6 +239,13 @@ class Joint(ABC):
     def primitives(self, i: Attachment, j: Attachment) -> Sequence[Primitive]:
         """Return the primitives of this joint; each takes body i first."""
 
+    def equivalent(self) -> tuple[Sequence[Any], Sequence[Joint]] | None:
+        """Return added bodies (`Body`), and joints of other types, that leave the same motion.
+
+        None by default. Simulators without a counterpart of this type solve these instead.
+        """
+        return None
+
 
 @dataclass(frozen=True)
 class AxialJoint(Joint):

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from .. import primitives as p
 from ..algebra import Vec3, cross, vec
 from ..errors import MechanismError
+from ..failures import FailureKind
 from .base import Attachment, Joint, directions, position, triad, unit
 
 
@@ -31,7 +32,8 @@ class ConstantVelocity(Joint):
         if cosine <= 0.0:
             raise MechanismError(
                 f"{self}: the shafts enclose {cosine:.3g} as cosine, expected it positive; let both"
-                " axes point the same way on, from the driving to the driven side"
+                " axes point the same way on, from the driving to the driven side",
+                kind=FailureKind.WRONG_ANGLE,
             )
 
     def primitives(self, i: Attachment, j: Attachment) -> Sequence[p.Primitive]:

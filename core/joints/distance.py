@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from .. import primitives as p
 from ..algebra import root, vec
 from ..errors import MechanismError, Phrase
+from ..failures import FailureKind
 from .base import Attachment, Joint, length, positions
 
 # A length that differs from the design distance by less, relatively, moves no output beyond its
@@ -33,7 +34,9 @@ class Distance(Joint):
         super().__post_init__()
         if not self.design_distance > 0.0:
             raise MechanismError(
-                f"{self}: the points coincide at design, expected two places; use a spherical joint"
+                f"{self}: the points coincide at design, expected two places; use a spherical"
+                " joint",
+                kind=FailureKind.NO_LENGTH,
             )
         if not self.rod_length > 0.0:
             raise MechanismError(
@@ -43,7 +46,8 @@ class Distance(Joint):
                     ", expected a positive one; the points are ",
                     self.design_distance,
                     " apart at design, which is the length where none is given",
-                )
+                ),
+                kind=FailureKind.NO_LENGTH,
             )
 
     @property

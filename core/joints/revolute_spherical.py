@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from .. import primitives as p
 from ..algebra import root, vec
 from ..errors import MechanismError
+from ..failures import FailureKind
 from .base import Attachment, Joint, direction, positions, unit
 
 
@@ -28,7 +29,8 @@ class RevoluteSpherical(Joint):
         if self.points[0] == self.points[1]:
             raise MechanismError(
                 f"{self}: the link has length 0, expected two different points; for a link of no"
-                " length use inline"
+                " length use inline",
+                kind=FailureKind.NO_LENGTH,
             )
 
     def primitives(self, i: Attachment, j: Attachment) -> Sequence[p.Primitive]:

@@ -225,8 +225,8 @@ class Doubled(Crank):
             0.0,
             1e-16,
             (
-                "no assembly at the design position: the residual 1e-15 is rounding, and the"
-                " tolerance 1e-16 is less"
+                "no assembly at the design position: the residual 1e-15 of the mechanism's size is"
+                " rounding, and the tolerance 1e-16 is less"
             ),
         ),
         (0.0, 1.0, 1e-12, "at the design position the drivers cannot move"),

@@ -215,7 +215,7 @@ def test_the_component_that_ends_a_motion_is_the_one_that_is_singular():
     for values in (np.linspace(0.0, 6.0, 31), [0.0, 3.0], [0.1, 2.0, 4.0]):
         found = CascadeSweep(cascade, Path({"turn": Ramp(1.0)}, np.array(values))).solve(1e-12)
         assert not found.solved.all()
-        assert "the component of rod1, rocker1 is the nearest to singular" in found.message
+        assert "the component of rod1, rocker1: there is a singular pose ahead" in found.message
 
 
 def test_what_it_cannot_take_apart_is_refused():

@@ -16,7 +16,7 @@ from kincheck.core.kinematics.compiled.samples import Route
 from kincheck.core.kinematics.continuation import row_exchange, segments, singular_samples, sweep
 from kincheck.core.kinematics.continuation.row_exchange import Choice, chosen
 from kincheck.core.kinematics.continuation.segments import Followed
-from kincheck.core.kinematics.continuation.side_follower import Marcher
+from kincheck.core.kinematics.continuation.side_follower import SideWalk
 from kincheck.core.kinematics.continuation.sweep import follow
 from kincheck.core.kinematics.continuation.walk import march
 from kincheck.core.kinematics.diagnosis.conditioning import conditioning
@@ -261,9 +261,9 @@ def test_a_sample_is_taken_again_only_where_it_is_much_farther_from_singular(par
 
 def test_other_rows_are_looked_for_before_a_step_is_divided_down_to_the_pose(monkeypatch):
     """Down to where nothing is seen through rounding takes thirty parts each time."""
-    divided, divide = list[float](), Marcher._divide
+    divided, divide = list[float](), SideWalk._divided
     monkeypatch.setattr(
-        Marcher, "_divide", lambda self, *where: divided.append(1.0) or divide(self, *where)
+        SideWalk, "_divided", lambda self, *where: divided.append(1.0) or divide(self, *where)
     )
     turn = np.linspace(0.0, 2.0 * np.pi, 73)
 

@@ -9,7 +9,7 @@ import pytest
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.continuation import side_follower
-from kincheck.core.kinematics.continuation.side_follower import FINER, Marcher
+from kincheck.core.kinematics.continuation.side_follower import FINER, SideWalk
 from kincheck.core.kinematics.continuation.sweep import sweep
 from kincheck.core.mechanism.motions import Path, Ramp
 
@@ -52,11 +52,11 @@ def assert_right(found, values):
 @pytest.fixture
 def divided(monkeypatch):
     """The steps of which parts were looked for one by one."""
-    aims, divide = list[float](), Marcher._divide
+    aims, divide = list[float](), SideWalk._divided
     monkeypatch.setattr(
-        Marcher,
-        "_divide",
-        lambda self, anchor, aim, *rest: aims.append(aim) or divide(self, anchor, aim, *rest),
+        SideWalk,
+        "_divided",
+        lambda self, anchor, aim: aims.append(aim) or divide(self, anchor, aim),
     )
     return aims
 

@@ -30,7 +30,7 @@ from kincheck.core.kinematics.continuation.sweep import follow
 from kincheck.core.kinematics.formulation.constraints import frames
 from kincheck.core.kinematics.solver_selection import IRREDUCIBLE
 from kincheck.core.kinematics.sparse.determinant_signs import Blocks
-from kincheck.core.kinematics.sparse.sparse_equations import FailedError
+from kincheck.core.kinematics.sparse.sparse_equations import PoseError
 from kincheck.core.kinematics.sparse.sparse_model import SparseModel
 from kincheck.core.kinematics.sparse.sweep import solve_sparse
 from kincheck.core.kinematics.structure.components import components
@@ -168,7 +168,7 @@ def test_turns_are_counted_and_no_step_is_longer_than_can_be_told_from_another()
     model = SparseModel(CRANK, compiled=False)
     here = model.moving(model.design, 0.0, model.drives(path, np.zeros(1))[:, 0])
     assert model.reach(here, 0.9, model.drives(path, np.array([0.9]))[:, 0], 1e-12).iterations
-    with pytest.raises(FailedError, match="too long to be believed"):
+    with pytest.raises(PoseError, match="too long to be believed"):
         model.reach(
             replace(here, slopes=np.array([1e-3])),
             1.1,
@@ -182,7 +182,7 @@ def test_a_wrong_branch_is_no_solution():
     here = model.moving(model.design, 0.0, model.drives(turning(0.0), np.zeros(1))[:, 0])
     # half a turn about x: the axes are parallel, but opposite
     over = np.array([0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0])
-    with pytest.raises(FailedError, match="wrong branch"):
+    with pytest.raises(PoseError, match="wrong branch"):
         model.reach(
             replace(here, state=over), 0.0, model.drives(turning(0.0), np.zeros(1))[:, 0], 1e-12
         )

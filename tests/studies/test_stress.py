@@ -10,6 +10,7 @@ from kincheck.core import solve
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.io.case_writer import case_text
 from kincheck.core.errors import KincheckError, SolveError
+from kincheck.core.failures import FailureKind
 from kincheck.core.harness.execution import Answer, Failure, Pair
 from kincheck.core.harness.record import Outcome
 from kincheck.core.studies.stress.families import Family, Specimen
@@ -26,6 +27,7 @@ from kincheck.core.trajectory import PointMotion
 
 NATIVE = engine("native")
 FAMILIES = Family.registry
+ROUNDING = frozenset({FailureKind.BELOW_ROUNDING})
 
 
 @pytest.fixture(scope="module")
@@ -46,8 +48,8 @@ class Fake:
 
     name, mode, loop, settings = "native", "projection", "python", {}
 
-    def __init__(self, change=lambda motion: motion, message="", fails=None):
-        self.change, self.message, self.fails = change, message, fails
+    def __init__(self, change=lambda motion: motion, failures=(), fails=None):
+        self.change, self.failures, self.fails = change, failures, fails
 
     def version(self):
         return "1"
@@ -63,7 +65,7 @@ class Fake:
     def solve(self, model, case, tol):
         points = {name: self.change(motion) for name, motion in model.points.items()}
         solved = np.isfinite([motion.position for motion in points.values()]).all(axis=(0, 2))
-        return replace(model, points=points, solved=solved, message=self.message)
+        return replace(model, points=points, solved=solved, failures=self.failures)
 
 
 def judge(case, truth, engine, **about):
@@ -108,7 +110,10 @@ def test_an_answer_where_there_is_none_is_silently_wrong(case, truth):
     beyond = replace(truth, reach=np.array([Reach.BEYOND, *[Reach.REACHED] * 4]))
     found = judge(case, beyond, NATIVE)
     assert (found.counts[Verdict.SILENTLY_WRONG], found.elsewhere) == (1, 1)
-    assert judge(case, None, NATIVE, reasons="anything").counts[Verdict.SILENTLY_WRONG] == 5
+    assert (
+        judge(case, None, NATIVE, reasons=frozenset(FailureKind)).counts[Verdict.SILENTLY_WRONG]
+        == 5
+    )
 
 
 def test_what_the_truth_does_not_know_is_not_judged(case, truth):
@@ -121,47 +126,41 @@ def test_what_the_truth_does_not_know_is_not_judged(case, truth):
 
 
 @pytest.mark.parametrize(
-    ("singular", "message", "about", "right"),
+    ("singular", "failures", "about", "right"),
     [
-        (False, "cannot be followed beyond turn = 0: dead centre", {}, 0),  # there is none
-        (True, "cannot be followed beyond turn = 0: dead centre", {}, 2),
-        (True, "Newton gave up", {}, 0),  # which names no cause
-        (False, "the tolerance is below round-off", {"reasons": "round-off", "excused": True}, 2),
-        (
-            False,
-            "the tolerance is below round-off",
-            {"reasons": "round-off"},
-            0,
-        ),  # it can be solved, and is no excuse
-        (False, "it rains", {"reasons": "round-off", "excused": True}, 0),
+        (False, [FailureKind.SINGULAR_AHEAD], {}, 0),  # there is none
+        (True, [FailureKind.SINGULAR_AHEAD], {}, 2),
+        (True, [], {}, 0),  # which names no cause
+        (True, [FailureKind.TOO_MANY_PARTS], {}, 0),
+        (False, [FailureKind.BELOW_ROUNDING], {"reasons": ROUNDING, "excused": True}, 2),
+        # it can be solved, and is no excuse
+        (False, [FailureKind.BELOW_ROUNDING], {"reasons": ROUNDING}, 0),
+        (False, [FailureKind.FREE], {"reasons": ROUNDING, "excused": True}, 0),
     ],
 )
-def test_a_refusal_is_as_right_as_its_reason(case, truth, singular, message, about, right):
+def test_a_refusal_is_as_right_as_its_reason(case, truth, singular, failures, about, right):
     truth = replace(truth, singular=np.array([singular] * 2 + [False] * 3))
-    found = judge(case, truth, Fake(moved(np.nan, samples=slice(0, 2)), message), **about)
+    found = judge(case, truth, Fake(moved(np.nan, samples=slice(0, 2)), failures), **about)
     assert found.counts[Verdict.REFUSED_RIGHTLY] == right
     assert found.counts[Verdict.REFUSED_WRONGLY] == 2 - right
     assert found.counts[Verdict.RIGHT] == 3
 
 
 def test_errors_are_refusals_and_crashes_are_never_right(case):
-    assert (
-        judge(case, None, Fake(fails=SolveError("a body is free")), reasons="free").counts[
-            Verdict.REFUSED_RIGHTLY
-        ]
-        == 5
-    )
-    one = Specimen("one", lambda: case, None, reasons="free")
+    free = SolveError("a body can turn", FailureKind.FREE)
+    reasons = frozenset({FailureKind.FREE})
+    assert judge(case, None, Fake(fails=free), reasons=reasons).counts[Verdict.REFUSED_RIGHTLY] == 5
+    one = Specimen("one", lambda: case, None, reasons=reasons)
     for outcome, verdict in (
         (Outcome.CRASHED, Verdict.REFUSED_WRONGLY),
         (Outcome.UNSUPPORTED, Verdict.UNSUPPORTED),
     ):
-        assert judged(one, case, None, Failure(outcome, "free")).counts[verdict] == 5
-    assert described_wrong(one, 3, "free").counts[Verdict.REFUSED_RIGHTLY] == 3
-    assert described_wrong(one, 3, "odd").counts[Verdict.REFUSED_WRONGLY] == 3
+        failure = Failure(outcome, "free", kind=FailureKind.FREE)
+        assert judged(one, case, None, failure).counts[verdict] == 5
+    assert described_wrong(one, 3, free).counts[Verdict.REFUSED_RIGHTLY] == 3
+    assert described_wrong(one, 3, SolveError("odd")).counts[Verdict.REFUSED_WRONGLY] == 3
     assert (
-        described_wrong(Specimen("one", lambda: case), 3, "free").counts[Verdict.REFUSED_WRONGLY]
-        == 3
+        described_wrong(Specimen("one", lambda: case), 3, free).counts[Verdict.REFUSED_WRONGLY] == 3
     )
 
 

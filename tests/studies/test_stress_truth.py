@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from kincheck import cases
-from kincheck.core import SolveError, solve
+from kincheck.core import solve
 from kincheck.core.case.case import Output
 from kincheck.core.case.joint_probe import probes
 from kincheck.core.errors import KincheckError
@@ -265,17 +265,15 @@ def test_a_proof_is_about_rows_that_are_good_at_the_sample():
     assert distance_from_proof(truth, 2) < 1e-2
 
 
+def failures(make):
+    """The kinds of failures of a description."""
+    try:
+        mechanism = make(np.random.default_rng(7))
+        return solve(mechanism, mechanism.drivers[0].name, [-0.3, 0.3]).failures
+    except KincheckError as error:
+        return (error.kind,)
+
+
 @pytest.mark.parametrize(("make", "reasons"), WRONG, ids=[make.__name__ for make, _ in WRONG])
 def test_what_is_no_mechanism_is_refused_by_its_reason(make, reasons):
-    """The reasons are searched for in messages: one that is worded anew is to be worded anew here
-    too.
-    """
-
-    def solved():
-        mechanism = make(np.random.default_rng(7))
-        found = solve(mechanism, mechanism.drivers[0].name, [-0.3, 0.3])
-        if not found.solved.all():
-            raise SolveError(found.message)
-
-    with pytest.raises(KincheckError, match=reasons):
-        solved()
+    assert reasons.intersection(failures(make))

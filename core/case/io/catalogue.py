@@ -100,7 +100,7 @@ def output_catalogue() -> Iterator[str]:
 
 
 def rows_of(cls: type[Joint]) -> int | None:
-    """Number of constraint equations of a joint type; None where the example geometry is none for
+    """Number of constraint equations of a joint type; None if the example geometry is none for
     it.
     """
     given = {each.name: _EXAMPLES[kind_of(each)] for each in own_fields(cls)}
@@ -138,7 +138,7 @@ def _measure_keys(cls: type[Measure]) -> Iterator[str]:
 
 
 def _meaning(cls: type[Described] | type[Measure]) -> str:
-    """The first line of what a class says of itself; a dataclass that says nothing has its
+    """The first line of the docstring of a class; a dataclass without one has its
     signature there.
     """
     first, *_ = (cls.__doc__ or "").strip().splitlines() or [""]

@@ -9,8 +9,10 @@ from typing import Protocol
 
 import numpy as np
 
+from ... import joints
 from ...errors import SolveError
 from ...kinematics import NativeSolver, start_of
+from ...mechanism.equivalents import with_equivalents
 from ...mechanism.mechanism import Mechanism
 from ...trajectory import Array, BodyMotion
 from ..case import Case
@@ -55,6 +57,9 @@ def written(case: Case, write: Writer, at: float | None = None) -> Mapping[str, 
     Raises:
         KincheckError: the start cannot be reached, or the format cannot express something.
     """
+    # all writers know the built-in types
+    built_in = {getattr(joints, name) for name in joints.__all__}
+    case = replace(case, mechanism=with_equivalents(case.mechanism, built_in))
     stop = case.sweep.design if at is None else at
     start = replace(case.sweep, values=np.array([stop])).moved
     held = {driver.name: 0.0 for driver in case.mechanism.drivers}

@@ -25,14 +25,14 @@ _DECIMAL = re.compile(r"[-+]?\d++(?:\.\d*+)?(?:[eE][-+]?\d++)?", re.ASCII)
 
 
 class ProvedSeries(msgspec.Struct, frozen=True, kw_only=True):
-    """One output, SI, as decimals; null where a sample is not proved or the output is not known
+    """One output, SI, as decimals; null if a sample is not proved or the output is not known
     there.
 
     Attributes:
-        signs: the convention of signs and axes; empty where the case's own axes are all there is.
+        signs: the convention of signs and axes; empty for the case's own axes alone.
         radius: proved bounds of |printed - true| for position, velocity and acceleration, the
             largest over the samples.
-        reason: why there are no numbers, where there are none.
+        reason: why there are no numbers; null otherwise.
     """
 
     position: list[str | None]
@@ -73,11 +73,11 @@ class Reference(msgspec.Struct, frozen=True, kw_only=True):
 
     Attributes:
         numbers: how the numbers of the case are understood: "double" or "decimal".
-        note: what is proved.
+        note: the proved statement.
         digits: all printed numbers are within 10^-digits of the true ones.
         bits: working precision.
         rows: the equations solved, as "joint: primitive"; redundant: those left out.
-        driver: values at the samples [m, rad or s], of what is swept first.
+        driver: values at the samples [m, rad or s], of the coordinate swept first.
         samples: one for each value.
         seconds: that the proofs took.
     """

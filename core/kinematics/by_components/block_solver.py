@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import SolveError
+from ...failures import FailureKind
 from ...mechanism.mechanism import Mechanism, Vector
 from ...trajectory import Array
 from ..compiled.compiled_model import CLOSED, Model, compile_model
@@ -36,12 +37,12 @@ from ..structure.degrees_of_freedom import counted
 
 @dataclass(frozen=True, eq=False)
 class ComponentType:
-    """Components that are built alike: one model, and numbers for each.
+    """Components of one structure: one model, and numbers for each.
 
     Attributes:
-        members: which components they are.
-        fixed: what is the same in all lanes (`Plan.fixed`), at the design position, shape (members,
-            fixed).
+        members: numbers of the components.
+        fixed: values of the slots `Plan.fixed`, the same in all lanes, at the design position,
+            shape (members, fixed).
         base: first row of the first member in the world; each has `model.kept` rows.
     """
 
@@ -52,14 +53,14 @@ class ComponentType:
 
     @cached_property
     def column(self) -> Mapping[str, int]:
-        """Where in what is fixed stands what tests go by: what they are told, and what was there
-        before; and the times of that.
+        """Return the columns of `fixed` with the tolerances, and with times and singular values at
+        the poses before.
         """
         names = (*ACCEPT, EARLIER + TIME, *(FROM + name for name in (TIME, SIGMA, LARGEST_SIGMA)))
         return {name: list(self.model.plan.fixed).index(self.model.slots[name]) for name in names}
 
     def rows(self, name: str, member: int) -> range:
-        """Rows of the world that hold what the model keeps of a member under a name."""
+        """Return the rows of the world with a kept quantity of a member."""
         rows = self.model.rows[name]
         start = self.base + member * self.model.kept
         return range(start + rows.start, start + rows.stop)
@@ -71,7 +72,7 @@ class Cascade:
     Args:
         request: as for `compile_model`; accelerations are computed whatever its order, to predict
             from.
-        parts: its components, where they are known already.
+        parts: its components, if known already.
 
     Raises:
         SolveError: the mechanism has couplers, is not driven enough, or does not close at the
@@ -168,7 +169,8 @@ class Cascade:
             raise SolveError(
                 f"mechanism {self.mechanism.name!r}: the component of {', '.join(worst.bodies)}"
                 f" does not close at the design position to {CLOSED:g} of its size; check points,"
-                " axes and lengths"
+                " axes and lengths",
+                FailureKind.NOT_CLOSED,
             )
         source, target = np.array(model.plan.carried).T
         lanes[target] = lanes[source]
@@ -177,7 +179,7 @@ class Cascade:
         )
 
     def body_rows(self, name: str) -> list[int]:
-        """Rows of the world that tell how a body moves, in the order of `PRESCRIBED`."""
+        """Return the rows of the world with the motion of a body, in the order of `PRESCRIBED`."""
         kind, member = self.place[self.part_of[name]]
         k = self.parts[kind.members[member]].bodies.index(name)
         u, q, v, a = (kind.rows(label, member) for label in (f"u b{k}", f"q b{k}", RATE, RATE_T))

@@ -1,6 +1,6 @@
 """Components of a cascade bound to lanes, one sample a lane.
 
-All lanes are predicted from one pose: the last sample that every component accepted.
+All lanes are predicted from one pose: the last sample accepted by every component.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ SOUND = 0.1
 
 
 class Lanes:
-    """A cascade bound to lanes: the world, and calls for its components in order, one for those
-    alike that follow each other.
+    """A cascade bound to lanes: the world, and calls for its components in order, one for
+    neighbours of one type.
 
     Attributes:
-        world: all that is solved, shape (rows, room); see `Cascade`.
+        world: all solved quantities, shape (rows, room); see `Cascade`.
         worst: the worst of all components, shape (WORST, room).
-        last: the lane of the last of the times that were attempted last.
+        last: the lane of the last time of the last attempt.
     """
 
     def __init__(self, cascade: Cascade, lanes: int) -> None:
@@ -99,15 +99,13 @@ class Lanes:
                 fixed[:, kind.column[name]] = value
 
     def stand_at(self, time: float) -> None:
-        """Have what the lanes are predicted from stand at another time, with no step behind it: so
-        it does on another path.
-        """
+        """Set the time of the pose before the lanes, with no step behind it, as on another path."""
         for kind, fixed in zip(self.cascade.kinds, self._fixed, strict=True):
             fixed[:, [kind.column[FROM + TIME], kind.column[EARLIER + TIME]]] = time
 
     @property
     def anchor(self) -> list[Array]:
-        """What the lanes are predicted from; to come back to."""
+        """The pose before the lanes, to be restored later."""
         return [fixed.copy() for fixed in self._fixed]
 
     @anchor.setter
@@ -116,14 +114,14 @@ class Lanes:
             fixed[:] = kept
 
     def attempt(self, times: Array, path: Path) -> Array:
-        """Solve all components at as many times as there are lanes, or fewer; the margin of each,
-        positive where accepted.
+        """Solve all components at times, up to the number of lanes; return the margin of each time,
+        positive if accepted.
         """
         return self.attempt_at(self.sampled(times, path))
 
     def sampled(self, times: Array, path: Path) -> list[Array]:
-        """What is given at times, by kind, shape (sampled, times): of those that no driver moves
-        one table for all.
+        """Return the inputs at times by component type, shape (sampled, times); types without
+        drivers share one table.
         """
         models, alone = [kind.model for kind in self.cascade.kinds], times[None]
         driven = [(model, model.request.drivers) for model in models]
@@ -133,9 +131,7 @@ class Lanes:
         ]
 
     def attempt_at(self, tables: Sequence[Array]) -> Array:
-        """Attempt all components as `attempt` does, from the tables that `sampled` gives of the
-        times.
-        """
+        """Attempt all components as `attempt` does, with tables from `sampled`."""
         count = tables[0].shape[1]
         self.last = count - 1
         for table, samples in zip(tables, self._samples, strict=True):
@@ -148,7 +144,7 @@ class Lanes:
         return self.worst[WORST.index(MARGIN), :count].copy()
 
     def each(self, name: str) -> Array:
-        """A test that is kept of all components, shape (components, room)."""
+        """Return a kept test of all components, shape (components, room)."""
         found: list[Array] = []
         for kind in self.cascade.kinds:
             size, first = kind.model.kept, kind.base + kind.model.rows[name].start
@@ -170,7 +166,7 @@ class Lanes:
         return np.concatenate(found)
 
     def stands(self, *, rates: bool = False) -> Array:
-        """The same of what the lanes are predicted from, shape (numbers,)."""
+        """Return the same of the pose before the lanes, shape (numbers,)."""
         found: list[Array] = []
         for kind, fixed in zip(self.cascade.kinds, self._fixed, strict=True):
             names, slots = (
@@ -185,7 +181,7 @@ class Lanes:
 
     @property
     def sound(self) -> bool:
-        """Whether nothing is nearly singular where the lanes are predicted from."""
+        """Whether no component is nearly singular at the pose before the lanes."""
         for kind, fixed in zip(self.cascade.kinds, self._fixed, strict=True):
             sigma, largest = (fixed[:, kind.column[FROM + name]] for name in (SIGMA, LARGEST_SIGMA))
             if not (sigma >= SOUND * largest).all():
@@ -193,7 +189,7 @@ class Lanes:
         return True
 
     def go_on(self) -> None:
-        """Predict from the last lane from now on: what that takes is there."""
+        """Predict from the last lane from now on; its values are in place."""
         self._fixed, self._ahead = self._ahead, self._fixed
         self._calls.reverse()
 
@@ -213,8 +209,8 @@ class Lanes:
 
 
 def _carried(plan: Plan) -> list[tuple[list[int], list[int]]]:
-    """Columns of what is kept, sampled and fixed that are carried, and the columns of what is fixed
-    that they are carried to.
+    """Return the carried columns of kept, sampled and fixed values, and their targets among the
+    fixed ones.
     """
     column = [
         {slot: k for k, slot in enumerate(slots)} for slots in (plan.kept, plan.sampled, plan.fixed)

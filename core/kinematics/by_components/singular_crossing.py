@@ -34,13 +34,13 @@ def cross(
     aim: float,
     tol: float,
 ) -> float | None:
-    """Take what the lanes are predicted from over a singular pose; where it stands beyond, or None:
-    then it is as it was.
+    """Take the pose before the lanes over a singular pose; return its time beyond, or None if it
+    stays.
 
     Args:
         lanes: predicted from the last pose before the singular one.
-        sound, start: what they were predicted from where all was sound, and its time.
-        here, aim: time of the last pose, and of a sample that is not reached from there.
+        sound, start: the last sound pose before the lanes, and its time.
+        here, aim: time of the last pose, and of a sample out of reach from there.
     """
     near, stands = lanes.anchor, lanes.stands()
     lanes.anchor = sound
@@ -76,7 +76,7 @@ def _eight(
 
 
 def _reach(lanes: Lanes, path: Path, here: float, time: float) -> bool:
-    """Solve at a time as lane 0, by parts of the step where it must be."""
+    """Solve at a time as lane 0, by parts of the step if needed."""
     for _ in range(MOST):
         parts: Array = here + (time - here) * 0.5 ** np.arange(0.0, HALVED)
         part = longest(lanes.attempt(parts, path))

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ...caches import ThreadCache, keep_last
 from ...errors import SolveError
+from ...failures import FailureKind
 from ...mechanism.mechanism import Mechanism
 from ...program import Executor, NumpyExecutor
 from ...program.llvm.compiler import available
@@ -237,6 +238,7 @@ class Model:
             raise SolveError(
                 f"mechanism {self.mechanism.name!r} does not close at the design position: residual"
                 f" {closure * self.frame.unit:.3g} m after Newton's iteration, expected 0; check"
-                " points, axes and lengths"
+                " points, axes and lengths",
+                FailureKind.NOT_CLOSED,
             )
         return found

@@ -1,4 +1,4 @@
-"""Why a pose was not accepted, in words."""
+"""The failure of a pose by the acceptance criteria it does not meet."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ...failures import FailureKind, PoseFailure
 from ...trajectory import Array
 from ..compiled.acceptance import margins, steepness
 from ..compiled.compiled_model import Model
@@ -14,11 +15,11 @@ from ..formulation.acceptance_criteria import ROUNDING
 from ..formulation.driver_inputs import turns
 
 SINGULAR = ("as regular", "on this side", "regular between", "certain", "not turned by rounding")
-"""The tests that a lane fails where a singular pose is ahead."""
+"""Criteria that a lane does not meet if a singular pose is ahead."""
 
 
-def why_refused(model: Model, lane: Array) -> str:
-    """Why a lane was not accepted, with the number found.
+def pose_failure(model: Model, lane: Array) -> PoseFailure:
+    """Return the failure of a lane, with its numbers.
 
     Args:
         lane: all its slots.
@@ -40,42 +41,29 @@ def why_refused(model: Model, lane: Array) -> str:
     closure, leftover, branch, tol = (
         read(name) for name in ("closure", "leftover", "branch", "tolerance")
     )
-    return in_words(failed, closure, leftover, branch, tol, model.selection.account.redundant_rows)
+    redundant = model.selection.account.redundant_rows
+    return PoseFailure(failure_kind(failed, closure), closure, tol, leftover, branch, redundant)
 
 
-def in_words(
-    failed: Sequence[str],
-    closure: float,
-    leftover: float,
-    branch: float,
-    tol: float,
-    redundant: Sequence[str],
-) -> str:
-    """Why a pose was refused that failed so many tests.
+def failure_kind(failed: Sequence[str], closure: float) -> FailureKind:
+    """Return the kind of a failure by the criteria that a pose does not meet.
 
     Args:
-        closure, leftover, branch, tol: what the tests are of.
-        redundant: names of rows.
+        failed: names of those criteria, see `acceptance.margins`.
+        closure: largest residual of the solved rows [units of the mechanism's size].
     """
     if not np.isfinite(closure):
-        return "Newton diverges to numbers that are not finite"
+        return FailureKind.DIVERGED
     if "on the branch" in failed:
-        return f"Newton reaches a wrong branch (axes turned over, cosine {branch:.3g})"
-    if "closed" in failed and closure <= ROUNDING:
-        return (
-            f"the residual {closure:.3g} of the mechanism's size is rounding, and the tolerance"
-            f" {tol:.3g} is less; allow more"
-        )
+        return FailureKind.WRONG_BRANCH
     if "closed" in failed:
-        return f"Newton does not converge, residual {closure:.3g} of the mechanism's size"
+        return FailureKind.BELOW_ROUNDING if closure <= ROUNDING else FailureKind.NOT_CONVERGED
     if "consistent" in failed:
-        return (
-            f"the redundant rows ({', '.join(redundant)}) contradict the others by {leftover:.3g}"
-        )
+        return FailureKind.CONTRADICTORY
     if any(name in failed for name in SINGULAR):
-        return "there is a singular pose ahead"
+        return FailureKind.SINGULAR_AHEAD
     if failed == ["converged"]:
-        return f"Newton does not settle, residual {closure:.3g} of the mechanism's size"
+        return FailureKind.NOT_SETTLED
     if not set(failed) - {"near", "not turned round"}:
-        return "the step to it is too long to be believed"
-    return "Newton jumps to another assembly"
+        return FailureKind.LONG_STEP
+    return FailureKind.OTHER_ASSEMBLY

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...failures import FailureKind
 from ...mechanism.motions import Path
 from ...trajectory import Array
 from ..compiled.request import FROM, LARGEST_SIGMA, SIGMA, TIME
@@ -151,7 +152,7 @@ class Followed:
         """What ends the motion beyond an end; None where it does not go on."""
         slots = end.route.model.slots
         if (
-            not end.early
+            end.failure is not FailureKind.LEFT_OFF
             and end.lane[slots[FROM + SIGMA]] > NEAR * end.lane[slots[FROM + LARGEST_SIGMA]]
         ):
             return None
@@ -167,7 +168,9 @@ class Followed:
                 Route(standing.model, self._path(missing), standing.lane, here), missing
             )
             return [each for each in ends if side * (each.wanted - here) >= 0.0]
-        if end.early and number is not None:  # the way to the start is gone to its end
+        if (
+            end.failure is FailureKind.LEFT_OFF and number is not None
+        ):  # the way to the start is gone to its end
             return self._further(end, number, side)
         if len(self.passages) == MOST:
             return None
@@ -187,7 +190,7 @@ class Followed:
         beyond = _time(end.route, passed.beyond)
         back = [each for each in ends if side * (each.wanted - beyond) < 0.0]
         # a sample right beyond the pose is not given up for want of better rows
-        while back and back[0].early:
+        while back and back[0].failure is FailureKind.LEFT_OFF:
             back = self._further(back[0], len(self.parts) - 1, -side)
         short = {
             k

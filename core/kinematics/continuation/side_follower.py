@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from types import MappingProxyType
 from typing import NamedTuple
@@ -16,19 +16,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...failures import FailureKind, PoseFailure
 from ...program import MARGIN, Side
 from ...trajectory import Array
 from ..compiled.request import FROM, LARGEST_SIGMA, SIGMA, TIME
 from ..compiled.samples import AS_THEY_ARE, Route
-from .failure_reasons import why_refused
-from .step_halving import AT_ONCE, LONGER, MOST_PARTS, TOO_MANY, part_of_step
+from .failure_reasons import pose_failure
+from .step_halving import AT_ONCE, LONGER, Walk, part_of_step
 
-# A step that fails is gone in so many equal parts, or in more where that fails: each takes a tenth
-# of a microsecond, and a hundred where it is looked for by itself. They are kept ready for sweeps
-# of up to so many parts: longer ones are seldom coarse.
+# Equal parts of a step that fails. One takes a tenth of a microsecond, a part that is looked for by
+# itself a hundred. Grids of up to ROOM parts are kept: longer sweeps are seldom coarse.
 FINER, ROOM = (8, 64, 512, 4096), 8192
-# So many steps are gone in parts before the next is tried whole; twice as many where that fails
-# each time.
+# Steps in equal parts before the next is tried whole; twice as many after each failure.
 FEW = 4
 
 
@@ -36,8 +35,7 @@ class March(NamedTuple):
     """What a march found, sample by sample in the order given.
 
     Attributes:
-        kept: the kept rows of every sample (`Model.rows`), shape (kept, n); NaN where it was not
-            reached.
+        kept: the kept rows of every sample (`Model.rows`), shape (kept, n); NaN if not reached.
         worst: see `Track`: the largest residuals of kept and redundant rows, and the smallest
             estimate of sigma.
         solved: shape (n,).
@@ -57,6 +55,11 @@ class March(NamedTuple):
         """Why samples are missing."""
         return tuple(end.message for end in self.ends)
 
+    @property
+    def failures(self) -> tuple[FailureKind, ...]:
+        """The kinds of these failures."""
+        return tuple(end.failure for end in self.ends)
+
 
 @dataclass(frozen=True, eq=False)
 class End:
@@ -64,23 +67,21 @@ class End:
 
     Attributes:
         message: where, and why.
-        route: on which: the one asked for, or the straight way to its start.
-        lane: all slots of the last pose that was reached.
-        wanted: time of the sample that was not.
-        early: see `march`: no part of the step was tried.
-        divided: the step was too long to be gone in parts, and nothing else is known to be wrong.
+        route: the given one, or the straight way to its start.
+        lane: all slots of the last pose.
+        wanted: time of the sample out of reach [s].
+        failure: the reason; `LEFT_OFF` if no part of the step was tried, see `march`.
     """
 
     message: str
     route: Route
     lane: Array
     wanted: float
-    early: bool = False
-    divided: bool = False
+    failure: FailureKind
 
 
 def _columns(side: Side, at: int, stop: int) -> NDArray[np.intp]:
-    """Of samples of a side among all that are kept."""
+    """Return the columns of samples of a side among all samples."""
     return side.first + side.step * np.arange(at, stop)
 
 
@@ -153,74 +154,24 @@ class Marcher:
         return March(kept, self.track.worst.tolist(), solved, tuple(ends), self.visited)
 
     def _side(self, number: int, at: int) -> End | None:
-        """Follow one side, which came so far, to its last sample; None, or where and why it ends
+        """Follow one side, after `at` samples, to its last sample; return its end if it ends
         before.
         """
         side, anew = self.grid.sides[number], True
         for stop in self._stops(side) if self.visit else [side.count]:
             if self.visit:
                 at, anew = self.track.follow(number, at, stop, anew=anew), False
-            few, divided, length = FEW, 0, math.inf
-            while at < stop:
-                came, early = at, self._early(number)
-                if not early and not divided:
-                    at, few = self._in_parts(number, at, min(at + few, stop)), 2 * few
-                if at == came:
-                    anchor, wanted = self._anchor(number), float(side.samples[0, at])
-                    further = (
-                        ""
-                        if early
-                        else (
-                            TOO_MANY
-                            if divided == MOST_PARTS
-                            else self._divide(anchor, wanted, length)
-                        )
-                    )
-                    if isinstance(further, str):
-                        columns = _columns(side, at, side.count)
-                        self.kept[:, columns], self.solved[columns] = np.nan, False
-                        said = self._end(side, at, anchor, further)
-                        return End(
-                            said, self.route, anchor, wanted, early, divided=further is TOO_MANY
-                        )
-                    self.track.anchors[number] = further[self.model.ahead]
-                    divided, length = (
-                        divided + 1,
-                        LONGER * abs(self._stands(further) - self._stands(anchor)),
-                    )
-                beyond, at = at, self.track.follow(number, at, stop, anew=False)
-                few = FEW if at - beyond > few else few
-                divided, length = (0, math.inf) if at > came else (divided, length)
+            walk = SideWalk(self, number)
+            at, failure = walk.advance(at, stop)
+            if failure is not None:
+                columns = _columns(side, at, side.count)
+                self.kept[:, columns], self.solved[columns] = np.nan, False
+                return self._end(side, at, self.anchor(number), failure)
             if self.visit:
                 self._stand(number, at)
         return None
 
-    def _early(self, number: int) -> bool:
-        """Whether to leave off where a side stands; see `march`."""
-        sigma, largest = self.track.anchors[number, self.sigmas]
-        return self.crossing or bool(sigma < self.low * largest)
-
-    def _in_parts(self, number: int, at: int, stop: int) -> int:
-        """Go on in equal parts of steps, and in more to the end of one that fails; how many samples
-        have passed then.
-        """
-        anchors, passed, before = self.track.anchors, at, 1
-        for grid in self.finer():
-            kept, parts = grid.kept, grid.parts
-            grid.track.anchors[number] = anchors[number]
-            passed = grid.track.follow(number, passed * (parts // before), stop * parts, anew=False)
-            anchors[number] = grid.track.anchors[number]
-            came, at, before = at, passed // parts, parts
-            if at > came:
-                columns = _columns(self.grid.sides[number], came, at)
-                self.kept[:, columns] = kept[:, grid.ends[columns]]
-                self._worsen(columns)
-            if at == stop:
-                break
-            stop = at + 1
-        return at
-
-    def _worsen(self, columns: NDArray[np.intp]) -> None:
+    def worsen(self, columns: NDArray[np.intp]) -> None:
         """Take account of samples that a finer grid reached."""
         plan, worst = self.model.plan, self.track.worst
         for k, slot in enumerate([*plan.largest, *plan.smallest]):
@@ -232,13 +183,13 @@ class Marcher:
                     else min(worst[k], values.min())
                 )
 
-    def _anchor(self, number: int) -> Array:
+    def anchor(self, number: int) -> Array:
         """All slots of a lane where the motion stands on a side."""
         found = self.departure.copy()
         found[self.model.ahead] = self.track.anchors[number]
         return found
 
-    def _stands(self, lane: Array) -> float:
+    def time_of(self, lane: Array) -> float:
         """The time at which a lane stands."""
         return float(lane[self.slots[FROM + TIME]])
 
@@ -252,36 +203,97 @@ class Marcher:
         side = self.route.sides[number]
         sample = int(self.route.by_time[side.first + side.step * (passed - 1)])
         if sample in self.visit:
-            self.visited[sample] = self._anchor(number)
+            self.visited[sample] = self.anchor(number)
 
-    def _divide(self, anchor: Array, aim: float, length: float) -> Array | str:
-        """Go a part of a step, no longer than a length: the lane there, or why the shortest is
-        refused.
+    def _end(self, side: Side, at: int, anchor: Array, failure: PoseFailure) -> End:
+        if failure.kind is not FailureKind.TOO_MANY_PARTS:
+            failure = replace(failure, sigma=float(anchor[self.slots[FROM + SIGMA]]))
+        last, wanted = float(side.samples[0, at - 1]) if at else None, float(side.samples[0, at])
+        message = self.route.path.ended(self.time_of(anchor), wanted, last, str(failure))
+        return End(message, self.route, anchor, wanted, failure.kind)
+
+
+class SideWalk(Walk):
+    """The walk along one side of a marcher, after a step that has failed."""
+
+    def __init__(self, marcher: Marcher, number: int) -> None:
+        self.marcher, self.number, self.track = marcher, number, marcher.track
+        self.model, self.route, self.side = marcher.model, marcher.route, marcher.grid.sides[number]
+        self.few, self.length, self.leaves_off = FEW, math.inf, False
+
+    def follow(self, at: int, stop: int, parts: int) -> int:
+        """Follow samples in equal parts of their steps, then whole.
+
+        The rest of a step is tried whole: in equal parts the step has failed.
         """
-        parts, every = self.model.executor(AT_ONCE), range(len(self.slots))
+        passed = at
+        if not parts:
+            self.leaves_off = self._leaves_off()
+            if not self.leaves_off:
+                passed, self.few = self._in_parts(at, min(at + self.few, stop)), 2 * self.few
+            if passed == at:
+                return at
+        beyond = passed
+        passed = self.track.follow(self.number, passed, stop, anew=False)
+        self.few = FEW if passed - beyond > self.few else self.few
+        if passed > at:
+            self.length = math.inf
+        else:
+            self.leaves_off = self._leaves_off()
+        return passed
+
+    def follow_part(self, at: int) -> PoseFailure | None:
+        """Follow a part of a step, up to `LONGER` times as long as the one before."""
+        if self.leaves_off:
+            return PoseFailure(FailureKind.LEFT_OFF)
+        anchor, time_of = self.marcher.anchor(self.number), self.marcher.time_of
+        found = self._divided(anchor, float(self.side.samples[0, at]))
+        if isinstance(found, PoseFailure):
+            return found
+        self.track.anchors[self.number] = found[self.model.ahead]
+        self.length = LONGER * abs(time_of(found) - time_of(anchor))
+        return None
+
+    def _leaves_off(self) -> bool:
+        """Return whether no part of the step is tried; see `march`."""
+        sigma, largest = self.track.anchors[self.number, self.marcher.sigmas]
+        return self.marcher.crossing or bool(sigma < self.marcher.low * largest)
+
+    def _in_parts(self, at: int, stop: int) -> int:
+        """Follow samples in equal parts of their steps, and a step that fails in more; return the
+        number passed.
+        """
+        anchors, number = self.track.anchors, self.number
+        passed, before = at, 1
+        for grid in self.marcher.finer():
+            kept, parts = grid.kept, grid.parts
+            grid.track.anchors[number] = anchors[number]
+            passed = grid.track.follow(number, passed * (parts // before), stop * parts, anew=False)
+            anchors[number] = grid.track.anchors[number]
+            came, at, before = at, passed // parts, parts
+            if at > came:
+                columns = _columns(self.side, came, at)
+                self.marcher.kept[:, columns] = kept[:, grid.ends[columns]]
+                self.marcher.worsen(columns)
+            if at == stop:
+                break
+            stop = at + 1
+        return at
+
+    def _divided(self, anchor: Array, aim: float) -> Array | PoseFailure:
+        """Return a lane after a part of the step, or the failure of the shortest part."""
+        parts, every = self.model.executor(AT_ONCE), range(len(self.model.slots))
+        margin = self.model.slots[MARGIN]
 
         def attempt(times: Array) -> Array:
             parts.put(every, anchor[:, None])
             parts.put(self.model.sampled, self.route.sampled(times))
             parts.attempt()
-            return parts.get([self.slots[MARGIN]])[0]
+            return parts.get([margin])[0]
 
-        part = part_of_step(self._stands(anchor), aim, attempt, AT_ONCE, length)
+        part = part_of_step(self.marcher.time_of(anchor), aim, attempt, AT_ONCE, self.length)
         lanes = parts.get(every)
         if part is None:
-            return why_refused(
-                self.model, lanes[:, np.flatnonzero(~(lanes[self.slots[MARGIN]] > 0.0))[-1]]
-            )
+            refused = np.flatnonzero(~(lanes[margin] > 0.0))[-1]
+            return pose_failure(self.model, lanes[:, refused])
         return self.model.departing(lanes[:, part[0]], lanes[self.model.sampled, part[0]])
-
-    def _end(self, side: Side, at: int, anchor: Array, reason: str) -> str:
-        sigma, last = (
-            float(anchor[self.slots[FROM + SIGMA]]),
-            float(side.samples[0, at - 1]) if at else None,
-        )
-        if reason is not TOO_MANY:
-            reason += (
-                f"; smallest singular value there about {sigma:.3g} (zero at a lock-up or dead"
-                " centre)"
-            )
-        return self.route.path.ended(self._stands(anchor), float(side.samples[0, at]), last, reason)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ...failures import FailureKind
 from ...mechanism.motions import Path
 from ..compiled.dense_equations import system_of
 from ..compiled.request import FROM, TIME
@@ -34,6 +35,7 @@ class Findings:
     Attributes:
         notes: of samples that are right, but at or beyond singular poses.
         messages: why samples are missing.
+        failures: the kinds of these failures.
         poses: the singular poses, for the record.
         retried: samples that were solved again.
         sigma: smallest singular value among those.
@@ -44,6 +46,7 @@ class Findings:
 
     notes: list[str] = field(default_factory=list[str])
     messages: list[str] = field(default_factory=list[str])
+    failures: list[FailureKind] = field(default_factory=list[FailureKind])
     poses: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
     retried: int = 0
     sigma: float = np.inf
@@ -130,7 +133,8 @@ def add_end(findings: Findings, end: End, tol: float) -> None:
     """Add the reason why a side ended: a limit point ahead, or the singularity nearest to its last
     pose.
     """
-    if end.divided:
+    findings.failures.append(end.failure)
+    if end.failure is FailureKind.TOO_MANY_PARTS:
         findings.messages.append(end.message)
         return
     model, path = end.route.model, end.route.path

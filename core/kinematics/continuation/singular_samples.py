@@ -15,6 +15,7 @@ from collections.abc import Iterable, Iterator, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from ...failures import FailureKind
 from ...trajectory import Array
 from ..compiled.compiled_model import Model
 from ..compiled.dense_equations import System, system_of
@@ -81,6 +82,7 @@ class _Scrutiny:
                 f" unknowns are more than {LARGEST}"
             )
         self.findings.messages += self.found.messages
+        self.findings.failures += self.found.failures
         return self.findings
 
     # Samples
@@ -177,6 +179,7 @@ class _Scrutiny:
                 f" {self.tol:.3g}; allow more"
             )
             self.findings.messages.append(f"refused at {places}: {why}")
+            self.findings.failures.append(FailureKind.UNREPEATABLE)
 
     def stuck(self) -> None:
         """Interpolate samples beside passages that neither side could reach, or refuse them."""
@@ -256,6 +259,7 @@ class _Scrutiny:
                 " pose is regular; allow more"
             )
         self.findings.messages.append(f"refused at {places}: {why}")
+        self.findings.failures.append(FailureKind.UNCERTAIN)
 
     def _where(self, time: float) -> str:
         return self.route.path.where(time)

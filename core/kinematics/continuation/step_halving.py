@@ -1,12 +1,19 @@
-"""Parts of a step that fails, where they are looked for one by one."""
+"""The walk along a motion, sample by sample, with parts of the steps that fail.
+
+The compiled solver, the solver by components and the sparse solver share it. Each predicts, solves
+and accepts poses in its own way: many samples in a call, all components at once, or a sparse
+system.
+"""
 
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 
 import numpy as np
 
+from ...failures import MOST_PARTS, FailureKind, PoseFailure
 from ...trajectory import Array
 
 # A failing step is tried at its halves, quarters, ... down to this many halvings, and so many at
@@ -16,13 +23,47 @@ HALVINGS, AT_ONCE = 40, 8
 # The next part is looked for among those up to so many times as long as the last: towards a limit
 # they get shorter and shorter.
 LONGER = 8.0
-# A step is gone in at most so many parts. Of a slider-crank a part is 0.7 rad: a step of 1,000 rad
-# is gone to its end, one of 1,500 is not.
-MOST_PARTS = 2000
-TOO_MANY = (
-    f"{MOST_PARTS} parts of the step were taken, and the next sample was not reached; give samples"
-    " in between"
-)
+
+
+class Walk(ABC):
+    """A walk over samples in their order, each from the pose before."""
+
+    @abstractmethod
+    def follow(self, at: int, stop: int, parts: int) -> int:
+        """Follow samples as far as each continues the motion; return the number passed.
+
+        Args:
+            at: number passed so far.
+            stop: number to pass.
+            parts: number of parts taken of the step to the next sample.
+        """
+
+    @abstractmethod
+    def follow_part(self, at: int) -> PoseFailure | None:
+        """Follow a part of the step to the next sample; return the failure if no part succeeds."""
+
+    def advance(self, at: int, stop: int) -> tuple[int, PoseFailure | None]:
+        """Follow samples to the last one, or to the first one out of reach.
+
+        A step that fails is divided: the longest part that succeeds is followed, and the rest of
+        the step is tried again.
+
+        Returns:
+            The number of samples passed, and the failure if it is not `stop`.
+        """
+        parts = 0
+        while at < stop:
+            passed = self.follow(at, stop, parts)
+            if passed > at:
+                at, parts = passed, 0
+                continue
+            if parts == MOST_PARTS:
+                return at, PoseFailure(FailureKind.TOO_MANY_PARTS)
+            failure = self.follow_part(at)
+            if failure is not None:
+                return at, failure
+            parts += 1
+        return at, None
 
 
 def longest(margins: Array) -> int | None:

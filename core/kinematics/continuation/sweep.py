@@ -5,11 +5,12 @@ of points and bodies.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from ...failures import FailureKind
 from ...forces import Forces
 from ...mechanism.motions import Path
 from ...program import ITERATIONS
@@ -43,6 +44,7 @@ def follow(route: Route, tol: float) -> Trajectory:
 
 def _follow(route: Route, tol: float) -> Trajectory:
     model, rows, found, message = route.model, route.model.rows, march(route, tol, low=LOW), ""
+    failures: Sequence[FailureKind] = found.failures
     closure, leftover, sigma = found.worst
     largest = math.inf if model.selection.dropped else None
     findings: Mapping[str, Any] = {}
@@ -56,6 +58,7 @@ def _follow(route: Route, tol: float) -> Trajectory:
             found.kept[rows["closure"].start : rows[SIGMA].stop, found.solved]
         )
         message, findings = "; ".join(scrutiny.messages), scrutiny.details
+        failures = scrutiny.failures
     if not (found.solved.any() if message else found.solved.size):
         closure = leftover = sigma = math.nan
     iterations, table, unit = found.kept[rows[ITERATIONS].start], found.kept.T, model.frame.unit
@@ -75,6 +78,7 @@ def _follow(route: Route, tol: float) -> Trajectory:
         },
         bodies=Motions(BodyMotion, table, model.of_bodies),
         forces=_forces(model, table, sigma) if not message and "notes" not in findings else None,
+        failures=failures,
     )
 
 

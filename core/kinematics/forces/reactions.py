@@ -45,6 +45,7 @@ def with_forces(
         motion.details,
         {name: motion.bodies[name] for name in bodies},
         found,
+        failures=motion.failures,
     )
 
 

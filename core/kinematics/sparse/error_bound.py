@@ -9,7 +9,7 @@ import numpy as np
 
 from ...trajectory import Array
 from ..formulation.acceptance_criteria import EPSILON
-from .sparse_equations import FailedError, SparseEquations
+from .sparse_equations import PoseError, SparseEquations
 from .step_state import Stand, distance
 
 # Steps of inverse iteration: each divides what is left of other directions by the square of how
@@ -37,7 +37,7 @@ def uncertain(model: SparseEquations, at: Stand, drives: Array) -> Sequence[floa
             moved = model.moved(at.state, model.factors.solve(residual * np.sign(left)))
             model.evaluate(moved, drives)
             there = model.motion()
-    except FailedError:  # singular to rounding, here or there
+    except PoseError:  # singular to rounding, here or there
         return math.inf, math.inf, math.inf
     speed, acceleration = (float(np.abs(each).max(initial=0.0)) for each in here)
     sizes = speed, max(acceleration, speed**2)

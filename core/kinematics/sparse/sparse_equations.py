@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import SolveError
+from ...failures import FailureKind, PoseFailure
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path
 from ...trajectory import Array
@@ -30,8 +31,12 @@ from .step_state import Stand
 # Rows are chosen anew where that makes the determinant, and so the least of what it is a product
 
 
-class FailedError(ArithmeticError):
-    """A pose that is not reached, and the reason."""
+class PoseError(ArithmeticError):
+    """A pose that is not reached."""
+
+    def __init__(self, failure: PoseFailure) -> None:
+        super().__init__(str(failure))
+        self.failure = failure
 
 
 class SparseEquations:
@@ -98,7 +103,8 @@ class SparseEquations:
                 f"mechanism {self.mechanism.name!r}: driven by {locked_drivers(self.mechanism)} it"
                 " does not move at the design position (lock-up or dead centre); give the design"
                 " in another pose, some degrees on, and sweep from there, or drive another"
-                " coordinate"
+                " coordinate",
+                FailureKind.LOCKED,
             )
 
     def _keep(self, kept: Indices, jacobian: Jacobian) -> None:
@@ -156,14 +162,15 @@ class SparseEquations:
             raise SolveError(
                 f"mechanism {self.mechanism.name!r} does not close at the design position: residual"
                 f" {residual * self.frame.unit:.3g} m after Newton's iteration, expected 0; check"
-                " points, axes and lengths"
+                " points, axes and lengths",
+                FailureKind.NOT_CLOSED,
             )
         zero = np.zeros(self.elements.numbering.unknowns)
         return Stand(0.0, 0.0, state, state, zero, zero)
 
     def moving(self, at: Stand, time: float, drives: Array) -> Stand:
         """What stands, with the rates that the drives give it there, and no step behind it. Raises
-        FailedError.
+        PoseError.
         """
         self.evaluate(at.state, drives)
         rates, accelerations = self.motion()
@@ -208,7 +215,7 @@ class SparseEquations:
         try:
             self.factors.factor()
         except SingularError as error:
-            raise FailedError("the equations are singular there") from error
+            raise PoseError(PoseFailure(FailureKind.SINGULAR_ROWS)) from error
 
     def motion(self) -> tuple[Array, Array]:
         """Rates and accelerations of the unknowns where all was last evaluated: one factorisation

@@ -19,13 +19,14 @@ from functools import cached_property
 
 import numpy as np
 
+from ...failures import PoseFailure
 from ...trajectory import Array
 from ..compiled.request import MAX_ITERATIONS
-from ..continuation.failure_reasons import in_words
+from ..continuation.failure_reasons import failure_kind
 from ..structure.sparse_lu import SingularError
 from .batched_newton import Batch
 from .row_selection import Jacobian
-from .sparse_equations import FailedError, SparseEquations
+from .sparse_equations import PoseError, SparseEquations
 from .step_state import CONTRACTS, SETTLED, STALLS, Poses, Stand, distance, lacked
 
 # Rows are chosen anew where that makes the determinant, and so the least of what it is a product
@@ -48,7 +49,7 @@ class SparseModel(SparseEquations):
             known: others that are made already.
 
         Raises:
-            FailedError: it is too near to a singular pose for that to be seen.
+            PoseError: it is too near to a singular pose for that to be seen.
         """
         self.evaluate(at.state, drives)
         self._factor()
@@ -91,7 +92,7 @@ class SparseModel(SparseEquations):
         """Go from where a motion stands to a time.
 
         Raises:
-            FailedError: what is there is no solution, or does not continue the motion.
+            PoseError: what is there is no solution, or does not continue the motion.
         """
         # a lost iteration may overflow; it is found by its residual
         with np.errstate(all="ignore"):
@@ -100,7 +101,7 @@ class SparseModel(SparseEquations):
             rate, done, iterations = math.inf, residual <= SETTLED, 0
             while not done and iterations < MAX_ITERATIONS:
                 if not math.isfinite(residual):
-                    raise FailedError("Newton diverges to numbers that are not finite")
+                    raise self._failed(["closed"], residual, tol)
                 renewed = not rate <= CONTRACTS
                 if renewed:
                     self._factor()
@@ -109,7 +110,7 @@ class SparseModel(SparseEquations):
                 rate, iterations = residual / last, iterations + 1
                 done = residual <= SETTLED or (renewed and residual <= tol and rate > STALLS)
             if not done or not math.isfinite(residual):
-                raise FailedError(self._in_words(["closed"], residual, tol))
+                raise self._failed(["closed"], residual, tol)
             step, gap = (
                 float(distance(state - other, self.scale)) for other in (here.state, taylor)
             )
@@ -132,7 +133,7 @@ class SparseModel(SparseEquations):
         )
         failed = [name for name, passed in poses.passed(here, tol).items() if not passed.all()]
         if failed:
-            raise FailedError(self._in_words(failed, residual, tol, leftover, branch))
+            raise self._failed(failed, residual, tol, leftover, branch)
         (found,) = poses.remembered(here)
         motion = (
             time,
@@ -155,21 +156,16 @@ class SparseModel(SparseEquations):
             *found,
         )
 
-    def _in_words(
+    def _failed(
         self,
         failed: Sequence[str],
         closure: float,
         tol: float,
         leftover: float = 0.0,
         branch: float = 1.0,
-    ) -> str:
-        """Why a pose was refused."""
+    ) -> PoseError:
+        """Return the failure of a pose by the criteria that it does not meet."""
         names = self.redundant
-        return in_words(
-            failed,
-            closure,
-            leftover,
-            branch,
-            tol,
-            [*names[:FEW], "..."] if len(names) > FEW else names,
-        )
+        few = [*names[:FEW], "..."] if len(names) > FEW else names
+        kind = failure_kind(failed, closure)
+        return PoseError(PoseFailure(kind, closure, tol, leftover, branch, few))

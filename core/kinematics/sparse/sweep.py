@@ -11,18 +11,19 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
+from ...failures import FailureKind, PoseFailure
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path, outwards
 from ...trajectory import Array, BodyMotion, PointMotion, Trajectory, largest_found
 from ..compiled.motion_start import Start, solve_from_start, start_of
-from ..continuation.step_halving import HALVINGS, MOST_PARTS, TOO_MANY
 from ..formulation.acceptance_criteria import AMPLIFIED, EPSILON, LOW, WORSE_BY_PIVOTS
 from .batched_newton import REMEMBERED
 from .error_bound import uncertain
 from .output_motions import OutputMotions
-from .sparse_equations import FailedError
+from .sparse_equations import PoseError
 from .sparse_model import SparseModel
 from .step_state import Stand
+from .step_walk import StepWalk
 
 
 def solve_sparse(
@@ -82,6 +83,7 @@ class _Sweep:
     order: int
     start: Start
     messages: list[str] = field(default_factory=list[str])
+    failures: list[FailureKind] = field(default_factory=list[FailureKind])
     smallest_pivot: float = np.inf
     renewed: int = 0
     refused: dict[int, float] = field(default_factory=dict[int, float])
@@ -129,8 +131,9 @@ class _Sweep:
                     self.messages[:] = [f"on the way to {self.start.name}: {self.messages[0]}"]
                     return None
             return model.moving(here, start, self._drives(path, start))
-        except FailedError as error:
+        except PoseError as error:
             self.messages.append(f"the motion cannot start at {path.where(start)}: {error}")
+            self.failures.append(error.failure.kind)
             return None
 
     def _follow(self, here: Stand, path: Path, times: Array) -> Iterable[Stand]:
@@ -150,13 +153,15 @@ class _Sweep:
                     alone = k + together.width
                     try:
                         here = self.by.moving(here, here.time, self._drives(path, here.time))
-                    except FailedError as error:
-                        self._end(here, path, times, k, str(error))
+                    except PoseError as error:
+                        self._end(here, path, times, k, error.failure)
                         return
             if not found:
-                here, why = self._reach(here, path, float(times[k]), drives[:, k])
-                if why:
-                    self._end(here, path, times, k, why)
+                walk = self._walk(here, path, float(times[k]), drives[:, k])
+                _, failure = walk.advance(0, 1)
+                here = walk.here
+                if failure is not None:
+                    self._end(here, path, times, k, failure)
                     return
                 found = [here]
                 if together and together.outgrown and self.by.together is together:
@@ -172,37 +177,13 @@ class _Sweep:
                 if self.by is not by:  # what was found beyond is not as good
                     break
 
-    def _reach(self, here: Stand, path: Path, time: float, drives: Array) -> tuple[Stand, str]:
-        """Go to a time, in parts where need be: where that ends, and why before that time."""
-        for _ in range(MOST_PARTS):
-            try:
-                return self.by.reach(here, time, drives, self.tol), ""
-            except FailedError:
-                try:
-                    here = self._by_better_rows(self._part(here, path, time), path)
-                except FailedError as error:
-                    return here, str(error)
-        return here, TOO_MANY
+    def _walk(self, here: Stand, path: Path, time: float, drives: Array) -> StepWalk:
+        """Return the walk to a time, by the present rows."""
 
-    def _part(self, here: Stand, path: Path, time: float) -> Stand:
-        """Go a part of the way to a time that could not be reached, the longest that can be along
-        with its half (see `longest`).
+        def reach(at: Stand, to: float) -> Stand:
+            return self.by.reach(at, to, drives if to == time else self._drives(path, to), self.tol)
 
-        Raises:
-            FailedError: there is none.
-        """
-        last, longer = FailedError(), None
-        for k in range(1, HALVINGS + 1):
-            part = here.time + (time - here.time) * 0.5**k
-            try:
-                found = self.by.reach(here, part, self._drives(path, part), self.tol)
-            except FailedError as error:
-                last, longer = error, None
-                continue
-            if longer is not None:
-                return longer
-            longer = found
-        raise last
+        return StepWalk(here, time, reach, lambda at: self._by_better_rows(at, path))
 
     def _certain(self, followed: Iterable[tuple[Stand, int]]) -> Iterator[tuple[Stand, int]]:
         """Samples, each as soon as the motion stands there, without those that residuals leave
@@ -234,6 +215,7 @@ class _Sweep:
                 f" {where}"
             )
             self.messages.append(f"refused at {len(self.refused)} samples {why}; keep away from it")
+            self.failures.append(FailureKind.UNCERTAIN)
 
     def _by_better_rows(self, here: Stand, path: Path) -> Stand:
         """Where it stands; by other rows, where its own are much nearer to singular than they were
@@ -252,9 +234,10 @@ class _Sweep:
     def _drives(self, path: Path, time: float) -> Array:
         return self.model.drives(path, np.array([time]))[:, 0]
 
-    def _end(self, here: Stand, path: Path, times: Array, k: int, reason: str) -> None:
+    def _end(self, here: Stand, path: Path, times: Array, k: int, failure: PoseFailure) -> None:
         self.smallest_pivot = min(self.smallest_pivot, here.pivot)
-        reason += f"; smallest pivot there {here.pivot:.3g} (zero at a lock-up or dead centre)"
+        reason = str(replace(failure, pivot=here.pivot))
+        self.failures.append(failure.kind)
         self.messages.append(
             path.ended(here.time, float(times[k]), float(times[k - 1]) if k else None, reason)
         )
@@ -296,4 +279,5 @@ class _Sweep:
                 )
                 for k, name in enumerate(self.bodies.names)
             },
+            failures=self.failures,
         )

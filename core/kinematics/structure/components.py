@@ -17,6 +17,7 @@ import numpy as np
 
 from ...algebra import ZERO, vec
 from ...errors import SolveError
+from ...failures import FailureKind
 from ...joints import Joint, Kind
 from ...mechanism.drivers import Driver, JointDriver, PointCoordinate
 from ...mechanism.mechanism import GROUND, Body, Mechanism, Point, Vector
@@ -162,7 +163,8 @@ def _order(mechanism: Mechanism, formulation: Cartesian) -> list[tuple[str, ...]
     if min(row_of) < 0:
         raise SolveError(
             f"mechanism {mechanism.name!r}: its rows cannot be matched with its unknowns; it is not"
-            " driven enough"
+            " driven enough",
+            FailureKind.FREE,
         )
     # a joint's own coordinate goes to the body with which its joint is solved
     owner = {
@@ -277,7 +279,8 @@ def select_section(mechanism: Mechanism, frame: Frames, formulation: Formulation
         raise SolveError(
             f"a component with the joints {', '.join(joint.type for joint in mechanism.joints)} can"
             f" still move at the design position (rank {len(kept)} of {formulation.unknowns}):"
-            " lock-up, dead centre or too few drivers; shift the design"
+            " lock-up, dead centre or too few drivers; shift the design",
+            FailureKind.LOCKED,
         )
     taken = set(kept)
     dropped = tuple(k for k in range(len(matrix)) if k not in taken)

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import SolveError
+from ...failures import FailureKind
 from ...mechanism.mechanism import Mechanism
 from ...trajectory import Array
 from ..formulation.cartesian import COLUMNS, Cartesian
@@ -126,11 +127,12 @@ def driven_account(mechanism: Mechanism, frame: Frames) -> FreedomAccount:
     """
     if not mechanism.moving:
         raise SolveError(
-            f"mechanism {mechanism.name!r}: no body can move; declare a body that is not fixed"
+            f"mechanism {mechanism.name!r}: no body can move; declare a body that is not fixed",
+            FailureKind.OVERDRIVEN,
         )
     found = account(mechanism, frame)
     if found.dof != len(mechanism.drivers):
-        raise SolveError(_mismatch(mechanism, frame, found))
+        raise SolveError(_mismatch(mechanism, frame, found), imbalance(mechanism, found.dof))
     return found
 
 
@@ -149,7 +151,7 @@ def select_rows(
     matrix = jacobian(formulation)
     kept = wanted or independent_rows(matrix, drivers, formulation.conditions)
     if len(kept) < formulation.unknowns:
-        raise SolveError(_locked(mechanism, formulation, matrix))
+        raise SolveError(_locked(mechanism, formulation, matrix), FailureKind.LOCKED)
     taken = set(kept)
     dropped = tuple(k for k in range(len(matrix)) if k not in taken)
     names = row_names(formulation)
@@ -197,6 +199,11 @@ def mismatch(mechanism: Mechanism, dof: int, unknowns: int) -> str:
         f"mechanism {mechanism.name!r}: {dof} degree{'s' * (dof != 1)} of freedom ({unknowns}"
         f" coordinates - rank {unknowns - dof}) but {drivers} driver{'s' * (drivers != 1)}"
     )
+
+
+def imbalance(mechanism: Mechanism, dof: int) -> FailureKind:
+    """Return the kind of a mismatch between degrees of freedom and drivers."""
+    return FailureKind.FREE if dof > len(mechanism.drivers) else FailureKind.OVERDRIVEN
 
 
 def _mismatch(mechanism: Mechanism, frame: Frames, found: FreedomAccount) -> str:

@@ -26,7 +26,7 @@ from ...mechanism.mechanism import Mechanism
 from ...trajectory import Array
 from ..formulation.cartesian import COLUMNS, Cartesian
 from ..formulation.constraints import frames, measured
-from .degrees_of_freedom import account, driven_account, mismatch
+from .degrees_of_freedom import account, driven_account, imbalance, mismatch
 from .redundancy import RANK_TOLERANCE
 from .sparse_lu import NARROW
 
@@ -53,7 +53,8 @@ def require_driven(mechanism: Mechanism) -> None:
     found = _balance(mechanism)
     if found.dof != len(mechanism.drivers):
         raise SolveError(
-            f"{mismatch(mechanism, found.dof, found.formulation.unknowns)}; {found.remedy}"
+            f"{mismatch(mechanism, found.dof, found.formulation.unknowns)}; {found.remedy}",
+            imbalance(mechanism, found.dof),
         )
 
 

@@ -79,7 +79,8 @@ def check_engine(
     records = {record.case: record for record in results.records}
     found += [_compared(name, records[case.name]) for name, case in cases.items()]
     found += rates([(case, records[case.name]) for case in cases.values()])
-    found += [_folded(refused[BEYOND], records), _unknown(records[refused[UNKNOWN].name])]
+    beyond = refused[BEYOND].name
+    found += [_folded(records[beyond], answers[beyond]), _unknown(records[refused[UNKNOWN].name])]
     again = [Pair(case, engine, tol, timed=False) for case in reversed(cases.values())]
     found.append(_same("determinism", again, answers, in_workers(1, limits or Limits())))
     if may_run_here(engine):
@@ -133,18 +134,18 @@ def _compared(name: str, record: Record) -> Finding:
     return Finding(name, verdict, worst, limit, why, row=where, message=told)
 
 
-def _folded(case: Case, records: Mapping[str, Record]) -> Finding:
+def _folded(record: Record, attempt: Attempt) -> Finding:
     """Check that samples behind a fold have no values, and that the message says why."""
-    record = records[case.name]
     if record.outcome is Outcome.UNSUPPORTED:
         return Finding(BEYOND, Verdict.SKIP, message=record.message)
     beyond = sum(each.contradicted or 0 for each in record.errors.values())
     reached = record.solved or 0
+    silent = isinstance(attempt.result, Answer) and not attempt.result.message
     problems = [
         f"ends with {record.outcome.shown}: {record.message}" if record.solved is None else "",
         "has values at samples that cannot be reached; mark them unsolved" if beyond else "",
         "" if reached else "reaches no sample, though the design is among them",
-        "" if "does not say why" not in record.message else "gives no message",
+        "gives no message" if silent else "",
     ]
     told = "; ".join(filter(None, problems))
     return Finding(

@@ -19,6 +19,7 @@ from ...harness.standard import STANDARD
 from ...harness.verdict import excess
 from ...joints import Joint
 from ...kinematics import solve
+from ...mechanism.equivalents import declared_equivalent, with_equivalents
 from ...trajectory import Array, Trajectory
 from ..findings import Finding, Verdict, judged
 from .checks import ROUND_OFF
@@ -143,14 +144,10 @@ def _equivalent(case: Case) -> Case | None:
     if it has none.
     """
     tested = next(joint for joint in case.mechanism.joints if joint.type == case.name)
-    offered = getattr(tested, "equivalent", None)
-    if offered is None:
+    if declared_equivalent(tested) is None:
         return None
-    bodies, joints = offered()
-    others = [joint for joint in case.mechanism.joints if joint is not tested]
-    mechanism = replace(
-        case.mechanism, bodies=[*case.mechanism.bodies, *bodies], joints=[*others, *joints]
-    )
+    known = {*Joint.registry.values()} - {type(tested)}
+    mechanism = with_equivalents(case.mechanism, known)
     return replace(case, name=f"{case.name}_equivalent", mechanism=mechanism)
 
 
@@ -163,7 +160,12 @@ def _simulated(
     name = f"loop: {engine.name}"
     if engine.version() is None:
         return Finding(name, Verdict.SKIP, message="not installed")
-    reason = engine.unsupported(case)
+    try:
+        reason = engine.unsupported(case)
+    except Exception as error:  # any error of the joint's own equivalent, or of an engine
+        if isinstance(other, str):
+            return Finding(name, Verdict.SKIP, message=other)
+        return Finding(name, Verdict.FAIL, message=f"{type(error).__name__}: {error}")
     chosen = case
     if reason is not None:
         if isinstance(other, str):
@@ -178,7 +180,8 @@ def _simulated(
     except Exception as error:  # any error of a simulator
         return Finding(name, Verdict.FAIL, message=f"{type(error).__name__}: {error}")
     found = _compared(name, chosen, solved, reference)
-    how = "on the joint itself" if chosen is case else "on the equivalent"
+    itself = chosen is case and "equivalents" not in solved.details
+    how = "on the joint itself" if itself else "on the equivalent"
     return replace(found, message="; ".join(part for part in (how, found.message) if part))
 
 

@@ -51,7 +51,7 @@ class Made:
     samples: int
     specimen: Specimen
     case: Case | None
-    refusal: str
+    refusal: KincheckError | None
     truth: Truth | None
 
 
@@ -159,8 +159,8 @@ def specimen(family: Family, seed: int, number: int, most: int) -> Made:
     try:
         case = one.describe()
     except KincheckError as error:
-        return Made(number, samples, one, None, str(error), None)
-    return Made(number, samples, one, case, "", one.truth(case) if one.truth else None)
+        return Made(number, samples, one, None, error, None)
+    return Made(number, samples, one, case, None, one.truth(case) if one.truth else None)
 
 
 def _solve(family: Family, engine: Engine, made: Sequence[Made], found: _Results) -> None:
@@ -175,7 +175,7 @@ def _solve(family: Family, engine: Engine, made: Sequence[Made], found: _Results
     }
     judgements: list[tuple[Made, Judgement]] = []
     for one in made:
-        if one.number not in results:
+        if one.refusal is not None:
             judgements.append((one, described_wrong(one.specimen, one.samples, one.refusal)))
             continue
         case, answer = results[one.number]

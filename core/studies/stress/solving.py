@@ -72,8 +72,8 @@ def once(pair: Pair) -> Answer | Failure:
         trajectory = engine.solve(engine.build(case), case, pair.tol)
         check(case, engine.name, trajectory)
     except KincheckError as error:
-        return Failure(Outcome.ERROR, str(error))
-    except Exception as error:  # a defect, judged by its text
+        return Failure(Outcome.ERROR, str(error), kind=error.kind)
+    except Exception as error:  # a defect
         return Failure(Outcome.ERROR, said(error))
     return Answer(
         outputs={output.name: output_series(case, output, trajectory) for output in case.outputs},
@@ -82,4 +82,5 @@ def once(pair: Pair) -> Answer | Failure:
         residual=float(trajectory.residual),
         message=bounded(trajectory.message),
         details=plain(trajectory.facts),
+        failures=trajectory.failures,
     )

@@ -4,8 +4,7 @@ or silently wrong.
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -13,10 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...case.case import Case
+from ...errors import KincheckError
+from ...failures import FailureKind
 from ...harness.execution import Answer, Failure
 from ...harness.record import Outcome
 from ...trajectory import QUANTITIES, Array
-from .families import Specimen
+from .families.base import MOTION_ENDS, Specimen
 from .truth.reference_motion import Reach, Truth
 
 
@@ -34,11 +35,6 @@ class Verdict(StrEnum):
 BAD = (Verdict.SILENTLY_WRONG, Verdict.REFUSED_WRONGLY)
 """The bad verdicts, the worst first."""
 
-# A refusal at or behind a singular pose, or beyond the end of the motion, is right if its message
-# has any of these words.
-THE_MOTION_ENDS = (
-    r"lock-up|dead centre|singular|bifurcat|beyond|out of reach|not assemble|contradict"
-)
 # A larger error, relative to the mechanism's size, is another assembly or none, not a lack of
 # digits.
 ELSEWHERE = 1e-3
@@ -78,12 +74,13 @@ class Judgement:
         return int(found[0]) if len(found) else None
 
 
-def described_wrong(specimen: Specimen, samples: int, message: str) -> Judgement:
+def described_wrong(specimen: Specimen, samples: int, error: KincheckError) -> Judgement:
     """Return the judgement of a specimen whose description was refused; it is the same
     for every engine.
     """
-    right = specimen.truth is None and re.search(specimen.reasons, message)
-    return _all(samples, Verdict.REFUSED_RIGHTLY if right else Verdict.REFUSED_WRONGLY, message)
+    right = specimen.truth is None and error.kind in specimen.reasons
+    verdict = Verdict.REFUSED_RIGHTLY if right else Verdict.REFUSED_WRONGLY
+    return _all(samples, verdict, str(error))
 
 
 def judged(
@@ -98,10 +95,11 @@ def judged(
             return _all(n, Verdict.UNSUPPORTED, result.message)
         if result.outcome is not Outcome.ERROR:  # a crash or a hang is no valid refusal
             return _all(n, Verdict.REFUSED_WRONGLY, result.message)
-        return _refused(specimen, truth, n, result.message)
+        kinds = [] if result.kind is None else [result.kind]
+        return _refused(specimen, truth, n, kinds, result.message)
     positions = {name: _moved(result, name, "position") for name in case.points}
     solved = np.logical_and.reduce([np.isfinite(each).all(axis=1) for each in positions.values()])
-    verdicts = _refused(specimen, truth, n, result.message).verdicts
+    verdicts = _refused(specimen, truth, n, result.failures, result.message).verdicts
     if truth is None:
         verdicts[solved] = Verdict.SILENTLY_WRONG
         return Judgement(verdicts, message=result.message, elsewhere=int(solved.sum()))
@@ -144,10 +142,16 @@ def judged(
     )
 
 
-def _refused(specimen: Specimen, truth: Truth | None, n: int, message: str) -> Judgement:
-    """Return the judgement of a refusal of all samples, by its reason."""
-    named = bool(specimen.reasons and re.search(specimen.reasons, message))
-    ended = bool(re.search(THE_MOTION_ENDS, message))
+def _refused(
+    specimen: Specimen,
+    truth: Truth | None,
+    n: int,
+    kinds: Collection[FailureKind],
+    message: str,
+) -> Judgement:
+    """Return the judgement of a refusal of all samples, by its reasons."""
+    named = not specimen.reasons.isdisjoint(kinds)
+    ended = not MOTION_ENDS.isdisjoint(kinds)
     if truth is None:
         right = np.full(n, named)
     else:

@@ -1,3 +1,3 @@
-"""MJCF: models of MuJoCo, closed by equalities, onto mechanisms; what has no meaning for kinematics
-is listed, not read.
+"""MJCF: models of MuJoCo, closed by equalities, onto mechanisms; elements without meaning for
+kinematics are listed, not read.
 """

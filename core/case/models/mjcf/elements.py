@@ -1,7 +1,7 @@
 """Elements of an XML file somebody wrote: attributes and lines, no entities, no document types, a
 bounded depth.
 
-Every element is read once, by taking what it has; attributes that MJCF does not know are refused,
+Every element is read once, by taking its attributes; attributes unknown to MJCF are refused,
 because a mistyped one would silently fall back to its default.
 """
 

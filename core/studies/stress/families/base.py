@@ -13,6 +13,7 @@ import numpy as np
 
 from ....case.case import Case, Sweep, Truth
 from ....case.io.coordinates import with_all_coordinates
+from ....failures import FailureKind
 from ....mechanism.mechanism import Mechanism
 from ....mechanism.motions import Motion
 from ....trajectory import Array
@@ -21,6 +22,27 @@ from ..truth.reference_motion import followed
 
 TOL = 1e-12
 """Largest accepted residual, as of `kincheck run`."""
+
+# A refusal at or behind a singular pose, or beyond the end of the motion, is right for any of these
+# reasons: Newton's iteration finds no pose there, or one of another motion.
+MOTION_ENDS = frozenset(
+    {
+        FailureKind.LOCKED,
+        FailureKind.DIVERGED,
+        FailureKind.NOT_CONVERGED,
+        FailureKind.NOT_SETTLED,
+        FailureKind.NOT_FOUND,
+        FailureKind.NO_POSE,
+        FailureKind.CONTRADICTORY,
+        FailureKind.WRONG_BRANCH,
+        FailureKind.OTHER_ASSEMBLY,
+        FailureKind.LONG_STEP,
+        FailureKind.SINGULAR_AHEAD,
+        FailureKind.SINGULAR_ROWS,
+        FailureKind.DEAD_CENTRE,
+        FailureKind.UNCERTAIN,
+    }
+)
 
 Rng = np.random.Generator
 
@@ -33,8 +55,7 @@ class Specimen:
         describe: makes the case; may refuse to (KincheckError), which is the outcome for every
             engine then.
         truth: of the case; None where no sample makes sense and every answer is wrong.
-        reasons: what a right refusal speaks of (a regular expression), beyond singular poses and
-            the end of the motion.
+        reasons: kinds of failures that are right, beyond singular poses and the end of the motion.
         excused: whether it may be refused for these reasons though solutions exist.
         reported: whether an answer must report what the geometry contradicts itself by
             (`Known.violated`).
@@ -45,7 +66,7 @@ class Specimen:
     describe: Callable[[], Case]
     truth: Callable[[Case], Known] | None = followed
     tol: float = TOL
-    reasons: str = ""
+    reasons: frozenset[FailureKind] = frozenset()
     excused: bool = False
     reported: bool = False
     facts: tuple[tuple[str, float], ...] = ()

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ....case.case import Case
+from ....failures import FailureKind
 from ....joints import (
     ConstantVelocity,
     Distance,
@@ -24,11 +25,17 @@ from ....joints import (
 from ....mechanism.drivers import JointAngle, PointCoordinate
 from ....mechanism.mechanism import GROUND, Body, Mechanism, Point
 from ..truth.reference_motion import followed
-from .base import Family, Rng, Specimen, as_case, direction, triple
+from .base import MOTION_ENDS, Family, Rng, Specimen, as_case, direction, triple
 from .dimensions import crank_rocker
 from .planar import any_plane, four_bar, slider_crank
 
 Values = np.ndarray[Any, Any]
+
+NOT_FINITE = frozenset({FailureKind.NOT_FINITE})
+NO_LENGTH = frozenset({FailureKind.NO_LENGTH})
+WRONG_ANGLE = frozenset({FailureKind.WRONG_ANGLE})
+FREE = frozenset({FailureKind.FREE})
+NOT_CLOSED = frozenset({FailureKind.NOT_CLOSED, FailureKind.NO_POSE})
 
 
 class Degenerate(Family):
@@ -46,7 +53,7 @@ class Degenerate(Family):
         make, reasons = (
             WRONG[int(rng.integers(len(WRONG)))]
             if rng.random() < 0.7
-            else (SOUND[int(rng.integers(len(SOUND)))], "")
+            else (SOUND[int(rng.integers(len(SOUND)))], frozenset[FailureKind]())
         )
         values = np.linspace(-0.5, 0.5, samples)
         name = make.__name__.strip("_").replace("_", " ")
@@ -163,23 +170,23 @@ def _same_ball_twice(rng: Rng) -> Mechanism:
     return replace(found, joints=[*found.joints, Spherical("again", "a", "b", p)])
 
 
-WRONG: tuple[tuple[Callable[[Rng], Mechanism], str], ...] = (
-    (_rod_between_coincident_points, "coincide|0 m"),
-    (_rod_of_length_zero, "length is 0"),
-    (_link_between_coincident_points, "length 0"),
-    (_axis_of_zero, "axis is zero"),
-    (_axis_not_finite, "not finite"),
-    (_point_at_infinity, "not finite"),
-    (_cross_of_parallel_axes, "not perpendicular"),
-    (_shafts_that_turn_back, "cosine"),
-    (_body_that_spins_freely, "free"),
-    (_rocker_of_length_zero, "free|lock-up|dead centre|does not move|beyond|singular"),
-    (_driver_across_the_motion, "dead centre|lock-up|singular|free|does not move"),
-    (_slider_at_its_dead_centre, "dead centre|lock-up|singular|free|does not move|no assembly"),
-    (_rod_too_long_to_close, "does not close|no assembly"),
-    (_same_ball_twice, "free"),
+WRONG: tuple[tuple[Callable[[Rng], Mechanism], frozenset[FailureKind]], ...] = (
+    (_rod_between_coincident_points, NO_LENGTH),
+    (_rod_of_length_zero, NO_LENGTH),
+    (_link_between_coincident_points, NO_LENGTH),
+    (_axis_of_zero, NO_LENGTH),
+    (_axis_not_finite, NOT_FINITE),
+    (_point_at_infinity, NOT_FINITE),
+    (_cross_of_parallel_axes, WRONG_ANGLE),
+    (_shafts_that_turn_back, WRONG_ANGLE),
+    (_body_that_spins_freely, FREE),
+    (_rocker_of_length_zero, FREE | MOTION_ENDS),
+    (_driver_across_the_motion, FREE | MOTION_ENDS),
+    (_slider_at_its_dead_centre, FREE | MOTION_ENDS | NOT_CLOSED),
+    (_rod_too_long_to_close, NOT_CLOSED),
+    (_same_ball_twice, FREE),
 )
-"""What is no mechanism, and what its refusal must speak of."""
+"""Descriptions of no mechanism, and the kinds of their right refusals."""
 
 
 def _crank_of_length_zero(rng: Rng) -> Mechanism:

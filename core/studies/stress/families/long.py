@@ -7,6 +7,7 @@ from functools import partial
 
 import numpy as np
 
+from ....failures import FailureKind
 from ..truth.reference_motion import closed
 from .base import Family, Rng, Specimen, as_case, power
 from .dimensions import crank_rocker
@@ -14,6 +15,15 @@ from .planar import JOINTS_OF_A_LOOP, any_plane, four_bar, four_bar_motion
 from .sizes import linkage
 
 TURNS = 1000
+# Refusals of a tolerance that is too small name the residual.
+BELOW_ROUNDING = frozenset(
+    {
+        FailureKind.BELOW_ROUNDING,
+        FailureKind.NOT_CONVERGED,
+        FailureKind.NOT_SETTLED,
+        FailureKind.NO_POSE,
+    }
+)
 # From one sample to the next: a step is gone in 2,000 parts at most, of which a turn takes some
 # twelve.
 MOST_BETWEEN = 100
@@ -66,12 +76,11 @@ class Tolerances(Family):
         """To be solved as well as can be, or refused by naming the residual that was reached."""
         tol = power(rng, -300.0, -15.0) if rng.random() < 0.2 else power(rng, -20.0, -15.0)
         found = linkage(rng, any_plane(rng), samples)
-        reasons = r"residual .*\d"
         return replace(
             found,
             name=f"{found.name} to {tol:.3g}",
             tol=tol,
-            reasons=reasons,
+            reasons=BELOW_ROUNDING,
             excused=True,
             facts=(("tol", tol),),
         )

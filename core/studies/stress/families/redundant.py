@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ....case.case import Case
+from ....failures import FailureKind
 from ....mechanism.mechanism import Mechanism
 from ..truth.newton_kantorovich import LANES, System
 from ..truth.reference_motion import Motion, Truth, closed, closed_poses
@@ -18,6 +19,17 @@ from .planar import any_plane, four_bar, four_bar_motion
 
 # Directions are given to 1e-16, and what redundant rows make of that is no contradiction.
 ROUNDED = 1e-14
+
+CONTRADICTIONS = frozenset(
+    {
+        FailureKind.CONTRADICTORY,
+        FailureKind.DEAD_CENTRE,
+        FailureKind.FREE,
+        FailureKind.NO_POSE,
+        FailureKind.OVERDRIVEN,
+    }
+)
+"""Right refusals of a loop whose hinges are not parallel."""
 
 
 class Redundant(Family):
@@ -43,7 +55,7 @@ class Redundant(Family):
             f"four_bar, one hinge off by {tilt:.2g} rad",
             partial(as_case, mechanism, "turn", values),
             partial(_tilted, sound=sound, motion=four_bar_motion(plane, *points), tilt=tilt),
-            reasons=r"contradict|degrees? of freedom|left free|redundant",
+            reasons=CONTRADICTIONS,
             excused=tilt > ROUNDED,
             reported=True,
             facts=(("tilt", tilt),),

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ....failures import FailureKind
 from ....joints import Cylindrical, Distance, Joint, Revolute, Spherical, Translational, Universal
 from ....mechanism.drivers import JointAngle, JointDisplacement
 from ....mechanism.mechanism import GROUND, Body, Mechanism, Point
@@ -185,7 +186,7 @@ def _platform(rng: Rng, samples: int) -> Specimen:
         f"platform off by {off:.2g} from its singular shape",
         partial(as_case, mechanism, "stroke", np.linspace(-0.05, 0.05, samples)),
         followed,
-        reasons="degrees of freedom",
+        reasons=frozenset({FailureKind.FREE, FailureKind.OVERDRIVEN}),
         excused=off < UNTOLD,
         facts=(("off", off),),
     )

@@ -1,0 +1,68 @@
+"""The walk of a sparse system to one sample."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from ...failures import PoseFailure
+from ..continuation.step_halving import HALVINGS, Walk
+from .sparse_equations import PoseError
+from .step_state import Stand
+
+
+class StepWalk(Walk):
+    """The walk to a time, from where the motion stands.
+
+    Args:
+        here: where it stands.
+        time: of the sample [s].
+        reach: goes from there to a time, or raises PoseError.
+        improve: changes to better rows where it stands, or raises PoseError.
+
+    Attributes:
+        here: where it stands now.
+    """
+
+    def __init__(
+        self,
+        here: Stand,
+        time: float,
+        reach: Callable[[Stand, float], Stand],
+        improve: Callable[[Stand], Stand],
+    ) -> None:
+        self.here, self.time, self.reach, self.improve = here, time, reach, improve
+
+    def follow(self, at: int, stop: int, parts: int) -> int:
+        """Follow the step, or the rest of it."""
+        try:
+            self.here = self.reach(self.here, self.time)
+        except PoseError:
+            return at
+        return stop
+
+    def follow_part(self, at: int) -> PoseFailure | None:
+        """Follow the longest part that succeeds, and change to better rows there."""
+        try:
+            self.here = self.improve(self._part())
+        except PoseError as error:
+            return error.failure
+        return None
+
+    def _part(self) -> Stand:
+        """Return the end of the longest part that succeeds along with its half (see `longest`).
+
+        Raises:
+            PoseError: there is none.
+        """
+        here, last, longer = self.here, None, None
+        for k in range(1, HALVINGS + 1):
+            try:
+                found = self.reach(here, here.time + (self.time - here.time) * 0.5**k)
+            except PoseError as error:
+                last, longer = error, None
+                continue
+            if longer is not None:
+                return longer
+            longer = found
+        assert last is not None  # no two parts in a row succeeded
+        raise last

@@ -1,0 +1,149 @@
+"""A joint type declared in one file, this one, in every engine: the native one takes its
+primitives, the simulators its equivalent.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from kincheck import adapters
+from kincheck.core import Body, Joint, JointAngle, Mechanism, Point, Revolute, Translational
+from kincheck.core import primitives as p
+from kincheck.core.algebra import ZERO, cross, vec
+from kincheck.core.case.case import Case, Output, Sweep, Truth
+from kincheck.core.case.io.model_writer import written
+from kincheck.core.joints import Planar
+from kincheck.core.joints.base import directions, position, triad, unit
+from kincheck.core.mechanism.equivalents import with_equivalents
+
+UP, ALONG = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
+CRANK, PIVOT, REACH, RATE = 0.3, -1.0, 1.4, 2.0
+
+
+@dataclass(frozen=True)
+class Slotted(Joint):
+    """Body i has a slot along the first axis; a pin of body j, about the second, slides and turns
+    in it.
+    """
+
+    freedoms = ("slide", "turn")
+    symmetric = False
+    point: tuple[float, float, float] = position()
+    axes: tuple[tuple[float, float, float], tuple[float, float, float]] = directions()
+
+    def primitives(self, i, j):
+        P, (slot, pin) = vec(self.point), map(unit, self.axes)
+        sides = (p.Dot20(a, i.arm(P), j.arm(P), ZERO) for a in (unit([*cross(pin, slot)]), pin))
+        return p.Dot11(*triad([*pin])), *sides
+
+    def equivalent(self):
+        block, (slot, pin) = f"{self.name}_block", self.axes
+        return [Body(block)], [
+            Translational(f"{self.name}_slot", self.i, block, self.point, slot),
+            Revolute(f"{self.name}_pin", block, self.j, self.point, pin),
+        ]
+
+
+Slotted.type = "slotted"  # set here, it is not registered for case files
+
+
+def quick_return(joint=Slotted):
+    """Whitworth's mechanism: the pin of a crank slides in the slot of a rocker."""
+    mechanism = Mechanism(
+        "quick_return",
+        [Body("crank"), Body("rocker")],
+        [
+            Revolute("pivot", "ground", "crank", (0.0, 0.0, 0.0), UP),
+            Revolute("bearing", "ground", "rocker", (PIVOT, 0.0, 0.0), UP),
+            joint("slot", "rocker", "crank", (CRANK, 0.0, 0.0), (ALONG, UP)),
+        ],
+        [Point("tip", "rocker", (PIVOT + REACH, 0.0, 0.0))],
+        [JointAngle("turn", "pivot")],
+    )
+    outputs = (Output("x", "tip", ALONG, False, 0.0, 0.0, ""),)
+    sweep = Sweep("turn", np.linspace(-1.5, 2.0, 36), RATE)
+    return Case("quick_return", "test", Truth.CLOSED_FORM, mechanism, sweep, outputs)
+
+
+def motion():
+    """Position, velocity and acceleration of the tip, by complex numbers."""
+    turned = CRANK * np.exp(1j * np.linspace(-1.5, 2.0, 36))
+    arm, rate, rate_t = turned - PIVOT, 1j * RATE * turned, -(RATE**2) * turned
+    ratio = rate / arm
+    spin, spin_t = ratio.imag, (rate_t / arm - ratio**2).imag
+    e = REACH * arm / abs(arm)
+    found = PIVOT + e, 1j * spin * e, (1j * spin_t - spin**2) * e
+    return [np.stack([z.real, z.imag, 0.0 * z.real], axis=1) for z in found]
+
+
+def solved(engine, case):
+    if engine.version() is None:
+        pytest.skip("not installed")
+    assert engine.unsupported(case) is None
+    found = engine.solve(engine.build(case), case, 1e-12)
+    assert found.solved.all(), found.message
+    tip = found.points["tip"]
+    return found, [tip.position, tip.velocity, tip.acceleration]
+
+
+@pytest.mark.parametrize("name", adapters.ENGINES)
+def test_a_joint_of_one_file_is_solved_by_every_engine(name):
+    found, series = solved(adapters.engine(name), quick_return())
+    for values, right, atol in zip(series, motion(), (1e-12, 1e-11, 1e-10), strict=True):
+        np.testing.assert_allclose(values, right, atol=atol)
+    expected = None if name == "native" else {"slot": ["translational", "revolute"]}
+    assert found.details.get("equivalents") == expected
+
+
+@pytest.mark.parametrize(("name", "atol"), [("mujoco", 1e-4), ("exudyn-static", 1e-9)])
+def test_a_simulator_simulates_the_equivalent(name, atol):
+    _, series = solved(adapters.engine(name, "simulate"), quick_return())
+    np.testing.assert_allclose(series[0], motion()[0], atol=atol)
+
+
+@pytest.mark.parametrize("name", adapters.WRITERS)
+def test_a_written_model_has_the_equivalent(name):
+    assert "slot_block" in "".join(written(quick_return(), adapters.writer(name)).values())
+
+
+def test_a_subclass_with_other_primitives_inherits_no_equivalent():
+    class Narrow(Slotted):
+        """A pin that does not turn in the slot."""
+
+        def primitives(self, i, j):
+            return *super().primitives(i, j), p.Dot10(*map(unit, self.axes))
+
+    class Renamed(Slotted):
+        """The same joint under another name."""
+
+    engine = adapters.engine("mujoco")
+    assert "has no counterpart in MuJoCo" in engine.unsupported(quick_return(Narrow))
+    assert engine.unsupported(quick_return(Renamed)) is None
+
+
+def test_equivalents_have_equivalents():
+    class Nested(Slotted):
+        """A slot whose equivalent is a slot."""
+
+        def equivalent(self):
+            return [], [Slotted(self.name, self.i, self.j, self.point, self.axes)]
+
+    class Circular(Slotted):
+        """A slot whose equivalent is itself."""
+
+        def equivalent(self):
+            return [], [replace(self, name=f"{self.name}_again")]
+
+    known = {Revolute, Translational}
+    types = [
+        [each.type for each in with_equivalents(quick_return(kind).mechanism, known).joints[2:]]
+        for kind in (Nested, Circular)
+    ]
+    assert types == [["translational", "revolute"], ["slotted"]]
+
+
+def test_known_joints_stay():
+    mechanism = quick_return().mechanism
+    assert with_equivalents(mechanism, {Slotted, Revolute}) is mechanism
+    unlike = quick_return(lambda *given: Planar(*given[:4], UP)).mechanism
+    assert with_equivalents(unlike, {Revolute}) is unlike
