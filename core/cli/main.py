@@ -19,6 +19,7 @@ from ..errors import KincheckError
 from ..harness.interrupts import Terminated, listening, status_of, words_of
 from ..version import VERSION
 from . import COMMANDS
+from .parser import Parser
 
 if TYPE_CHECKING:
     from .registry import House
@@ -140,15 +141,16 @@ def house() -> House:
         cases.names,
         cases.load,
         *writers,
+        cases.summary,
         tuple(adapters.SIMULATIONS),
     )
 
 
-def _parser(argv: Sequence[str]) -> argparse.ArgumentParser:
+def _parser(argv: Sequence[str]) -> Parser:
     """Return the parser of the command that the arguments begin with, or of all commands. Each
     takes a millisecond to build.
     """
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="kincheck", description="Cross-validation of the kinematics of multibody systems."
     )
     parser.add_argument("--version", action="version", version=f"kincheck {VERSION}")

@@ -18,7 +18,7 @@ Describe:
     start_of, solve_from_start, notes_on_start      the start of the samples on a path
     degrees_of_freedom, require_driven              drivers against degrees of freedom
     kinds, places, placed                           the geometry by name
-    Ranks, conditioning, describe_screws            rank, conditioning and screws at a pose
+    Ranks, freeing, conditioning, describe_screws   rank, conditioning and screws at a pose
     prove, prove_pose                               samples and poses enclosed in balls
     constraints, Cartesian, Frames, Relation        the equations of joints and drivers
     continued, continuous, regular_between          tests of a step
@@ -60,6 +60,7 @@ if TYPE_CHECKING:
     from .diagnosis.conditioning import Conditioning as Conditioning
     from .diagnosis.conditioning import PoseConditioning as PoseConditioning
     from .diagnosis.conditioning import conditioning as conditioning
+    from .diagnosis.freeing import freeing as freeing
     from .diagnosis.instantaneous_screws import Screw as Screw
     from .diagnosis.instantaneous_screws import describe_screws as describe_screws
     from .diagnosis.position_gradients import Gradient as Gradient
@@ -116,6 +117,7 @@ _NAMES = {
     "design_batch": "Variants",
     "design_sweep": "Designs solve_designs",
     "diagnosis.conditioning": "Conditioning PoseConditioning conditioning",
+    "diagnosis.freeing": "freeing",
     "diagnosis.instantaneous_screws": "Screw describe_screws",
     "diagnosis.position_gradients": "Gradient",
     "diagnosis.rank": "Blocked ComponentCount Dependency NamedRow Ranks Violation",

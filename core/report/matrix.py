@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from typing import TextIO
 
-from rich.table import Table
 from rich.text import Text
 
 from ..case.io.escape import visible
@@ -14,6 +13,7 @@ from ..harness.labels import against, motion_unit, notes, signs, suspects, unrea
 from ..harness.record import Outcome, Record, Results
 from ..trajectory import QUANTITIES
 from . import terminal
+from .fitting_table import FittingTable
 from .markdown import code, escaped, row
 from .table import COLOURS, LENGTH, messages, print_messages, print_signs, worst
 
@@ -26,13 +26,7 @@ def print_matrix(results: Results, file: TextIO) -> None:
     """
     console = terminal.console(file)
     print_signs(results.run, console)
-    table = Table(
-        box=None,
-        pad_edge=False,
-        header_style="bold",
-        caption=Text(visible(_reading(results))),
-        caption_justify="left",
-    )
+    table = FittingTable(caption=Text(visible(_reading(results))))
     table.add_column("case", overflow="fold")
     engines, rows = _laid_out(results)
     for engine in engines:
