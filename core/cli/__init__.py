@@ -22,5 +22,6 @@ COMMANDS = (
     "history",
     "report",
     "stress",
+    "completion",
 )
 """Modules of the commands, in the order of the help."""

@@ -12,7 +12,7 @@ def freeing(ranks: Ranks) -> tuple[list[str], int]:
     """Return the joints and couplers of which any one, taken out alone, frees all blocked drivers,
     and the number of motions that are free then with the drivers held.
 
-    Of all that free the drivers, those that leave the fewest motions free. No names where none does.
+    Of all that free the drivers, those that leave the fewest motions free; none if none frees them.
     """
     joints, drives = ranks.matrix[: ranks.joint_rows], ranks.matrix[ranks.joint_rows :]
     owners = [row.owner for row in ranks.rows[: ranks.joint_rows]]

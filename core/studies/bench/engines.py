@@ -111,8 +111,7 @@ def measure(
         cases: by name as on the command line; at least one.
         engines: in both modes.
         tol: largest accepted constraint residual, as for `Engine.solve`.
-        tell: called with the name of each measurement, and the finished part of the work, from 0 to
-            1; every measurement is taken for equally long.
+        tell: called with the name of each measurement and the finished part of all, from 0 to 1.
 
     Raises:
         KincheckError: a case has no reference and cannot be given one.

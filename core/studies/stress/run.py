@@ -76,9 +76,8 @@ def stress(
 ) -> tuple[Stress, list[Example]]:
     """Run all families; return the results and the smallest example of each bad engine and outcome.
 
-    `prove` proves a share of the followed samples and needs python-flint. `tell` is called with
-    what is done next and the finished part of the work. A KincheckError is raised if this machine
-    has no extended precision.
+    `prove` proves a share of the followed samples and needs python-flint. `tell` gets what is done
+    next and the finished part. A KincheckError is raised if this machine has no extended precision.
     """
     require_extended()
     found, seconds = _Results(), {"truth": 0.0, "proofs": 0.0, "engines": 0.0}
