@@ -6,7 +6,6 @@ import argparse
 from collections.abc import Iterable
 from typing import Any
 
-from ..extras import library
 from .registry import House, Status
 
 SHELLS = ("bash", "zsh", "tcsh")
@@ -40,11 +39,12 @@ def _complete(options: argparse.Namespace, house: House) -> int:
     """Print the script that completes commands, options, built-in cases, engines and files. Make it
     anew after an update.
     """
+    import shtab
+
     from ..case.models.hardpoints.templates import TEMPLATES
     from ..studies.stress.families import Family
     from .main import parser
 
-    shtab = library("kincheck completion", "shtab", "completion")
     names = {
         **{each: [*dict.fromkeys((*house.engines, *house.simulations))] for each in ENGINES},
         "family": [*Family.registry],
