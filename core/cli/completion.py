@@ -67,8 +67,9 @@ def _complete(options: argparse.Namespace, house: House) -> int:
                 action.complete = shtab.DIRECTORY  # pyright: ignore[reportAttributeAccessIssue]
             elif action.choices is None:
                 action.choices = names.get(action.dest)
-    preamble = PREAMBLE[options.shell].format(names=" ".join(house.cases()))
-    print(shtab.complete(found, options.shell, preamble={options.shell: preamble}))
+    # a dictionary by shell, which the library's types do not say
+    preamble: Any = {options.shell: PREAMBLE[options.shell].format(names=" ".join(house.cases()))}
+    print(shtab.complete(found, options.shell, preamble=preamble))
     return Status.WITHIN
 
 
