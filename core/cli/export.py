@@ -14,7 +14,13 @@ from . import import_options
 from .option_types import number
 from .registry import House, Status
 
-FORMATS = {"mjcf": "MuJoCo", "exudyn": "a Python script", "urdf": "Pinocchio"}
+FORMATS = {
+    "mjcf": "MuJoCo",
+    "exudyn": "a Python script",
+    "urdf": "Pinocchio",
+    "sdf": "Drake",
+    "osim": "Simbody, by OpenSim",
+}
 """Formats of the adapters' writers, for help texts: adapters load later. A test compares both."""
 
 

@@ -23,7 +23,7 @@ class FittingTable(Table):
     it the others with their heads.
     """
 
-    def __init__(self, *, title: str | None = None, caption: Text | None = None) -> None:
+    def __init__(self, *, title: str | None = None) -> None:
         super().__init__(
             box=None,
             pad_edge=False,
@@ -31,8 +31,6 @@ class FittingTable(Table):
             title=title,
             title_justify="left",
             title_style="bold",
-            caption=caption,
-            caption_justify="left",
         )
 
     def natural_width(self, console: Console, options: ConsoleOptions) -> int:
@@ -55,8 +53,6 @@ class FittingTable(Table):
         if self.title:
             yield Text(str(self.title), "bold")
         yield from self._blocks(options.max_width)
-        if self.caption:
-            yield self.caption if isinstance(self.caption, Text) else Text(self.caption)
 
     def _blocks(self, width: int) -> Iterator[Text | Padding]:
         """Yield the lines of each row."""

@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 import msgspec
 
-from ...case.case import Case
+from ...case.case import Case, without_forces
 from ...errors import KincheckError
 from ...harness.engine import Engine
 from ...harness.native_engine import NativeEngine
@@ -105,7 +105,7 @@ def measure(
     command: str,
     tell: Callable[[str, float], object],
 ) -> Bench:
-    """Measure the requested parts. Batches, studies and processes are of the first case.
+    """Measure the requested parts of the motion; batches, studies and processes of the first case.
 
     Args:
         cases: by name as on the command line; at least one.
@@ -123,7 +123,7 @@ def measure(
         found.setdefault(what, []).extend(rows)
 
     peak = prepare() if compiler.available() else None
-    true = {name: with_truth(case, tol) for name, case in cases.items()}
+    true = {name: with_truth(without_forces(case), tol) for name, case in cases.items()}
     native = any(isinstance(engine, NativeEngine) for engine in engines)
     several = {"work": 2 * len(true), "size": 2 if native else 1}
     steps, numbers = sum(several.get(part, 1) for part in parts), count()
@@ -194,7 +194,7 @@ def _measure_work(
             entering[f"{engine.name} {engine.mode}", each.entry.setting] = each
     detailed = any(isinstance(engine, NativeEngine) for engine in engines)
     if detailed:
-        for each in contestants(case, native_breakdown.LEVELS, tol):
+        for each in contestants(case, native_breakdown.levels(case), tol):
             entering["levels", each.entry.setting] = each
     work: dict[tuple[str, str], Work] = {
         key: each.work for key, each in entering.items() if each.work is not None
