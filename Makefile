@@ -40,10 +40,12 @@ endif
 	$(BIN)/python -m compileall -q build
 	touch $@
 
-# Pin the newest versions that pyproject.toml allows.
+# Pin the newest versions that pyproject.toml allows: for developers, and for those who only run kincheck (Containerfile).
+LOCK := uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --upgrade
 lock: .venv/ready
-	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --upgrade \
-		--extra dev pyproject.toml --output-file requirements.lock
+	$(LOCK) --extra dev pyproject.toml --output-file requirements.lock
+	$(LOCK) --extra engines --extra fast --extra proofs --extra parquet --constraint requirements.lock \
+		pyproject.toml --output-file requirements-runtime.lock
 
 # An hour on each reader.
 fuzz: .venv/ready

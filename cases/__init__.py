@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import importlib
 import sys
+import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -47,16 +48,32 @@ def load(name: str) -> Case:
     return with_closed_form(case, motion, forces)
 
 
+def summary(name: str) -> tuple[Truth, str]:
+    """The kind of reference and the source of a built-in case, as `load` finds them, without its
+    motion.
+    """
+    with (FOLDER / f"{name}.toml").open("rb") as file:
+        found = tomllib.load(file)
+    if "reference" in found:
+        return Truth(found["truth"]), found["source"]
+    return (Truth.CLOSED_FORM if _module(name) else Truth.CONSENSUS_ONLY), found["source"]
+
+
 def closed_form(name: str) -> Callable[..., Motion] | None:
     """Takes the drivers' changes from the design, as jets in the order of the case file, to the
     points; None if there is none.
     """
-    stems = [file.stem for file in FOLDER.glob("*.py") if f"{name}_".startswith(f"{file.stem}_")]
-    if not stems:
+    stem = _module(name)
+    if not stem:
         return None
-    stem = max(stems, key=len)
     module = importlib.import_module(f".{stem}", __name__)
     return getattr(module, name[len(stem) + 1 :], module.motion)
+
+
+def _module(name: str) -> str:
+    """The module with the closed form of a case; empty if there is none."""
+    stems = (file.stem for file in FOLDER.glob("*.py") if f"{name}_".startswith(f"{file.stem}_"))
+    return max(stems, key=len, default="")
 
 
 def with_closed_form(

@@ -14,14 +14,37 @@ def how_to_install(extra: str) -> str:
     """Return the command that installs an extra, from kincheck's own metadata. An engine's extra
     has the engine's name up to a hyphen.
     """
+    wanted = _requirements(extra)
+    return f"pip install {shlex.join(wanted)}" if wanted else f"install what {extra} needs"
+
+
+def installed_version(extra: str) -> str | None:
+    """Return the version of an extra's first distribution, from its metadata, without importing it;
+    None if it is not installed.
+    """
     import importlib.metadata  # rarely needed, and slow
 
-    wanted = [
+    try:
+        (name, *_) = (re.split(r"[^\w.-]", each, maxsplit=1)[0] for each in _requirements(extra))
+        return importlib.metadata.version(name)
+    except (ValueError, importlib.metadata.PackageNotFoundError):
+        return None
+
+
+def is_extra(name: str) -> bool:
+    """Return whether kincheck has an extra for the engine of that name."""
+    return bool(_requirements(name))
+
+
+def _requirements(extra: str) -> list[str]:
+    """Return the requirements of an extra, from kincheck's own metadata."""
+    import importlib.metadata
+
+    return [
         requirement.split(";")[0].strip()
         for requirement in importlib.metadata.requires("kincheck") or []
         if re.search(rf"""extra == ['"]{extra.split("-")[0]}['"]""", requirement)
     ]
-    return f"pip install {shlex.join(wanted)}" if wanted else f"install what {extra} needs"
 
 
 def library(purpose: str, module: str, extra: str) -> Any:

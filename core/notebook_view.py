@@ -41,7 +41,7 @@ def _table(data: Dataset) -> str:
         lines.append(f"<tr>{''.join(f'<td style={CELL!r}>{cell}</td>' for cell in cells)}</tr>")
     more = len(columns) - len(shown)
     left = f"<div>{count} rows, {more} further columns</div>" if more or count > MOST_ROWS else ""
-    return f"<table>{''.join(lines)}</table>{left}"
+    return f"<div style='overflow-x:auto'><table>{''.join(lines)}</table></div>{left}"
 
 
 def _number(value: Any) -> str:
@@ -96,21 +96,23 @@ def _diagram(label: str, below: str, x: NDArray[Any], columns: Mapping[str, NDAr
         "</text>",
     ]
     for name, line in drawn:
-        colour = COLOURS[names.index(name) % len(COLOURS)]
+        again, colour = divmod(names.index(name), len(COLOURS))
+        dashes = " stroke-dasharray='4 3'" if again else ""
         known = np.concatenate([[False], np.isfinite(line), [False]])
         for start, stop in np.flatnonzero(known[1:] != known[:-1]).reshape(-1, 2).tolist():
             points = zip(to_x(x[start:stop]), to_y(line[start:stop]), strict=True)
             path = " ".join(f"{a:.1f},{b:.1f}" for a, b in points)
             parts.append(
-                f"<polyline points='{path}' fill='none' stroke='{colour}'>"
+                f"<polyline points='{path}' fill='none' stroke='{COLOURS[colour]}'{dashes}>"
                 f"<title>{escape(name)}</title></polyline>"
             )
     legend = (
         ""
         if len(names) == 1
         else " ".join(
-            f"<span style='color:{COLOURS[k % len(COLOURS)]}'>{escape(name)}</span>"
-            for k, name in enumerate(names[: len(COLOURS)])
+            f"<span style='color:{COLOURS[k % len(COLOURS)]}"
+            f"{';border-bottom:1px dashed' if k >= len(COLOURS) else ''}'>{escape(name)}</span>"
+            for k, name in enumerate(dict.fromkeys(name for name, _ in drawn))
         )
     )
     more = f" and {len(lines) - len(drawn)} more" if len(lines) > len(drawn) else ""

@@ -9,6 +9,7 @@ import pytest
 from kincheck.core import Joint
 from kincheck.core.caches import clear_caches
 from kincheck.core.cli import main as cli
+from kincheck.core.harness.provenance import truth_of
 
 from .support.fakes import Fake, crank
 
@@ -60,6 +61,8 @@ def kincheck_main(monkeypatch):
         monkeypatch.setattr(kincheck.adapters, "engine", lambda name: by_name.get(name, NATIVE))
         monkeypatch.setattr(kincheck.cases, "names", lambda: tuple(cases), raising=False)
         monkeypatch.setattr(kincheck.cases, "load", lambda name: cases[name], raising=False)
+        about = {name: (truth_of(case), case.source) for name, case in cases.items()}
+        monkeypatch.setattr(kincheck.cases, "summary", about.__getitem__)
         # in this process, to which fakes with answers of their own belong; isolation has a room of
         # its own
         return cli.main([*map(str, argv), *(["--jobs", jobs] if argv[0] == "run" and jobs else [])])

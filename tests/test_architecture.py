@@ -125,11 +125,11 @@ IMPORTS = {
         "report studies studies/tolerance studies/paper"
     ),
     "cli": (
-        ". program program/llvm joints kinematics case case/io case/models/hardpoints "
-        "case/variation case/models harness harness/workers history history/regression "
-        "report studies/stress/families studies studies/joint_check "
-        "studies/engine_check studies/tolerance studies/stress studies/paper "
-        "studies/diagnosis studies/bench"
+        ". program program/llvm joints kinematics case/models/hardpoints/templates case "
+        "case/io case/models/hardpoints case/variation case/models harness "
+        "harness/workers history history/regression report studies/stress/families "
+        "studies studies/joint_check studies/engine_check studies/tolerance "
+        "studies/stress studies/paper studies/diagnosis studies/bench"
     ),
     "__init__": ". joints mechanism kinematics case case/io harness studies/joint_check",
     "kincheck": "case case/io harness harness/workers studies cli __init__",

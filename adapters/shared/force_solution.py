@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol, cast, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -128,6 +128,6 @@ def _solve(J: Array, demand: Array) -> _Solved:
     rows, unknowns = J.shape
     u, sizes, vh = np.linalg.svd(J, full_matrices=True)
     if rows < unknowns or sizes[-1] <= RANK_TOLERANCE * sizes[0]:
-        return _Solved(np.full(rows, np.nan), np.zeros((rows, 0)), True)
-    multipliers = cast("Array", u[:, :unknowns] @ ((vh @ demand) / sizes))
+        return _Solved(np.full(rows, np.nan, dtype=np.float64), np.zeros((rows, 0)), True)
+    multipliers: Array = np.einsum("ru,u->r", u[:, :unknowns], (vh @ demand) / sizes)
     return _Solved(multipliers, u[:, unknowns:], False)

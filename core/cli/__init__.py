@@ -23,6 +23,7 @@ COMMANDS = (
     "history",
     "report",
     "stress",
+    "completion",
 )
 """Modules of the commands, in the order of the help; see `command_name`."""
 

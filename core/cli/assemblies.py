@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 from ..errors import KincheckError, unknown
 from . import import_options
 from .export import formats, keep_texts
-from .registry import House, Status, given, whole
+from .option_types import number, whole
+from .registry import House, Status, given
 
 if TYPE_CHECKING:
     from ..studies.assemblies import Survey
@@ -30,7 +31,7 @@ def add(commands: Any) -> None:
     )
     listing.add_argument(
         "--at",
-        type=float,
+        type=number,
         metavar="VALUE",
         help="of the swept driver as the sweep has it, in SI units; default: the design position",
     )
@@ -119,7 +120,7 @@ def _print(found: Survey, json: str | None) -> None:
     table = columns(
         ">#", "which", ">distance", ">starts", ">residual", ">smallest sv", "det", *telling
     )
-    for number, each in enumerate(all_of_them.found, 1):
+    for index, each in enumerate(all_of_them.found, 1):
         which = (
             "intended"
             if found.intended(each)
@@ -134,7 +135,7 @@ def _print(found: Survey, json: str | None) -> None:
             f"{each.residual:.1e}",
             f"{each.smallest:.3g}",
         )
-        table.add_row(f"{number}", which, *numbers, *signs)
+        table.add_row(f"{index}", which, *numbers, *signs)
     console.print(table)
     if found.reason:
         console.print(f"no assembly is the intended one: {found.reason}", soft_wrap=True)

@@ -15,8 +15,10 @@ from typing import TYPE_CHECKING, Any
 from ..errors import KincheckError
 from ..extras import how_to_install
 from ..report.progress import complain
-from .registry import House, Status, add_joint_types, whole
+from .option_types import whole
+from .registry import House, Status, add_joint_types
 from .run_options import TOL
+from .verbosity import add_verbosity
 
 if TYPE_CHECKING:
     from ..studies.bench.engines import Bench
@@ -48,6 +50,7 @@ def add(commands: Any) -> None:
     bench.add_argument(
         "--json", metavar="FILE", help="write the results as JSON; - for standard output"
     )
+    add_verbosity(bench, quiet="print no progress")
     benchmarks = bench.add_subparsers(title="benchmarks", metavar="BENCHMARK")
     engines = benchmarks.add_parser(
         "engines",
@@ -60,7 +63,7 @@ def add(commands: Any) -> None:
         nargs="+",
         default=[STRUT],
         metavar="CASE",
-        help=f"built-in names, or paths to case files; all: every built-in case; default: {STRUT}",
+        help=f"built-in names, patterns, or case files; all: every built-in case; default: {STRUT}",
     )
     add_joint_types(engines)
     engines.add_argument(
@@ -96,7 +99,7 @@ def add(commands: Any) -> None:
     formulation.set_defaults(do=_formulation)
     formulation.add_argument(
         "--seed",
-        type=int,
+        type=whole(0),
         default=SEED,
         metavar="N",
         help="of the random states; default %(default)s",
@@ -117,6 +120,9 @@ def add(commands: Any) -> None:
             help="write the results as JSON; - for standard output",
             **given,
         )
+    engines.add_argument(
+        "-q", "--quiet", action="store_true", default=argparse.SUPPRESS, help="print no progress"
+    )
 
 
 def _all(options: argparse.Namespace, house: House) -> int:
@@ -135,6 +141,7 @@ def _engines(options: argparse.Namespace, house: House) -> int:
 def _measured(options: argparse.Namespace, house: House, *, formulation: bool) -> int:
     from ..harness.provenance import THREADS
     from ..harness.record import Outcome
+    from ..report.meter import Meter
     from ..report.sections import deliver
     from ..studies.bench import engines as bench_engines
     from ..studies.bench.engines_report import report
@@ -159,7 +166,10 @@ def _measured(options: argparse.Namespace, house: House, *, formulation: bool) -
     engines += house.find_engines(others, problems)  # of users, or a message
     if problems:
         raise KincheckError("\n".join(problems))
-    with json_only() if options.json == "-" else nullcontext():
+    with (
+        json_only() if options.json == "-" else nullcontext(),
+        Meter("bench", quiet=options.quiet, every=1.0) as meter,
+    ):
         found: Bench = bench_engines.measure(
             cases,
             engines,
@@ -167,10 +177,10 @@ def _measured(options: argparse.Namespace, house: House, *, formulation: bool) -
             rounds=options.rounds,
             parts=options.parts or bench_engines.PARTS,
             command=options.command,
-            tell=lambda what: complain([f"bench: {what}"]),
+            tell=meter,
         )
         if formulation:
-            complain(["bench: formulation"])
+            meter("formulation", 1.0)
             rows = bench_formulation.measure(house.case(STRUT), SEED, bench_formulation.STATES)
             found = bench_engines.with_formulation(found, rows)
     deliver(report(found), found, out=options.out, json=options.json)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import KincheckError
 from .registry import House, Status
 from .run_options import TOL
+from .verbosity import add_verbosity
 
 if TYPE_CHECKING:
     from ..harness.engine import Engine
@@ -38,6 +39,7 @@ def add(commands: Any) -> None:
         metavar="MODULE:CLASS",
         help="the class, in a module of this folder or an installed one; or an engine's name",
     )
+    add_verbosity(checking, quiet="print the failed checks and the count alone")
 
 
 def _check_engine(options: argparse.Namespace, house: House) -> int:
@@ -45,7 +47,7 @@ def _check_engine(options: argparse.Namespace, house: House) -> int:
     refusals, and that it keeps no state. Each pair is solved in a worker process.
     """
     report = examined(options.engine, house)
-    report.print(sys.stdout)
+    report.print(sys.stdout, quiet=options.quiet)
     return Status.WITHIN if report.passed else Status.DEVIATES
 
 

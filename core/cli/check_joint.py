@@ -6,7 +6,9 @@ import argparse
 import sys
 from typing import Any
 
-from .registry import House, Status, whole
+from .option_types import whole
+from .registry import House, Status
+from .verbosity import add_verbosity
 
 
 def add(commands: Any) -> None:
@@ -28,6 +30,7 @@ def add(commands: Any) -> None:
         metavar="N",
         help="of the random poses; default %(default)s",
     )
+    add_verbosity(checking, quiet="print the failed checks and the count alone")
 
 
 def _check_joint(options: argparse.Namespace, house: House) -> int:
@@ -40,5 +43,5 @@ def _check_joint(options: argparse.Namespace, house: House) -> int:
     report = check_joint(
         load_joint(options.joint), seed=options.seed, engines=[*map(house.engine, house.engines)]
     )
-    report.print(sys.stdout)
+    report.print(sys.stdout, quiet=options.quiet)
     return Status.WITHIN if report.passed else Status.DEVIATES

@@ -10,7 +10,7 @@ from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass, fields
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, TextIO, TypeAlias
 
 from ..case.io.atomic_files import Content, Named, to_standard_output, unwritable, write_all
 from ..case.io.table_file import no_parquet
@@ -113,19 +113,19 @@ def deliver(
     problems: list[str],
     to: Destinations,
     *,
-    matrix: bool = False,
+    show: Callable[[Results, TextIO], None] | None = None,
     precision: Mapping[str, Sequence[Effort]] | None = None,
     history: Callable[[], Trends] | None = None,
 ) -> None:
-    """Print the table and write the requested files; a file that cannot be written does not
+    """Print the results and write the requested files; a file that cannot be written does not
     stop the others.
 
     Args:
-        matrix: print a line for each case and a column for each engine, not a line for each pair.
+        show: prints the results; default: `print_table`.
         precision: error against time at several efforts, by case, for the report.
         history: reads the trends for the report, after all other files; None without a history.
     """
-    from ..report.matrix import print_matrix, to_markdown
+    from ..report.matrix import to_markdown
     from ..report.table import print_table
 
     encoded = to_json(results) if to.out is not None or to.json is not None else b""
@@ -150,7 +150,7 @@ def deliver(
         )
     problems += write_all(contents)
     # last: the reader of standard output may have closed it
-    (print_matrix if matrix else print_table)(results, sys.stderr if to.json == "-" else sys.stdout)
+    (show or print_table)(results, sys.stderr if to.json == "-" else sys.stdout)
     if to.json == "-":
         to_standard_output(encoded)
 

@@ -10,8 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 from .registry import House, Status
 from .run_options import TOL
+from .verbosity import add_verbosity
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from .installation import Examination
 
 SAMPLE = "mcpherson_strut"
@@ -30,6 +33,7 @@ def add(commands: Any) -> None:
     doctor.add_argument(
         "--json", metavar="FILE", help="write the findings as JSON; - for standard output"
     )
+    add_verbosity(doctor, quiet="print the verdict and what is essential and missing alone")
 
 
 def _doctor(options: argparse.Namespace, house: House) -> int:
@@ -38,21 +42,23 @@ def _doctor(options: argparse.Namespace, house: House) -> int:
     Exit status: 0 the tool can do its work, 2 something essential is missing or broken.
     """
     from ..harness.standard import STANDARD
-    from ..report.terminal import write_json
+    from ..report.terminal import page, write_json
     from .installation import examine
 
     found = examine(house.case(SAMPLE), house.engine(STANDARD), TOL, house.engines)
     write_json(found, options.json)
-    _print(found, options.json)
+    if options.quiet:
+        _print_verdict(found, page(options.json))
+    else:
+        _print(found, page(options.json))
     return Status.WITHIN if found.able else Status.FAILED
 
 
-def _print(found: Examination, json: str | None) -> None:
+def _print(found: Examination, console: Console) -> None:
     from rich.text import Text
 
-    from ..report.terminal import columns, page
+    from ..report.terminal import columns
 
-    console = page(json)
     machine, check = found.machine, found.check
     console.print(
         f"kincheck {found.kincheck}, Python {machine.python}, {machine.platform}", soft_wrap=True
@@ -89,5 +95,12 @@ def _print(found: Examination, json: str | None) -> None:
     )
     said = f": {check.message}" if check.message else ""
     console.print(f"self-check {check.case}: {check.outcome}{measured}{time}{said}", soft_wrap=True)
+    _print_verdict(found, console)
+
+
+def _print_verdict(found: Examination, console: Console) -> None:
+    for part in found.parts:
+        if part.essential and part.problem:
+            console.print(f"{part.name}: {part.problem}: {part.remedy}", soft_wrap=True)
     verdict = "can do its work" if found.able else "cannot do its work: see above"
     console.print(f"kincheck {verdict}", style="bold" if found.able else "bold red")

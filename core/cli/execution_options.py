@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from ..harness.resource_limits import MEMORY, MOST, TIMEOUT, Limits
-from .registry import whole
+from .option_types import whole
 
 if TYPE_CHECKING:
     from ..harness.engine import Engine

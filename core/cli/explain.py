@@ -6,8 +6,10 @@ import argparse
 from typing import Any
 
 from . import import_options
-from .registry import House, Status, positive, whole
+from .option_types import positive, whole
+from .registry import House, Status
 from .run_options import TOL
+from .verbosity import add_verbosity
 
 
 def add(commands: Any) -> None:
@@ -39,6 +41,11 @@ def add(commands: Any) -> None:
     explaining.add_argument(
         "--json", metavar="FILE", help="write the diagnosis as JSON; - for standard output"
     )
+    add_verbosity(
+        explaining,
+        quiet="print verdict, findings and notes alone",
+        verbose="print all samples and sensitivities, not a few of each",
+    )
     import_options.add_options(explaining)
 
 
@@ -58,5 +65,6 @@ def _explain(options: argparse.Namespace, house: House) -> int:
     import_options.tell_left_out([case])
     found = diagnose(case, samples=options.samples, tol=options.tol)
     write_json(found, options.json)
-    print_diagnosis(found, page(options.json))
+    how = {"quiet": options.quiet, "verbose": options.verbose}
+    print_diagnosis(found, page(options.json), **how)
     return Status.DEVIATES if found.findings else Status.WITHIN

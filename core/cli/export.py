@@ -11,6 +11,7 @@ from typing import Any
 from ..case.io.escape import file_name
 from ..errors import KincheckError, unknown
 from . import import_options
+from .option_types import number
 from .registry import House, Status
 
 FORMATS = {
@@ -45,7 +46,7 @@ def add(commands: Any) -> None:
     )
     export.add_argument(
         "--at",
-        type=float,
+        type=number,
         metavar="VALUE",
         help=(
             "start there: a value of the swept driver as the sweep has it, in SI units; default:"

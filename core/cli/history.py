@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import KincheckError, unknown
 from ..report.progress import complain
-from .registry import House, Status, whole
+from .option_types import whole
+from .registry import House, Status
 from .run_options import HISTORY
 
 if TYPE_CHECKING:

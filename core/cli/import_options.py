@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 
 from ..case.io.reader_options import LEFT_OUT, Supplied
 from ..report.progress import complain
-from .registry import add_joint_types, positive
+from .option_types import positive
+from .registry import add_joint_types
 
 if TYPE_CHECKING:
     from ..case.case import Case

@@ -5,10 +5,16 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from ..extras import how_to_install
+from ..extras import how_to_install, installed_version, is_extra
 from .registry import House, Status, add_joint_types
+from .verbosity import add_verbosity
+
+if TYPE_CHECKING:
+    from ..harness.engine import Engine
+
+CUT = {"no_wrap": True, "overflow": "ellipsis", "crop": True}
 
 
 def add(commands: Any) -> None:
@@ -32,50 +38,64 @@ def add(commands: Any) -> None:
         action="store_true",
         help="list the types of outputs a case file can name, with their signs",
     )
+    add_verbosity(
+        listing,
+        quiet="print the names alone: cases, then engines",
+        verbose="print sources in full, on narrow terminals too",
+    )
     add_joint_types(listing)
 
 
 def _list(options: argparse.Namespace, house: House) -> int:
-    """List the built-in cases with reference kind and source, and the engines with their versions;
-    or the keys and types of files.
+    """List the built-in cases with reference kind and source, and the engines with the installed
+    versions, which kincheck doctor also imports; or the keys and types of files.
     """
-    from ..case.io.catalogue import catalogue, output_catalogue
-    from ..harness.engine_versions import versions
-    from ..harness.provenance import truth_of
     from ..report.terminal import page
 
-    tell = partial(page(None).print, soft_wrap=True)
+    console = page(None)
+    # a line for each case: cut at the edge of a terminal, whole in a pipe
+    how: Any = {"soft_wrap": True} if options.verbose or not console.is_terminal else CUT
+    tell = partial(console.print, **how)
     if options.schema or options.joints or options.outputs:
+        from ..case.io.catalogue import catalogue, output_catalogue
+
         listed = [*(_references() if options.schema else ())]
         listed += [
             *(catalogue() if options.joints else ()),
             *(output_catalogue() if options.outputs else ()),
         ]
-        tell(*listed, sep="\n")
+        console.print(*listed, sep="\n", soft_wrap=True)
+        return Status.WITHIN
+    cases = house.cases()
+    if options.quiet:
+        print(*cases, *dict.fromkeys((*house.engines, *house.simulations)), sep="\n")
         return Status.WITHIN
     tell("cases:")
-    names = house.cases()
-    for name in names:
-        case = house.case(name)
-        tell(
-            f"  {name:{max(map(len, names))}}  {str(truth_of(case)).replace('_', ' '):16} "
-            f" {case.source}"
-        )
+    for name in cases:
+        kind, source = house.summary(name)
+        tell(f"  {name:{max(map(len, cases))}}  {kind.replace('_', ' '):16}  {source}")
     tell("engines:")
-    engines = [
+    engines: list[Engine] = [
         *map(house.engine, house.engines),
         *(house.engine(name, "simulate") for name in house.simulations),
     ]
     width = max(len(engine.name) for engine in engines)
-    for engine, version in zip(engines, versions(engines), strict=True):
-        name = engine.name
-        missing = (
-            f"not installed, or cannot be imported: {how_to_install(name)}; kincheck doctor says"
-            " which"
+    for engine in engines:
+        version = _version(engine)
+        state = (
+            f"not installed: {how_to_install(engine.name)}"
+            if version is None
+            else f"{version}  {engine.mode}, loop: {engine.loop}"
         )
-        state = missing if version is None else f"{version}  {engine.mode}, loop: {engine.loop}"
-        tell(f"  {name:{width}}  {state}")
+        tell(f"  {engine.name:{width}}  {state}")
     return Status.WITHIN
+
+
+def _version(engine: Engine) -> str | None:
+    """Return the installed version of an engine; a simulator with an extra is not imported."""
+    from ..harness.engine_versions import versions
+
+    return installed_version(engine.name) if is_extra(engine.name) else versions([engine])[0]
 
 
 def _references() -> Iterator[str]:

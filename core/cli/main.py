@@ -19,6 +19,7 @@ from ..errors import KincheckError
 from ..harness.interrupts import Terminated, listening, status_of, words_of
 from ..version import VERSION
 from . import COMMANDS, command_name
+from .parser import Parser
 
 if TYPE_CHECKING:
     from .registry import House
@@ -51,7 +52,7 @@ def _done(argv: list[str]) -> int:
     from .registry import Status
 
     try:
-        options = _parser(argv).parse_args(
+        options = parser(argv).parse_args(
             argv, argparse.Namespace(command=shlex.join(["kincheck", *argv]))
         )
     except SystemExit as end:  # argparse has printed why
@@ -140,20 +141,21 @@ def house() -> House:
         cases.names,
         cases.load,
         *writers,
+        cases.summary,
         tuple(adapters.SIMULATIONS),
     )
 
 
-def _parser(argv: Sequence[str]) -> argparse.ArgumentParser:
+def parser(argv: Sequence[str]) -> Parser:
     """Return the parser of the command that the arguments begin with, or of all commands. Each
     takes a millisecond to build.
     """
-    parser = argparse.ArgumentParser(
+    found = Parser(
         prog="kincheck", description="Cross-validation of the kinematics of multibody systems."
     )
-    parser.add_argument("--version", action="version", version=f"kincheck {VERSION}")
-    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+    found.add_argument("--version", action="version", version=f"kincheck {VERSION}")
+    commands = found.add_subparsers(title="commands", required=True, metavar="COMMAND")
     named = [name for name in COMMANDS if argv and argv[0] == command_name(name)]
     for name in named or COMMANDS:
         importlib.import_module(f".{name}", __package__).add(commands)
-    return parser
+    return found

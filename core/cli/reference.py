@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING, Any
 from ..case.io.escape import file_name
 from ..errors import KincheckError
 from ..trajectory import QUANTITIES
-from .registry import House, Status, add_joint_types, whole
+from .option_types import whole
+from .registry import House, Status, add_joint_types
 from .run_options import TOL
+from .verbosity import add_verbosity
 
 if TYPE_CHECKING:
     from ..case.io.reference_file import Reference
@@ -37,7 +39,10 @@ def add(commands: Any) -> None:
         "case",
         nargs="*",
         metavar="CASE",
-        help="built-in name, or path to a case file; default: all built-in cases",
+        help=(
+            "built-in names, patterns such as 'mcpherson*', or case files; default: all built-in"
+            " cases"
+        ),
     )
     add_joint_types(proving)
     proving.add_argument(
@@ -60,6 +65,11 @@ def add(commands: Any) -> None:
             "take the numbers of a case as the decimals that print them, not as the doubles that"
             " engines are given"
         ),
+    )
+    add_verbosity(
+        proving,
+        quiet="print one line for each case",
+        verbose="print every sample that is not proved",
     )
 
 
@@ -96,13 +106,14 @@ def _prove(options: argparse.Namespace, house: House) -> int:
         numbers = "decimal" if options.decimal else "double"
         found, errors = prove_case(case, digits=options.digits, numbers=numbers, tol=TOL)
         complete &= found.proved == len(found.samples)
-        print(*_lines(found, errors), sep="\n", flush=True)
+        lines = _lines(found, errors, len(found.samples) if options.verbose else NAMED)
+        print(*(lines[:1] if options.quiet else lines), sep="\n", flush=True)
         if options.out is not None:
             write("--out", options.out / name, to_json(found))
     return Status.WITHIN if complete else Status.DEVIATES
 
 
-def _lines(found: Reference, errors: list[NativeError]) -> list[str]:
+def _lines(found: Reference, errors: list[NativeError], named: int) -> list[str]:
     """Return the lines of a report: proved and unproved samples, and the native engine's errors."""
     count, proved = len(found.samples), [sample for sample in found.samples if sample.proved]
     each = 1e3 * found.seconds / max(1, count)
@@ -132,7 +143,7 @@ def _lines(found: Reference, errors: list[NativeError]) -> list[str]:
     lines += [
         f"  {name}: no proof: {each.reason}" for name, each in found.outputs.items() if each.reason
     ]
-    lines += _missing(found)
+    lines += _missing(found, named)
     lines += [
         f"  signs: {words}"
         for words in dict.fromkeys(each.signs for each in found.outputs.values())
@@ -158,16 +169,16 @@ def _cell(largest: float | None, ulps: float | None) -> str:
     return f"{largest:.1e}" + (f" {ulps:6.1f} ulp" if ulps is not None else "")
 
 
-def _missing(found: Reference) -> list[str]:
+def _missing(found: Reference, named: int) -> list[str]:
     """Return the lines about samples without a proof."""
     name, values = next(iter(found.driver.items()))
     missing = [(k, sample.reason) for k, sample in enumerate(found.samples) if not sample.proved]
     lines = [
         f"  sample {k} ({name} = {values[k]:.9g}) not proved: {reason}"
-        for k, reason in missing[:NAMED]
+        for k, reason in missing[:named]
     ]
     return lines + (
-        [f"  and {len(missing) - NAMED} more; --out writes the reason for each"]
-        if len(missing) > NAMED
+        [f"  and {len(missing) - named} more; -v shows all, --out writes them"]
+        if len(missing) > named
         else []
     )

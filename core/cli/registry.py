@@ -5,16 +5,17 @@ cases and engines.
 from __future__ import annotations
 
 import argparse
-import math
 import os
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from fnmatch import fnmatchcase
+from glob import glob
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..case.io.reader_options import NOTHING, Supplied
-from ..errors import KincheckError, SolveError, unknown
+from ..errors import MOST_NAMED, KincheckError, SolveError, shortened, unknown
 from .engine_loading import WHERE, load_engine
 
 if TYPE_CHECKING:
@@ -46,6 +47,7 @@ class House:
         case: returns the built-in case of a name, with its reference.
         writers: names of the export formats.
         writer: returns the writer of a format.
+        summary: returns kind of reference and source of the built-in case of a name, quickly.
         simulations: names of the engines in simulate mode.
     """
 
@@ -55,6 +57,7 @@ class House:
     case: Callable[[str], Case]
     writers: Sequence[str]
     writer: Callable[[str], Writer]
+    summary: Callable[[str], tuple[str, str]]
     simulations: Sequence[str] = ()
 
     def find_case(self, name: str, supplied: Supplied = NOTHING, *, driven: bool = True) -> Case:
@@ -65,13 +68,19 @@ class House:
             driven: require drivers for all degrees of freedom.
 
         Raises:
-            KincheckError: there is no such case, its file is invalid, or its drivers do not match
-                its degrees of freedom.
+            KincheckError: there is no such case, a pattern matches several, its file is invalid,
+                or its drivers do not match its degrees of freedom.
         """
         from ..case.models.files import SUFFIXES, load
         from ..kinematics import require_driven
 
-        known = self.cases()
+        matching, known = self.matching(name), self.cases()
+        if len(matching) > 1:
+            raise KincheckError(
+                f"{name!r} matches {len(matching)} cases: {shortened(matching, MOST_NAMED)}; name"
+                " one of them"
+            )
+        (name,) = matching
         if name in known:
             if supplied.given:
                 raise KincheckError(
@@ -95,6 +104,22 @@ class House:
             ) from error
         return case
 
+    def matching(self, name: str) -> list[str]:
+        """Return the built-in cases and files that a shell-style pattern matches; any other name as
+        it is.
+
+        Raises:
+            KincheckError: the pattern matches nothing.
+        """
+        if not set(name) & set("*?[") or Path(name).exists():
+            return [name]
+        found = [each for each in self.cases() if fnmatchcase(each, name)] + sorted(glob(name))
+        if not found:
+            raise KincheckError(
+                f"no built-in case and no file matches {name!r}; kincheck list shows the cases"
+            )
+        return found
+
     def find_cases(
         self,
         names: Sequence[str],
@@ -102,13 +127,19 @@ class House:
         found: Sequence[Case] = (),
         supplied: Supplied = NOTHING,
     ) -> list[Case]:
-        """Return the cases already found and the named ones.
+        """Return the cases already found and the named ones, by names, files and patterns.
 
         Args:
             unread: receives the messages of unreadable cases, by their names as given.
         """
         cases = {case.name: case for case in found}
-        for name in dict.fromkeys(names):
+        wanted: dict[str, None] = {}
+        for name in names:
+            try:
+                wanted |= dict.fromkeys(self.matching(name))
+            except KincheckError as error:
+                unread[name] = str(error)
+        for name in wanted:
             try:
                 case = self.find_case(name, supplied)
             except KincheckError as error:
@@ -214,32 +245,3 @@ def given(options: argparse.Namespace, names: Iterable[str]) -> str:
         if getattr(options, name) not in ([], None) and getattr(options, name) is not False
     )
     return ", ".join(f"--{name.replace('_', '-')}" for name in found)
-
-
-def whole(least: int, most: int | None = None) -> Callable[[str], int]:
-    """Return the parser of a whole number between two limits for an option."""
-    expected = f"of {least} or more" if most is None else f"from {least} to {most}"
-
-    def read(text: str) -> int:
-        try:
-            number = int(text)
-        except ValueError:
-            number = least - 1
-        if number < least or (most is not None and number > most):
-            raise argparse.ArgumentTypeError(f"{text!r} is not a whole number {expected}; give one")
-        return number
-
-    return read
-
-
-def positive(text: str) -> float:
-    """Return the positive number in the text of an option."""
-    try:
-        tol = float(text)
-    except ValueError:
-        tol = math.nan
-    if not (math.isfinite(tol) and tol > 0):
-        raise argparse.ArgumentTypeError(
-            f"{text!r} is not a positive number; give one such as 1, 0.5 or 1e-12"
-        )
-    return tol

@@ -13,6 +13,7 @@ from ..errors import KincheckError
 from ..report.progress import complain
 from .history import add_history
 from .registry import House, Status
+from .verbosity import add_verbosity
 
 if TYPE_CHECKING:
     from ..history.regression.findings import Regressions
@@ -72,6 +73,7 @@ def add(commands: Any) -> None:
         metavar="FILE",
         help="write the summary as Markdown, for a pull request or a mail",
     )
+    add_verbosity(report, quiet="print the headline alone")
 
 
 def _report(options: argparse.Namespace, house: House) -> int:
@@ -99,7 +101,12 @@ def _report(options: argparse.Namespace, house: House) -> int:
         found = regressions(
             subject, against, reason, store, missing_is_failure=options.missing_is_failure
         )
-        print(to_markdown(found), end="", file=sys.stderr if options.json == "-" else sys.stdout)
+        text = to_markdown(found)
+        print(
+            text.partition("\n")[0].removeprefix("## ") + "\n" if options.quiet else text,
+            end="",
+            file=sys.stderr if options.json == "-" else sys.stdout,
+        )
         _write(options, subject, found, store, problems)
         problems += store.damage if store is not None else []
     complain(problems)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 from ..case.io.escape import visible
 from ..errors import KincheckError, SolveError
@@ -89,7 +89,7 @@ def _run(options: argparse.Namespace, house: House) -> int:
     if options.history is not None:
         history = partial(history_options.past, keeping, problems) if keeping else lambda: None
     delivery.deliver(
-        results, problems, to, matrix=options.joints, precision=precision, history=history
+        results, problems, to, show=_shown(options), precision=precision, history=history
     )
     if options.explain:
         print(*_explained(plan.cases), sep="\n", file=sys.stderr if to.json == "-" else sys.stdout)
@@ -102,6 +102,18 @@ def _run(options: argparse.Namespace, house: House) -> int:
     return (
         Status.DEVIATES if any(record.outcome.bad for record in results.records) else Status.WITHIN
     )
+
+
+def _shown(options: argparse.Namespace) -> Callable[[Results, TextIO], None]:
+    """Return the function that prints the results."""
+    from ..report.matrix import print_matrix
+    from ..report.table import print_outputs, print_summary, print_table
+
+    if options.quiet:
+        return print_summary
+    if options.verbose:
+        return print_outputs
+    return print_matrix if options.joints else print_table
 
 
 def _planned(options: argparse.Namespace, house: House, to: Destinations) -> _Plan:
@@ -169,7 +181,7 @@ def _solved(
     )
     made = [*keeping.made] if keeping else []
     records: list[Record] = [*made]
-    tell = progress(records)
+    tell = progress(records, quiet=options.quiet)
 
     def keep(record: Record, done: int, total: int) -> None:
         if keeping:

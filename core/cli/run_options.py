@@ -7,7 +7,8 @@ import os
 from pathlib import Path
 
 from . import execution_options, import_options
-from .registry import positive
+from .option_types import positive
+from .verbosity import add_verbosity
 
 # Largest accepted constraint residual [m or -]: a thousand times the round-off of metre-sized
 # coordinates, and a thousandth of the outputs' 1e-9 m, so that a residual amplified a hundredfold
@@ -26,7 +27,10 @@ def add_options(run: argparse.ArgumentParser) -> None:
         "case",
         nargs="*",
         metavar="CASE",
-        help="built-in name, or path to a case file; default: all built-in cases",
+        help=(
+            "built-in names, patterns such as 'mcpherson*', or case files; default: all built-in"
+            " cases"
+        ),
     )
     run.add_argument(
         "--joints",
@@ -100,6 +104,11 @@ def add_options(run: argparse.ArgumentParser) -> None:
         default=[],
         metavar="NAME",
         help="engines that must be there and able (else status 2)",
+    )
+    add_verbosity(
+        run,
+        quiet="print messages and the counts of outcomes alone: no progress, no table",
+        verbose="print the errors of every output, with their tolerances",
     )
     import_options.add_options(run)
     execution_options.add_options(run, positive)

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import KincheckError, unknown
-from .registry import House, Status, given, positive, whole
+from .option_types import positive, whole
+from .registry import House, Status, given
 from .run_options import MODES, TOL
+from .verbosity import add_verbosity
 
 if TYPE_CHECKING:
     from ..harness.engine import Engine
@@ -84,6 +85,7 @@ def add(commands: Any) -> None:
         metavar="X",
         help=f"of replayed files: largest constraint residual; default {TOL:g}",
     )
+    add_verbosity(stress, quiet="print no progress")
 
 
 def _stress(options: argparse.Namespace, house: House) -> int:
@@ -152,21 +154,20 @@ def _run(options: argparse.Namespace, families: list[Family], engines: list[Engi
     """Run the families; reduce and save bad examples."""
     from msgspec.structs import replace
 
+    from ..report.meter import Meter
     from ..studies.stress.reproducers import save
     from ..studies.stress.run import stress
 
-    def tell(line: str) -> None:
-        print(line, file=sys.stderr, flush=True)
-
-    found, examples = stress(
-        families,
-        engines,
-        samples=options.samples or SAMPLES,
-        seed=options.seed or 0,
-        command=options.command,
-        prove=not options.no_proofs,
-        tell=tell,
-    )
+    with Meter("stress", quiet=options.quiet) as meter:
+        found, examples = stress(
+            families,
+            engines,
+            samples=options.samples or SAMPLES,
+            seed=options.seed or 0,
+            command=options.command,
+            prove=not options.no_proofs,
+            tell=meter,
+        )
     if options.out is not None and examples:
         found = replace(found, findings=[save(example, options.out) for example in examples])
     return found

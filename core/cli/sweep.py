@@ -17,7 +17,6 @@ from ..version import VERSION
 from . import execution_options, import_options
 from .registry import House, Status
 from .sweep_options import FILES, PART, add_options
-from .sweep_progress import Teller
 
 if TYPE_CHECKING:
     from ..case.case import Case
@@ -26,6 +25,10 @@ if TYPE_CHECKING:
     from ..studies.tolerance.part_file import Part
     from ..studies.tolerance.results import SweepResults
     from ..studies.tolerance.study import Study
+    from ..studies.tolerance.sweep import Progress
+
+# Seconds between lines of progress without a terminal.
+EVERY = 10.0
 
 
 def add(commands: Any) -> None:
@@ -188,16 +191,27 @@ def _solve(
     stops: list[KeyboardInterrupt | KincheckError],
 ) -> SweepResults:
     from ..harness.resource_limits import default_jobs
+    from ..report.meter import Meter
     from ..studies.tolerance.chunk_execution import on_cluster
     from ..studies.tolerance.sweep import Check, sweep_designs
     from ..studies.tolerance.tables import ParquetStore
 
-    tell = Teller()
+    def solved(progress: Progress) -> None:
+        rate = f"{progress.solved / progress.seconds:.3g} variants/s"
+        unsolved = f", {progress.unsolved} unsolved" if progress.unsolved else ""
+        meter(
+            f"[{progress.done}/{progress.total}] {rate}{unsolved}", progress.done / progress.total
+        )
+
+    def checked(done: int, total: int) -> None:
+        meter(f"[{done}/{total}] checked", done / total)
+
+    meter = Meter("sweep", quiet=options.quiet, every=EVERY)
     check = None
     if engine is not None:
-        check = Check(engine, share, _solver(options, engine), options.tol, tell.checked)
+        check = Check(engine, share, _solver(options, engine), options.tol, checked)
     with ExitStack() as stack:
-        stack.callback(tell.end)
+        stack.enter_context(meter)
         store = (
             None
             if options.store is None
@@ -214,7 +228,7 @@ def _solve(
             source=None if options.scheduler is None else on_cluster(options.scheduler),
             check=check,
             store=store,
-            progress=tell.solved,
+            progress=solved,
             command=options.command,
             part=part,
             stopped=stops.append,

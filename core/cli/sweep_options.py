@@ -6,8 +6,9 @@ import argparse
 from pathlib import Path
 
 from . import import_options
-from .registry import positive, whole
+from .option_types import positive, whole
 from .run_options import TOL
+from .verbosity import add_verbosity
 
 PART = "sweep.part"
 """File of a sweep's finished part, in the folder of its results until the sweep ends."""
@@ -94,4 +95,5 @@ def add_options(sweep: argparse.ArgumentParser) -> None:
             " --out"
         ),
     )
+    add_verbosity(sweep, quiet="print no progress")
     import_options.add_options(sweep)

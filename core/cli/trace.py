@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import KincheckError, unknown
 from . import import_options
-from .registry import House, Status, positive
+from .option_types import positive
+from .registry import House, Status
 
 if TYPE_CHECKING:
     from ..kinematics import Curve, Event

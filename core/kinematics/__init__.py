@@ -19,7 +19,7 @@ Describe:
     degrees_of_freedom, require_driven              drivers against degrees of freedom
     reduce_rows, largest_residual                   rows that are redundant but for digits
     kinds, places, placed                           the geometry by name
-    Ranks, conditioning, describe_screws            rank, conditioning and screws at a pose
+    Ranks, freeing, conditioning, describe_screws   rank, conditioning and screws at a pose
     prove, prove_pose                               samples and poses enclosed in balls
     constraints, Cartesian, Frames, Relation        the equations of joints and drivers
     continued, continuous, regular_between          tests of a step
@@ -61,6 +61,7 @@ if TYPE_CHECKING:
     from .diagnosis.conditioning import Conditioning as Conditioning
     from .diagnosis.conditioning import PoseConditioning as PoseConditioning
     from .diagnosis.conditioning import conditioning as conditioning
+    from .diagnosis.freeing import freeing as freeing
     from .diagnosis.instantaneous_screws import Screw as Screw
     from .diagnosis.instantaneous_screws import describe_screws as describe_screws
     from .diagnosis.position_gradients import Gradient as Gradient
@@ -119,6 +120,7 @@ _NAMES = {
     "design_batch": "Variants",
     "design_sweep": "Designs solve_designs",
     "diagnosis.conditioning": "Conditioning PoseConditioning conditioning",
+    "diagnosis.freeing": "freeing",
     "diagnosis.instantaneous_screws": "Screw describe_screws",
     "diagnosis.position_gradients": "Gradient",
     "diagnosis.rank": "Blocked ComponentCount Dependency NamedRow Ranks Violation",

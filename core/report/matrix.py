@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from typing import TextIO
 
 from rich.cells import cell_len
-from rich.table import Table
 from rich.text import Text
 
 from ..case.io.escape import visible
@@ -16,6 +15,7 @@ from ..harness.labels import against, motion_unit, notes, signs, suspects, unrea
 from ..harness.record import Outcome, Record, Results
 from ..trajectory import QUANTITIES
 from . import terminal
+from .fitting_table import FittingTable
 from .markdown import code, escaped, row
 from .table import COLOURS, LENGTH, messages, print_messages, print_signs, worst
 
@@ -34,7 +34,7 @@ def print_matrix(results: Results, file: TextIO) -> None:
     for n, band in enumerate(_bands(engines, rows, console.width)):
         if n:
             console.print()
-        table = Table(box=None, pad_edge=False, header_style="bold")
+        table = FittingTable()
         table.add_column("case", overflow="fold")
         for engine in band:
             table.add_column(Text(visible(engine)), overflow="fold")

@@ -17,14 +17,16 @@ def complain(lines: Iterable[str]) -> None:
         print(f"kincheck: {visible(line)}", file=sys.stderr)
 
 
-def progress(records: list[Record]) -> Callable[[Record, int, int], None]:
-    """Collects records and shows them on standard error: one changing line on a terminal, plain
-    lines elsewhere.
+def progress(records: list[Record], *, quiet: bool = False) -> Callable[[Record, int, int], None]:
+    """Return a function that collects records and shows them on standard error: a changing line on
+    a terminal, plain lines elsewhere; nothing if quiet.
     """
     terminal = sys.stderr.isatty()
 
     def tell(record: Record, done: int, total: int) -> None:
         records.append(record)
+        if quiet:
+            return
         line = visible(f"[{done}/{total}] {record.case} {record.engine}: {record.outcome.shown}")
         if terminal:
             line = f"\r\x1b[2K{line}" if done < total else "\r\x1b[2K"

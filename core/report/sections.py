@@ -14,7 +14,6 @@ from typing import Any, TextIO, cast
 
 import msgspec
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from rich.table import Table
 from rich.text import Text
 
 from ..case.io.atomic_files import to_standard_output, write_all
@@ -23,6 +22,7 @@ from ..harness.labels import known, number
 from ..harness.record import to_json
 from . import terminal
 from .figures import Figure, Style
+from .fitting_table import FittingTable
 from .page_model import Plot
 from .report import packed
 
@@ -96,7 +96,7 @@ def print_report(report: Report, file: TextIO) -> None:
     console.print(Text(report.headline, style="bold"))
     console.print(Text(" · ".join(report.facts)), soft_wrap=True)
     for section in report.sections:
-        table = Table(box=None, pad_edge=False, header_style="bold")
+        table = FittingTable()
         for column, heading in enumerate(section.columns):
             table.add_column(Text(heading), justify="left" if column < section.labels else "right")
         for row in section.rows:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from itertools import groupby
 from typing import Any, TextIO
 
+from rich.cells import cell_len
 from rich.console import Console
-from rich.table import Table
+from rich.padding import Padding
 from rich.text import Text
 
 from ..case.io.escape import visible
@@ -23,32 +25,104 @@ COLOURS = {
     Outcome.UNAVAILABLE: "yellow",
 }
 LENGTH = "m"
+HEADS = (
+    "engine",
+    "outcome",
+    *(f">error\n{motion_unit(LENGTH, quantity)}" for quantity in QUANTITIES),
+    ">us/step",
+)
 
 
 def print_table(results: Results, file: TextIO) -> None:
-    """Print the conventions of signs, a line per record, every message, and outcome counts."""
+    """Print the conventions of signs, a line per record, every message, and outcome counts.
+
+    Where the console is too narrow for a line per record, the records stand below their case.
+    """
     console = terminal.console(file)
     print_signs(results.run, console)
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    table.add_column("case", overflow="fold")
-    for name in ("engine", "outcome"):
-        table.add_column(name, no_wrap=True)
-    for quantity in QUANTITIES:
-        table.add_column(f"error\n{motion_unit(LENGTH, quantity)}", justify="right", no_wrap=True)
-    table.add_column("truth", overflow="fold")
-    table.add_column("us/step", justify="right", no_wrap=True)
     several = len({record.mode for record in results.records}) > 1
-    for record in results.records:
-        outcome = Text(record.outcome.shown, style=COLOURS.get(record.outcome, "bold red"))
-        errors = [_error(record, quantity) for quantity in QUANTITIES]
-        time = "–" if record.us_per_step is None else f"{record.us_per_step:.3g}"
-        engine = f"{record.engine} · {record.mode}" if several else record.engine
-        # texts, not strings: those would be taken for mark-up, in which [red] is a colour
-        case, engine, judge = (Text(visible(each)) for each in (record.case, engine, truth(record)))
-        table.add_row(case, engine, outcome, *errors, judge, time)
-    if results.records:
+    rows = [(record, _cells(record, several)) for record in results.records]
+    table = terminal.columns("case", *HEADS, "truth")
+    for record, cells in rows:
+        table.add_row(Text(visible(record.case)), *cells, Text(visible(truth(record))))
+    if rows and table.natural_width(console, console.options) <= console.width:
         console.print(table)
+    elif rows:
+        _print_by_case(rows, console)
     print_messages(results, console)
+
+
+def print_outputs(results: Results, file: TextIO) -> None:
+    """Print a line for each output of each record, its largest errors and their tolerances, then
+    what `print_table` prints.
+    """
+    console = terminal.console(file)
+    table = terminal.columns(
+        "case", "engine", "output", *(f">{each}" for each in QUANTITIES), "unit"
+    )
+    for record in results.records:
+        for name, errors in record.errors.items():
+            unit = record.outputs[name].unit if name in record.outputs else LENGTH
+            cells = (_of_tolerance(getattr(errors, quantity)) for quantity in QUANTITIES)
+            names = (record.case, record.engine, name)
+            table.add_row(*(Text(visible(each)) for each in names), *cells, unit)
+    console.print(table)
+    print_table(results, file)
+
+
+def print_summary(results: Results, file: TextIO) -> None:
+    """Print the messages and the counts of outcomes alone."""
+    print_messages(results, terminal.console(file))
+
+
+def _of_tolerance(error: Deviation | None) -> Text:
+    if error is None:
+        return Text("–")
+    text = f"{error.max_abs:.1e} of {error.tolerance:.0e}"
+    return Text(text, style="" if error.within else "bold red")
+
+
+def _cells(record: Record, several: bool) -> tuple[Text, ...]:
+    """Return the cells of `HEADS`, as texts; with the engine's mode if there are several."""
+    engine = f"{record.engine} · {record.mode}" if several else record.engine
+    outcome = Text(record.outcome.shown, style=COLOURS.get(record.outcome, "bold red"))
+    errors = (_error(record, quantity) for quantity in QUANTITIES)
+    return Text(visible(engine)), outcome, *errors, Text(_time(record.us_per_step))
+
+
+def _print_by_case(rows: Sequence[tuple[Record, tuple[Text, ...]]], console: Console) -> None:
+    """Print the records of each case below its name and standard, all in the same columns."""
+    heads = [head.removeprefix(">").split("\n") for head in HEADS]
+    texts = [[*lines, *(cells[k].plain for _, cells in rows)] for k, lines in enumerate(heads)]
+    widths = [max(map(cell_len, column)) for column in texts]
+    show_header = True
+    for case, group in groupby(rows, lambda row: row[0].case):
+        found = [*group]
+        standard = _standard([record for record, _ in found])
+        console.print(Text.assemble((visible(case), "bold"), "  ", (visible(standard), "dim")))
+        table = terminal.columns(*HEADS)
+        for column, width in zip(table.columns, widths, strict=True):
+            column.min_width = width
+        for _, cells in found:
+            table.add_row(*cells)
+        table.show_header, show_header = show_header, False
+        console.print(Padding(table, (0, 0, 0, 2), expand=False))
+
+
+def _standard(records: Sequence[Record]) -> str:
+    """Return the standard of the records of a case; of several notes, with their engines."""
+    engines: dict[str, list[str]] = {}
+    for record in records:
+        engines.setdefault(truth(record), []).append(record.engine)
+    if len(engines) == 1:
+        return next(iter(engines))
+    return "; ".join(f"{', '.join(names)}: {standard}" for standard, names in engines.items())
+
+
+def _time(us: float | None) -> str:
+    if us is None:
+        return "–"
+    return f"{us:.3g}" if us < 999.5 else f"{us:.0f}"
 
 
 def print_signs(run: Mapping[str, Any], console: Console) -> None:

@@ -12,13 +12,14 @@ from typing import IO, Any, TextIO
 
 import msgspec
 from rich.console import Console
-from rich.table import Table
+from rich.text import Text
 
 from ..case.io.atomic_files import to_standard_output, write
 from ..harness.record import to_json
+from .fitting_table import FittingTable
 
-# Columns for a log or a pipe, which have no width of their own: the table's lines are not to be
-# broken there.
+# Columns for a log or a pipe, unless the environment variable COLUMNS says how many: they have no
+# width of their own, and the table's lines are not to be broken there.
 LOG_WIDTH = 200
 
 
@@ -43,7 +44,7 @@ def console(file: TextIO) -> Console:
     """
     return _Console(
         file=file,
-        width=None if file.isatty() else LOG_WIDTH,
+        width=None if file.isatty() or os.environ.get("COLUMNS", "").isdigit() else LOG_WIDTH,
         highlight=False,
         markup=False,
         emoji=False,
@@ -55,20 +56,18 @@ def page(json: str | None) -> Console:
     return console(sys.stderr if json == "-" else sys.stdout)
 
 
-def columns(*heads: str, title: str | None = None) -> Table:
-    """A table without lines; columns whose heads begin with ">" stand right."""
-    table = Table(
-        box=None,
-        pad_edge=False,
-        header_style="bold",
-        title=title,
-        title_justify="left",
-        title_style="bold",
-    )
+def columns(*heads: str, title: str | None = None) -> FittingTable:
+    """Return a table without lines that fits the console.
+
+    Args:
+        heads: of the columns. Those that begin with ">" stand right and are never wrapped.
+    """
+    table = FittingTable(title=title)
     for head in heads:
         right = head.startswith(">")
+        # a text, not a string: that would be taken for mark-up, in which [red] is a colour
         table.add_column(
-            head.removeprefix(">"),
+            Text(head.removeprefix(">")),
             justify="right" if right else "left",
             overflow="fold",
             no_wrap=right,

@@ -121,15 +121,17 @@ class Report:
         self.print(text)
         return text.getvalue()
 
-    def print(self, file: TextIO) -> None:
-        """Print one line per check, then the messages, the specimens and a count."""
-        from rich.table import Table
+    def print(self, file: TextIO, *, quiet: bool = False) -> None:
+        """Print one line per check, then the messages, the specimens and a count; if quiet, the
+        failures and the count alone.
+        """
         from rich.text import Text
 
         from ..report import terminal
+        from ..report.fitting_table import FittingTable
 
         console = terminal.console(file)
-        table = Table(box=None, pad_edge=False, header_style="bold")
+        table = FittingTable()
         for name in ("check", "verdict", "worst", "limit", "at"):
             table.add_column(
                 name,
@@ -138,7 +140,8 @@ class Report:
             )
         table.add_column("limit because", overflow="fold")
         colours = {Verdict.PASS: "green", Verdict.FAIL: "bold red", Verdict.SKIP: "yellow"}
-        for each in self.findings:
+        shown = [each for each in self.findings if not quiet or each.verdict is Verdict.FAIL]
+        for each in shown:
             numbers = ("–" if x is None else f"{x:.3g}" for x in (each.figure, each.limit))
             table.add_row(
                 each.check,
@@ -147,11 +150,12 @@ class Report:
                 _where(each),
                 each.why,
             )
-        console.print(table)
-        for each in self.findings:
+        if shown:
+            console.print(table)
+        for each in shown:
             if each.message:
                 console.print(Text(f"{each.check}: {each.message}"), soft_wrap=True)
-        for k, specimen in enumerate(self.specimens):
+        for k, specimen in enumerate(() if quiet else self.specimens):
             console.print(Text(f"specimen {k}: {specimen}"), soft_wrap=True)
         counts = Counter(each.verdict for each in self.findings)
         summary = ", ".join(

@@ -24,6 +24,7 @@ ROUND_OFF = 1e-13
 
 IN_HOUSE = {"mcpherson_strut", "mcpherson_steered", "mcpherson_suspension"}
 IN_HOUSE |= {
+    "mcpherson_strut_loaded",
     "chrono_macpherson",
     "chrono_macpherson_cylindrical",
     "chrono_double_wishbone",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Collection, Mapping, Sequence
 from datetime import UTC, datetime
+from itertools import count
 from pathlib import Path
 from typing import Any, Literal
 
@@ -104,16 +105,15 @@ def measure(
     rounds: int,
     parts: Collection[str],
     command: str,
-    tell: Callable[[str], object],
+    tell: Callable[[str, float], object],
 ) -> Bench:
-    """Measure the requested parts, for the motion alone. Batches, studies and processes are of the
-    first case.
+    """Measure the requested parts of the motion; batches, studies and processes of the first case.
 
     Args:
         cases: by name as on the command line; at least one.
         engines: in both modes.
         tol: largest accepted constraint residual, as for `Engine.solve`.
-        tell: called with the name of each measurement.
+        tell: called with the name of each measurement and the finished part of all, from 0 to 1.
 
     Raises:
         KincheckError: a case has no reference and cannot be given one.
@@ -126,27 +126,36 @@ def measure(
 
     peak = prepare() if compiler.available() else None
     true = {name: with_truth(without_forces(case), tol) for name, case in cases.items()}
+    native = any(isinstance(engine, NativeEngine) for engine in engines)
+    several = {"work": 2 * len(true), "loop": len(true), "size": 2 if native else 1}
+    steps, numbers = sum(several.get(part, 1) for part in parts), count()
+
+    def begin(what: str) -> Callable[[float], object]:
+        number = next(numbers)
+        tell(what, number / steps)
+        return lambda done: tell(what, (number + done) / steps)
+
     if "work" in parts:
         for case in true.values():
-            _measure_work(case, engines, tol, rounds, peak, add, tell)
+            _measure_work(case, engines, tol, rounds, peak, add, begin)
     name, first = next(iter(true.items()))
     projections = [engine for engine in engines if engine.mode == "projection"]
     if "loop" in parts:
-        add("loops", measure_loops(true.values(), projections, tol, rounds, tell))
+        add("loops", measure_loops(true.values(), projections, tol, rounds, begin))
     if "batch" in parts:
-        tell(f"{first.name}: batches of variants")
+        begin(f"{first.name}: batches of variants")
         add("batches", measure_batches(first, tol, rounds, peak))
     if "study" in parts:
-        tell(f"{first.name}: a study by threads")
+        begin(f"{first.name}: a study by threads")
         add("studies", measure_studies(first, tol, rounds, peak))
     if "size" in parts:
-        tell("chains and rings of loops")
+        begin("chains and rings of loops")
         add("sizes", measure_sizes(projections, tol, rounds))
-        if any(isinstance(engine, NativeEngine) for engine in engines):
-            tell("large mechanisms")
+        if native:
+            begin("large mechanisms")
             add("scalings", scaling.measure(LARGE, LARGE, min(rounds, LARGE_ROUNDS)))
     if "processes" in parts:
-        tell(f"{first.name}: processes of their own")
+        begin(f"{first.name}: processes of their own")
         # variants of a simulator take the memory that it takes
         names = {engine.name for engine in projections}
         add(
@@ -178,7 +187,7 @@ def _measure_work(
     rounds: int,
     peak: Peak | None,
     add: Callable[[str, Sequence[Any]], object],
-    tell: Callable[[str], object],
+    begin: Callable[[str], Callable[[float], object]],
 ) -> None:
     """A case's work and precision, its floors, and the native engine in detail: all in the same
     rounds.
@@ -198,8 +207,8 @@ def _measure_work(
         work["levels", native_breakdown.ALONE] = native_breakdown.loops_alone(case, tol)
     if peak is not None:
         work["peak", ""] = peak
-    tell(f"{case.name}: {len(work)} contestants, {rounds} rounds")
-    seconds = take_turns(work, rounds)
+    told = begin(f"{case.name}: {len(work)} contestants, {rounds} rounds")
+    seconds = take_turns(work, rounds, told)
     timed = {key: each.timed(seconds.get(key)) for key, each in entering.items()}
     entries = [entry for (kind, _), entry in timed.items() if kind != "levels"]
     native = {setting: entry for (kind, setting), entry in timed.items() if kind == "levels"}
@@ -212,7 +221,7 @@ def _measure_work(
     add("entries", entries)
     add("needed", needed(entries))
     add("levels", [*native.values()])
-    tell(f"{case.name}: floors")
+    begin(f"{case.name}: floors")
     add("floors", floors(case, engines))
     if peak is not None:
         add("rates", _rates(case, native, peak, seconds["peak", ""]))

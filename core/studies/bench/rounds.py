@@ -49,18 +49,24 @@ def spread(values: Sequence[float]) -> Spread:
     return Spread(least=least, median=median, lower=lower, upper=upper, rounds=len(values))
 
 
-def take_turns(contestants: Mapping[Key, Work], rounds: int) -> dict[Key, Spread]:
+def take_turns(
+    contestants: Mapping[Key, Work],
+    rounds: int,
+    tell: Callable[[float], object] = lambda done: None,
+) -> dict[Key, Spread]:
     """Return the seconds of one call of each contestant, over rounds with a turn of each.
 
     Each is called before all rounds. Quick work is called once more before each of its turns,
     untimed: this fills the caches after the contestant before it, for all alike.
-    Python's garbage is collected between rounds only.
+    Python's garbage is collected between rounds only. `tell` is called before each round, with the
+    finished part of all.
     """
     calls = {key: _calls(work) for key, work in contestants.items()}
     times: dict[Key, list[float]] = {key: [] for key in contestants}
     enabled = gc.isenabled()
     try:
-        for _ in range(rounds):
+        for number in range(rounds):
+            tell(number / rounds)
             gc.collect()
             gc.disable()
             for key, work in contestants.items():

@@ -22,11 +22,14 @@ from ...kinematics import (
     Violation,
     conditioning,
     describe_screws,
+    freeing,
     places,
 )
 from .outputs import Budget, Sensitivity, binding, budgets, read_points, sensitivities
 
 SCHEMA = "kincheck-explain/1"
+# Joints that a sentence names as alternatives.
+NAMED = 5
 
 
 class Freedom(msgspec.Struct, frozen=True):
@@ -62,7 +65,9 @@ class Diagnosis(msgspec.Struct, frozen=True):
     """The diagnosis. findings: why the case cannot be solved as described; empty where it can.
 
     Attributes:
+        verdict: whether it can be solved, in one sentence.
         notes: remarks on the joints' geometry.
+        freeing: joints of which any one, taken out alone, frees the blocked drivers.
         binding: numbers of the geometry that cannot be changed alone without contradiction.
         signs: sign conventions of the outputs; empty without.
         not_derived: outputs that depend on more than the pose, without budget and sensitivities.
@@ -71,6 +76,7 @@ class Diagnosis(msgspec.Struct, frozen=True):
 
     schema: str
     case: str
+    verdict: str
     findings: list[str]
     notes: list[str]
     freedom: Freedom
@@ -79,6 +85,7 @@ class Diagnosis(msgspec.Struct, frozen=True):
     nearly_redundant: list[Nearly]
     free: list[list[Screw]]
     blocked: list[Blocked]
+    freeing: list[str]
     contradictions: list[Violation]
     swept: str
     reached: int
@@ -148,6 +155,7 @@ def diagnose(case: Case, *, samples: int, tol: float) -> Diagnosis:
     return Diagnosis(
         schema=SCHEMA,
         case=case.name,
+        verdict=_verdict(ranks, findings, swept),
         findings=findings,
         notes=notes(case),
         freedom=freedom,
@@ -156,6 +164,7 @@ def diagnose(case: Case, *, samples: int, tol: float) -> Diagnosis:
         nearly_redundant=[Nearly(size, rows) for size, rows in ranks.nearly],
         free=ranks.free,
         blocked=ranks.blocked,
+        freeing=freeing(ranks)[0] if ranks.blocked else [],
         contradictions=ranks.contradictions,
         swept=case.sweep.driver,
         reached=int(swept.trajectory.solved.sum()) if swept else 0,
@@ -182,6 +191,42 @@ def _samples(swept: Conditioning) -> list[Sample]:
         )
         for p in swept.poses
     ]
+
+
+def _verdict(ranks: Ranks, findings: list[str], swept: Conditioning | None) -> str:
+    """Return in one plain sentence whether the case can be solved, and if not, of what kind the
+    reason is.
+    """
+    dof, drivers = ranks.account.dof, len(ranks.mechanism.drivers)
+    count = f"{_counted(dof, 'degree', 'degrees')} of freedom, {_counted(drivers, 'driver')}"
+    if ranks.contradictions:
+        return f"the joints contradict each other: it does not close at the design ({count})"
+    if ranks.blocked:
+        names, free = freeing(ranks)
+        remedy = f"; it moves without {_alternatives(names)}" if names else ""
+        more = f", which leaves {_counted(free, 'motion')} free" if names and free else ""
+        return f"over-constrained, a driver cannot move: {count}{remedy}{more}"
+    if ranks.free:
+        kind = "under-constrained" if dof > drivers else "singular at the design"
+        return f"{kind}, the drivers do not determine the motion: {count}"
+    if swept is None or findings:
+        reached = int(swept.trajectory.solved.sum()) if swept else 0
+        samples = len(swept.trajectory.solved) if swept else 0
+        return f"the sweep cannot be followed: {reached} of {samples} samples reached ({count})"
+    worst = max((p.condition for p in swept.poses), default=1.0)
+    lost = f"{np.log10(worst):.0f} of 16 digits at most are lost to conditioning"
+    redundant = _counted(len(ranks.dependencies), "redundant row")
+    return f"it can be solved: {count}, {redundant}; all samples reached; {lost}"
+
+
+def _counted(number: int, one: str, several: str = "") -> str:
+    return f"{number} {one if number == 1 else several or f'{one}s'}"
+
+
+def _alternatives(names: list[str]) -> str:
+    """Return the first names as alternatives, "a", "a or b"."""
+    texts = [repr(name) for name in names[:NAMED]]
+    return " or ".join(filter(None, (", ".join(texts[:-1]), texts[-1])))
 
 
 def _findings(ranks: Ranks) -> list[str]:
@@ -223,7 +268,11 @@ def _remedy(ranks: Ranks) -> str:
             f"a combination of rows of {owners} nearly vanishes ({size:.1e}): make their geometry"
             " exactly parallel or aligned"
         )
-    return "remove a driver or free the mechanism"
+    names, free = freeing(ranks)
+    if not names:
+        return "remove a driver or free the mechanism"
+    more = f", which leaves {_counted(free, 'motion')} free" if free else ""
+    return f"remove the driver, or take out {_alternatives(names)}{more}"
 
 
 def _violations(rows: tuple[Violation, ...] | list[Violation], most: int = 4) -> str:

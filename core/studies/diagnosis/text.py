@@ -17,25 +17,38 @@ from .diagnose import Diagnosis, Sample
 SAMPLES, PLACES, TERMS = 9, 5, 6
 
 
-def print_diagnosis(found: Diagnosis, console: Console) -> None:
-    """Print the diagnosis, findings first."""
-    for each in _parts(found):
+def print_diagnosis(
+    found: Diagnosis, console: Console, *, quiet: bool = False, verbose: bool = False
+) -> None:
+    """Print the diagnosis: verdict, findings, and the numbers that they rest on.
+
+    Args:
+        quiet: print verdict and findings alone.
+        verbose: print all samples, terms and sensitivities, not those that show where to look.
+    """
+    for each in _verdict(found):
+        console.print(each, soft_wrap=True)
+    for each in () if quiet else _parts(found, verbose):
         console.print(each, soft_wrap=isinstance(each, Text))
 
 
-def _parts(found: Diagnosis) -> Iterator[Text | Table]:
-    yield Text(found.case, "bold")
+def _verdict(found: Diagnosis) -> Iterator[Text]:
+    style = "bold red" if found.findings else "bold green"
+    yield Text.assemble((f"{found.case}: ", "bold"), (found.verdict, style))
     for finding in found.findings:
-        yield Text(f"finding: {finding}", "bold red")
+        yield Text(f"finding: {finding}", "red")
     for note in found.notes:
         yield Text(f"note: {note}", "yellow")
-    yield from _freedom(found)
+
+
+def _parts(found: Diagnosis, verbose: bool) -> Iterator[Text | Table]:
+    yield from _freedom(found, len(found.redundant) if verbose else TERMS)
     if found.samples:
-        yield from _conditioning(found)
+        yield from _conditioning(found, len(found.samples) if verbose else SAMPLES)
     if found.budgets:
         yield from _budgets(found)
     if found.sensitivities:
-        yield from _sensitivities(found)
+        yield from _sensitivities(found, len(found.sensitivities) if verbose else PLACES)
     if found.not_derived and found.samples:
         yield Text(
             "not functions of the pose alone, so without tolerance and sensitivities here:"
@@ -50,7 +63,7 @@ def _head(line: str) -> Text:
     return Text(f"\n{line}", "bold")
 
 
-def _freedom(found: Diagnosis) -> Iterator[Text | Table]:
+def _freedom(found: Diagnosis, terms: int) -> Iterator[Text | Table]:
     freedom = found.freedom
     yield _head(
         f"freedom: {freedom.coordinates} coordinates - rank {freedom.rank} of {freedom.rows} joint"
@@ -65,7 +78,7 @@ def _freedom(found: Diagnosis) -> Iterator[Text | Table]:
     if not found.redundant:
         yield Text("redundant rows: none")
     for each in found.redundant:
-        yield Text(f"redundant: {each.row} = {_sum(each.repeats)}")
+        yield Text(f"redundant: {each.row} = {_sum(each.repeats, terms)}")
     if found.redundant_residual is not None and found.redundant:
         yield Text(f"  along the sweep they hold to {found.redundant_residual:.1e} m")
     for each in found.nearly_redundant:
@@ -74,8 +87,8 @@ def _freedom(found: Diagnosis) -> Iterator[Text | Table]:
         )
 
 
-def _sum(terms: Sequence[tuple[float, NamedRow]]) -> str:
-    if len(terms) > TERMS:
+def _sum(terms: Sequence[tuple[float, NamedRow]], most: int) -> str:
+    if len(terms) > most:
         return (
             f"a sum of {len(terms)} rows of"
             f" {listed(list(dict.fromkeys(row.owner for _, row in terms)))}"
@@ -84,11 +97,11 @@ def _sum(terms: Sequence[tuple[float, NamedRow]]) -> str:
     return " ".join(parts).removeprefix("+ ") or "0"
 
 
-def _conditioning(found: Diagnosis) -> Iterator[Text | Table]:
+def _conditioning(found: Diagnosis, most: int) -> Iterator[Text | Table]:
     worst, count = found.worst, len(found.samples)
     yield _head(f"conditioning along the sweep, {count} samples looked at, {found.reached} reached")
     table = columns(f">{found.swept}", ">smallest sv", ">condition", "det", "least determined")
-    shown = {round(k * (count - 1) / (SAMPLES - 1)) for k in range(SAMPLES)}
+    shown = {round(k * (count - 1) / max(1, most - 1)) for k in range(most)}
     for k, each in enumerate(found.samples):
         if k in shown or each is worst:
             condition = "singular" if each.condition is None else f"{each.condition:.3g}"
@@ -153,16 +166,17 @@ def _signs(found: Diagnosis) -> Iterator[Text]:
         yield Text(f"signs: {found.signs}")
 
 
-def _sensitivities(found: Diagnosis) -> Iterator[Text | Table]:
+def _sensitivities(found: Diagnosis, most: int) -> Iterator[Text | Table]:
     yield _head(
-        f"sensitivity of the outputs to the geometry, drivers held: the {PLACES} largest of each"
+        "sensitivity of the outputs to the geometry, drivers held"
+        + (f": the {most} largest of each" if most == PLACES else "")
     )
     yield from _signs(found)
     table = columns("output", "number", ">largest", "unit", f">at {found.swept}")
     shown: dict[str, int] = {}
     for each in found.sensitivities:
         shown[each.output] = shown.get(each.output, 0) + 1
-        if shown[each.output] > PLACES:
+        if shown[each.output] > most:
             continue
         at = found.samples[each.by_sample.index(each.largest)].value
         name = each.output if shown[each.output] == 1 else ""

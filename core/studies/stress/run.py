@@ -72,16 +72,16 @@ def stress(
     seed: int,
     command: str = "",
     prove: bool = True,
-    tell: Callable[[str], object] = lambda line: None,
+    tell: Callable[[str, float], object] = lambda what, done: None,
 ) -> tuple[Stress, list[Example]]:
     """Run all families; return the results and the smallest example of each bad engine and outcome.
 
-    `prove` proves a share of the followed samples and needs python-flint. A KincheckError is raised
-    if this machine has no extended precision.
+    `prove` proves a share of the followed samples and needs python-flint. `tell` gets what is done
+    next and the finished part. A KincheckError is raised if this machine has no extended precision.
     """
     require_extended()
     found, seconds = _Results(), {"truth": 0.0, "proofs": 0.0, "engines": 0.0}
-    for family in families:
+    for number, family in enumerate(families):
         try:
             _family(
                 family,
@@ -91,11 +91,11 @@ def stress(
                 samples=max(1, samples // len(families)),
                 seed=seed,
                 prove=prove,
-                tell=tell,
+                tell=lambda what, done, before=number: tell(what, (before + done) / len(families)),
             )
         except KincheckError as error:  # the results of the other families are kept
             found.unfinished[family.name] = str(error)
-            tell(f"{family.name}: not finished: {error}")
+            tell(f"{family.name}: not finished: {error}", (number + 1) / len(families))
     results = Stress(
         kincheck=VERSION,
         command=command,
@@ -121,18 +121,20 @@ def _family(
     samples: int,
     seed: int,
     prove: bool,
-    tell: Callable[[str], object],
+    tell: Callable[[str, float], object],
 ) -> None:
-    begun = perf_counter()
+    begun, parts = perf_counter(), 1 + len(engines)
+    tell(f"{family.name}: making {samples} samples", 0.0)
     made = specimens(family, seed, samples)
     seconds["truth"] += (now := perf_counter()) - begun
     if prove:
         found.proofs += _proofs(family.name, made, seed)
     seconds["proofs"] += (then := perf_counter()) - now
-    for engine in engines:
+    count = f"{sum(each.samples for each in made)} samples of {len(made)} specimens"
+    for number, engine in enumerate(engines, 1):
+        tell(f"{family.name}: {count} by {engine.name}", number / parts)
         _solve(family, engine, made, found)
     seconds["engines"] += perf_counter() - then
-    tell(f"{family.name}: {sum(each.samples for each in made)} samples of {len(made)} specimens")
 
 
 def specimens(family: Family, seed: int, share: int) -> list[Made]:

@@ -13,7 +13,6 @@ from types import TracebackType
 from typing import Any, Self, TextIO
 
 import numpy as np
-from rich.table import Table
 from rich.text import Text
 
 from ...case.io.escape import cell
@@ -22,6 +21,7 @@ from ...errors import KincheckError
 from ...extras import library
 from ...harness.labels import notes, number
 from ...report import terminal
+from ...report.fitting_table import FittingTable
 from ...report.table import print_signs
 from .page import effect, headline
 from .results import SweepResults
@@ -35,7 +35,7 @@ def print_sweep(results: SweepResults, file: TextIO) -> None:
     console = terminal.console(file)
     console.print(Text(headline(results), style="bold"))
     print_signs(results.run, console)
-    table = Table(box=None, pad_edge=False, header_style="bold")
+    table = FittingTable()
     for name in ("output", "unit"):
         table.add_column(name)
     for name in ("least", "variant", "most", "variant", "largest\nst. dev.", "largest\n1-99 %"):

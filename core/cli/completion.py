@@ -1,0 +1,80 @@
+"""kincheck completion: print the completion script of a shell."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterable
+from typing import Any
+
+from .registry import House, Status
+
+SHELLS = ("bash", "zsh", "tcsh")
+FILES = ("FILE", "FILE.html", "RUN")
+# Options of engines: these names complete them; files complete cases, beside the built-in names.
+ENGINES = ("engine", "require")
+PREAMBLE = {
+    "bash": 'kincheck_cases() {{ compgen -W "{names}" -- "$1"; compgen -f -- "$1"; }}',
+    "zsh": "kincheck_cases() {{ compadd {names}; _files; }}",
+    "tcsh": "",
+}
+
+
+def add(commands: Any) -> None:
+    """Add the command to the parser."""
+    completion: argparse.ArgumentParser = commands.add_parser(
+        "completion",
+        help="print the completion script of a shell",
+        description=_complete.__doc__,
+        epilog=(
+            "bash: echo 'eval \"$(kincheck completion bash)\"' >> ~/.bashrc. zsh: kincheck"
+            " completion zsh > a folder of $fpath, as _kincheck. tcsh: kincheck completion tcsh >"
+            " ~/.kincheck.tcsh, and source that in ~/.tcshrc. Then open a new shell."
+        ),
+    )
+    completion.set_defaults(do=_complete)
+    completion.add_argument("shell", choices=SHELLS, metavar="SHELL", help=", ".join(SHELLS))
+
+
+def _complete(options: argparse.Namespace, house: House) -> int:
+    """Print the script that completes commands, options, built-in cases, engines and files. Make it
+    anew after an update.
+    """
+    import shtab
+
+    from ..case.models.hardpoints.templates import TEMPLATES
+    from ..studies.stress.families import Family
+    from .main import parser
+
+    names = {
+        **{each: [*dict.fromkeys((*house.engines, *house.simulations))] for each in ENGINES},
+        "family": [*Family.registry],
+        "template": [*TEMPLATES],
+        "to": [*house.writers],
+        "export": [*house.writers],
+    }
+    found = parser([])
+    for each in (found, *_below(found)):
+        for action in each.arguments():
+            if action.metavar == "CASE":
+                action.complete = {  # pyright: ignore[reportAttributeAccessIssue]
+                    "bash": "kincheck_cases",
+                    "zsh": "kincheck_cases",
+                    "tcsh": "f",
+                }
+            elif action.metavar in FILES:
+                action.complete = shtab.FILE  # pyright: ignore[reportAttributeAccessIssue]
+            elif action.metavar == "DIR":
+                action.complete = shtab.DIRECTORY  # pyright: ignore[reportAttributeAccessIssue]
+            elif action.choices is None:
+                action.choices = names.get(action.dest)
+    # a dictionary by shell, which the library's types do not say
+    preamble: Any = {options.shell: PREAMBLE[options.shell].format(names=" ".join(house.cases()))}
+    print(shtab.complete(found, options.shell, preamble=preamble))
+    return Status.WITHIN
+
+
+def _below(parser: Any) -> Iterable[Any]:
+    """Yield the parsers of the commands of a parser, and of theirs."""
+    for each in parser.commands().values():
+        yield each
+        yield from _below(each)

@@ -1,0 +1,161 @@
+"""What makes the command line quick to use: completion, patterns, -q and -v, numbers, progress."""
+
+import io
+import re
+import shutil
+import subprocess
+import sys
+
+import pytest
+from kincheck import cases
+from kincheck.core.cli import main
+from kincheck.core.cli.option_types import whole
+from kincheck.core.harness.provenance import truth_of
+from kincheck.core.report.meter import Meter
+from kincheck.core.report.terminal import columns, console
+
+from ..support.fakes import Fake
+
+RIGHT = Fake("native")
+
+
+@pytest.mark.parametrize(("text", "value"), [("1000000", 10**6), ("1e6", 10**6), ("2.0", 2)])
+def test_whole_numbers_in_any_notation(text, value):
+    assert whole(1)(text) == value
+
+
+@pytest.mark.parametrize("text", ["1.5", "1e-3", "nan", "inf", "0", "ten", "1e3000"])
+def test_what_is_no_whole_number_is_refused(text):
+    with pytest.raises(Exception, match="is not a whole number of 1 or more"):
+        whole(1)(text)
+
+
+def test_a_pattern_names_all_cases_that_match(kincheck_main, capsys):
+    assert kincheck_main("run", "crank*", engines=[RIGHT]) == 0
+    assert "2 pass" in capsys.readouterr().out
+    assert kincheck_main("run", "crank_?wo", engines=[RIGHT]) == 0
+    assert "1 pass" in capsys.readouterr().out
+
+
+def test_a_command_for_one_case_refuses_a_pattern_of_several(kincheck_main, capsys):
+    assert kincheck_main("explain", "cran*", engines=[RIGHT]) == 2
+    said = capsys.readouterr().err
+    assert "'cran*' matches 2 cases: crank, crank_two; name one of them" in said
+
+
+def test_a_pattern_names_files_too(kincheck_main, tmp_path, capsys):
+    shutil.copy(cases.FOLDER / "rssr.toml", tmp_path / "mine.toml")
+    (tmp_path / "other.csv").touch()
+    kincheck_main("run", f"{tmp_path}/*.toml", engines=[RIGHT], cases={})
+    assert "[1/1] rssr native" in capsys.readouterr().err
+
+
+def test_quiet_and_verbose(kincheck_main, capsys):
+    assert kincheck_main("run", "crank", "-q", engines=[RIGHT]) == 0
+    assert capsys.readouterr() == ("1 pass\n", "")
+    assert kincheck_main("run", "crank", "-v", engines=[RIGHT]) == 0
+    out = capsys.readouterr().out
+    assert re.search(r"crank +native +x +\S+ of \S+ +\S+ of", out)
+    assert kincheck_main("list", "-q", engines=[RIGHT]) == 0
+    assert capsys.readouterr().out.split() == ["crank", "crank_two", "native"]
+
+
+@pytest.mark.parametrize(
+    ("argv", "said"),
+    [
+        (["runn"], "kincheck: error: there is no command 'runn'; did you mean 'run'?"),
+        (["--engine", "native", "run"], "it belongs to kincheck run"),
+        (["bench", "--rounds", "3"], "'--rounds'; it belongs to kincheck bench engines"),
+        (["sweep", "--sample", "1e3", "--vari", "f"], "kincheck sweep: error: "),
+        (["sweep", "--varry", "f"], "no option '--varry'; did you mean '--vary'?"),
+        (["explain", "rssr", "bennett"], "kincheck explain: error: too many arguments: bennett"),
+        (["export", "rssr", "--at", "nan"], "'nan' is not a number"),
+    ],
+)
+def test_mistakes_name_the_command_and_the_remedy(argv, said, capsys):
+    assert main.main(argv) == 2
+    found = capsys.readouterr().err
+    assert said in found
+    assert len(found.splitlines()) == 2
+
+
+@pytest.mark.parametrize("width", [40, 60, 80, 100])
+def test_no_table_breaks_a_name_or_overflows(width, monkeypatch):
+    monkeypatch.setenv("COLUMNS", str(width))
+    table = columns("case", "engine", ">error", "what it says of itself")
+    names = ["chrono_sedan_double_wishbone_arm", "exudyn-static-modified"]
+    text = "a sentence of many words that may be wrapped anywhere between any two of them"
+    table.add_row(*names, "1.5e-16", text)
+    file = io.StringIO()
+    console(file).print(table)
+    lines = file.getvalue().splitlines()
+    assert max(map(len, lines)) <= width
+    assert all(name in file.getvalue() for name in (*names, "1.5e-16"))
+    assert file.getvalue().split().count("wrapped") == 1
+
+
+@pytest.mark.parametrize("width", [60, 80, 200])
+def test_records_stand_below_their_case_on_a_narrow_console(
+    kincheck_main, capsys, monkeypatch, width
+):
+    monkeypatch.setenv("COLUMNS", str(width))
+    assert kincheck_main("run", "crank", engines=[RIGHT, Fake("twin")]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= width
+    assert sum("crank" in line for line in lines) == (2 if width == 200 else 1)
+
+
+def test_progress_says_how_much_time_is_left(capsys, monkeypatch):
+    now = iter([0.0, 0.0, 90.0, 100.0])
+    monkeypatch.setattr("kincheck.core.report.meter.perf_counter", lambda: next(now))
+    with Meter("stress", every=5.0) as meter:
+        meter("arms", 0.0)
+        meter("folds", 0.25)
+        meter("hidden", 0.3)
+    found = ["stress: arms (0 %)", "stress: folds (25 %, about 4 min 30 s left)"]
+    assert capsys.readouterr().err.splitlines()[:2] == found
+
+
+def test_quiet_progress_is_silent(capsys):
+    with Meter("stress", quiet=True) as meter:
+        meter("arms", 0.5)
+    assert capsys.readouterr() == ("", "")
+
+
+def test_the_summary_of_a_case_is_that_of_the_case():
+    for name in ("rssr", "mcpherson_strut", "modelica_four_bar_distance"):
+        case = cases.load(name)
+        assert cases.summary(name) == (truth_of(case), case.source)
+
+
+def test_list_imports_no_simulator(capsys):
+    code = (
+        "import sys; from kincheck.core.cli.main import main; main(['list']);"
+        " sys.exit(bool({'mujoco', 'pinocchio', 'exudyn', 'pydrake'} & {*sys.modules}))"
+    )
+    assert subprocess.run([sys.executable, "-c", code], stdout=subprocess.DEVNULL).returncode == 0
+
+
+TRY = """
+source {script}
+COMP_WORDS=({words}); COMP_CWORD=$((${{#COMP_WORDS[@]}} - 1)); _shtab_kincheck
+echo "${{COMPREPLY[@]}}"
+"""
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="needs bash")
+def test_bash_completes_commands_cases_engines_and_options(tmp_path, capsys):
+    pytest.importorskip("shtab")
+    assert main.main(["completion", "bash"]) == 0
+    (script := tmp_path / "script").write_text(capsys.readouterr().out)
+    for words, expected in (
+        ("kincheck exp", "export explain"),
+        ("kincheck explain rssr_", "rssr_other_branch"),
+        ("kincheck run --engine muj", "mujoco mujoco-default mujoco-projecting"),
+        ("kincheck export rssr --to mj", "mjcf"),
+        ("kincheck bench engines --rou", "--rounds"),
+    ):
+        told = subprocess.run(
+            ["bash", "-c", TRY.format(script=script, words=words)], capture_output=True, text=True
+        )
+        assert sorted(told.stdout.split()) == sorted(expected.split())
