@@ -71,7 +71,10 @@ def test_every_type_says_what_it_does(own_joint_types):
     for registry in (Joint.registry, Coupler.registry, DRIVERS, Motion.registry):
         for name, cls in registry.items():
             if cls.__module__.startswith("kincheck."):
-                assert found[name].endswith(f"  {cls.__doc__.splitlines()[0]}")
+                # a whole sentence, also where the source breaks the line
+                meaning = " ".join(cls.__doc__.partition("\n\n")[0].split()).partition(". ")[0]
+                assert found[name].rstrip(".").endswith(f"  {meaning.rstrip('.')}")
+                assert found[name].endswith(".")
     assert found["revolute"].endswith(
         "  Both bodies share the point and the axis and turn about it."
     )
