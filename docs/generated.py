@@ -15,6 +15,7 @@ from kincheck.core.case.io.catalogue import output_tables, type_tables
 from kincheck.core.case.variation import variation_schema
 from kincheck.core.cli.main import _parser
 
+ROOT = Path(__file__).parent.parent
 SHARED = {
     "hardpoints": "Hardpoint tables",
     "models": "Models",
@@ -29,15 +30,14 @@ def PAGES() -> dict[str, str]:  # noqa: N802
         "reference/command-line.md": command_line(),
         "reference/case-file.md": case_file(),
         "reference/types.md": types(),
+        "project/changes.md": (ROOT / "CHANGELOG.md").read_text("utf-8"),
     }
 
 
 def command_line() -> str:
     """Return the page of all commands and options, from their parsers."""
     parser = _parser([])
-    (commands,) = (
-        each for each in parser._actions if isinstance(each, argparse._SubParsersAction)
-    )
+    (commands,) = (each for each in parser._actions if isinstance(each, argparse._SubParsersAction))
     helps = {each.dest: each.help or "" for each in commands._choices_actions}
     shared: dict[str, list[str]] = {}
     parts = [
@@ -172,5 +172,3 @@ def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
         f"| {' | '.join(' '.join(str(cell).split()).replace('|', chr(92) + '|') for cell in row)} |"
         for row in cells
     )
-
-

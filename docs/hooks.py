@@ -1,10 +1,7 @@
 """Hooks of MkDocs: pages and figures made by the code, and formulas as MathML."""
 
-import os
 import re
 from html import unescape
-
-os.environ.setdefault("NO_MKDOCS_2_WARNING", "1")
 
 import figures
 import generated

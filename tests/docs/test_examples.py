@@ -113,9 +113,7 @@ def follow(reader, block, where):
             lacks = differences(block.shown, printed)
             assert not lacks, f"{where}: no line {lacks!r} in\n{printed}"
     elif block.language in ("sh", "console"):
-        scripts = (
-            [(block.text, "")] if block.language == "sh" else [*commands(block.text)]
-        )
+        scripts = [(block.text, "")] if block.language == "sh" else [*commands(block.text)]
         for k, (script, shown) in enumerate(scripts, 1):
             status, output, errors = reader.types(script)
             expected = block.status if k == len(scripts) else 0
