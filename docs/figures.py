@@ -178,18 +178,15 @@ def leg_scene() -> str:
 
 
 def scene(results: Any, name: str, frames: tuple[int, ...]) -> str:
-    """A mechanism at some samples, in space."""
-    figure = Figure(figsize=(7.5, 5.0), layout="none")
-    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0), projection="3d")
-    draw(axes, results.scenes[name], frames, plane=(0, 1, 2))
-    axes.set_aspect("equal")
-    axes.view_init(elev=12, azim=-140)
-    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
-        axis.pane.set_alpha(0)
-        axis.set_major_locator(matplotlib.ticker.MaxNLocator(3))
-    axes.set_xlabel("x [m]")
-    axes.set_ylabel("y [m]")
-    axes.set_zlabel("z [m]")
+    """A mechanism at some samples, from the front and from the side."""
+    figure = Figure(figsize=(7.5, 5.0))
+    views = ((1, 2, "front: y", "z"), (0, 2, "side: x", "z"))
+    for axes, (across, up, one, two) in zip(figure.subplots(1, 2, sharey=True), views, strict=True):
+        axes.set_aspect("equal")
+        draw(axes, results.scenes[name], frames, plane=(across, up))
+        axes.set_xlabel(f"{one} [m]")
+        axes.set_ylabel(f"{two} [m]")
+    figure.axes[1].get_legend().remove()
     return svg(figure)
 
 

@@ -23,10 +23,13 @@ def serve(address: str) -> None:
 
     from kincheck.core.cli.main import main
 
-    with open(os.devnull, "w") as nowhere, contextlib.redirect_stdout(nowhere):
-        with contextlib.redirect_stderr(nowhere):
-            main(["run", "rssr", "--engine", "native", "--out", os.path.dirname(address)])
-            main(["explain", "rssr", "--samples", "3"])
+    with (
+        open(os.devnull, "w") as nowhere,
+        contextlib.redirect_stdout(nowhere),
+        contextlib.redirect_stderr(nowhere),
+    ):
+        main(["run", "rssr", "--engine", "native", "--out", os.path.dirname(address)])
+        main(["explain", "rssr", "--samples", "3"])
 
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)
     listening = socket.socket(socket.AF_UNIX)
@@ -44,8 +47,9 @@ def serve(address: str) -> None:
         arguments, folder, environment = json.loads(message)
         for number, stream in enumerate(streams):
             os.dup2(stream, number)
-        sys.stdout = open(1, "w", closefd=False)  # the old ones know pipes, not files
-        sys.stderr = open(2, "w", buffering=1, closefd=False)
+        # the old ones know pipes, not files
+        sys.stdout = os.fdopen(1, "w", closefd=False)
+        sys.stderr = os.fdopen(2, "w", buffering=1, closefd=False)
         os.chdir(folder)
         os.environ.clear()
         os.environ.update(environment)
