@@ -9,7 +9,11 @@ over G and over H from E to A. The sides are those of the published start.
 
 from __future__ import annotations
 
-from .jet import Jet, Motion, cos, sin
+from collections.abc import Mapping
+
+from ..core.mechanism.mechanism import Mechanism
+from .dynamics import Three, effort, standing
+from .jet import Jet, Lanes, Motion, cos, sin
 from .vectors import Vec, fixed, meet_in_plane
 
 # with the misprint x = +0.03635 found for B nothing closes
@@ -30,3 +34,17 @@ def motion(turn: Jet) -> Motion:
     along = (1.0 / SS) * (E - b)
     D = b + SC * along + SD * Vec(-along.y, along.x, a.z)
     return {"F": F, "E": E, "D": D, "G": G, "H": H}
+
+
+def bodies(turn: Jet) -> Mapping[str, Three]:
+    """Return three points of each body."""
+    at = {name: Vec(*point) for name, point in motion(turn).items()}
+    a, b, z = fixed(A, turn), fixed(B, turn), fixed((0.0, 0.0, 1.0), turn)
+    E, F, G, H = (at[name] for name in "EFGH")
+    ends = (fixed((0.0, 0.0, 0.0), turn), F), (F, E), (b, E), (E, G), (a, G), (E, H), (a, H)
+    return {f"K{k}": (start, end, start + z) for k, (start, end) in enumerate(ends, 1)}
+
+
+def forces(mechanism: Mechanism, turn: Jet) -> Mapping[str, Lanes]:
+    """Return the torque of the crank."""
+    return {"crank_torque": effort(mechanism, turn, bodies(turn), bodies(standing(turn)))}

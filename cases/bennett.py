@@ -13,8 +13,12 @@ new x, and turns by its twist about that. The angles are p, q, -p and -q with
 
 from __future__ import annotations
 
-from .jet import Jet, Motion, cos, sin
-from .vectors import cross, fixed
+from collections.abc import Mapping
+
+from ..core.mechanism.mechanism import Mechanism
+from .dynamics import Three, effort, standing
+from .jet import Jet, Lanes, Motion, cos, sin
+from .vectors import Vec, cross, fixed
 
 A, B = 0.3, 0.4  # lengths of coupler and crank [m]
 COSINE, SINE = 0.6, 0.8  # of the crank's twist, beta
@@ -43,3 +47,20 @@ def motion(turn: Jet) -> Motion:
         "follower_pin": follower_pin,
         "tracer": crank_pin + along * x + across * cross(z, x) + up * z,
     }
+
+
+def bodies(turn: Jet) -> Mapping[str, Three]:
+    """Return three points of each body."""
+    at = {name: Vec(*point) for name, point in motion(turn).items()}
+    crank_pin, follower_pin = at["crank_pin"], at["follower_pin"]
+    hinge = fixed((-0.3, 0.0, 0.0), turn)
+    return {
+        "crank": (fixed((0.0, 0.0, 0.0), turn), crank_pin, fixed((0.0, 0.0, 1.0), turn)),
+        "coupler": (crank_pin, follower_pin, at["tracer"]),
+        "follower": (hinge, follower_pin, hinge + fixed((0.0, 0.6, 0.8), turn)),
+    }
+
+
+def forces(mechanism: Mechanism, turn: Jet) -> Mapping[str, Lanes]:
+    """Return the torque of the crank."""
+    return {"crank_torque": effort(mechanism, turn, bodies(turn), bodies(standing(turn)))}

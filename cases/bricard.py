@@ -13,14 +13,23 @@ by a right angle, to one side and the other: the next axis is  -u x z,  then  u 
 
 from __future__ import annotations
 
-from .jet import Jet, Motion, cos, sin, sqrt
-from .vectors import Vec, cross, fixed
+from collections.abc import Mapping
+
+from ..core.mechanism.mechanism import Mechanism
+from .dynamics import Three, effort, standing
+from .jet import Jet, Lanes, Motion, cos, sin, sqrt
+from .vectors import cross, fixed
 
 
 def motion(turn: Jet) -> Motion:
     """The ends of the links that follow the grounded one, its neighbour turned from the design by
     `turn` [rad].
     """
+    return {f"P{k + 2}": end for k, (_, end, _) in enumerate(chain(turn))}
+
+
+def chain(turn: Jet) -> list[Three]:
+    """Return start, end and a point of the hinge at the end, of four links from the ground on."""
     c, s = -sin(turn), cos(turn)  # of p = 90 degrees + turn
     d = -(c / (1.0 + c))  # cosine of q
     angles = (c, s), (d, sqrt(1.0 - d * d))
@@ -29,11 +38,23 @@ def motion(turn: Jet) -> Motion:
         fixed((1.0, 0.0, 0.0), turn),
         fixed((0.0, 0.0, -1.0), turn),
     )
-    points: dict[str, Vec] = {}
+    links: list[Three] = []
     for k in range(4):
         cosine, sine = angles[k % 2]
         u = cosine * u + sine * cross(z, u)
         z = (1.0 if k % 2 else -1.0) * cross(u, z)
+        links.append((point, point + u, point + u + z))
         point = point + u
-        points[f"P{k + 2}"] = point
-    return points
+    return links
+
+
+def bodies(turn: Jet) -> Mapping[str, Three]:
+    """Return three points of each body."""
+    links = {f"link{k}": link for k, link in enumerate(chain(turn), 1)}
+    origin = fixed((0.0, 0.0, 0.0), turn)
+    return links | {"link5": (links["link4"][1], origin, fixed((0.0, -1.0, 0.0), turn))}
+
+
+def forces(mechanism: Mechanism, turn: Jet) -> Mapping[str, Lanes]:
+    """Return the torque of the driven hinge."""
+    return {"hinge_torque": effort(mechanism, turn, bodies(turn), bodies(standing(turn)))}

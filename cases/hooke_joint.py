@@ -10,7 +10,11 @@ the same without a quadrant to choose.
 
 from __future__ import annotations
 
-from .jet import Jet, Motion, cos, sin, sqrt
+from collections.abc import Mapping
+
+from ..core.mechanism.mechanism import Mechanism
+from .dynamics import Three, effort, standing
+from .jet import Jet, Lanes, Motion, cos, sin, sqrt
 from .vectors import Numbers, Vec, fixed
 
 # cos b, sin b: the driving shaft is along x, the driven one turned from it towards z
@@ -39,3 +43,23 @@ def on_shaft(start: Numbers, bend: tuple[float, float], c: Jet, s: Jet) -> Vec:
 def motion(turn: Jet) -> Motion:
     """The tip of the driven shaft with the driving one turned from the design by `turn` [rad]."""
     return {"driven_tip": on_shaft((0.0, 0.0, 0.0), BEND, *driven(turn, BEND[0]))}
+
+
+def bodies(turn: Jet) -> Mapping[str, Three]:
+    """Return three points of each shaft."""
+    origin, x = fixed((0.0, 0.0, 0.0), turn), fixed((1.0, 0.0, 0.0), turn)
+    bent = fixed((BEND[0], 0.0, BEND[1]), turn)
+    tip = Vec(*motion(turn)["driven_tip"])
+    return {
+        "driving": (
+            origin,
+            x,
+            cos(turn) * fixed((0.0, 1.0, 0.0), turn) + sin(turn) * fixed((0.0, 0.0, 1.0), turn),
+        ),
+        "driven": (origin, bent, tip),
+    }
+
+
+def forces(mechanism: Mechanism, turn: Jet) -> Mapping[str, Lanes]:
+    """Return the torque of the driving shaft."""
+    return {"shaft_torque": effort(mechanism, turn, bodies(turn), bodies(standing(turn)))}

@@ -8,7 +8,12 @@ both u and the joint's axis X on the slider.
 
 from __future__ import annotations
 
-from .jet import Jet, Motion, constant, cos, sin, sqrt
+from collections.abc import Mapping
+
+from ..core.mechanism.mechanism import Mechanism
+from .dynamics import Three, effort, standing
+from .jet import Jet, Lanes, Motion, constant, cos, sin, sqrt
+from .vectors import Vec, fixed
 
 CRANK, CONROD = 0.08, 0.3  # r, l [m]
 AY, AZ = 0.1, 0.12  # crank pivot [m]
@@ -37,3 +42,25 @@ def motion(turn: Jet) -> Motion:
             su * uz + sa * az + sw * wz,
         ),
     }
+
+
+def bodies(turn: Jet) -> Mapping[str, Three]:
+    """Return three points of each body."""
+    at = {name: Vec(*point) for name, point in motion(turn).items()}
+    slider, middle = at["slider"], at["conrod_centre"]
+    pivot = fixed((0.0, AY, AZ), turn)
+    pin = 2.0 * middle - slider
+    return {
+        "crank": (pivot, pin, pivot + fixed((1.0, 0.0, 0.0), turn)),
+        "conrod": (slider, pin, at["conrod_side"]),
+        "slider": (
+            slider,
+            slider + fixed((1.0, 0.0, 0.0), turn),
+            slider + fixed((0.0, 1.0, 0.0), turn),
+        ),
+    }
+
+
+def forces(mechanism: Mechanism, turn: Jet) -> Mapping[str, Lanes]:
+    """Return the torque of the crank."""
+    return {"crank_torque": effort(mechanism, turn, bodies(turn), bodies(standing(turn)))}

@@ -85,10 +85,7 @@ IMPORTS = {
         "kinematics/sparse kinematics/diagnosis"
     ),
     "case/models/hardpoints/templates": "joints mechanism",
-    "case": (
-        ". joints mechanism kinematics/formulation kinematics/structure "
-        "kinematics/compiled kinematics"
-    ),
+    "case": ". joints mechanism kinematics",
     "case/suspension": ". mechanism case",
     "case/measures": ". joints mechanism case",
     "case/io": ". joints mechanism kinematics case case/suspension case/measures",

@@ -7,11 +7,7 @@ from dataclasses import replace
 
 from ..errors import CaseError
 from ..joints import Joint
-from ..kinematics.compiled.request import Request
-from ..kinematics.formulation.constraints import frames
-from ..kinematics.solver_selection import prepare
-from ..kinematics.structure.driver_count import degrees_of_freedom
-from ..kinematics.structure.reduction import ADDED_UP, largest_residual, reduce_rows
+from ..kinematics import NativeSolver, degrees_of_freedom, largest_residual, reduce_rows
 from .case import Case
 
 # Largest accepted residual of the rows that are solved, relative to the mechanism's size.
@@ -36,9 +32,9 @@ def within_digits(case: Case, tolerance: float, why: str) -> Case:
         return case
     left = _residual_left(less, found.originals)
     names = ", ".join(map(str, found.originals))
-    if left <= _TOL * frames(case.mechanism).unit and _driven(case):
+    if left <= _TOL * found.unit and _driven(case):
         return case
-    if left <= ADDED_UP * tolerance:
+    if left <= found.limit:
         note = (
             f"rows that are redundant within {tolerance:.3g} m ({why}) are left out, of {names};"
             f" along the motion they keep a residual of {left:.2g} m"
@@ -49,7 +45,7 @@ def within_digits(case: Case, tolerance: float, why: str) -> Case:
     raise CaseError(
         f"case {case.name!r}: rows of {names} are redundant at the start within {tolerance:.3g} m"
         f" ({why}), but along the motion they are off by up to {left:.3g} m, expected"
-        f" {ADDED_UP * tolerance:.3g} m at most; start farther from a singular pose, or give"
+        f" {found.limit:.3g} m at most; start farther from a singular pose, or give"
         " another tolerance by --closure"
     )
 
@@ -60,9 +56,8 @@ def _driven(case: Case) -> bool:
 
 def _residual_left(case: Case, joints: Sequence[Joint]) -> float:
     """Return the largest residual of joints along the motion of a case [m]."""
-    path, bodies = case.sweep.path, tuple(body.name for body in case.mechanism.moving)
-    request = Request(tuple(path.motions), (), bodies, order=0)
-    motion = prepare(case.mechanism, request, path)(_TOL)
+    bodies = tuple(body.name for body in case.mechanism.moving)
+    motion = NativeSolver(order=0).prepare(case.mechanism, case.sweep.path, bodies=bodies)(_TOL)
     solved = {
         name: replace(each, r=each.r[motion.solved], p=each.p[motion.solved])
         for name, each in motion.bodies.items()

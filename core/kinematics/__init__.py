@@ -17,6 +17,7 @@ Describe:
 
     start_of, solve_from_start, notes_on_start      the start of the samples on a path
     degrees_of_freedom, require_driven              drivers against degrees of freedom
+    reduce_rows, largest_residual                   rows that are redundant but for digits
     kinds, places, placed                           the geometry by name
     Ranks, conditioning, describe_screws            rank, conditioning and screws at a pose
     prove, prove_pose                               samples and poses enclosed in balls
@@ -94,6 +95,8 @@ if TYPE_CHECKING:
     from .solver_selection import Solver as Solver
     from .structure.driver_count import degrees_of_freedom as degrees_of_freedom
     from .structure.driver_count import require_driven as require_driven
+    from .structure.reduction import largest_residual as largest_residual
+    from .structure.reduction import reduce_rows as reduce_rows
     from .verified.exact import Exact as Exact
     from .verified.exact import Reading as Reading
     from .verified.exact import as_decimal as as_decimal
@@ -130,6 +133,7 @@ _NAMES = {
     "program_size": "ProgramSize",
     "solver_selection": "Solver",
     "structure.driver_count": "degrees_of_freedom require_driven",
+    "structure.reduction": "largest_residual reduce_rows",
     "verified.exact": "Exact Reading as_decimal as_double",
     "verified.krawczyk": "Enclosure UnprovedError",
     "verified.pose_proof": "PoseState prove_pose",

@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from kincheck.adapters.shared.loop_closures import CLOSURES
 from kincheck.core import (
     GROUND,
     Body,
@@ -27,7 +28,7 @@ from kincheck.core.trajectory import Trajectory
 
 pytest.importorskip("pinocchio")
 
-from .test_pinocchio import CRANK, HINGE, adapter, rotation, solved
+from .test_pinocchio import CRANK, HINGE, rotation, solved
 
 
 def derivative(x: np.ndarray, h: float) -> np.ndarray:
@@ -172,7 +173,7 @@ def test_every_joint_moves_as_in_the_native_engine(
 
 
 def test_every_type_is_known() -> None:
-    assert {each.type for each in adapter.CLOSURES} == set(TYPES)
+    assert {each.type for each in CLOSURES} == set(TYPES)
 
 
 def cardan_shaft(mechanism: Mechanism) -> SpanningTree:

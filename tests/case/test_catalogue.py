@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import msgspec
 from kincheck.core.case.io import schema
 from kincheck.core.case.io.catalogue import catalogue, rows_of
+from kincheck.core.case.io.class_keys import driver_keys, joint_keys, motion_keys
 from kincheck.core.case.io.driving import DRIVERS
 from kincheck.core.case.io.loads import force_keys
-from kincheck.core.case.io.schema import driver_keys, joint_keys, motion_keys
 from kincheck.core.case.variation import variation_schema
 from kincheck.core.cli import main
 from kincheck.core.errors import MechanismError

@@ -7,8 +7,7 @@ from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
 from kincheck.core.cli.main import main
 from kincheck.core.errors import CaseError
-from kincheck.core.kinematics.solve import solve
-from kincheck.core.kinematics.structure.driver_count import degrees_of_freedom
+from kincheck.core.kinematics import degrees_of_freedom, solve
 
 HEAD = """schema = "kincheck-case/1"
 name = "loop"

@@ -156,6 +156,7 @@ class Angle:
     signs: str = ""
     orders: int = ORDERS
     period: float = 0.0
+    facts = {}  # noqa: RUF012
 
     def of(self, at, design):
         tip = at["tip"]
@@ -182,6 +183,7 @@ def test_a_formula_that_balls_cannot_compute_says_so():
         points=("tip",),
         unit="m",
         signs="",
+        facts={},
         of=lambda at, design: np.arccosh(at["tip"].x.x),
     )
     found, errors = prove_case(

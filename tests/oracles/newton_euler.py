@@ -71,3 +71,74 @@ def left_over(mechanism, trajectory, k, pushes):
             t = t + torque + np.cross(at - C, force)
         found[name] = (f, t)
     return found
+
+
+def unit_wrenches(joint, axis, at, other):
+    """Unit reactions of a joint on its second body: forces and moments about its point, six each.
+
+    Args:
+        axis: of a revolute or translational joint, now.
+        at: the joint's point on its second body, now; other: that on its first.
+    """
+    none, across = np.zeros((3, 3)), np.linalg.svd(axis[None])[2][1:]
+    match joint.type:
+        case "spherical":
+            forces, moments = np.eye(3), none
+        case "revolute":
+            forces, moments = np.eye(3), across
+        case "translational":
+            forces, moments = across, np.eye(3)
+        case "distance":
+            return np.array([[*(at - other) / np.linalg.norm(at - other), 0.0, 0.0, 0.0]])
+    force = [[*each, 0.0, 0.0, 0.0] for each in forces]
+    moment = [[0.0, 0.0, 0.0, *each] for each in moments if each.any()]
+    return np.array(force + moment)
+
+
+def reactions(mechanism, motions, k, pushes):
+    """The force and moment of every joint on its second body, and the effort of the driver of a
+    point: six equations a body, solved at once.
+
+    Args:
+        pushes: as for `left_over`.
+    """
+    bodies = {body.name: body for body in mechanism.bodies}
+    rows = {name: 6 * n for n, name in enumerate(motions)}
+    columns, widths, right = [], [], np.zeros(6 * len(motions))
+    centers = {}
+    for name, motion in motions.items():
+        force, torque, C = demand(bodies[name], motion, k, mechanism.gravity)
+        centers[name] = C
+        for push, at, turn in pushes.get(name, ()):
+            force, torque = force - push, torque - turn - np.cross(at - C, push)
+        right[rows[name] : rows[name] + 6] = [*force, *torque]
+
+    def on(name, at, wrenches, sign):
+        found = np.zeros((len(right), len(wrenches)))
+        if name in motions:
+            forces, moments = wrenches[:, :3], wrenches[:, 3:]
+            about = moments + np.cross(at - centers[name], forces)
+            found[rows[name] : rows[name] + 6] = sign * np.hstack([forces, about]).T
+        return found
+
+    def now(name, position):
+        return carried(bodies.get(name), motions.get(name), k, position)
+
+    for joint in mechanism.joints:
+        first, second = joint.points_on(joint.i)[0], joint.points_on(joint.j)[0]
+        at, other = now(joint.j, second), now(joint.i, first)
+        axis = np.array(getattr(joint, "axis", (0.0, 0.0, 1.0)))
+        axis = now(joint.i, np.array(first) + axis) - other
+        wrenches = unit_wrenches(joint, axis, at, other)
+        widths.append((joint.name, wrenches))
+        columns.append(on(joint.j, at, wrenches, 1.0) + on(joint.i, at, wrenches, -1.0))
+    (driver,) = mechanism.drivers
+    point = mechanism.point(driver.point)
+    push = np.array([[*driver.direction, 0.0, 0.0, 0.0]])
+    columns.append(on(point.body, now(point.body, point.position), push, 1.0))
+    solution = np.linalg.solve(np.hstack(columns), right)
+    found, start = {}, 0
+    for name, wrenches in widths:
+        found[name] = solution[start : start + len(wrenches)] @ wrenches
+        start += len(wrenches)
+    return found, solution[-1]

@@ -276,8 +276,10 @@ def test_command_and_report_of_a_run(tmp_path, capsys):
 @pytest.mark.usefixtures("one_thread")
 def test_an_engine_that_is_named_and_missing_is_no_success(monkeypatch, capsys):
     found = measured()  # of an engine "gone" too
-    monkeypatch.setattr(engines, "measure", lambda cases, engines, **options: found)
+    there = [each for each in found.entries if each.engine != "gone"]
     for name, status in (("gone", 2), ("native", 0)):
+        result = found if status else msgspec.structs.replace(found, entries=there)
+        monkeypatch.setattr(engines, "measure", lambda *given, found=result, **options: found)
         monkeypatch.setattr(
             "kincheck.core.cli.registry.House.find_engines", lambda house, names, *rest: []
         )

@@ -2,46 +2,38 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...errors import remedy
 from ...joints import Coupler, Joint, Kind
 from ...mechanism.dimension import ACCELERATION
-from ...mechanism.mechanism import Body, Mechanism, Point, Vector
-from ..case import PER_TRAVEL, Case, Output, Quantity, Truth, size
+from ...mechanism.mechanism import Body, Mechanism, Point
+from ..case import Case, Truth, size
 from ..markers import with_markers
-from ..measures import Measure
 from ..units import ANGLES, LENGTHS, Unit
-from .coordinates import AXES, with_all_coordinates
+from .class_keys import joint_keys, kind_of, own_fields
+from .coordinates import with_all_coordinates
 from .document import explained, fault, join, parse, read_text, shown
 from .driving import read_drivers, read_sweep
 from .in_si import geometry_in_si, load_in_si
 from .loads import inertia_in_si, read_forces
-from .measures import read_measure
-from .reference import Convert, is_derivative, read_reference
+from .outputs import read_outputs
+from .reference import Convert, read_reference
 from .reference_samples import ReferenceKeys
 from .schema import (
-    COORDINATE,
     SCHEMA,
     BodyKeys,
     CaseKeys,
     ClosureKeys,
-    OutputKeys,
     PointKeys,
     UnitsKeys,
-    joint_keys,
-    kind_of,
-    own_fields,
 )
-from .tolerance import tolerance
 from .typed_tables import as_table, class_of, typed
 
 if TYPE_CHECKING:
-    from .suspension_table import SuspensionTable
+    pass
 
 LARGEST_FILE = 4_000_000
 # Twice the bodies of the largest measured mechanism; the same limit for joints and points.
@@ -188,12 +180,6 @@ def _joint(file: Path, key: str, name: str, value: object, length: Unit) -> Join
         )
 
 
-def _unit(direction: Vector) -> Vector:
-    length = math.hypot(*direction)
-    x, y, z = direction
-    return x / length, y / length, z / length
-
-
 def _with_outputs(
     file: Path, keys: CaseKeys, case: Case, length: Unit, units: Mapping[str, Convert]
 ) -> Case:
@@ -207,7 +193,7 @@ def _with_outputs(
             " of a joint or body, [outputs.NAME]",
         )
     if keys.suspension is None:
-        outputs = _outputs(file, keys, None, case, units)
+        outputs = read_outputs(file, keys, None, case, units)
         if not outputs:
             return with_all_coordinates(case)
         return replace(case, mechanism=with_markers(mechanism, outputs), outputs=outputs)
@@ -215,94 +201,10 @@ def _with_outputs(
     from .suspension_table import read_suspension
 
     table = read_suspension(file, keys.suspension, case, length, units["rad"])
-    outputs = _outputs(file, keys, table, case, units) or with_all_coordinates(case).outputs
+    outputs = read_outputs(file, keys, table, case, units) or with_all_coordinates(case).outputs
     case = replace(case, mechanism=with_markers(mechanism, outputs), outputs=outputs)
     return (
         replace(case, outputs=suspension.with_slopes(outputs, size(case)))
         if table.per_travel
         else case
-    )
-
-
-def _outputs(
-    file: Path,
-    keys: CaseKeys,
-    table: SuspensionTable | None,
-    case: Case,
-    units: Mapping[str, Convert],
-) -> tuple[Quantity, ...]:
-    """Return the outputs named in the file."""
-    return tuple(
-        _output(file, name, value, keys, table, case, units) for name, value in keys.outputs.items()
-    )
-
-
-def _output(
-    file: Path,
-    name: str,
-    value: object,
-    keys: CaseKeys,
-    table: SuspensionTable | None,
-    case: Case,
-    units: Mapping[str, Convert],
-) -> Quantity:
-    key = join("outputs", name)
-    if is_derivative(name) or name.endswith(PER_TRAVEL):
-        raise fault(
-            file,
-            key,
-            "a name with this ending is a derivative in reference tables; give the output another"
-            " name",
-        )
-    if as_table(file, key, value).get("type", COORDINATE) != COORDINATE:
-        from .suspension import SuspensionOutput, read_output
-
-        known = {COORDINATE: Output, **Measure.registry, **SuspensionOutput.registry}
-        cls = class_of(file, key, "output", value, known)
-        if issubclass(cls, Measure):
-            return read_measure(file, key, cls, name, value, case, units)
-        if issubclass(cls, SuspensionOutput):
-            return read_output(file, key, cls, name, value, table, case, units)
-    return _coordinate(file, key, name, value, keys, case, units["m"])
-
-
-def _coordinate(
-    file: Path, key: str, name: str, value: object, keys: CaseKeys, case: Case, length: Convert
-) -> Output:
-    output = typed(file, key, value, OutputKeys)
-    if output.point not in keys.points:
-        raise fault(
-            file,
-            join(key, "point"),
-            f"found {shown(output.point)}, expected a point; {remedy(output.point, keys.points)}",
-        )
-    match output.component, output.direction:
-        case str(axis), None:
-            direction = AXES[axis]
-        case None, (_, _, _) as found:
-            if not any(found):
-                raise fault(
-                    file,
-                    join(key, "direction"),
-                    "found zero, expected a direction; give one of any other length",
-                )
-            direction = _unit(found)
-        case component, _:
-            what = (
-                "neither component nor direction"
-                if component is None
-                else "both component and direction"
-            )
-            raise fault(
-                file,
-                key,
-                f'found {what}, expected one of them; give component = "x" or direction = [x,'
-                " y, z]",
-            )
-    return Output(
-        name,
-        output.point,
-        direction,
-        output.relative,
-        *tolerance(file, key, output, length, size(case)),
     )

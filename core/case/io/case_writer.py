@@ -18,8 +18,9 @@ from ...mechanism.motions import Absolute
 from ..case import MARKER, TIME, Case, Output
 from ..measures import Measure, key_of, own_keys
 from ..suspension import PerTravel, SuspensionOutput
+from .class_keys import own_fields
 from .coordinates import AXES
-from .schema import SCHEMA, own_fields
+from .schema import SCHEMA
 from .suspension_writer import suspension_output, suspension_tables
 
 # What a body has unless the file says otherwise.

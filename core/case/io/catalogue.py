@@ -14,8 +14,8 @@ from ...mechanism.motions import Motion
 from .. import measures
 from ..measures import Measure
 from ..suspension import SuspensionOutput, own_keys
+from .class_keys import Described, kind_of, own_fields
 from .driving import DRIVERS
-from .schema import Described, kind_of, own_fields
 
 # Geometry that suits any joint. The two directions make a right angle up to the rounding of a
 # table, as a cross wants it, and point the same way on, as the shafts of a constant-velocity joint

@@ -16,10 +16,11 @@ from ...mechanism.motions import ROUNDED_TIME, Absolute, Measure, Motion
 from ...trajectory import Array
 from ..case import TIME, Sweep
 from ..units import SECOND, Unit, plain
+from .class_keys import driver_keys, motion_keys, own_fields
 from .document import explained, fault, join, shown
 from .reference import Convert, read_grid
 from .reference_samples import ReferenceKeys
-from .schema import MOST_SAMPLES, CaseKeys, SweepKeys, driver_keys, motion_keys, own_fields
+from .schema import MOST_SAMPLES, CaseKeys, SweepKeys
 from .typed_tables import class_of, typed
 
 DRIVERS: Mapping[str, type[Driver]] = {
@@ -112,7 +113,7 @@ def _samples(
     """Return the samples in the file's unit: an even grid, or those of the reference."""
     if sweep.at is None:
         for key, expected in _EVEN.items():
-            if key not in written:
+            if written.get(key) is None:
                 problem = f"missing, expected {expected}; add the key {key!r}"
                 raise fault(
                     file,
@@ -123,7 +124,7 @@ def _samples(
         _check_even(file, sweep, written)
         return np.linspace(sweep.start or 0.0, sweep.stop or 0.0, sweep.steps or 1).tolist()
     for key in _EVEN:
-        if key in written:
+        if written.get(key) is not None:
             problem = f"found {shown(written[key])} beside at = {shown(sweep.at)}, expected one"
             raise fault(file, join("sweep", key), f"{problem}; remove {key} or at")
     if reference is None:

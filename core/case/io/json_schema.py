@@ -10,6 +10,7 @@ import msgspec
 from ...joints import Coupler, Joint
 from ...mechanism.motions import Motion
 from ..suspension import SuspensionOutput
+from .class_keys import driver_keys, joint_keys, motion_keys
 from .driving import DRIVERS
 from .reference_samples import ReferenceKeys
 from .schema import (
@@ -21,9 +22,6 @@ from .schema import (
     PointKeys,
     SweepKeys,
     UnitsKeys,
-    driver_keys,
-    joint_keys,
-    motion_keys,
 )
 from .suspension import output_keys
 from .suspension_table import SuspensionKeys

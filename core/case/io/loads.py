@@ -40,6 +40,7 @@ from ...mechanism.body import Inertia, checked_inertia
 from ...mechanism.dimension import ANGLE, INERTIA, dimension_of
 from ...mechanism.loads import ELEMENTS, ForceElement, SpringDamper
 from ..units import RADIAN, Unit
+from .class_keys import key_of, kind_of, own_fields, shape_of
 from .document import explained, join
 from .in_si import geometry_in_si, load_in_si
 from .schema import (
@@ -48,10 +49,6 @@ from .schema import (
     Numbers3,
     Size,
     Text,
-    key_of,
-    kind_of,
-    own_fields,
-    shape_of,
 )
 from .typed_tables import class_of, typed
 

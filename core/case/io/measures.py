@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import MISSING, replace
 from enum import StrEnum
@@ -10,11 +11,13 @@ from pathlib import Path
 from typing import Annotated, Any, get_args, get_type_hints
 
 import msgspec
+import numpy as np
 from msgspec import Meta
 
-from ...mechanism.mechanism import Vector
+from ...mechanism.loads import Torque, TorsionSpringDamper
+from ...mechanism.mechanism import Mechanism, Vector
 from ..case import Case, pace, size
-from ..measures import NAMES, ForceMeasure, Measure, key_of, largest_load, own_keys
+from ..measures import NAMES, ForceMeasure, Measure, key_of, own_keys
 from .document import explained
 from .reference import Convert
 from .schema import Flag, Text, ToleranceKeys
@@ -92,7 +95,25 @@ def read_measure(
     unit = output.unit
     scale = size(case)
     if isinstance(output, ForceMeasure):
-        loads = largest_load(case.mechanism, scale, pace(case))
+        loads = _largest_load(case.mechanism, scale, pace(case))
         scale = loads * scale if output.turns else loads
     atol, rtol, why = tolerance(file, key, keys, units[unit], scale, unit)
     return replace(output, atol=atol, rtol=rtol, why=why)
+
+
+def _largest_load(mechanism: Mechanism, size: float, pace: float) -> float:
+    """Return an estimate of the largest force of a mechanism [N], the scale of errors.
+
+    The weights, the inertia of the masses at a pace [1/s], springs stretched by their own length,
+    and applied forces.
+    """
+    masses = sum(body.mass for body in mechanism.moving)
+    total = masses * (math.hypot(*mechanism.gravity) + size * pace**2)
+    for each in mechanism.forces:
+        stiffness = getattr(each, "stiffness", 0.0)
+        damping = getattr(each, "damping", 0.0)
+        arm = 1.0 / size if isinstance(each, TorsionSpringDamper) else size
+        total += (stiffness + damping * pace) * arm
+        vector = getattr(each, "vector", (0.0,))
+        total += float(np.linalg.norm(vector)) / (size if isinstance(each, Torque) else 1.0)
+    return total

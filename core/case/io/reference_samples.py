@@ -68,6 +68,9 @@ class ReferenceKeys(msgspec.Struct, forbid_unknown_fields=True):
     ) = None
 
 
+_ROWS = "expected rows of numbers, one for each sample; add them"
+
+
 @dataclass(frozen=True)
 class Samples:
     """Columns by name, and rows with their place for messages.
@@ -114,6 +117,8 @@ def inline(file: Path, keys: ReferenceKeys, outputs: Sequence[Quantity]) -> Samp
     key = "reference.rows"
     rows = [(f"{key}[{k}]", row) for k, row in enumerate(keys.rows)]
     printed = [Printed() for _ in columns]
+    if not rows:
+        raise fault(file, key, f"found none, {_ROWS}")
     samples = Samples(file, "reference.columns", columns, rows, key, printed=printed)
     for where, row in rows:
         _check_width(samples, where, len(row))
@@ -174,6 +179,8 @@ def from_csv(case_file: Path, keys: ReferenceKeys) -> Samples:
             "",
             "found no samples, expected a line of column names and rows of numbers; add them",
         )
+    if not rows:
+        raise fault(file, "", f"found column names only, {_ROWS}")
     return samples
 
 

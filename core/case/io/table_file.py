@@ -9,6 +9,8 @@ from enum import Enum
 from pathlib import Path
 from typing import Any, TextIO
 
+from ...errors import KincheckError
+from ...extras import library
 from .escape import cell
 
 Rows = Sequence[Sequence[Any]]
@@ -70,7 +72,7 @@ def no_parquet(named: str, remedy: str) -> str:
     """Return the message that Parquet needs pyarrow, if it is not installed; else an empty one."""
     try:
         for name in ("pyarrow", "pyarrow.parquet"):
-            importlib.import_module(name)
-    except ImportError:
-        return f"{named}: Parquet needs pyarrow: pip install 'kincheck[parquet]'; {remedy}"
+            library("Parquet", name, "parquet")
+    except KincheckError as error:
+        return f"{named}: {error}; {remedy}"
     return ""

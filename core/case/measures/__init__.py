@@ -2,7 +2,7 @@
 
 from .base import NAMES, Measure, key_of, own_keys
 from .body import Component, Orientation
-from .force import DriverEffort, ElementForce, ForceMeasure, JointForce, JointMoment, largest_load
+from .force import DriverEffort, ElementForce, ForceMeasure, JointForce, JointMoment
 from .joint import JointAngle, JointDisplacement
 from .pairs import Angle, Distance
 
@@ -21,6 +21,5 @@ __all__ = [
     "Measure",
     "Orientation",
     "key_of",
-    "largest_load",
     "own_keys",
 ]

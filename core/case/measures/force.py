@@ -282,21 +282,3 @@ def _joint_place(mechanism: Mechanism, name: str) -> tuple[str, Vector]:
     joint = mechanism.joint(name)
     known = joint.points_on(joint.j)
     return joint.j, known[0] if known else coordinates(place_on(mechanism, joint.j))
-
-
-def largest_load(mechanism: Mechanism, size: float, pace: float) -> float:
-    """Return an estimate of the largest force of a mechanism [N], the scale of errors.
-
-    The weights, the inertia of the masses at a pace [1/s], springs stretched by their own length,
-    and applied forces.
-    """
-    masses = sum(body.mass for body in mechanism.moving)
-    total = masses * (math.hypot(*mechanism.gravity) + size * pace**2)
-    for each in mechanism.forces:
-        stiffness = getattr(each, "stiffness", 0.0)
-        damping = getattr(each, "damping", 0.0)
-        arm = 1.0 / size if isinstance(each, TorsionSpringDamper) else size
-        total += (stiffness + damping * pace) * arm
-        vector = getattr(each, "vector", (0.0,))
-        total += float(np.linalg.norm(vector)) / (size if isinstance(each, Torque) else 1.0)
-    return total

@@ -7,7 +7,8 @@ from . import instant_axis as instant_axis
 from . import steering_axis as steering_axis
 from . import wheel as wheel
 from .axle import AxleOutput
-from .base import PerTravel, Rate, SuspensionOutput, own_keys
+from .base import Rate, SuspensionOutput, own_keys
+from .per_travel import PerTravel
 from .vehicle import Axle, Convention, Reaction, Side, Vehicle
 
 __all__ = [

@@ -49,10 +49,14 @@ class Reduction:
 
     Attributes:
         originals: joints with rows left out, as they were.
+        unit: the mechanism's size [m].
+        limit: largest residual that the originals may keep along a motion [m].
     """
 
     mechanism: Mechanism
     originals: tuple[Joint, ...]
+    unit: float
+    limit: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,6 +154,8 @@ def reduce_rows(mechanism: Mechanism, tolerance: float) -> Reduction:
     return Reduction(
         replace(mechanism, joints=joints) if changed else mechanism,
         tuple(joint for joint in mechanism.joints if joint.name in changed),
+        frame.unit,
+        ADDED_UP * tolerance,
     )
 
 
