@@ -51,9 +51,8 @@ def effort(
         ]
         way = ends[1] - ends[0]
         length = sqrt(way @ way)
-        power += (each.stiffness * (length.x - each.free_length) + each.damping * length.v) * (
-            length.v
-        )
+        stretch = length.x - (each.free_length or 0.0)
+        power += (each.stiffness * stretch + each.damping * length.v) * length.v
     return power / turn.v
 
 

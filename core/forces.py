@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,3 +80,21 @@ class Forces:
     power: Array
     largest_power: Array
     message: str = ""
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """The balance of power, and how many directions of force, moment and wrench are determined
+        at joints where not all are: for the record.
+        """
+        known = np.isfinite(self.power)
+        largest = float(self.largest_power[known].max(initial=0.0))
+        missing = float(np.abs(self.power[known]).max(initial=0.0))
+        counts = {name: each.determined() for name, each in self.joints.items()}
+        return {
+            "power_missing": missing / largest if largest else 0.0,
+            "determined_directions": {
+                name: {"force": force, "moment": moment, "wrench": wrench}
+                for name, (force, moment, wrench) in counts.items()
+                if wrench < 6
+            },
+        }

@@ -149,6 +149,13 @@ class Trajectory(Tabular):
         """Driver values and times; computed on use, because a sweep takes microseconds."""
         return None if self.driven_by is None else self.driven_by()
 
+    @property
+    def facts(self) -> Mapping[str, Any]:
+        """The details, and the facts of the forces if there are any."""
+        return (
+            self.details if self.forces is None else {"forces": self.forces.facts, **self.details}
+        )
+
     def summary(self) -> str:
         """Return the driver's range, the samples and points, and why samples are missing."""
         count, reached = len(self.solved), int(self.solved.sum())

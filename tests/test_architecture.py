@@ -53,7 +53,8 @@ IMPORTS = {
     "kinematics/forces": ". primitives joints mechanism kinematics/formulation",
     "kinematics/structure": ". primitives joints mechanism kinematics/formulation",
     "kinematics/compiled": (
-        ". primitives program program/llvm mechanism kinematics/formulation kinematics/structure"
+        ". primitives program program/llvm joints mechanism kinematics/formulation "
+        "kinematics/forces kinematics/structure"
     ),
     "kinematics/assembly": (
         ". primitives program joints mechanism kinematics/formulation "

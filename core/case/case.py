@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 import numpy as np
@@ -214,3 +214,8 @@ def pace(case: Case) -> float:
     extent = np.where(turns, 1.0, size(case))
     rate, second = (np.abs(each).max(axis=1) for each in (rates, seconds))
     return float(np.maximum(rate / extent, np.sqrt(second / extent)).max())
+
+
+def without_forces(case: Case) -> Case:
+    """Return the case with its outputs of motion only."""
+    return replace(case, outputs=tuple(output for output in case.outputs if not output.forces))

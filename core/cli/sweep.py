@@ -125,14 +125,19 @@ def _check(
 
 
 def _only(case: Case, names: list[str], problems: list[str]) -> Case:
-    """Return the case with the named outputs only, or with all if none is named."""
+    """Return the case with the named outputs only, or with all motions if none is named."""
+    from ..case.case import without_forces
+
     there = [output.name for output in case.outputs]
     problems += [unknown("output", name, there) for name in names if name not in there]
-    return (
-        replace(case, outputs=tuple(output for output in case.outputs if output.name in names))
-        if names
-        else case
-    )
+    wanted = [output for output in case.outputs if output.name in names or not names]
+    if loads := [output.name for output in wanted if output.forces]:
+        text = f"forces are not reduced over variants: {', '.join(loads)}"
+        if names:
+            problems.append(f"--output: {text}; leave them out")
+        else:
+            complain([f"{text} {'is' if len(loads) == 1 else 'are'} left out"])
+    return without_forces(replace(case, outputs=tuple(wanted)))
 
 
 def _solver(options: argparse.Namespace, engine: Engine) -> Solver:

@@ -199,7 +199,7 @@ def _solve(pair: Pair, seconds: dict[str, float]) -> Answer:
         iterations=int(np.asarray(trajectory.iterations)[solved].sum()),
         residual=float(trajectory.residual),
         message=bounded("; ".join(filter(None, (trajectory.message, why)))),
-        details=plain(trajectory.details),
+        details=plain(trajectory.facts),
     )
 
 

@@ -25,10 +25,13 @@ class NativeEngine:
             iteration leaves is accepted.
         every_body: the motion of every moving body is solved too, and not of the compared points
             only.
+        every_force: the reactions of all joints, the efforts of all drivers and all force elements
+            are solved, and not those of outputs only.
     """
 
     solver: NativeSolver = field(default_factory=NativeSolver)
     every_body: bool = False
+    every_force: bool = False
     name: str = STANDARD
     mode = "projection"
     in_process = True
@@ -60,6 +63,7 @@ class NativeEngine:
             "last_iteration_below": last,
             **({"order": solver.order} if solver.order != NativeSolver.order else {}),
             **({"every_body": True} if self.every_body else {}),
+            **({"every_force": True} if self.every_force else {}),
         }
 
     def version(self) -> str | None:
@@ -78,8 +82,13 @@ class NativeEngine:
         """Select the rows, trace the programs for the points that the outputs read, and lay out the
         samples.
         """
-        path, bodies = case.sweep.path, self.bodies(case)
-        return self.solver.prepare(case.mechanism, path, case.points, bodies, case.forces)
+        path, bodies, forces = case.sweep.path, self.bodies(case), self._forces(case)
+        return self.solver.prepare(case.mechanism, path, case.points, bodies, forces)
+
+    def _forces(self, case: Case) -> tuple[str, ...]:
+        mechanism = case.mechanism
+        every = (*mechanism.joints, *mechanism.drivers, *mechanism.forces)
+        return tuple(each.name for each in every) if self.every_force else case.forces
 
     def solve(self, model: Solver, case: Case, tol: float) -> Trajectory:
         """March all samples; tol is relative to the mechanism's size."""

@@ -14,12 +14,12 @@ from ..trajectory import Array
 from .compiled.compiled_model import Model, compile_model
 from .compiled.request import LAST_ITERATION, Request
 from .compiled.samples import Route
-from .continuation.sweep import follow
 from .continuation.walk import marcher
+from .force_solver import Solver, by_motion, by_program, motion_only
 from .formulation.constraints import Style
 from .prepared_designs import PreparedDesigns
 from .program_size import ProgramSize
-from .solver_selection import Solver, prepare
+from .solver_selection import prepare
 
 
 class Method(StrEnum):
@@ -73,13 +73,21 @@ class NativeSolver:
             SolveError: drivers and degrees of freedom do not match, or the mechanism does not close
                 at the design position.
         """
-        if forces:
-            return self._with_forces(mechanism, path, points, bodies, forces)
         request = self._request(path, points, bodies)
+        if forces:
+            from .forces.wanted import wanted_forces  # most motions are without forces
+
+            request = replace(request, forces=wanted_forces(mechanism, forces))
         if self.method is Method.BY_SIZE:
             return prepare(mechanism, request, path)
         if self.method is Method.ONE_PROGRAM:
-            return partial(follow, Route(compile_model(mechanism, request), path))
+            return by_program(
+                mechanism, request, path, lambda each: Route(compile_model(mechanism, each), path)
+            )
+        motion = motion_only(mechanism, request)
+        return by_motion(mechanism, request, path, self._large(mechanism, motion, path))
+
+    def _large(self, mechanism: Mechanism, request: Request, path: Path) -> Solver:
         # few mechanisms are so large: the others need not wait for the import
         if self.method is Method.BY_COMPONENTS:
             from .by_components.block_solver import Cascade
@@ -90,22 +98,7 @@ class NativeSolver:
         from .sparse.sweep import solve_sparse
 
         model = SparseModel(mechanism, compiled=self.compiled)
-        return partial(solve_sparse, model, path, request.points, request.bodies, self.order)
-
-    def _with_forces(
-        self,
-        mechanism: Mechanism,
-        path: Path,
-        points: Sequence[str],
-        bodies: Sequence[str],
-        forces: Collection[str],
-    ) -> Solver:
-        # most motions are asked for without forces: they need not wait for the import
-        from .forces.reactions import with_forces
-
-        moving = tuple(body.name for body in mechanism.moving)
-        motion = replace(self, order=2).prepare(mechanism, path, points, moving)
-        return lambda tol: with_forces(mechanism, path, motion(tol), forces, bodies)
+        return partial(solve_sparse, model, path, request.points, request.bodies, request.order)
 
     def prepare_designs(
         self, mechanism: Mechanism, path: Path, varied: Sequence[str], points: Sequence[str] = ()

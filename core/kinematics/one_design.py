@@ -85,15 +85,12 @@ def solve(
         style=style,
     )
     moved = partial(driving, mechanism, path, driver, np.array(values, dtype=float))
-    if forces is False:
-        return prepare(mechanism, request, path)(tol).along(moved)
-    # most motions are asked for without forces: they need not wait for the import
-    from .forces.reactions import with_forces
+    if forces is not False:
+        from .forces.wanted import wanted_forces  # most motions are without forces
 
-    moving = tuple(body.name for body in mechanism.moving)
-    motion = prepare(mechanism, replace(request, bodies=moving, order=2), path)(tol)
-    names = None if forces is True else forces
-    return with_forces(mechanism, path, motion, names, request.bodies).along(moved)
+        names = None if forces is True else forces
+        request = replace(request, forces=wanted_forces(mechanism, names))
+    return prepare(mechanism, request, path)(tol).along(moved)
 
 
 def driving(mechanism: Mechanism, path: Path, driver: str, values: Array) -> Driving:

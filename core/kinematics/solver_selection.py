@@ -22,12 +22,11 @@ from ..caches import keep_last
 from ..errors import SolveError
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.motions import Path
-from ..trajectory import Trajectory
 from .compiled.motion_start import start_of
 from .compiled.program_cache import is_builtin
 from .compiled.request import Request
 from .compiled.samples import recent_route
-from .continuation.sweep import follow
+from .force_solver import Solver, by_motion, by_program, motion_only
 from .formulation.constraints import Style, frames
 
 # Up to as many bodies one program is made ready in a third of a second.
@@ -37,12 +36,12 @@ ONE_PROGRAM = 20
 # samples in doubt.
 IRREDUCIBLE = 40
 
-Solver = Callable[[float], Trajectory]
-"""Solves what it was made for, to a tolerance."""
-
 
 def prepare(mechanism: Mechanism, request: Request, path: Path) -> Solver:
     """Make a mechanism ready to be solved along a path.
+
+    Forces are computed by the program where there is one for the whole mechanism, else from the
+    motion of all bodies.
 
     Raises:
         SolveError: drivers and degrees of freedom do not match, or the mechanism does not close at
@@ -50,10 +49,10 @@ def prepare(mechanism: Mechanism, request: Request, path: Path) -> Solver:
     """
     if len(mechanism.moving) > ONE_PROGRAM and request.style is Style.NATIVE:
         known = is_builtin(mechanism) and path.is_builtin
-        make = (_recent_large if known else _large)(mechanism, request)
+        make = (_recent_large if known else _large)(mechanism, motion_only(mechanism, request))
         if make:
-            return make(path)
-    return partial(follow, recent_route(mechanism, request, path))
+            return by_motion(mechanism, request, path, make(path))
+    return by_program(mechanism, request, path, lambda each: recent_route(mechanism, each, path))
 
 
 def start_notes(mechanism: Mechanism, request: Request, path: Path, tol: float) -> list[str]:

@@ -137,3 +137,25 @@ class Core:
             v[k] = v[k] * self.inverses[k]
         for j, value in zip(self.columns, v, strict=True):
             x[j] = value
+
+    def solve_transposed(self, c: list[Scalar], y: list[Scalar]) -> None:
+        """Write the solution of the transposed block into y; take its part of earlier blocks off
+        c.
+        """
+        v = [c[j] for j in self.columns]
+        for k in range(len(v)):
+            v[k] = v[k] * self.inverses[k]
+            for j in range(k + 1, len(v)):
+                v[j] = v[j] - self.matrix[k][j] * v[k]
+        for k, step in reversed([*enumerate(self.steps)]):
+            for i, factor in step.multipliers:
+                v[k] = v[k] - factor * v[i]
+            for i, larger, other in reversed(step.exchanges):
+                v[k], v[i] = (
+                    where_larger(larger, other, v[i], v[k]),
+                    where_larger(larger, other, v[k], v[i]),
+                )
+        for i, known, value in zip(self.rows, self.before, v, strict=True):
+            y[i] = value
+            for j, entry in known:
+                c[j] = c[j] - entry * value

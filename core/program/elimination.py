@@ -162,6 +162,23 @@ class Elimination:
             x[pivot.column] = value * pivot.inverse
         return x
 
+    def solve_transposed(self, c: Sequence[Scalar]) -> list[Scalar]:
+        """Return the solution y of the transposed system, by rows; literal zeros of c cost nothing.
+
+        These are the steps of `solve`, transposed, in reverse order.
+        """
+        c, y = list(c), [0.0] * self.n
+        for pivot in self._sparse:
+            y[pivot.row] = value = c[pivot.column] * pivot.inverse
+            for j, entry in pivot.rest:
+                c[j] = c[j] - entry * value
+        for core in reversed(self._cores):
+            core.solve_transposed(c, y)
+        for pivot in reversed(self._sparse):
+            for i, factor in pivot.multipliers:
+                y[pivot.row] = y[pivot.row] - factor * y[i]
+        return y
+
 
 def _blocks(
     entries: Sequence[Mapping[int, Scalar]], rows: Sequence[int]

@@ -91,6 +91,9 @@ def prove_case(
                     "is a derivative with other drivers held, which is no proof's"
                 )
                 continue
+            if output.forces:
+                reasons[output.name] = "is a force; motion alone is enclosed"
+                continue
             try:
                 values[output.name] = _values(case, output, found, numbers)
             except (TypeError, AttributeError) as error:

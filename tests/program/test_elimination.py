@@ -22,7 +22,7 @@ def random_matrix(rng, n, lanes, density, literal):
     return values, literals
 
 
-def eliminate(values, literals, right):
+def eliminate(values, literals, right, solve=Elimination.solve):
     """Solutions by a traced elimination, shape (lanes, n); the smallest pivot of each lane; the
     elimination.
     """
@@ -37,7 +37,7 @@ def eliminate(values, literals, right):
     elimination = Elimination(rows)
     b = [tape.input(n * n + i) if np.any(right[:, i]) else 0.0 for i in range(n)]
     smallest = reduce(minimum, (absolute(x) for x in elimination.pivots), 1e300)
-    outputs = {n * (n + 1) + i: x for i, x in enumerate(elimination.solve(b))} | {
+    outputs = {n * (n + 1) + i: x for i, x in enumerate(solve(elimination, b))} | {
         n * (n + 2): smallest
     }
     block = np.zeros((n * (n + 2) + 1, lanes))
@@ -59,6 +59,20 @@ def test_elimination_solves(n, density, literal):
         found, _, _ = eliminate(values, literals, right)
         expected = np.linalg.solve(values, right[:, :, None])[:, :, 0]
         # the growth of the free pivots, beside the condition, limits what may be asked
+        error = np.abs(found - expected).max(axis=1) / (np.abs(expected).max(axis=1) + 1e-300)
+        assert (error <= 1e-13 * np.linalg.cond(values)).all()
+
+
+@pytest.mark.parametrize("literal", [0.0, 0.5])
+@pytest.mark.parametrize("density", [0.3, 1.0])
+def test_the_same_factors_solve_the_transposed_system(literal, density):
+    """In each lane by its own pivots, with several blocks where entries are few."""
+    rng = np.random.default_rng([7, int(10 * density), int(10 * literal)])
+    for n in (1, 4, 9):
+        values, literals = random_matrix(rng, n, 20, density, literal)
+        right = rng.normal(size=(20, n)) * (rng.random(n) < 0.6)
+        found, _, _ = eliminate(values, literals, right, Elimination.solve_transposed)
+        expected = np.linalg.solve(values.swapaxes(1, 2), right[:, :, None])[:, :, 0]
         error = np.abs(found - expected).max(axis=1) / (np.abs(expected).max(axis=1) + 1e-300)
         assert (error <= 1e-13 * np.linalg.cond(values)).all()
 

@@ -23,6 +23,8 @@ from kincheck.core.studies.bench import (
     study_throughput,
 )
 
+from ..support.loads import loaded
+
 TOL = 1e-12
 
 
@@ -55,6 +57,16 @@ def test_levels_give_what_is_asked_and_no_more():
     assert found["every body and point: position"].errors.velocity is None
     assert found[native_breakdown.EVERYTHING].errors.acceleration < 1e-11
     assert found[native_breakdown.NUMPY].loop == "python"
+
+
+def test_forces_are_a_level_of_cases_with_masses():
+    case = cases.load("rssr")
+    assert native_breakdown.levels(case) == native_breakdown.LEVELS
+    case = replace(case, mechanism=loaded(case.mechanism))
+    engine = native_breakdown.levels(case)[native_breakdown.FORCES]
+    found = engine.solve(engine.build(case), case, TOL)
+    assert [*found.forces.joints] == [joint.name for joint in case.mechanism.joints]
+    assert [*found.bodies] == [body.name for body in case.mechanism.moving]
 
 
 def test_loops_alone_reach_every_sample_or_say_so():

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-from kincheck.core.kinematics import NativeSolver, Style, with_forces
+from kincheck.core.kinematics import Method, NativeSolver, Style, with_forces
 from kincheck.core.mechanism.drivers import JointAngle, PointCoordinate
 
 from ..oracles import naive, newton_euler
@@ -49,6 +49,18 @@ def solved(mechanism, case, style="native"):
     motion = NativeSolver(style=Style(style)).prepare(mechanism, path, bodies=names)(1e-12)
     assert motion.solved.all(), motion.message
     return with_forces(mechanism, path, motion, bodies=names)
+
+
+def traced(mechanism, case, style="native", compiled=False):
+    """As `solved`, by the mechanism's own program, traced anew."""
+    names = tuple(body.name for body in mechanism.moving)
+    members = (*mechanism.joints, *mechanism.drivers, *mechanism.forces)
+    solver = NativeSolver(style=Style(style), compiled=compiled, method=Method.ONE_PROGRAM)
+    found = solver.prepare(
+        mechanism, case.sweep.path, bodies=names, forces=[each.name for each in members]
+    )(1e-12)
+    assert found.solved.all(), found.message
+    return found
 
 
 def pushes(mechanism, trajectory, k):

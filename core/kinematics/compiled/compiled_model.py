@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,9 @@ from ..structure.components import Section
 from .program_cache import Tracing, is_builtin, traced
 from .request import EARLIER, FROM, TIME, Request, slots_of
 from .sample_rows import rows_of_bodies, rows_of_points
+
+if TYPE_CHECKING:
+    from .force_table import ForceTable
 
 # Models that are kept for whoever solves one mechanism again and again: to fetch one from disk
 # takes longer than many sweeps.
@@ -100,6 +103,16 @@ class Model:
     def of_bodies(self) -> Mapping[str, list[slice | None]]:
         """By body: rows of its r, p, v and a, None for an absent one."""
         return rows_of_bodies(self.request, self.rows)
+
+    @cached_property
+    def forces(self) -> ForceTable | None:
+        """The forces of a sample; None if none are wanted."""
+        wanted = self.request.forces
+        if wanted is None:
+            return None
+        from .force_table import ForceTable  # most motions are without forces
+
+        return ForceTable(self.mechanism, wanted, self.rows, self.frame.unit)
 
     @property
     def orders(self) -> int:

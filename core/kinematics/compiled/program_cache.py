@@ -29,6 +29,7 @@ from .sample_rows import (
     LARGEST_OF_PARTS,
     SMALLEST,
     SMALLEST_OF_PARTS,
+    kept_forces,
     kept_motions,
     kept_tests,
     row_ranges,
@@ -86,7 +87,7 @@ def traced(mechanism: Mechanism, request: Request, section: Section | None = Non
 
 def is_builtin(mechanism: Mechanism) -> bool:
     """Whether all it is made of is of this package: what is equal then means the same."""
-    parts = (*mechanism.joints, *mechanism.couplers, *mechanism.drivers)
+    parts = (*mechanism.joints, *mechanism.couplers, *mechanism.drivers, *mechanism.forces)
     return all(type(each).__module__.startswith(f"{PACKAGE}.") for each in parts)
 
 
@@ -130,7 +131,8 @@ def _trace(mechanism: Mechanism, request: Request, section: Section | None, lane
     tracer.layout.scalar(ITERATIONS)
     slots, vectors, state = tracer.layout.slots, tracer.layout.vectors, tracer.formulation.design
     sampled = [slots[TIME], *slots_of(vectors, (f"drive {name}" for name in request.drivers))]
-    motions, tests = kept_motions(request, state), kept_tests(request, tracer.blocks)
+    motions = [*kept_motions(request, state), *(kept_forces(vectors) if request.forces else ())]
+    tests = kept_tests(request, tracer.blocks)
     fixed = [*(target for _, target in carried), *slots_of(vectors, tracer.geometry)]
     plan = Plan(
         {program.name: program for program in programs},

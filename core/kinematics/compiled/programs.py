@@ -23,6 +23,7 @@ from ...mechanism.mechanism import Mechanism, Vector
 from ...primitives.base import GROUND_POSE, GROUND_TWIST, Drive, Pose, Twist
 from ...program import Elimination, Prepared, Program, Tape, absolute, maximum, minimum, program
 from ...trajectory import QUANTITIES
+from ..forces.demand import BodyStates
 from ..formulation.acceptance_criteria import EPSILON
 from ..formulation.body_kinematics import motion_of_frame, motion_of_point
 from ..formulation.cartesian import Cartesian, PrescribedBody
@@ -45,6 +46,7 @@ from .request import (
     Request,
     by_block,
 )
+from .traced_forces import Rows, TracedForces, angles, native_rows
 
 
 class Tracer:
@@ -63,6 +65,8 @@ class Tracer:
         self.prescribed: Mapping[str, PrescribedBody] = (
             {name: PrescribedBody() for name in section.given} if section else {}
         )
+        # the angle of a torsional spring is a coordinate, followed through any number of turns
+        self.named = angles(mechanism) if request.forces else []
         formulation = self._formulate({})
         if section:
             self.selection = select_section(mechanism, self.frame, formulation)
@@ -80,9 +84,8 @@ class Tracer:
                 else frames(self.mechanism, self.frame.unit)
             )
         self.prescribed = {name: self._moved(name) for name in self.prescribed}
-        self.formulation = self._formulate(
-            {name: Drive(*self.vector(f"drive {name}", 5)) for name in request.drivers}
-        )
+        self.drives = {name: Drive(*self.vector(f"drive {name}", 5)) for name in request.drivers}
+        self.formulation = self._formulate(self.drives)
         design = self.formulation.design
         for label in BLOCKS:
             for name, value in design.items():
@@ -93,7 +96,7 @@ class Tracer:
         self.unknowns = self.formulation.unknowns
 
     def _formulate(self, drives: Mapping[str, Drive]) -> Formulation:
-        found = constraints(self.mechanism, self.frame, drives, self.request.style)
+        found = constraints(self.mechanism, self.frame, drives, self.request.style, self.named)
         if self.request.style is Style.RELATIVE:
             return Relative.of(self.mechanism, self.frame, found)
         return Cartesian(found, self.frame.moving, prescribed=self.prescribed)
@@ -129,7 +132,7 @@ class Tracer:
         return [values[k] for k in self.selection.chosen]
 
     @cached_property
-    def _factor(self) -> Elimination:
+    def factor(self) -> Elimination:
         """The rows at the state, factored: to iterate, and where the iteration ends for the
         rates.
         """
@@ -143,7 +146,7 @@ class Tracer:
     @property
     def blocks(self) -> int:
         """Blocks of the rows, each with an estimate of its own of how singular it is."""
-        return len(self._factor.sigmas)
+        return len(self.factor.sigmas)
 
     def newton(self) -> Program:
         """One Newton-Raphson iteration of (28), Phi = 0: (29) Phi_Pi dPi = -Phi."""
@@ -152,16 +155,16 @@ class Tracer:
             # iterations end by this: a pose is off by the residual over sigma, and the next one by
             # the square of that
             self.layout.scalar("residual"): (
-                largest(phi) * maximum(1.0, FIRM / maximum(self._factor.sigma, EPSILON))
+                largest(phi) * maximum(1.0, FIRM / maximum(self.factor.sigma, EPSILON))
             ),
-            self.layout.scalar(SIGMA): self._factor.sigma,
-            self.layout.scalar(ORIENTATION): self._factor.orientation,
+            self.layout.scalar(SIGMA): self.factor.sigma,
+            self.layout.scalar(ORIENTATION): self.factor.orientation,
         }
         out |= {
             self.layout.scalar(name): x
-            for name, x in zip(by_block(SIGMA, self.blocks), self._factor.sigmas, strict=True)
+            for name, x in zip(by_block(SIGMA, self.blocks), self.factor.sigmas, strict=True)
         }
-        step = self._factor.solve(phi)
+        step = self.factor.solve(phi)
         self.store_state(out, self.formulation.retract(self.at, [-x for x in step]))
         return program("newton", self.tape, out, self.prepared)
 
@@ -178,10 +181,10 @@ class Tracer:
         # (30) Phi_Pi v = nu and (32) Phi_Pi a = gamma are linear: one factor at the pose serves
         # both; the paper iterates, (31)
         if order:
-            v = self._factor.solve(self._kept(self.formulation.nu(self.at)))
+            v = self.factor.solve(self._kept(self.formulation.nu(self.at)))
             self.store(out, RATE, v)
         if order == 2:
-            a = self._factor.solve(self._kept(self.formulation.gamma(self.at, v)))
+            a = self.factor.solve(self._kept(self.formulation.gamma(self.at, v)))
             self.store(out, RATE_T, a)
         return v, a, out
 
@@ -249,7 +252,18 @@ class Tracer:
                 name,
                 motion_of_frame(quat(body.euler_parameters), *moving(name)),
             )
+        if self.request.forces:
+            states = BodyStates(self.frame, self.at.poses, twists, accelerations)
+            forces = TracedForces(self.mechanism, self._native_rows(), states, self.at, self.drives)
+            for name, value in forces.vectors(self.request.forces):
+                self.store(out, name, value)
         return program("outputs", self.tape, out, self.prepared)
+
+    def _native_rows(self) -> Rows:
+        formulation = self.formulation
+        if self.request.style is Style.NATIVE and isinstance(formulation, Cartesian):
+            return Rows(formulation, self.selection, self.factor)
+        return native_rows(self.mechanism, self.frame, self.drives, self.at)
 
     def _store_motion(
         self,

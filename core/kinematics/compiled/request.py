@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
+from ..forces.wanted import WantedForces
 from ..formulation.constraints import Style
 
 # Newton is quadratic: an iteration that starts from a residual below this ends at round-off (1e-16
@@ -34,6 +35,7 @@ class Request:
             mechanism's size]; a sparse system iterates as long as it gains by it.
         rows: of the formulation, which are solved; those that are independent at the design
             position unless given.
+        forces: what forces are wanted; they take order 2.
     """
 
     drivers: tuple[str, ...]
@@ -46,6 +48,7 @@ class Request:
     varied: tuple[str, ...] = ()
     last_iteration: float = LAST_ITERATION
     rows: tuple[int, ...] = ()
+    forces: WantedForces | None = None
 
 
 RATE, RATE_T = "rate", "rate_t"

@@ -26,6 +26,25 @@ LARGEST, SMALLEST = ("closure", "leftover"), (SIGMA,)
 LARGEST_OF_PARTS, SMALLEST_OF_PARTS = (*LARGEST, ITERATIONS), (*SMALLEST, MARGIN)
 """Tests whose worst value over all parts of a sample is computed."""
 
+EFFORT, ELEMENT, REACTION = "effort ", "element ", "reaction "
+"""Before the names of vectors of forces: of a driver; of a force element; of a joint, its force and
+moment. Those of drivers and joints repeat for each undetermined direction.
+"""
+POWER, REDUNDANT = "power", "redundant"
+"""The vectors of the sum of the powers and the largest of them; and of the products of the
+undetermined directions with the multipliers and, upper triangle by rows, with each other.
+"""
+FORCE_SIGMA = "force sigma"
+"""The vector of the estimate of the smallest singular value of the rows that forces are solved by,
+where the motion is solved by others.
+"""
+
+
+def kept_forces(vectors: Iterable[str]) -> list[str]:
+    """Return the names of the vectors of forces, of all vectors."""
+    prefixes, whole = (EFFORT, ELEMENT, REACTION), (POWER, REDUNDANT, FORCE_SIGMA)
+    return [name for name in vectors if name.startswith(prefixes) or name in whole]
+
 
 def kept_motions(request: Request, state: Iterable[str]) -> list[str]:
     """Return the names of the vectors asked for, those of one motion side by side.

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ...forces import Forces
 from ...mechanism.motions import Path
 from ...program import ITERATIONS
 from ...trajectory import Array, BodyMotion, Motions, PointMotion, Trajectory
@@ -73,7 +74,17 @@ def _follow(route: Route, tol: float) -> Trajectory:
             **findings,
         },
         bodies=Motions(BodyMotion, table, model.of_bodies),
+        forces=_forces(model, table, sigma) if not message and "notes" not in findings else None,
     )
+
+
+def _forces(model: Model, table: Array, sigma: float) -> Forces | None:
+    """Return the forces that a model computes; None if none are wanted, or some may not be finite.
+
+    At a singular pose rigid bodies determine no finite force. Samples there are interpolated, or
+    not reached because forces cannot be interpolated: both leave notes or messages.
+    """
+    return model.forces.read(table, sigma) if model.forces else None
 
 
 def _worst(tests: Array) -> tuple[float, float, float]:

@@ -5,11 +5,12 @@ M a + h - Q   for one body: force, and torque about the body's internal origin, 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from ...algebra import ZERO, Mat3, Scalar, Vec3, cross, root, vec
+from ...errors import SolveError
 from ...joints.base import unit
 from ...mechanism.body import Body
 from ...mechanism.loads import Axes, Force, SpringDamper, Torque, TorsionSpringDamper
@@ -73,30 +74,47 @@ class BodyStates:
 
 def inertial(body: Body, at: BodyStates, gravity: Vec3) -> Wrench:
     """Return the wrench that a body with mass demands: m (a - g), and I wdot + w x I w at C."""
-    C, twist = body.center_of_mass or body.origin, at.twists[body.name]
-    acceleration = at.accelerations[body.name]
-    arm = at.poses[body.name].turn(at.frame.arm(body.name, C))
-    force = body.mass * (at.frame.unit * acceleration.of(arm, twist) - gravity)
+    arm = arm_of_center(body, at)
+    force = body.mass * (acceleration_of_center(body, at) - gravity)
     return Wrench(force, cross(at.frame.unit * arm, force) + spin_change(body, at))
 
 
+def arm_of_center(body: Body, at: BodyStates) -> Vec3:
+    """Return the arm from a body's internal origin to its centre of mass, turned [units]."""
+    return at.poses[body.name].turn(at.frame.arm(body.name, body.center_of_mass or body.origin))
+
+
+def acceleration_of_center(body: Body, at: BodyStates) -> Vec3:
+    """Return the acceleration of a body's centre of mass [m/s^2]."""
+    acceleration, twist = at.accelerations[body.name], at.twists[body.name]
+    return at.frame.unit * acceleration.of(arm_of_center(body, at), twist)
+
+
 def spin_change(body: Body, at: BodyStates) -> Vec3:
-    """Return the change of a body's angular momentum about its centre of mass [N m]."""
-    I = inertia_now(body, at.poses[body.name])  # noqa: E741 - the field's letter
-    w, w_t = at.twists[body.name].w, at.accelerations[body.name].w_t
-    return ZERO if I is None else I @ w_t + cross(w, I @ w)
+    """Return the change of a body's angular momentum about its centre of mass [N m].
 
-
-def inertia_now(body: Body, pose: Pose) -> Mat3 | None:
-    """Return A I A^T, the inertia about the centre of mass in global axes; None for a point mass.
-
-    The inertia at design is in global axes, so A is the rotation since design.
+    The inertia at design is in global axes, so it is constant in axes that turn with the body.
     """
+    I = inertia_of(body)  # noqa: E741 - the field's letter
+    if I is None:
+        return ZERO
+    pose, (w, w_t) = at.poses[body.name], spin_of(body, at)
+    return pose.turn(I @ w_t + cross(w, I @ w))
+
+
+def spin_of(body: Body, at: BodyStates) -> tuple[Vec3, Vec3]:
+    """Return w and wdot of a body in axes that turn with it, global at design."""
+    back = at.poses[body.name].D.T
+    w, w_t = at.twists[body.name].w, at.accelerations[body.name].w_t
+    return w + back @ w, w_t + back @ w_t
+
+
+def inertia_of(body: Body) -> Mat3 | None:
+    """Return the inertia about the centre of mass at design, global axes; None for a point mass."""
     if body.inertia is None:
         return None
     xx, yy, zz, xy, yz, xz = body.inertia
-    at_design = Mat3(Vec3(xx, xy, xz), Vec3(xy, yy, yz), Vec3(xz, yz, zz))
-    return pose.A.times(at_design).times(pose.A.T)
+    return Mat3(Vec3(xx, xy, xz), Vec3(xy, yy, yz), Vec3(xz, yz, zz))
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,6 +133,30 @@ class Applied:
     wrenches: Mapping[str, Wrench]
     stored: Scalar
     lost: Scalar
+
+
+def at_work(
+    mechanism: Mechanism, at: BodyStates, angle: Callable[[str], Scalar]
+) -> dict[str, Applied]:
+    """Return all force elements at work, by name.
+
+    Args:
+        angle: gives a joint's angle by its name [rad], continuous, zero at design.
+
+    Raises:
+        SolveError: an element is of a kind that the native solver does not know.
+    """
+
+    def at_work_now(each: Any) -> Applied:
+        if isinstance(each, SpringDamper):
+            return spring(each, at)
+        if isinstance(each, TorsionSpringDamper):
+            return torsion(each, mechanism, at, angle(each.joint))
+        if isinstance(each, Force | Torque):
+            return constant(each, at)
+        raise SolveError(f"{each}: the native engine knows no force element of this kind")
+
+    return {each.name: at_work_now(each) for each in mechanism.forces}
 
 
 def spring(each: SpringDamper, at: BodyStates) -> Applied:

@@ -10,7 +10,6 @@ import numpy as np
 from ...algebra import ZERO, angle_about, cross, quat, vec
 from ...errors import SolveError
 from ...joints.base import unit
-from ...mechanism.loads import Force, SpringDamper, Torque, TorsionSpringDamper
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path
 from ...primitives.base import GROUND_POSE, Pose, Twist
@@ -18,7 +17,7 @@ from ...trajectory import Array, Trajectory
 from ..formulation.constraints import frames
 from ..formulation.formulation import Acceleration
 from ..formulation.state_vectors import displaced
-from .demand import Applied, BodyStates, constant, spring, torsion
+from .demand import Applied, BodyStates, at_work
 
 
 class MotionLanes:
@@ -48,9 +47,7 @@ class MotionLanes:
         self.drive = path.drive(names, self.times) if names else np.empty((3, 0, self.n))
         self.rates = dict(zip(names, self.drive[1], strict=True))
         self.values = dict(zip(names, self.drive[0], strict=True))
-        self.applied: Mapping[str, Applied] = {
-            each.name: self._applied(each) for each in mechanism.forces
-        }
+        self.applied: Mapping[str, Applied] = at_work(mechanism, self.at, self.angle)
 
     def _poses(self, motion: Trajectory) -> dict[str, Pose]:
         missing = [body.name for body in self.mechanism.moving if body.name not in motion.bodies]
@@ -80,23 +77,22 @@ class MotionLanes:
             accelerations[body.name] = Acceleration(per_unit * vec([*a[:3]]) - added, w_t)
         return BodyStates(self.frame, self.poses, twists, accelerations)
 
-    def _applied(self, each: Any) -> Applied:
-        if isinstance(each, SpringDamper):
-            return spring(each, self.at)
-        if isinstance(each, TorsionSpringDamper):
-            return torsion(each, self.mechanism, self.at, self.angle(each.joint))
-        if isinstance(each, Force | Torque):
-            return constant(each, self.at)
-        raise SolveError(f"{each}: the native engine knows no force element of this kind")
-
     def angle(self, name: str) -> Array:
         """Return the angle of a joint over the samples [rad], continuous, zero at design."""
         joint: Any = self.mechanism.joint(name)
         i, j = (self.poses.get(body, GROUND_POSE) for body in joint.bodies)
         found = angle_about(vec([*unit(joint.axis)]), i.q.conjugate() * j.q)
         angle: Array = found + np.zeros(self.n)
+        if not self.n:
+            return angle
+        axis = i.turn(vec([*unit(joint.axis)]))
+        rate: Array = axis @ (self.at.spin(joint.j) - self.at.spin(joint.i)) + np.zeros(self.n)
         order = np.argsort(self.times, kind="stable")
-        turned = np.asarray(np.unwrap(angle[order]), dtype=np.float64)
+        turned, rate = angle[order], rate[order]
+        # between coarse samples an angle is known up to turns: its rates tell how many
+        about = 0.5 * (rate[1:] + rate[:-1]) * np.diff(self.times[order])
+        turns = np.round((about - np.diff(turned)) / (2.0 * np.pi))
+        turned[1:] += 2.0 * np.pi * np.cumsum(turns)
         # the sample nearest to the design is within half a turn of it
         nearest = float(turned[int(np.argmin(np.abs(self.times[order])))])
         turned = turned - 2.0 * np.pi * round(nearest / (2.0 * np.pi))

@@ -1,30 +1,26 @@
-"""Reactions of joints and efforts of drivers from a solved motion: J^T lambda = M a + h - Q.
+"""Forces of a solved motion: reactions of joints and efforts of drivers.
 
-J has all native rows, of joints and of drivers. On the manifold the simplified rows of a whole
-joint span what the exact ones span, so the wrench of a joint does not depend on the row style; the
-forces of all styles and solvers are computed here, from the motion of the bodies. All samples are
-evaluated at once, as numpy lanes.
+All samples are evaluated at once, as numpy lanes. Singular values tell what redundant rows leave
+undetermined, and where a pose is singular.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import SolveError, unknown
 from ...forces import Forces, Reaction
-from ...joints.base import Joint
-from ...mechanism.drivers import Driver
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path
 from ...trajectory import Array, Trajectory
 from .force_rows import ForceRows
 from .motion_lanes import MotionLanes
-from .power import balance
+from .power import powers
+from .wanted import wanted_forces
 
 Lanes: TypeAlias = NDArray[np.bool_]
 # Numbers of a matrix of rows over all samples that are solved at once: some 64 MB.
@@ -38,10 +34,7 @@ def with_forces(
     names: Collection[str] | None = None,
     bodies: Collection[str] = (),
 ) -> Trajectory:
-    """Return a solved motion with its forces, of the bodies only those named; see `forces_of`.
-
-    Its details tell the balance of power, and the joints whose reaction is not wholly determined.
-    """
+    """Return a solved motion with its forces, of the bodies only those named; see `forces_of`."""
     found = forces_of(mechanism, path, motion, names)
     return Trajectory(
         motion.points,
@@ -49,26 +42,10 @@ def with_forces(
         motion.iterations,
         motion.residual,
         "; ".join(filter(None, (motion.message, found.message))),
-        {**motion.details, "forces": _account(found)},
+        motion.details,
         {name: motion.bodies[name] for name in bodies},
         found,
     )
-
-
-def _account(found: Forces) -> dict[str, Any]:
-    """Return the facts of the forces for the record."""
-    known = np.isfinite(found.power)
-    largest = float(found.largest_power[known].max(initial=0.0))
-    missing = float(np.abs(found.power[known]).max(initial=0.0))
-    counts = {name: each.determined() for name, each in found.joints.items()}
-    return {
-        "power_missing": missing / largest if largest else 0.0,
-        "determined_directions": {
-            name: {"force": force, "moment": moment, "wrench": wrench}
-            for name, (force, moment, wrench) in counts.items()
-            if wrench < 6
-        },
-    }
 
 
 def forces_of(
@@ -85,7 +62,7 @@ def forces_of(
     Raises:
         SolveError: a name is unknown, or the motion lacks a body.
     """
-    wanted = _wanted(mechanism, names)
+    wanted = wanted_forces(mechanism, names)
     solved = motion.solved
     lanes = MotionLanes(mechanism, path, motion)
     lines = ForceRows(lanes)
@@ -96,41 +73,19 @@ def forces_of(
     singular = np.concatenate([each.singular for each in parts])
     efforts = {each.name: lines.effort(each, multipliers, null) for each in mechanism.drivers}
     elements = {name: each.amount + np.zeros(lanes.n) for name, each in lanes.applied.items()}
-    power, largest = balance(mechanism, lanes.at, lanes.applied, efforts, lanes.rates, lanes.n)
+    every = powers(mechanism, lanes.at, lanes.applied, efforts, lanes.rates)
+    table: Array = np.array([each + np.zeros(lanes.n) for each in every]).reshape(-1, lanes.n)
     spread = _Spread(solved, singular)
     return Forces(
         {
-            joint.name: Reaction(*map(spread, lines.reaction(joint, multipliers, null)))
-            for joint in wanted.joints
+            name: Reaction(*map(spread, lines.reaction(mechanism.joint(name), multipliers, null)))
+            for name in wanted.joints
         },
-        {each.name: spread(efforts[each.name]) for each in wanted.drivers},
+        {name: spread(efforts[name]) for name in wanted.drivers},
         {name: spread(elements[name], ill=False) for name in wanted.elements},
-        spread(power),
-        spread(largest),
+        spread(table.sum(axis=0)),
+        spread(np.abs(table).max(axis=0, initial=0.0)),
         _said(singular, lanes.times),
-    )
-
-
-@dataclass(frozen=True)
-class _Wanted:
-    joints: Sequence[Joint]
-    drivers: Sequence[Driver]
-    elements: Sequence[str]
-
-
-def _wanted(mechanism: Mechanism, names: Collection[str] | None) -> _Wanted:
-    if isinstance(names, str):
-        raise SolveError(f"forces is {names!r}, expected a list of names, or True for all")
-    known = [each.name for each in (*mechanism.joints, *mechanism.drivers, *mechanism.forces)]
-    for name in names or ():
-        if name not in known:
-            what = unknown("joint, driver or force element", name, known)
-            raise SolveError(f"forces of mechanism {mechanism.name!r}: {what}")
-    given = known if names is None else names
-    return _Wanted(
-        [each for each in mechanism.joints if each.name in given],
-        [each for each in mechanism.drivers if each.name in given],
-        [each.name for each in mechanism.forces if each.name in given],
     )
 
 

@@ -144,7 +144,11 @@ class Style(StrEnum):
 
 
 def constraints(
-    mechanism: Mechanism, frame: Frames, drives: Mapping[str, Drive], style: Style = Style.NATIVE
+    mechanism: Mechanism,
+    frame: Frames,
+    drives: Mapping[str, Drive],
+    style: Style = Style.NATIVE,
+    named: Collection[str] = (),
 ) -> list[Constraint | Relation]:
     """Return all constraints: joints in order, then couplers, then drivers in order.
 
@@ -152,13 +156,14 @@ def constraints(
         drives: the motion of each driver by name; drivers not named hold their design value.
         style: style of the rows. MIXED and RELATIVE name the coordinates of all axial joints, the
             others those of couplers.
+        named: further coordinates to name, as JOINT.rotation or JOINT.translation.
     """
     mixed = style in (Style.MIXED, Style.RELATIVE)
     coupled = {
         f"{joint}.{freedom}"
         for coupler in mechanism.couplers
         for joint, freedom, _ in coupler.terms
-    }
+    }.union(named)
     found: list[Constraint | Relation] = []
     for original in mechanism.joints:
         if isinstance(original, AxialJoint):

@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import msgspec
 
-from ...case.case import Case
+from ...case.case import Case, without_forces
 from ...errors import KincheckError
 from ...harness.engine import Engine
 from ...harness.native_engine import NativeEngine
@@ -104,7 +104,8 @@ def measure(
     command: str,
     tell: Callable[[str], object],
 ) -> Bench:
-    """Measure the requested parts. Batches, studies and processes are of the first case.
+    """Measure the requested parts, for the motion alone. Batches, studies and processes are of the
+    first case.
 
     Args:
         cases: by name as on the command line; at least one.
@@ -122,7 +123,7 @@ def measure(
         found.setdefault(what, []).extend(rows)
 
     peak = prepare() if compiler.available() else None
-    true = {name: with_truth(case, tol) for name, case in cases.items()}
+    true = {name: with_truth(without_forces(case), tol) for name, case in cases.items()}
     if "work" in parts:
         for case in true.values():
             _measure_work(case, engines, tol, rounds, peak, add, tell)
@@ -184,7 +185,7 @@ def _measure_work(
             entering[f"{engine.name} {engine.mode}", each.entry.setting] = each
     detailed = any(isinstance(engine, NativeEngine) for engine in engines)
     if detailed:
-        for each in contestants(case, native_breakdown.LEVELS, tol):
+        for each in contestants(case, native_breakdown.levels(case), tol):
             entering["levels", each.entry.setting] = each
     work: dict[tuple[str, str], Work] = {
         key: each.work for key, each in entering.items() if each.work is not None

@@ -81,5 +81,5 @@ def once(pair: Pair) -> Answer | Failure:
         iterations=int(trajectory.iterations.sum()),
         residual=float(trajectory.residual),
         message=bounded(trajectory.message),
-        details=plain(trajectory.details),
+        details=plain(trajectory.facts),
     )

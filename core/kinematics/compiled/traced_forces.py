@@ -1,0 +1,170 @@
+"""Forces as traced operations: reactions, efforts and the balance of power, beside accelerations.
+
+The rows are factored already: the multipliers of a sample are one transposed solve. Rows that are
+left out as redundant may carry any multipliers, which the others balance. Each gives a direction of
+the multipliers that is not determined, by one more transposed solve; `force_table` orthonormalises
+these directions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, reduce
+
+from ...algebra import Scalar
+from ...joints import AxialJoint
+from ...mechanism.loads import TorsionSpringDamper
+from ...mechanism.mechanism import Mechanism
+from ...primitives.base import Drive
+from ...program import Elimination, absolute, maximum
+from ..forces.demand import BodyStates, at_work
+from ..forces.equations import ForceEquations
+from ..forces.power import powers
+from ..forces.wanted import WantedForces
+from ..formulation.cartesian import Cartesian
+from ..formulation.constraints import Frames, constraints
+from ..formulation.formulation import Configuration
+from ..structure.degrees_of_freedom import Selection, select_rows
+from .sample_rows import EFFORT, ELEMENT, FORCE_SIGMA, POWER, REACTION, REDUNDANT
+
+
+def can_trace(mechanism: Mechanism) -> bool:
+    """Return whether programs can follow all that forces depend on: the angles of torsional
+    springs.
+    """
+    return all(
+        isinstance(mechanism.joint(each.joint), AxialJoint)
+        for each in mechanism.forces
+        if isinstance(each, TorsionSpringDamper)
+    )
+
+
+def angles(mechanism: Mechanism) -> list[str]:
+    """Return the coordinates of joints that torsional springs measure."""
+    return [
+        f"{each.joint}.rotation"
+        for each in mechanism.forces
+        if isinstance(each, TorsionSpringDamper)
+    ]
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Native rows, those of them that are solved, and their factors.
+
+    Attributes:
+        own: whether they are not the rows that the motion is solved by.
+    """
+
+    formulation: Cartesian
+    selection: Selection
+    factor: Elimination
+    own: bool = False
+
+
+def native_rows(
+    mechanism: Mechanism, frame: Frames, drives: Mapping[str, Drive], at: Configuration
+) -> Rows:
+    """Return the native rows of a mechanism whose motion is solved in another style."""
+    found = constraints(mechanism, frame, drives, named=angles(mechanism))
+    formulation = Cartesian(found, frame.moving)
+    selection = select_rows(mechanism, frame, formulation)
+    rows = formulation.rows(at)
+    factor = Elimination([rows[k] for k in selection.chosen])
+    return Rows(formulation, selection, factor, own=True)
+
+
+class TracedForces:
+    """The forces of a traced mechanism.
+
+    Args:
+        states: how its bodies move.
+        at: the configuration, with the coordinates of `angles`.
+        drives: of the drivers that move.
+    """
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        rows: Rows,
+        states: BodyStates,
+        at: Configuration,
+        drives: Mapping[str, Drive],
+    ) -> None:
+        self._mechanism, self._rows, self._states, self._drives = mechanism, rows, states, drives
+        applied = at_work(mechanism, states, lambda joint: at.state[f"x {joint}.rotation"][0])
+        self._equations = ForceEquations(mechanism, rows.formulation, at, states, applied)
+
+    @cached_property
+    def _multipliers(self) -> list[Scalar]:
+        """Multipliers of all rows; zero of those left out."""
+        return self._of_rows(self._rows.factor.solve_transposed(self._equations.demand))
+
+    @cached_property
+    def _loose(self) -> list[list[Scalar]]:
+        """Multipliers of all rows that balance each other, by row left out."""
+        found = list[list[Scalar]]()
+        for left_out in self._rows.selection.dropped:
+            row = self._equations.rows[left_out]
+            right = [-row.get(k, 0.0) for k in range(self._equations.formulation.unknowns)]
+            multipliers = self._of_rows(self._rows.factor.solve_transposed(right))
+            multipliers[left_out] = 1.0
+            found.append(multipliers)
+        return found
+
+    def _of_rows(self, chosen: Sequence[Scalar]) -> list[Scalar]:
+        found: list[Scalar] = [0.0] * len(self._equations.rows)
+        for k, value in zip(self._rows.selection.chosen, chosen, strict=True):
+            found[k] = value
+        return found
+
+    def vectors(self, wanted: WantedForces) -> Iterator[tuple[str, list[Scalar]]]:
+        """Yield the vectors of all wanted forces by name."""
+        mechanism, equations = self._mechanism, self._equations
+        every = [self._multipliers, *self._loose]
+        efforts = {
+            driver.name: [equations.effort(driver, each) for each in every]
+            for driver in mechanism.drivers
+        }
+        for name in wanted.joints:
+            joint, values = mechanism.joint(name), list[Scalar]()
+            for k, each in enumerate(every):
+                force, moment = equations.reaction(joint, each)
+                force = force if k else (1.0 / self._states.frame.unit) * force
+                values += [*force, *moment]
+            yield f"{REACTION}{name}", values
+        for name, values in efforts.items():
+            yield f"{EFFORT}{name}", values
+        for name in wanted.elements:
+            yield f"{ELEMENT}{name}", [equations.applied[name].amount]
+        found = powers(
+            mechanism,
+            self._states,
+            equations.applied,
+            {name: effort[0] for name, effort in efforts.items()},
+            {driver.name: self._rate(driver.name) for driver in mechanism.drivers},
+        )
+        sizes = (absolute(each) for each in found)
+        yield POWER, [sum(found, 0.0), reduce(maximum, sizes, 0.0)]
+        if self._rows.own:
+            yield FORCE_SIGMA, [self._rows.factor.sigma]
+        if self._loose:
+            yield REDUNDANT, [*self._products()]
+
+    def _rate(self, driver: str) -> Scalar:
+        """The rate of a driver [SI]."""
+        rate = self._drives.get(driver, Drive()).c_t
+        turns = self._mechanism.driver(driver).turns
+        return rate if turns else self._states.frame.unit * rate
+
+    def _products(self) -> Iterator[Scalar]:
+        for each in self._loose:
+            yield _product(each, self._multipliers)
+        for k, each in enumerate(self._loose):
+            for other in self._loose[k:]:
+                yield _product(each, other)
+
+
+def _product(a: Sequence[Scalar], b: Sequence[Scalar]) -> Scalar:
+    return sum((x * y for x, y in zip(a, b, strict=True)), 0.0)

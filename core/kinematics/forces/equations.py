@@ -1,0 +1,150 @@
+"""The equations of forces at one state, over any scalar: J^T lambda = M a + h - Q.
+
+J has all native rows, of joints and of drivers. On the manifold the simplified rows of a whole
+joint span what the exact ones span, so the wrench of a joint does not depend on the row style: the
+forces of all styles are those of the native rows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+from ...algebra import ZERO, Scalar, Vec3, cross, vec
+from ...joints.base import Joint
+from ...mechanism.drivers import Driver
+from ...mechanism.mechanism import Mechanism
+from ...primitives.base import GROUND_POSE
+from ..formulation.cartesian import COLUMNS, Cartesian
+from ..formulation.constraints import Constraint, Relation
+from ..formulation.formulation import Configuration, Rows
+from .demand import NO_WRENCH, Applied, BodyStates, inertial
+
+
+@dataclass(frozen=True, eq=False)
+class ForceEquations:
+    """The rows of joints and drivers at one state, what they carry, and what multipliers mean.
+
+    Attributes:
+        formulation: the native one, of the whole mechanism.
+        at: its configuration.
+        states: how the bodies move.
+        applied: force elements at work, by name.
+    """
+
+    mechanism: Mechanism
+    formulation: Cartesian
+    at: Configuration
+    states: BodyStates
+    applied: Mapping[str, Applied]
+
+    @cached_property
+    def rows(self) -> Rows:
+        """The Jacobian of all rows, lengths in the unit of the frames."""
+        return self.formulation.rows(self.at)
+
+    @cached_property
+    def demand(self) -> list[Scalar]:
+        """M a + h - Q by the unknowns [J]; zero for the coordinates of joints."""
+        found: list[Scalar] = [0.0] * self.formulation.unknowns
+        gravity = vec(self.mechanism.gravity)
+        for name, first in self.formulation.columns.items():
+            body = self.mechanism.body(name)
+            total = inertial(body, self.states, gravity) if body.mass > 0.0 else NO_WRENCH
+            for each in self.applied.values():
+                if name in each.wrenches:
+                    total += -each.wrenches[name]
+            force = self.states.frame.unit * total.force
+            found[first : first + COLUMNS] = [*force, *total.torque]
+        return found
+
+    @cached_property
+    def _numbered(self) -> list[tuple[int, Constraint | Relation]]:
+        """The constraint of every row, with the row's number: joints, couplers, drivers."""
+        every = (
+            c
+            for c in self.formulation.constraints
+            for _ in range(c.primitive.n if isinstance(c, Constraint) else 1)
+        )
+        return list(enumerate(every))
+
+    @cached_property
+    def _of_joints(self) -> Mapping[str, list[tuple[int, Constraint | Relation]]]:
+        """The rows of each joint; a coupler or driver may have the name of a joint."""
+        mechanism, every = self.mechanism, self.formulation.constraints
+        last = len(every) - len(mechanism.couplers) - len(mechanism.drivers)
+        own = {id(c) for c in every[:last]}
+        found: dict[str, list[tuple[int, Constraint | Relation]]] = {}
+        for k, c in self._numbered:
+            if id(c) in own:
+                found.setdefault(c.owner, []).append((k, c))
+        return found
+
+    @cached_property
+    def _measuring(self) -> Mapping[str, int]:
+        """The row that measures each coordinate."""
+        return {
+            c.coordinate: k for k, c in self._numbered if isinstance(c, Constraint) and c.coordinate
+        }
+
+    def _parts(self, joint: Joint, multipliers: Sequence[Scalar]) -> Iterator[tuple[int, Scalar]]:
+        """Yield rows that act on the bodies of a joint, with the multipliers that are its own.
+
+        A row that measures a joint's coordinate carries what the relations of this coordinate ask
+        for: it counts as theirs. So a gear's torque is not the reaction of the joints that it
+        couples, and a screw's thrust is the screw's.
+        """
+        for k, c in self._of_joints[joint.name]:
+            if isinstance(c, Relation):
+                for name, weight in c.weights.items():
+                    measuring = self._measuring[name]
+                    share = self.rows[measuring][self.formulation.coordinates[name]]
+                    yield measuring, -(weight / share) * multipliers[k]
+            elif not c.coordinate:
+                yield k, multipliers[k]
+
+    def reaction(self, joint: Joint, multipliers: Sequence[Scalar]) -> tuple[Vec3, Vec3]:
+        """Return force [J / unit of the frames] and moment [N m] of a joint on its second body.
+
+        The moment is about the joint's point as carried by that body.
+        """
+        body, sign = (joint.j, 1.0) if joint.j in self.formulation.columns else (joint.i, -1.0)
+        first, force, torque = self.formulation.columns[body], ZERO, ZERO
+        for k, part in self._parts(joint, multipliers):
+            entries = [self.rows[k].get(first + x, 0.0) for x in range(COLUMNS)]
+            force += part * vec(entries[:3])
+            torque += part * vec(entries[3:])
+        return sign * force, sign * (torque - cross(self._arm(joint, body), force))
+
+    def _arm(self, joint: Joint, body: str) -> Vec3:
+        """Return the arm from a body's internal origin to the joint's point, turned [units].
+
+        The point is the one that the second body carries; that body's origin where there is none.
+        """
+        held = self.at.poses.get(joint.j, GROUND_POSE)
+        frame = self.states.frame
+        position = next(
+            iter(joint.points_on(joint.j)),
+            self.mechanism.body(joint.j).origin if joint.j in self.formulation.columns else None,
+        ) or (0.0, 0.0, 0.0)
+        arm = frame.arm(joint.j, position)
+        if body == joint.j:
+            return held.turn(arm)
+        seen = self.at.poses.get(body, GROUND_POSE)
+        carried = held.u + held.swing(arm) - seen.u
+        return (arm + frame.origins[joint.j] - frame.origins[body]) + carried
+
+    def effort(self, driver: Driver, multipliers: Sequence[Scalar]) -> Scalar:
+        """Return the effort of a driver [N or N m]."""
+        drivers = self.mechanism.drivers
+        c: Any = self.formulation.constraints[drivers.index(driver) - len(drivers)]
+        first = next(k for k, each in self._numbered if each is c)
+        # nu is linear in the driver's rate: at rate one it is the power of a multiplier
+        at_rate_one = replace(c.primitive, drive=replace(c.primitive.drive, c_t=1.0))
+        pair = (self.at.poses.get(b, GROUND_POSE) for b in (c.i, c.j))
+        found: Scalar = 0.0
+        for k, value in enumerate(at_rate_one.nu(*pair)):
+            found = found + value * multipliers[first + k]
+        return found if driver.turns else (1.0 / self.states.frame.unit) * found
