@@ -7,7 +7,8 @@
 - Other languages are not run. A comment before a block, `<!-- not run: REASON -->`, excuses it;
   `<!-- status: 1 -->` gives the exit status of its last command.
 
-A number in shown output stands for any number, and a line "..." for any lines.
+A number in shown output stands for any number, a line "..." for any lines, and " ..." at the end of
+a line for its rest.
 """
 
 import re
@@ -96,12 +97,17 @@ def differences(shown: str, printed: str) -> str:
             free = True
             continue
         places = range(at, len(found)) if free else range(at, min(at + 1, len(found)))
-        at = next((k + 1 for k in places if found[k] == line), -1)
+        at = next((k + 1 for k in places if _fits(line, found[k])), -1)
         if at < 0:
             return line
         free = False
     return ""
 
 
+def _fits(line: str, found: str) -> bool:
+    """Return whether a shown line is the found one; " ..." at its end stands for the rest."""
+    return found == line or (line.endswith(" ...") and found.startswith(line[:-4]))
+
+
 def _plain(line: str) -> str:
-    return " ".join(NUMBER.sub("#", line).replace("...", " ... ").split())
+    return " ".join(NUMBER.sub("#", line).split())
