@@ -41,7 +41,7 @@ def engine(name: str, mode: str = "projection") -> Any:
     return getattr(importlib.import_module(f".{module}", __name__), maker)()
 
 
-WRITERS = ("mjcf", "exudyn", "urdf")
+WRITERS = ("mjcf", "exudyn", "urdf", "sdf", "osim")
 """Formats, as on the command line; that of a name is the function `write` of the module
 writers.NAME.
 """

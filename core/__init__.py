@@ -25,6 +25,7 @@ if TYPE_CHECKING:
         ParallelAxes,
         PerpendicularAxes,
         Planar,
+        Polynomial,
         RackPinion,
         Revolute,
         RevoluteSpherical,
@@ -88,6 +89,7 @@ __all__ = [
     "Point",
     "PointCoordinate",
     "PointMotion",
+    "Polynomial",
     "RackPinion",
     "Ramp",
     "Record",
@@ -122,8 +124,8 @@ _NAMES = {
     "mechanism.motions": "Ramp Sine Table",
     "joints": (
         "ConstantVelocity Cylindrical Distance Fixed Gear Inline InPlane "
-        "Joint OrientationLock ParallelAxes PerpendicularAxes Planar RackPinion Revolute "
-        "RevoluteSpherical Screw Spherical Translational Universal"
+        "Joint OrientationLock ParallelAxes PerpendicularAxes Planar Polynomial RackPinion "
+        "Revolute RevoluteSpherical Screw Spherical Translational Universal"
     ),
     "case.case": "Case",
     "case.io.reader_options": "Supplied",

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.polynomial import Polynomial
 
 from ...core import joints
 from ...core.mechanism.mechanism import GROUND, Mechanism
@@ -55,6 +56,7 @@ class Equations:
         following: the equations among them that follow a value.
         turning: rows that follow an angle, and their markers on the first and second body; the
             first turns about its z axis.
+        bent: rows that follow a polynomial of a value: row, value, polynomial.
         values: the number of drivers and further unknowns.
     """
 
@@ -66,6 +68,7 @@ class Equations:
         self.rows: list[Equation] = []
         self.following: list[Following] = []
         self.turning: dict[int, tuple[int, int]] = {}
+        self.bent: list[tuple[int, int, Polynomial]] = []
         self.values = len(mechanism.drivers)
         self._add_bodies()
 

@@ -141,7 +141,10 @@ class ExudynModel:
         for each in rows.following:
             self.followed[each.row, each.value] = each.weight
         self.driven, self.shared = np.split(self.followed, [len(case.mechanism.drivers)], axis=1)
-        self.unknowns = self.coordinates + rows.values - len(case.mechanism.drivers)
+        # rows that follow a polynomial: the row, the place of its unknown, the polynomial
+        drivers = len(case.mechanism.drivers)
+        self.bent = [(row, value - drivers, curve) for row, value, curve in rows.bent]
+        self.unknowns = self.coordinates + rows.values - drivers
         self.turning = [
             (row, pair, np.array(self.mbs.GetMarkerParameter(pair[0], "localHT")))
             for row, pair in rows.turning.items()
@@ -184,6 +187,8 @@ class ExudynModel:
 
     def residual(self, c: Array) -> Array:
         values = self.followed @ np.concatenate([c, self.x[self.coordinates :]])
+        for row, place, curve in self.bent:
+            values[row] = curve(self.x[self.coordinates + place])
         for row, (first, second), frame in self.turning:
             self.mbs.SetMarkerParameter(first, "localHT", frame @ turned(values[row]))
             # The frame is there: the row is the sine of the angle still missing. From beyond a
@@ -205,6 +210,8 @@ class ExudynModel:
         return self.mbs.GetMarkerOutput(marker, self.rotation)[::3]
 
     def jacobian(self) -> Array:
+        for row, place, curve in self.bent:
+            self.shared[row, place] = curve.deriv()(self.x[self.coordinates + place])
         return np.hstack([self._jacobian(), -self.shared])
 
     def _jacobian(self) -> Array:
@@ -220,7 +227,7 @@ class ExudynModel:
         # The turned frames rest meanwhile: where the rows are met, the terms that their motion
         # would add are all zero. The step follows the speed, so the accuracy does not depend on the
         # rate of the sweep.
-        v = v[: self.coordinates]
+        v, rates = v[: self.coordinates], v[self.coordinates :]
         speed = np.abs(v).max() or 1.0
         bias = np.zeros(len(self.kept))
         for h in DIFFERENCES:
@@ -228,7 +235,10 @@ class ExudynModel:
             if np.abs(bias - low).max() <= AGREE * max(np.abs(bias).max(), 1.0):
                 break
         self.state.SetODE2Coordinates(self.q)
-        return speed**2 * bias
+        bias *= speed**2
+        for row, place, curve in self.bent:
+            bias[row] -= curve.deriv(2)(self.x[self.coordinates + place]) * rates[place] ** 2
+        return bias
 
     def _difference(self, u: Array, h: float) -> tuple[Array, Array]:
         """Return the derivative of J u along u by sixth and by fourth order, shape (rows,) each."""

@@ -31,6 +31,9 @@ def limitation_of(case: Case) -> str | None:
                 f"{joint} keeps a product at {kept:.3g}, at which Exudyn's own objects keep"
                 " only zero; make its axes exact"
             )
+    for coupler in case.mechanism.couplers:
+        if coupler.curve:
+            return f"{coupler}: Exudyn's own solvers have no object that keeps a polynomial"
     times = case.sweep.path.times
     if len(times) > 1 and np.ptp(np.diff(times)) > EQUIDISTANT * np.abs(np.diff(times)).max():
         return (

@@ -6,6 +6,8 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from numpy.polynomial import Polynomial
+
 from ...core import joints
 from ...core.mechanism.drivers import Driver
 from ...core.mechanism.mechanism import Mechanism
@@ -23,13 +25,24 @@ class Rows(Equations):
             for relation in joint.relations if isinstance(joint, joints.AxialJoint) else ():
                 self.relate([(joint.name, freedom, weight) for freedom, weight in relation.items()])
         for coupler in mechanism.couplers:
-            self.relate(coupler.terms)
+            if coupler.curve:
+                self.curve(coupler.terms, coupler.curve)
+            else:
+                self.relate(coupler.terms)
         for value, driver in enumerate(mechanism.drivers):
             self.drive(driver, value)
 
     def drive(self, driver: Driver, value: int) -> None:
         """Let the driver's coordinate follow its value."""
         self.follow(DRIVERS[type(driver)](self, driver), value)
+
+    def curve(self, terms: Sequence[tuple[str, str, float]], curve: Sequence[float]) -> None:
+        """Let the first coordinate, of weight one, follow the polynomial of the second."""
+        (first, freedom, _), (second, other_freedom, weight) = terms
+        value = self.unknown()
+        self.follow(self.coordinate(second, other_freedom), value)
+        bent = -Polynomial(curve) - Polynomial([0.0, weight])
+        self.bent.append((self.coordinate(first, freedom), value, bent))
 
     def relate(self, terms: Sequence[tuple[str, str, float]]) -> None:
         """Keep the weighted sum of two coordinates (joint, freedom, weight) at zero."""

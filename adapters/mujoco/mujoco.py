@@ -5,7 +5,7 @@ walk of `projection`.
 
 MuJoCo's time stepping treats equalities as soft, so it is not used: position is a root of
 `efc_pos`, velocity and acceleration follow from `efc_J` and its rate. MuJoCo puts that rate into
-`efc_aref` of connects and welds, not of tendons (measured: 4.0).
+`efc_aref` of connects and welds, not of tendons and joints (measured: 4.0).
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 from ...core.case.case import Case
@@ -111,6 +112,13 @@ class MuJoCoModel:
         self.tendons = [
             (row, *each.ends) for row, each in enumerate(owners) if each.kind == "tendon"
         ]
+        # of joints that follow a polynomial: row, address of the other's coordinate and rate, bend
+        self.bent = [
+            (row, int(other.qposadr[0]), int(other.dofadr[0]), Polynomial(each.curve).deriv(2))
+            for row, each in enumerate(owners)
+            if each.follows
+            for other in [self.m.joint(each.follows)]
+        ]
         self.present: slice | NDArray[np.intp] = slice(self.n)
         self.A = np.zeros((self.n + len(mechanism.drivers), self.m.nv))
         self.columns = np.eye(len(self.A))[:, self.n :]  # the rows of the drivers are the last
@@ -201,6 +209,8 @@ class MuJoCoModel:
             turned = (self.slope_rate(j) - self.slope_rate(i)) @ v
             length = math.sqrt(span @ span)
             b[row] = (apart @ apart - (span @ apart / length) ** 2 + span @ turned) / length
+        for row, place, rate, bend in self.bent:
+            b[row] = -bend(d.qpos[place]) * v[rate] ** 2
         for row, site, direction, _ in self.pulled:
             b[row] = direction @ (self.slope_rate(site) @ v)
         return b

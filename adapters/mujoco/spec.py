@@ -15,10 +15,18 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ...core.joints import Distance, Joint
+from ...core.joints import Coupler, Distance, Joint
 from ...core.mechanism.mechanism import GROUND, Mechanism, Vector
 from ...core.mechanism.topology import spanning_tree
-from ..shared.joint_chains import CHAINS, Link, dependence, end_of_loop, free, relations
+from ..shared.joint_chains import (
+    CHAINS,
+    Link,
+    dependence,
+    end_of_loop,
+    free,
+    polynomial_in_tree,
+    relations,
+)
 from ..shared.poses import middle
 
 JOINTS = (*CHAINS, Distance)
@@ -35,12 +43,14 @@ def coordinate(joint: str, name: str) -> str:
 @dataclass(frozen=True, slots=True)
 class Equality:
     """An equality constraint and the two sites it ties (their ids are known once the spec is
-    compiled); length of a tendon [m].
+    compiled); length of a tendon [m]; the joint it follows by a polynomial, and this.
     """
 
     kind: str
     ends: tuple[Any, ...] = ()
     length: float = 0.0
+    follows: str = ""
+    curve: tuple[float, ...] = ()
 
 
 class Sketch:
@@ -80,10 +90,13 @@ class Sketch:
         for joint in tree.cut:
             self.close(joint, self.bodies[joint.i], self.bodies[joint.j])
         for coupler in mechanism.couplers:
-            self.relate(
-                (joint, freedom, self.signs[joint] * weight)
-                for joint, freedom, weight in coupler.terms
-            )
+            if coupler.curve:
+                self.bend(coupler)
+            else:
+                self.relate(
+                    (joint, freedom, self.signs[joint] * weight)
+                    for joint, freedom, weight in coupler.terms
+                )
 
     def body(self, parent: Any) -> Any:
         """Add a body on its parent's frame.
@@ -168,12 +181,31 @@ class Sketch:
         one, other, factor = dependence(
             (coordinate(joint, freedom), weight) for joint, freedom, weight in terms
         )
+        self.follow(one, other, [0.0, factor])
+        self.relations.append(f"joint equality: {one} = {factor:.9g} {other}")
+
+    def bend(self, coupler: Coupler) -> None:
+        """Let the first coordinate, of weight one, follow the polynomial of the second."""
+        *_, (_, _, weight) = coupler.terms
+        one, other = (coordinate(joint, freedom) for joint, freedom, _ in coupler.terms)
+        driven, driving = (self.signs[joint] for joint in coupler.joints)
+        coefficients = polynomial_in_tree(weight, coupler.curve, driven, driving)
+        self.follow(one, other, coefficients, bent=True)
+        self.relations.append(f"joint equality: {one} is a polynomial of {other}")
+
+    def follow(
+        self, one: str, other: str, coefficients: Sequence[float], *, bent: bool = False
+    ) -> None:
+        """Keep a coordinate at a polynomial of another, the constant first."""
         equality = self.spec.add_equality(type=self.mj.mjtEq.mjEQ_JOINT, name1=one, name2=other)
         equality.objtype = self.mj.mjtObj.mjOBJ_JOINT
-        # one is a polynomial of the other, of which only the linear term is wanted
-        equality.data = [0.0, factor, *[0.0] * (len(equality.data) - 2)]
-        self.closures.append(Equality("joint"))
-        self.relations.append(f"joint equality: {one} = {factor:.9g} {other}")
+        data = [*coefficients, *[0.0] * len(equality.data)]
+        equality.data = data[: len(equality.data)]
+        self.closures.append(
+            Equality("joint", follows=other, curve=tuple(coefficients))
+            if bent
+            else Equality("joint")
+        )
 
     def join(self, kind: str, i: Any, j: Any, position: Sequence[float]) -> None:
         """Tie two bodies at a position. The default data stays: it holds the scale of a weld's

@@ -155,6 +155,21 @@ def dependence(terms: Iterable[tuple[Coordinate, float]]) -> tuple[Coordinate, C
     return one, other, -small / large
 
 
+def polynomial_in_tree(
+    weight: float, curve: Sequence[float], driven: float, driving: float
+) -> list[float]:
+    """Return the coefficients, the constant first, by which a coordinate of a tree follows another.
+
+    Args:
+        weight, curve: of the driving coordinate, see `Coupler.terms` and `Coupler.curve`.
+        driven, driving: signs of both coordinates in the tree.
+    """
+    found = [-c for c in curve]
+    if len(found) > 1:
+        found[1] -= weight
+    return [c * driven * driving**k for k, c in enumerate(found)]
+
+
 def end_of_loop(links: Sequence[Link], P: Vector) -> tuple[Sequence[Link], Vector, bool]:
     """Return the links of a chain that closes a loop, and the point that ties its last body.
 

@@ -67,13 +67,24 @@ def _rod(mechanism: Mechanism, joint: Distance, rod: str) -> list[Joint]:
     (i, j), (P_i, P_j) = joint.bodies, joint.points
     if mechanism.is_fixed(j):  # the cross stands on what turns least
         (i, j), (P_i, P_j) = (j, i), (P_j, P_i)
-    d = np.array([*unit([b - a for a, b in zip(P_i, P_j, strict=True)])])
-    # The cross locks where the rod comes to lie along its first axis. A crank turns its rod about
-    # the crank's own hinge.
+    axes = cross_of(mechanism, i, unit([b - a for a, b in zip(P_i, P_j, strict=True)]))
+    return [
+        Universal(f"{joint.name}: cross", i, rod, point=P_i, axes=axes),
+        Spherical(f"{joint.name}: ball", rod, j, point=P_j),
+    ]
+
+
+def cross_of(mechanism: Mechanism, body: str, along: Iterable[float]) -> tuple[Vector, Vector]:
+    """Return the axes of a cross between a body and a rod along a unit vector, unit vectors.
+
+    The cross locks where the rod comes to lie along the first axis. A crank turns its rod about the
+    crank's own hinge, so the first axis is that of such a hinge where it is across the rod.
+    """
+    d = np.array([*along])
     hinges = [
         each
         for each in mechanism.joints
-        if isinstance(each, AxialJoint) and i in each.bodies and not mechanism.is_fixed(i)
+        if isinstance(each, AxialJoint) and body in each.bodies and not mechanism.is_fixed(body)
     ]
     axes = [np.array([*unit(each.axis)]) for each in hinges]
     first = next(
@@ -81,16 +92,7 @@ def _rod(mechanism: Mechanism, joint: Distance, rod: str) -> list[Joint]:
         np.array([*triad((*d.tolist(),))[0]]),
     )
     second = np.cross(d, first)
-    return [
-        Universal(
-            f"{joint.name}: cross",
-            i,
-            rod,
-            point=P_i,
-            axes=(_vector(first), _vector(second / np.linalg.norm(second))),
-        ),
-        Spherical(f"{joint.name}: ball", rod, j, point=P_j),
-    ]
+    return _vector(first), _vector(second / np.linalg.norm(second))
 
 
 def _vector(a: Iterable[float]) -> Vector:

@@ -18,6 +18,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.polynomial import Polynomial
 
 from ...core.case.case import Case
 from ...core.joints import Fixed, Joint
@@ -30,7 +31,7 @@ from .frame_constraints import Condition
 from .joint_chains import CHAINS, Link, free, relations
 from .loop_closures import CLOSURES, ends_of
 from .poses import middle
-from .tree_rows import BodyFrame, DrivenPoint, Linear
+from .tree_rows import BodyFrame, Curved, DrivenPoint, Linear
 
 
 class TreeModel(ABC):
@@ -39,6 +40,7 @@ class TreeModel(ABC):
 
     Attributes:
         q: the configuration, never changed in place.
+        v: the velocity last set.
         origin: of each body, global at design [m].
         carrier: name of a body of the mechanism -> number of its body here.
         coordinates: joint and freedom -> body that moves by this coordinate, and its sign.
@@ -47,6 +49,7 @@ class TreeModel(ABC):
     """
 
     q: Array
+    v: Array
 
     def __init__(self, case: Case) -> None:
         self.case = case
@@ -65,7 +68,7 @@ class TreeModel(ABC):
         for joint in tree.cut:
             self.close(joint, ends_of(mechanism, joint), joint.name in named)
         for coupler in mechanism.couplers:
-            self.relate(coupler.terms)
+            self.relate(coupler.terms, coupler.curve)
         for driver in mechanism.drivers:
             if isinstance(driver, PointCoordinate):
                 point, k = mechanism.point(driver.point), np.array([*unit(driver.direction)])
@@ -213,11 +216,16 @@ class TreeModel(ABC):
         self.frames.append(BodyFrame(handle, np.array(at)))
         return self.frames[-1]
 
-    def relate(self, terms: Iterable[tuple[str, str, float]]) -> None:
-        """Add the row of a weighted sum of coordinates: joint, freedom and weight of its terms."""
+    def relate(self, terms: Iterable[tuple[str, str, float]], curve: Sequence[float] = ()) -> None:
+        """Add the row of a weighted sum of coordinates: joint, freedom and weight of its terms.
+
+        Args:
+            curve: coefficients of a polynomial in the last coordinate that is added.
+        """
         moved = [(*self.coordinates[joint, freedom], weight) for joint, freedom, weight in terms]
         weights = np.array([sign * weight for _, sign, weight in moved])
-        self.conditions.append(Linear(self, [body for body, _, _ in moved], weights))
+        row = Linear(self, [body for body, _, _ in moved], weights)
+        self.conditions.append(Curved(row, Polynomial(curve), moved[-1][1]) if curve else row)
 
     @property
     def details(self) -> Mapping[str, Any]:
@@ -244,6 +252,7 @@ class TreeModel(ABC):
 
     def observe_rates(self, v: Array) -> None:
         """Ask the simulator for their velocities at v and their Jdot v, at the q last placed."""
+        self.v = v
         self.rate(v, np.zeros_like(v))
         for frame in self.moving:
             frame.velocity, frame.acceleration = self.motion(frame.handle)

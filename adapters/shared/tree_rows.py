@@ -7,15 +7,18 @@ from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
+from numpy.polynomial import Polynomial
 
 from ...core.trajectory import Array
 from .frame_constraints import Frame
 
 
 class Coordinates(Protocol):
-    """A tree in its configuration q; see `tree_model.TreeModel`."""
+    """A tree in its configuration q, and at the velocity v last set; see `tree_model.TreeModel`."""
 
     q: Array
+
+    v: Array
 
     @property
     def unknowns(self) -> int: ...
@@ -66,6 +69,37 @@ class Linear:
 
     def bias(self) -> Any:
         return 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Curved:
+    """A linear row, and a polynomial in its last coordinate that is added.
+
+    Attributes:
+        sign: of the coordinate in the tree.
+    """
+
+    linear: Linear
+    curve: Polynomial
+    sign: float
+    n = 1
+
+    @cached_property
+    def _at(self) -> tuple[int, int]:
+        return self.linear.of.coordinate(self.linear.bodies[-1])
+
+    @property
+    def _x(self) -> float:
+        return self.sign * self.linear.of.q[self._at[0]]
+
+    def rows(self) -> tuple[Any, Array]:
+        value, row = self.linear.rows()
+        row = row.copy()
+        row[self._at[1]] += self.sign * self.curve.deriv()(self._x)
+        return value + self.curve(self._x), row
+
+    def bias(self) -> Any:
+        return self.curve.deriv(2)(self._x) * self.linear.of.v[self._at[1]] ** 2
 
 
 @dataclass(frozen=True, eq=False)

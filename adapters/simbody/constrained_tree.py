@@ -8,7 +8,7 @@ a name with a blank. Its limits of coordinates play no part: they act on its for
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from math import atan2, hypot
 from typing import Any
 
@@ -20,6 +20,7 @@ from ...core.joints.base import unit
 from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
 from ..shared.joint_chains import CHAINS, Link, dependence, end_of_loop, relations
+from ..shared.opensim_frames import orientation
 from ..shared.tree_model import TreeModel
 
 NO_TURN = (0.0, 0.0, 0.0)
@@ -45,7 +46,7 @@ class ConstrainedTree(TreeModel):
     def add_link(self, parent: int, link: Link, offset: Array) -> None:
         o, number = self.o, len(self.bodies)
         joint = {"slide": o.SliderJoint, "hinge": o.PinJoint, "ball": o.BallJoint}[link.move]
-        axes = self.vector(orientation(link))
+        axes = self.vector(orientation(link.move, link.axis))
         # kinematics does not depend on masses, but OpenSim asks for them
         body = o.Body(f"body_{number}", 1.0, o.Vec3(0.0), o.Inertia(1.0, 1.0, 1.0))
         move = joint(
@@ -97,10 +98,10 @@ class ConstrainedTree(TreeModel):
         moved = f", on a body that {' and '.join(each.move for each in links)} move on {joint.i!r}"
         self.closures[joint.name] = constraint.getConcreteClassName() + (moved if links else "")
 
-    def relate(self, terms: Iterable[tuple[str, str, float]]) -> None:
+    def relate(self, terms: Iterable[tuple[str, str, float]], curve: Sequence[float] = ()) -> None:
         terms = list(terms)
-        if len(terms) == 1:  # a driver's
-            super().relate(terms)
+        if len(terms) == 1 or curve:  # a driver's, or a polynomial
+            super().relate(terms, curve)
             return
         o, coupler = self.o, self.o.CoordinateCouplerConstraint()
         moved = [(self.coordinates[joint, freedom], weight) for joint, freedom, weight in terms]
@@ -125,18 +126,3 @@ class ConstrainedTree(TreeModel):
 def coordinate_name(body: int) -> str:
     """Return the name in OpenSim of the coordinate of a body's slide or hinge."""
     return f"coordinate_{body}"
-
-
-def orientation(link: Link) -> Vector:
-    """Return the angles about x, y and z, one after the other, of frames along a link's axis [rad].
-
-    A slider moves along x of its frames, a pin turns about z.
-    """
-    x, y, z = link.axis
-    match link.move:
-        case "slide":
-            return 0.0, atan2(-z, x), atan2(y, hypot(x, z))
-        case "hinge":
-            return atan2(-y, z), atan2(x, hypot(y, z)), 0.0
-        case "ball":
-            return NO_TURN

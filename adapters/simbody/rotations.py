@@ -9,9 +9,9 @@ by that velocity, and Simbody gets the angles of the result: no rate of an angle
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import atan2, cos, hypot, sin
+from math import cos, hypot, sin
 
-Parameters = tuple[float, float, float, float]
+from ..shared.opensim_frames import Parameters
 
 UNTURNED: Parameters = (1.0, 0.0, 0.0, 0.0)
 
@@ -35,17 +35,3 @@ def turned(p: Sequence[float], turn: Sequence[float]) -> Parameters:
     size = hypot(*parameters)
     e0, e1, e2, e3 = parameters
     return e0 / size, e1 / size, e2 / size, e3 / size
-
-
-def euler_angles(p: Sequence[float]) -> tuple[float, float, float]:
-    """Return the angles [rad] of successive turns about the body's x, y and z axes, exact to
-    round-off at any rotation.
-
-    With half angles a, b, c the parameters of such turns give (e1 ± e3, e0 ± e2) =
-    (cos b ± sin b) (sin(a ± c), cos(a ± c)).
-    """
-    e0, e1, e2, e3 = p
-    plus, minus = (e1 + e3, e0 + e2), (e1 - e3, e0 - e2)
-    total, difference = atan2(*plus), atan2(*minus)
-    large, small = hypot(*plus), hypot(*minus)
-    return total + difference, 2.0 * atan2(large - small, large + small), total - difference

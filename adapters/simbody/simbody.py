@@ -23,9 +23,10 @@ from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
 from ..shared.compiled_floor import Call, floor_of
 from ..shared.length_scaling import in_own_frame
+from ..shared.opensim_frames import euler_angles
 from ..shared.tree_engine import LEAST, TreeEngine
 from .constrained_tree import ConstrainedTree
-from .rotations import UNTURNED, euler_angles, turned
+from .rotations import UNTURNED, turned
 from .stations import Station
 
 

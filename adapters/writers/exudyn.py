@@ -54,7 +54,7 @@ def write(
     """A .py file; see `Writer`. Initial coordinates are the end of the way.
 
     Raises:
-        KincheckError: a joint has no counterpart in Exudyn.
+        KincheckError: a joint or coupler has no counterpart in Exudyn.
     """
     for joint in mechanism.joints:
         if type(joint) not in CHAINS and type(joint) is not j.Distance:
@@ -62,6 +62,8 @@ def write(
                 f"{joint} has no counterpart in Exudyn here; write an equivalent of known joints"
                 " instead"
             )
+    if curved := next((each for each in mechanism.couplers if each.curve), None):
+        raise KincheckError(f"{curved} has no counterpart in Exudyn; export MJCF or URDF instead")
     return {".py": _Script(*_spelled_out(mechanism, way)).text(start)}
 
 

@@ -15,12 +15,19 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from ...core.algebra import vec
 from ...core.errors import KincheckError
-from ...core.joints import Distance, Joint
+from ...core.joints import Coupler, Distance, Joint
 from ...core.mechanism.loads import ForceElement, SpringDamper, TorsionSpringDamper
 from ...core.mechanism.mechanism import GROUND, Body, Mechanism
 from ...core.mechanism.topology import spanning_tree
 from ...core.trajectory import BodyMotion
-from ..shared.joint_chains import CHAINS, Link, dependence, end_of_loop, relations
+from ..shared.joint_chains import (
+    CHAINS,
+    Link,
+    dependence,
+    end_of_loop,
+    polynomial_in_tree,
+    relations,
+)
 from ..shared.loop_closures import ends_of
 from ..shared.poses import (
     attitude,
@@ -101,10 +108,13 @@ class _Model:
         for joint in tree.cut:
             self.close(joint)
         for coupler in mechanism.couplers:
-            self.relate(
-                (joint, freedom, self.signs[joint] * weight)
-                for joint, freedom, weight in coupler.terms
-            )
+            if coupler.curve:
+                self.bend(coupler)
+            else:
+                self.relate(
+                    (joint, freedom, self.signs[joint] * weight)
+                    for joint, freedom, weight in coupler.terms
+                )
         for point in mechanism.points:
             self.add_site(point.name, point.body, point.position)
         sprung = {force.name for force in mechanism.forces if self.add_spring(force)}
@@ -256,5 +266,16 @@ class _Model:
         one, other, factor = dependence(
             (self.coordinates[joint, freedom], weight) for joint, freedom, weight in terms
         )
-        polynomial = numbers([0, factor, 0, 0, 0])
+        self.follow(one, other, [0, factor])
+
+    def bend(self, coupler: Coupler) -> None:
+        """Let the first coordinate, of weight one, follow the polynomial of the second."""
+        *_, (_, _, weight) = coupler.terms
+        one, other = (self.coordinates[joint, freedom] for joint, freedom, _ in coupler.terms)
+        signs = (self.signs[joint] for joint in coupler.joints)
+        self.follow(one, other, polynomial_in_tree(weight, coupler.curve, *signs))
+
+    def follow(self, one: str, other: str, coefficients: Sequence[float]) -> None:
+        """Keep a coordinate at a polynomial of another, the constant first."""
+        polynomial = numbers([*coefficients, 0, 0, 0, 0][:5])
         ET.SubElement(self.equalities, "joint", joint1=one, joint2=other, polycoef=polynomial)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import json
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -23,19 +23,12 @@ from ...core.joints import Fixed, Joint
 from ...core.mechanism.mechanism import GROUND, Body, Mechanism, Vector
 from ...core.mechanism.topology import spanning_tree
 from ...core.trajectory import BodyMotion
-from ..shared.frame_constraints import (
-    Coincident,
-    Condition,
-    Difference,
-    Direction,
-    Dot,
-    Frame,
-    Length,
-)
-from ..shared.joint_chains import CHAINS, Link, relations
+from ..shared.frame_constraints import Frame
+from ..shared.joint_chains import CHAINS, Link, polynomial_in_tree, relations
 from ..shared.loop_closures import CLOSURES, ends_of
 from ..shared.poses import backwards, displacements, link_coordinates
 from . import loads
+from .conditions import as_data
 from .xml_text import document, link_names, numbers
 
 SCHEMA = "kincheck-constraints/1"
@@ -49,6 +42,9 @@ MEANING = {
     "directions": "x . y = value [-], unit vectors",
     "offset": "x . (point j - point i) = value [m], x a unit vector",
     "linear": "the sum of weight * coordinate of the joint is zero [m or rad]",
+    "polynomial": (
+        "the coordinate of the driven joint is the polynomial of the driving one's, constant first"
+    ),
     "bodies": "the frame of the body in its link at design",
     "start": (
         "coordinates of joints: m or rad; floating: displacement x, y, z [m] and quaternion x, y,"
@@ -161,7 +157,7 @@ class _Model:
         for joint in (each for each in mechanism.joints if each in cut):
             self.close(joint, on_copy=joint.name in coupled or bool(relations(joint)))
         for coupler in mechanism.couplers:
-            self.relate(coupler.name, coupler.terms)
+            self.relate(coupler.name, coupler.terms, coupler.curve)
         for point in mechanism.points:
             self.attach(
                 f"point.{point.name}", point.body, point.position, f"point.{point.name}.fixed"
@@ -248,13 +244,30 @@ class _Model:
             cast(Frame, _End(link, self.arm(link, P))) for link, P in zip((i, j), ends, strict=True)
         ]
         for condition in closing.conditions(joint, *frames):
-            self.constraints += (
-                {"joint": joint.name, **written} for written in _written(condition)
-            )
+            self.constraints += ({"joint": joint.name, **written} for written in as_data(condition))
 
-    def relate(self, name: str, terms: Sequence[tuple[str, str, float]]) -> None:
-        """Keep the weighted sum of coordinates (joint, freedom, weight) at zero."""
+    def relate(
+        self, name: str, terms: Sequence[tuple[str, str, float]], curve: Sequence[float] = ()
+    ) -> None:
+        """Keep the weighted sum of coordinates (joint, freedom, weight) at zero.
+
+        Args:
+            curve: coefficients of a polynomial in the last coordinate that is added.
+        """
         found = [(*self.coordinates[joint, freedom], weight) for joint, freedom, weight in terms]
+        if curve:
+            (driven, first, _), (driving, second, weight) = found
+            coefficients = polynomial_in_tree(weight, curve, first, second)
+            self.constraints.append(
+                {
+                    "joint": name,
+                    "kind": "polynomial",
+                    "driven": driven,
+                    "driving": driving,
+                    "coefficients": coefficients,
+                }
+            )
+            return
         self.constraints.append(
             {
                 "joint": name,
@@ -270,25 +283,3 @@ class _Model:
             "origin": self.arm(body.name, body.origin),
             "euler_parameters": [*body.euler_parameters],
         }
-
-
-def _written(condition: Condition) -> Iterator[dict[str, Any]]:
-    """Yield a condition as data."""
-
-    def end(frame: Any) -> dict[str, Any]:
-        return {"link": frame.link, "point": frame.point}
-
-    def along(direction: Direction) -> dict[str, Any]:
-        return {"link": cast(Any, direction.frame).link, "direction": direction.a0.tolist()}
-
-    match condition:
-        case Coincident(Difference(i, j)):
-            yield {"kind": "coincident", "i": end(i), "j": end(j)}
-        case Length(Difference(i, j), length):
-            yield {"kind": "distance", "i": end(i), "j": end(j), "value": length}
-        case Dot(Direction() as x, Direction() as y, value):
-            yield {"kind": "directions", "x": along(x), "y": along(y), "value": value}
-        case Dot(Direction() as x, Difference(i, j), value):
-            yield {"kind": "offset", "x": along(x), "i": end(i), "j": end(j), "value": value}
-        case _:
-            raise NotImplementedError(f"{type(condition).__name__}: give its kind here")

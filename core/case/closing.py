@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 from ..errors import CaseError
@@ -14,19 +14,20 @@ from .case import Case
 _TOL = 1e-12
 
 
-def within_digits(case: Case, tolerance: float, why: str) -> Case:
+def within_digits(case: Case, tolerance: float, why: str, carrying: Collection[str] = ()) -> Case:
     """Return the case without rows that are redundant within a tolerance [m], with a note.
 
     Rows that are redundant to round-off stay: all engines know them.
 
     Args:
         why: origin of the tolerance, for the note.
+        carrying: joints with all their rows, as long as others can close the loops.
 
     Raises:
         CaseError: the rows are redundant at the start, but do not hold along the motion.
         SolveError: the mechanism does not close, or its drivers do not move it.
     """
-    found = reduce_rows(case.mechanism, tolerance)
+    found = reduce_rows(case.mechanism, tolerance, carrying)
     less = replace(case, mechanism=found.mechanism)
     if not found.originals or not _driven(less):
         return case

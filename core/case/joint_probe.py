@@ -65,6 +65,11 @@ WHY = (
     " (0.01), x10"
 )
 
+LISTS = ("tuple[float, ...]", tuple[float, ...])
+"""What fields that are lists of numbers are annotated with."""
+CURVE = (0.0, NUMBER, 0.25, -0.125, 0.0625)
+"""Coefficients of a polynomial whose slope vanishes nowhere near the design."""
+
 _Tested = TypeVar("_Tested", bound=Joint | Coupler)
 
 
@@ -130,7 +135,8 @@ def _geometry(of: type[Joint] | type[Coupler], pair: Any) -> Iterator[tuple[str,
     for each in fields(of):
         required = each.default is MISSING and each.default_factory is MISSING
         if required and each.name not in ("name", "i", "j", "joints"):
-            yield each.name, values[each.metadata.get("kind")]
+            one = values[each.metadata.get("kind")]
+            yield each.name, CURVE if each.type in LISTS else one
 
 
 def _of_joint(joint: Joint) -> Iterator[Case]:

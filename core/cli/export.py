@@ -13,7 +13,13 @@ from ..errors import KincheckError, unknown
 from . import import_options
 from .registry import House, Status
 
-FORMATS = {"mjcf": "MuJoCo", "exudyn": "a Python script", "urdf": "Pinocchio"}
+FORMATS = {
+    "mjcf": "MuJoCo",
+    "exudyn": "a Python script",
+    "urdf": "Pinocchio",
+    "sdf": "Drake",
+    "osim": "Simbody, by OpenSim",
+}
 """Formats of the adapters' writers, for help texts: adapters load later. A test compares both."""
 
 

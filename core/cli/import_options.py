@@ -25,8 +25,9 @@ def add_options(command: argparse.ArgumentParser) -> None:
         type=positive,
         metavar="X",
         help=(
-            "rows that are redundant within X [m], because of the digits of the file, are left out;"
-            " default: [closure] tolerance of a case file, else none are"
+            "gaps up to X [m] are the digits of the file: rows that are redundant within it are"
+            " left out; default: [closure] tolerance of a case file, else none are; of a model what"
+            " its digits allow"
         ),
     )
     points = command.add_argument_group(
@@ -84,7 +85,7 @@ def add_options(command: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="JOINT:START:STOP[:SAMPLES]",
-        help="the joint that moves [rad or m, as qpos]",
+        help="a joint that moves [rad or m, as qpos]; several move together",
     )
     model.add_argument(
         "--hold",
@@ -94,15 +95,32 @@ def add_options(command: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="joints, or free bodies, that stay where they are",
     )
+    model.add_argument(
+        "--hold-rest",
+        action="store_true",
+        help="hold joints as far as needed: free bodies, then joints with an actuator, then others",
+    )
+    model.add_argument(
+        "--start",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="WHERE",
+        help=(
+            "keyframe:NAME, or JOINT=VALUE [rad or m, as qpos], instead of qpos0; the start is"
+            " assembled to close, and a note says by how far joints moved"
+        ),
+    )
 
 
 def return_cases(options: argparse.Namespace) -> None:
-    """Move files from --hold back to the cases: in `run --hold knee hip model.xml` the option,
-    which takes several names, would take the file too.
+    """Move files from --hold and --start back to the cases: in `run --hold knee hip model.xml` the
+    option, which takes several names, would take the file too.
     """
-    files = [name for name in options.hold if Path(name).is_file()]
-    options.case += files
-    options.hold = [name for name in options.hold if name not in files]
+    for given in (options.hold, options.start):
+        files = [name for name in given if Path(name).is_file()]
+        options.case += files
+        given[:] = [name for name in given if name not in files]
 
 
 def supplied(options: argparse.Namespace) -> Supplied:
@@ -119,6 +137,8 @@ def supplied(options: argparse.Namespace) -> Supplied:
         options.wheelbase,
         options.axle,
         options.closure,
+        options.hold_rest,
+        (*options.start,),
     )
 
 

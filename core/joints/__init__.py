@@ -18,6 +18,7 @@ from .orientation_lock import OrientationLock
 from .parallel_axes import ParallelAxes
 from .perpendicular_axes import PerpendicularAxes
 from .planar import Planar
+from .polynomial import Polynomial
 from .rack_pinion import RackPinion
 from .revolute import Revolute
 from .revolute_spherical import RevoluteSpherical
@@ -46,6 +47,7 @@ __all__ = [
     "ParallelAxes",
     "PerpendicularAxes",
     "Planar",
+    "Polynomial",
     "RackPinion",
     "Revolute",
     "RevoluteSpherical",

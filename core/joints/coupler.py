@@ -1,5 +1,5 @@
-"""What couples two joints: a linear relation between their coordinates. A new one is one file, as a
-new joint is.
+"""What couples two joints: a relation between their coordinates. A new one is one file, as a new
+joint is.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ NUMBERS = (float, int, "float", "int")
 
 @dataclass(frozen=True)
 class Coupler(ABC):
-    """A linear relation between one coordinate each of two axial joints, zero at design.
+    """A relation between one coordinate each of two axial joints, which are zero at design.
 
     Attributes:
         joints: names of the two joints.
@@ -55,7 +55,15 @@ class Coupler(ABC):
                     (getattr(self, each.name),),
                     "a finite number other than zero",
                 )
-        if not all(weight and math.isfinite(weight) for weight in self.coefficients):
+        self.check()
+
+    def check(self) -> None:
+        """Refuse weights that lock or lose a joint.
+
+        Raises:
+            MechanismError: a weight is zero or not finite.
+        """
+        if not all(weight and math.isfinite(weight) for weight in self.weights):
             given = {
                 each.name: getattr(self, each.name)
                 for each in fields(self)
@@ -77,9 +85,16 @@ class Coupler(ABC):
     @property
     def terms(self) -> tuple[tuple[str, str, float], ...]:
         """Joint, freedom and weight of the two coordinates."""
-        return tuple(zip(self.joints, self.freedoms, self.coefficients, strict=True))
+        return tuple(zip(self.joints, self.freedoms, self.weights, strict=True))
+
+    @property
+    def curve(self) -> tuple[float, ...]:
+        """Coefficients of a polynomial in the second coordinate, the constant first, that is added
+        to the weighted sum; empty for a linear relation.
+        """
+        return ()
 
     @property
     @abstractmethod
-    def coefficients(self) -> tuple[float, float]:
-        """Weights of the two coordinates [m, rad]; their weighted sum stays zero."""
+    def weights(self) -> tuple[float, float]:
+        """Weights of the two coordinates [m, rad]; the sum, with that of `curve`, stays zero."""

@@ -16,5 +16,5 @@ class Gear(Coupler):
     ratio: float
 
     @property
-    def coefficients(self) -> tuple[float, float]:
+    def weights(self) -> tuple[float, float]:
         return 1.0, -self.ratio

@@ -19,5 +19,5 @@ class RackPinion(Coupler):
     radius: float = length()
 
     @property
-    def coefficients(self) -> tuple[float, float]:
+    def weights(self) -> tuple[float, float]:
         return -self.radius, 1.0

@@ -33,15 +33,20 @@ class SpanningTree:
     cut: tuple[Joint, ...]
 
 
-def spanning_tree(mechanism: Mechanism) -> SpanningTree:
+def spanning_tree(mechanism: Mechanism, first: Collection[str] = ()) -> SpanningTree:
     """Return the tree with the fewest coordinates: driven and coupled joints first, then those with
     the most rows (Prim).
 
     A joint with a driven or coupled freedom stays in the tree, so the freedom is a coordinate.
     Joints of fewer than three rows (a distance) hold a body too loosely to carry it; a body with
     such joints only is free.
+
+    Args:
+        first: further joints, taken as driven ones are.
     """
-    named = {driver.joint for driver in mechanism.drivers if isinstance(driver, JointDriver)}
+    named = {*first} | {
+        driver.joint for driver in mechanism.drivers if isinstance(driver, JointDriver)
+    }
     named |= {joint for coupler in mechanism.couplers for joint in coupler.joints}
     candidates = [joint for joint in mechanism.joints if joint.rows >= 3]
     # # the smallest is taken first

@@ -4,8 +4,10 @@ error, or why there is none.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import TextIO
 
+from rich.cells import cell_len
 from rich.table import Table
 from rich.text import Text
 
@@ -18,32 +20,52 @@ from .markdown import code, escaped, row
 from .table import COLOURS, LENGTH, messages, print_messages, print_signs, worst
 
 NOT_ASKED = "–"
+# Columns between two columns of a table without lines.
+GAP = 2
 
 
 def print_matrix(results: Results, file: TextIO) -> None:
     """Print the conventions of signs, a row per case and a column per engine, every message, and a
-    count of outcomes.
+    count of outcomes. Where the engines do not fit beside each other, a table follows another.
     """
     console = terminal.console(file)
     print_signs(results.run, console)
-    table = Table(
-        box=None,
-        pad_edge=False,
-        header_style="bold",
-        caption=Text(visible(_reading(results))),
-        caption_justify="left",
-    )
-    table.add_column("case", overflow="fold")
     engines, rows = _laid_out(results)
-    for engine in engines:
-        table.add_column(Text(visible(engine)), no_wrap=True)
-    for case, records in rows.items():
-        cells = (
-            _cell(records[engine]) if engine in records else Text(NOT_ASKED) for engine in engines
-        )
-        table.add_row(Text(visible(case)), *cells)
-    console.print(table)
+    for n, band in enumerate(_bands(engines, rows, console.width)):
+        if n:
+            console.print()
+        table = Table(box=None, pad_edge=False, header_style="bold")
+        table.add_column("case", overflow="fold")
+        for engine in band:
+            table.add_column(Text(visible(engine)), overflow="fold")
+        for case, records in rows.items():
+            cells = (
+                _cell(records[engine]) if engine in records else Text(NOT_ASKED) for engine in band
+            )
+            table.add_row(Text(visible(case)), *cells)
+        console.print(table)
+    console.print(Text(visible(_reading(results)), style="italic"))
     print_messages(results, console)
+
+
+def _bands(
+    engines: Sequence[str], rows: Mapping[str, Mapping[str, Record]], width: int
+) -> list[list[str]]:
+    """Return the engines in groups whose columns fit beside that of the cases, at least one each:
+    errors cut short would be of no use.
+    """
+    left = width - max((cell_len(visible(case)) for case in ("case", *rows)), default=0)
+    bands: list[list[str]] = [[]]
+    free = left
+    for engine in engines:
+        cells = (cell(each[engine]) for each in rows.values() if engine in each)
+        needed = GAP + max(cell_len(visible(each)) for each in (engine, NOT_ASKED, *cells))
+        if bands[-1] and needed > free:
+            bands.append([])
+            free = left
+        bands[-1].append(engine)
+        free -= needed
+    return bands
 
 
 def to_markdown(results: Results) -> str:

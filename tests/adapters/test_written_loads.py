@@ -160,13 +160,42 @@ def test_pinocchio_begins_to_turn():
     assert "Left out: gravity [1.0, 0.5, -9.80665] m/s^2, force 'spring' (spr" in found[".urdf"]
 
 
-@pytest.mark.parametrize("to", ["mjcf", "exudyn", "urdf"])
+def test_drake_begins_to_turn():
+    plants = pytest.importorskip("pydrake.multibody.plant", reason="drake is not installed")
+    found = texts("sdf", arm(forces=[*SPRINGS, *LOADS]))[".sdf"]
+    plant = plants.MultibodyPlant(1e-3)
+    parsing = importlib.import_module("pydrake.multibody.parsing")
+    parsing.Parser(plant).AddModelsFromString(found, "sdf")
+    plant.mutable_gravity_field().set_gravity_vector(GRAVITY)
+    plant.Finalize()
+    context = plant.CreateDefaultContext()
+    [[mass]] = plant.CalcMassMatrix(context)
+    [force] = plant.CalcGravityGeneralizedForces(context)
+    assert force / mass == pytest.approx(start(springs=False, loads=False), rel=1e-12)
+    assert "Left out: gravity [1.0, 0.5, -9.80665] m/s^2, force 'spring' (spr" in found
+
+
+def test_simbody_begins_to_turn(tmp_path):
+    o = pytest.importorskip("opensim", reason="opensim is not installed")
+    o.Logger.setLevelString("Off")
+    found = texts("osim", arm(forces=[*SPRINGS, *LOADS]))[".osim"]
+    file = tmp_path / "arm.osim"
+    file.write_text(found, encoding="utf-8")
+    model = o.Model(str(file))
+    state = model.initSystem()
+    model.realizeAcceleration(state)
+    [acceleration] = state.getUDot().to_numpy()
+    assert acceleration == pytest.approx(start(springs=False, loads=False), rel=1e-12)
+    assert "Left out: force 'spring' (spring_damper), force 'clock'" in found
+
+
+@pytest.mark.parametrize("to", adapters.WRITERS)
 def test_the_file_of_a_case_without_masses_has_none(to):
     """Gravity alone moves nothing: the file is that of the mechanism without."""
     plain = replace(arm(), bodies=[Body("arm", ORIGIN, TURNED)], gravity=(0.0, 0.0, 0.0))
     falling = replace(plain, gravity=(0.0, 0.0, -9.8))
     assert texts(to, falling) == texts(to, plain)
-    for text in written(cases.load("rssr"), adapters.writer(to)).values():
+    for text in written(cases.load("five_bar"), adapters.writer(to)).values():
         assert "Left out" not in text
 
 

@@ -110,15 +110,19 @@ FAULTS = {
     ),
     "include": (
         ("<tendon>", '<include file="x.xml"/><tendon>'),
-        ["<include>", "another file", "mj_saveLastXML"],
+        ["<include>", "'x.xml'", "no such file"],
     ),
     "include in a body": (
         (BASE, '<include file="x.xml"/>' + BASE),
-        ["<include>", "mj_saveLastXML"],
+        ["<include>", "'x.xml'", "no such file"],
     ),
     "replicate": (
-        (BASE, '<replicate count="3"/>' + BASE),
-        ["<replicate>", "makes bodies", "mj_saveLastXML"],
+        (BASE, '<replicate count="0"/>' + BASE),
+        ["<replicate>", "count: found '0'", "1 to 1000"],
+    ),
+    "composite": (
+        (BASE, '<composite count="3"/>' + BASE),
+        ["<composite>", "makes bodies", "mj_saveLastXML"],
     ),
     "free below": (
         ('<joint name="right_coupler_joint" class="coupler"/>', "<freejoint/>"),
@@ -141,26 +145,22 @@ FAULTS = {
     ),
     "sites apart": (
         (FIRST, '<connect site1="right_pad" site2="left_pad"/>' + FIRST),
-        ["open in the pose of the file", "m apart"],
+        ["is open in the start", "a tenth of the model's size", "--start"],
     ),
     "weld apart": (
         (
             FIRST,
             '<weld body1="right_driver" body2="left_driver" relpose="0 0 0.1 1 0 0 0"/>' + FIRST,
         ),
-        ["<weld>", "open in the pose of the file", "m apart"],
+        ["<weld>", "is open in the start", "--start"],
     ),
     "weld turned": (
         (FIRST, '<weld site1="right_pad" site2="turned"/>' + FIRST),
-        ["<weld>", "rad turned"],
+        ["<weld>", "with itself"],
     ),
-    "curved": (
-        (COUPLING, COUPLING.replace("0 1 0 0 0", "0 1 0.1 0 0")),
-        ["polycoef", "'0 1 0.1 0 0'", "linear"],
-    ),
-    "offset": (
-        (COUPLING, COUPLING.replace("0 1 0 0 0", "0.1 1 0 0 0")),
-        ["open in the pose of the file", "0.1 rad or m off"],
+    "curve of a sum": (
+        (FIRST, '<tendon tendon1="split" polycoef="0 1 0.1" tendon2="split"/>' + FIRST),
+        ["polycoef", "curve between sums", "one joint on either side"],
     ),
     "unknown joint": (
         (COUPLING, COUPLING.replace("left_driver_", "left_drivr_")),
@@ -222,10 +222,6 @@ FAULTS = {
         ["couples 3 joints"],
     ),
     "flex": ((FIRST, '<flex flex="cloth"/>' + FIRST), ["<flex>", "no joint for it"]),
-    "locked and coupled": (
-        (COUPLING, '<joint joint1="left_driver_joint"/>' + COUPLING),
-        ["'left_driver_joint', which is locked"],
-    ),
 }
 ALSO = {
     "all aligned": (BASE, "<body><freejoint/></body>" + BASE),
@@ -337,7 +333,7 @@ DRIVES = {
     "nowhere": (Supplied(drive=("right_driver_joint:1:1",)), ["--drive", "correct the numbers"]),
     "two": (
         Supplied(drive=("right_driver_joint:0:1", "left_driver_joint:0:1")),
-        ["--drive", "found 2 joints", "--hold"],
+        ["2 driven or held", "--hold JOINT for 2 more", "others for 1 that depend on each other"],
     ),
     "hold misspelt": (
         Supplied(drive=DRIVEN.drive, hold=("right_spring_link",)),

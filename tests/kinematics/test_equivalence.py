@@ -23,6 +23,7 @@ from kincheck.core import (
     PerpendicularAxes,
     Planar,
     Point,
+    Polynomial,
     RackPinion,
     RevoluteSpherical,
     Screw,
@@ -272,7 +273,11 @@ def mirrored(mechanism):
         for joint in joints
     ]
     couplers = [
-        replace(each, radius=-each.radius) if isinstance(each, RackPinion) else each
+        replace(each, radius=-each.radius)
+        if isinstance(each, RackPinion)
+        else each.in_units(1.0, -1.0)
+        if isinstance(each, Polynomial)
+        else each
         for each in m.couplers
     ]
     bodies = [

@@ -2,6 +2,7 @@
 the documentation.
 """
 
+import io
 import re
 from pathlib import Path
 
@@ -9,9 +10,12 @@ import kincheck.adapters
 import kincheck.cases
 import pytest
 from kincheck.core.cli import main as cli
+from kincheck.core.harness.record import Results
 from kincheck.core.joints import Coupler, Joint
+from kincheck.core.report.matrix import print_matrix
 
 from ..support.fakes import Fake, crank, off, raising
+from ..support.made_up import GRID, record
 
 ENGINES_PAGE = Path(__file__).parents[2] / "docs" / "pages" / "reference" / "engines.md"
 BUILT_IN = [
@@ -84,6 +88,34 @@ def test_joints_are_run_instead_of_the_built_in_cases_and_printed_as_a_matrix(ru
     lines = [line.split() for line in printed.splitlines()]
     assert lines[0] == ["case", "native", "other"]
     assert [line[0] for line in lines[1 : len(found) + 1]] == found
+
+
+class Terminal(io.StringIO):
+    """A terminal, by its own word."""
+
+    def isatty(self):
+        return True
+
+
+def test_in_a_narrow_terminal_every_error_is_whole_and_engines_follow_in_further_tables(
+    monkeypatch,
+):
+    names = ("native", "mujoco", "pinocchio", "exudyn", "drake", "dart", "simbody", "my_engine")
+    records = [
+        record(case, "closed_form", name, 1e-12, GRID)
+        for case in ("one", "with_a_longer_name")
+        for name in names
+    ]
+    monkeypatch.setenv("COLUMNS", "100")
+    screen = Terminal()
+    print_matrix(Results(run={}, records=records), screen)
+    lines = re.sub(r"\x1b\[[0-9;]*m", "", screen.getvalue()).splitlines()
+    assert max(map(len, lines)) <= 100
+    assert "…" not in screen.getvalue()
+    heads = [line.split()[1:] for line in lines if line.startswith("case ")]
+    assert len(heads) > 1
+    assert [name for head in heads for name in head] == [*names]
+    assert sum(line.startswith("with_a_longer_name ") for line in lines) == len(heads)
 
 
 def test_without_anything_to_compare_with_there_are_no_errors(run):

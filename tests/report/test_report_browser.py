@@ -116,8 +116,8 @@ def test_the_overview_is_filtered_by_outcome_engine_and_words_and_worked_by_keyb
         several(),
         """
         const shown = () => ({
-          rows: all(".overview tbody tr:not([hidden]) th").map((each) => each.textContent),
-          columns: all(".overview thead th:not([hidden])").slice(2).map((each) => each.textContent),
+          rows: all(".overview tbody tr:not([hidden]) th a").map((each) => each.textContent),
+          columns: all(".overview thead th:not([hidden])").slice(1).map((each) => each.textContent),
           sections: all("section.case:not([hidden]) h2").map((each) => each.textContent),
           said: one("#shown").textContent,
         });
@@ -322,3 +322,19 @@ def test_the_curves_of_a_case_are_a_file(visit: Any) -> None:
     )
     assert name.endswith(".csv")
     assert text.startswith("case,engine,mode,output,unit,sample,driver,")
+
+
+def test_eight_engines_fit_into_a_page_of_900_px(visit: Any) -> None:
+    names = ("native", "mujoco", "pinocchio", "exudyn", "drake", "dart", "simbody", "my_engine")
+    slow = {"us_per_step": 12345.0}
+    case = "a_case_of_a_rather_long_name"
+    records = [record(case, "closed_form", name, 1.234e-12, GRID, **slow) for name in names]
+    told = visit(
+        Results(run={}, records=records),
+        """
+        document.body.style.maxWidth = "900px";
+        const table = one(".wide");
+        return { seen: table.clientWidth, whole: table.scrollWidth };
+        """,
+    )
+    assert told["whole"] <= told["seen"]

@@ -2,7 +2,9 @@
 
 import importlib
 import json
+import re
 import runpy
+import xml.etree.ElementTree as ET
 from dataclasses import dataclass
 from typing import Any
 
@@ -127,6 +129,11 @@ def _urdf(texts, mechanism, folder):
                         for name, weight in each["weights"].items()
                     )
                 ]
+            case "polynomial":
+                driven, driving = (
+                    q[model.idx_qs[model.getJointId(each[name])]] for name in ("driven", "driving")
+                )
+                return [driven - np.polynomial.Polynomial(each["coefficients"])(driving)]
 
     def residuals(q):
         pin.framesForwardKinematics(model, data, q)
@@ -151,7 +158,116 @@ def _urdf(texts, mechanism, folder):
     return Reading(found, model.nv - _rank(J, 1e-7), bodies, points)
 
 
-READERS = {"mjcf": ("mujoco", _mjcf), "exudyn": ("exudyn", _exudyn), "urdf": ("pinocchio", _urdf)}
+DRAKE = "{http://drake.mit.edu}"
+
+
+def _sdf(texts, mechanism, folder):
+    """The tree is Drake's; its plant does not tell the residuals of its constraints, whose points
+    are read from the file.
+    """
+    plants = importlib.import_module("pydrake.multibody.plant")
+    kind = importlib.import_module("pydrake.multibody.tree").JacobianWrtVariable.kV
+    plant = plants.MultibodyPlant(1e-3)
+    parsing = importlib.import_module("pydrake.multibody.parsing")
+    parsing.Parser(plant).AddModelsFromString(texts[".sdf"], "sdf")
+    plant.Finalize()
+    context, world = plant.CreateDefaultContext(), plant.world_frame()
+    root = ET.fromstring(texts[".sdf"])
+    balls = [*root.iter(f"{DRAKE}ball_constraint")]
+    mimics = {
+        joint.get("name"): mimic
+        for joint in root.iter("joint")
+        for mimic in joint.iter(f"{DRAKE}mimic")
+    }
+    assert plant.num_constraints() == len(balls) + len(mimics)
+
+    def end(ball, side):
+        body, point = (
+            ball.find(f"{DRAKE}ball_constraint_{what}").text
+            for what in (f"body_{side[0]}", f"p_{side}")
+        )
+        frame, p = plant.GetFrameByName(body), np.array(list(map(float, point.split())))
+        J = plant.CalcJacobianTranslationalVelocity(context, kind, frame, p, world, world)
+        return frame.CalcPoseInWorld(context).multiply(p), J
+
+    found, rows = [], []
+    for ball in balls:
+        (P, J_P), (Q, J_Q) = (end(ball, side) for side in ("AP", "BQ"))
+        found.append(Q - P)
+        rows.append(J_Q - J_P)
+    q = plant.GetPositions(context)
+    for name, mimic in mimics.items():
+        one, other = map(plant.GetJointByName, (name, mimic.get("joint")))
+        factor, row = float(mimic.get("multiplier")), np.zeros((1, plant.num_velocities()))
+        row[0, one.velocity_start()], row[0, other.velocity_start()] = 1.0, -factor
+        found.append([q[one.position_start()] - factor * q[other.position_start()]])
+        rows.append(row)
+    poses = {
+        body.name: plant.GetFrameByName(body.name).CalcPoseInWorld(context)
+        for body in mechanism.bodies
+    }
+    return Reading(
+        np.concatenate([np.zeros(0), *found]),
+        plant.num_velocities()
+        - _rank(np.concatenate([np.zeros((0, plant.num_velocities())), *rows]), 1e-10),
+        {name: (pose.translation(), pose.rotation().matrix()) for name, pose in poses.items()},
+        {
+            point.name: plant.GetFrameByName(f"point.{point.name}")
+            .CalcPoseInWorld(context)
+            .translation()
+            for point in mechanism.points
+        },
+    )
+
+
+def _osim(texts, mechanism, folder):
+    """OpenSim assembles a model that it reads, so its coordinates are set to the file's again."""
+    o = importlib.import_module("opensim")
+    o.Logger.setLevelString("Off")
+    file = folder / "model.osim"
+    file.write_text(texts[".osim"], encoding="utf-8")
+    model = o.Model(str(file))
+    state = model.initSystem()
+    assert {each.getDefaultValue() for each in model.getCoordinateSet()} <= {0.0}
+    state.setQ(o.Vector(state.getNQ(), 0.0))
+    model.realizePosition(state)
+    G, bodies = o.Matrix(), model.getBodySet()
+    model.getMatterSubsystem().calcG(state, G)
+
+    def named(name):  # as OpenSim has it
+        return re.sub(r"[^A-Za-z0-9_.-]", "_", name)
+
+    placed = {
+        body.name: bodies.get(named(body.name)).getTransformInGround(state)
+        for body in mechanism.bodies
+    }
+    return Reading(
+        state.getQErr().to_numpy(),
+        state.getNU() - _rank(G.to_numpy(), 1e-10),
+        {
+            name: (
+                at.p().to_numpy(),
+                np.array([[at.R().get(i, j) for j in range(3)] for i in range(3)]),
+            )
+            for name, at in placed.items()
+        },
+        {
+            point.name: model.getMarkerSet()
+            .get(named(point.name))
+            .getLocationInGround(state)
+            .to_numpy()
+            for point in mechanism.points
+        },
+    )
+
+
+READERS = {
+    "mjcf": ("mujoco", _mjcf),
+    "exudyn": ("exudyn", _exudyn),
+    "urdf": ("pinocchio", _urdf),
+    "sdf": ("pydrake", _sdf),
+    "osim": ("opensim", _osim),
+}
 
 
 def read(name, texts, mechanism, folder):

@@ -5,19 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
-from ...joints import Coupler, Joint, Kind
+from ...joints import Kind
 from ...mechanism.dimension import ACCELERATION
 from ...mechanism.mechanism import Body, Mechanism, Point
 from ..case import Case, Truth, size
 from ..markers import with_markers
 from ..units import ANGLES, LENGTHS, Unit
-from .class_keys import joint_keys, kind_of, own_fields
 from .coordinates import with_all_coordinates
 from .document import explained, fault, join, parse, read_text, shown
 from .driving import read_drivers, read_sweep
 from .in_si import geometry_in_si, load_in_si
+from .joints import read_joints
 from .loads import inertia_in_si, read_forces
 from .outputs import read_outputs
 from .reference import Convert, read_reference
@@ -30,15 +29,12 @@ from .schema import (
     PointKeys,
     UnitsKeys,
 )
-from .typed_tables import as_table, class_of, typed
-
-if TYPE_CHECKING:
-    pass
+from .typed_tables import as_table, typed
 
 LARGEST_FILE = 4_000_000
 # Twice the bodies of the largest measured mechanism; the same limit for joints and points.
 MOST_PARTS = 60_000
-_PARTS = ("bodies", "joints", "points", "drivers", "forces", "outputs")
+_PARTS = ("bodies", "joints", "couplers", "points", "drivers", "forces", "outputs")
 
 
 def load_case(path: str | Path, closure: float | None = None) -> Case:
@@ -150,33 +146,13 @@ def _mechanism(file: Path, keys: CaseKeys, length: Unit, angle: Unit) -> Mechani
         points.append(
             Point(name, point.body, geometry_in_si(Kind.POSITION, point.position, length))
         )
-    joined = [
-        _joint(file, join("joints", name), name, value, length)
-        for name, value in keys.joints.items()
-    ]
-    joints = [each for each in joined if isinstance(each, Joint)]
-    couplers = [each for each in joined if isinstance(each, Coupler)]
+    joints, couplers = read_joints(file, keys, length, angle)
     drivers = read_drivers(file, keys.drivers)
     forces = read_forces(file, keys.forces, length, angle)
     gravity = load_in_si(ACCELERATION, keys.gravity, length, angle)
     with explained(file, "", length):
         return Mechanism(
             *(keys.name, bodies, joints, points, drivers, couplers), gravity=gravity, forces=forces
-        )
-
-
-def _joint(file: Path, key: str, name: str, value: object, length: Unit) -> Joint | Coupler:
-    cls = class_of(file, key, "joint", value, Joint.registry | Coupler.registry)
-    keys: Any = typed(file, key, value, joint_keys(cls))
-    given = {
-        each.name: geometry_in_si(kind_of(each), getattr(keys, each.name), length)
-        for each in own_fields(cls)
-    }
-    with explained(file, key, length, value):
-        return (
-            cls(name, keys.joints, **given)
-            if issubclass(cls, Coupler)
-            else cls(name, *keys.bodies, **given)
         )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import MISSING, Field, fields
 from functools import cache
-from typing import Annotated, Any, TypeAlias, get_type_hints
+from typing import Annotated, Any, Literal, TypeAlias, get_type_hints
 
 import msgspec
 from msgspec import Meta
@@ -32,6 +32,15 @@ _OF_FIELDS: Mapping[Any, Any] = {
     tuple[float, ...]: Numbers,
 }
 
+_LISTS: Mapping[Any, Any] = {
+    "tuple[float, ...]": Numbers,
+    "tuple[str, str]": Annotated[
+        tuple[Literal["rotation", "translation"], Literal["rotation", "translation"]],
+        Meta(description='two of "rotation", "translation", of the first and second joint'),
+    ],
+}
+"""Fields of a coupler that hold several values, by what they are annotated with."""
+
 Described: TypeAlias = Joint | Coupler | Driver | Motion | ForceElement
 _Keys = list[tuple[str, Any] | tuple[str, Any, Any]]
 _INHERITED = {each.name for base in (Joint, Coupler, Driver, Motion) for each in fields(base)}
@@ -46,7 +55,7 @@ def joint_keys(cls: type[Joint] | type[Coupler]) -> type[msgspec.Struct]:
     ]
     for each in own_fields(cls):
         keys.append(key_of(each, shape_of(each)))
-    return msgspec.defstruct(cls.__name__, keys, forbid_unknown_fields=True)
+    return msgspec.defstruct(cls.__name__, keys, forbid_unknown_fields=True, kw_only=True)
 
 
 @cache
@@ -86,7 +95,9 @@ def _keys_of_fields(
 def shape_of(each: Field[Any]) -> Any:
     """Return the shape of a field with geometry, or of a plain number."""
     kind = kind_of(each)
-    return Number if kind is None else Annotated[_SHAPES[kind], Meta(description=kind.value)]
+    if kind is None:
+        return _LISTS.get(each.type, Number)
+    return Annotated[_SHAPES[kind], Meta(description=kind.value)]
 
 
 def key_of(each: Field[Any], shape: Any) -> tuple[str, Any] | tuple[str, Any, Any]:

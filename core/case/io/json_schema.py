@@ -41,6 +41,7 @@ def case_schema() -> dict[str, Any]:
     tables: Tables = {
         "bodies": BodyKeys,
         "joints": {name: joint_keys(cls) for name, cls in joints.items()},
+        "couplers": {name: joint_keys(cls) for name, cls in Coupler.registry.items()},
         "points": PointKeys,
         "drivers": {name: driver_keys(cls) for name, cls in DRIVERS.items()},
         "outputs": {COORDINATE: OutputKeys, **outputs},

@@ -19,9 +19,11 @@ class Supplied:
         wheel_radius: loaded radius of the wheel of hardpoints [m].
         wheelbase: of the vehicle of hardpoints [m].
         axle: motion of both wheels of hardpoints: "heave", "roll" or "steer".
-        drive: driven joint of a model: "JOINT:START:STOP" or "JOINT:START:STOP:SAMPLES", in its
-            coordinate [rad, m].
+        drive: driven joints of a model: "JOINT:START:STOP" or "JOINT:START:STOP:SAMPLES", in their
+            coordinates [rad, m].
         hold: joints or free bodies of a model that are held in place.
+        hold_rest: whether joints of a model are held as far as needed.
+        start: where a model starts: "keyframe:NAME", "JOINT=VALUE" [rad, m].
         closure: tolerance of rows that are redundant but for the digits of a file [m].
     """
 
@@ -36,6 +38,8 @@ class Supplied:
     wheelbase: str | None = None
     axle: str | None = None
     closure: float | None = None
+    hold_rest: bool = False
+    start: tuple[str, ...] = ()
 
     @property
     def given(self) -> tuple[str, ...]:

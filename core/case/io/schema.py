@@ -24,6 +24,10 @@ left out. `kincheck list --joints` prints all types with their keys.
                          own types: declare them by --joint-type MODULE:CLASS
                          type, joints = [first, second], for a coupler of two other joints: gear
                          (ratio), rack_pinion (radius)
+    [couplers.NAME]      the same couplers; polynomial: joints = [driven, driving], coefficients =
+                         [c0, c1, c2, c3, c4], driven = c0 + c1 driving + c2 driving^2 + ...
+                         [units of driven by powers of units of driving]; (freedoms), where a joint
+                         has several: ["rotation", "translation"], of driven and driving
                          a joint's rotation and displacement are those of its second body relative
                          to its first, about and along its axis by the right-hand rule, zero at
                          design
@@ -163,6 +167,7 @@ class CaseKeys(msgspec.Struct, forbid_unknown_fields=True):
     truth: Truths | None = None
     units: Table = {}
     joints: Table = {}
+    couplers: Table = {}
     points: Table = {}
     closure: Table = {}
     suspension: Table | None = None

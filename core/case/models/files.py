@@ -26,7 +26,7 @@ CASE, CHRONO, ADAMS, TABLE, MODEL = (
 HARDPOINTS = (CHRONO, ADAMS, TABLE)
 _OPTIONS = {
     CASE: ("closure",),
-    MODEL: ("drive", "hold"),
+    MODEL: ("drive", "hold", "hold-rest", "start", "closure"),
     **dict.fromkeys(
         HARDPOINTS,
         ("template", "units", "axes", "travel", "names", "wheel-radius", "wheelbase", "axle"),

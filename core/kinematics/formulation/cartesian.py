@@ -149,10 +149,7 @@ class Cartesian:
         found: list[Scalar] = []
         for c in self.constraints:
             if isinstance(c, Relation):
-                found.append(
-                    sum((k * at.state[f"x {name}"][0] for name, k in c.weights.items()), 0.0)
-                    - c.drive.c
-                )
+                found.append(c.value(_values(c, at)))
             else:
                 found += self._bound(c, at).phi(*_pair(c, at))
         return found
@@ -165,7 +162,8 @@ class Cartesian:
         found: Rows = []
         for c in self.constraints:
             if isinstance(c, Relation):
-                found.append({self.coordinates[name]: k for name, k in c.weights.items()})
+                slopes = c.slopes(_values(c, at))
+                found.append({self.coordinates[name]: k for name, k in slopes.items()})
                 continue
             pair, bound = _pair(c, at), self._bound(c, at, rate=1.0)
             rows = [self._sparse(row, c) for row in bound.rows(*pair)]
@@ -197,7 +195,8 @@ class Cartesian:
         found: list[Scalar] = []
         for c in self.constraints:
             if isinstance(c, Relation):
-                found.append(c.drive.c_tt)
+                rates = [v[self.coordinates[name]] for name in c.weights]
+                found.append(c.gamma(_values(c, at), rates))
                 continue
             rate = v[self.coordinates[c.coordinate]] if c.coordinate else 0.0
             vi, vj = twists.get(c.i, GROUND_TWIST), twists.get(c.j, GROUND_TWIST)
@@ -273,6 +272,11 @@ class Cartesian:
 def _named(c: Constraint | Relation) -> tuple[str, str]:
     """Return the names of the joint or driver, and of the primitive."""
     return c.owner, "Relation" if isinstance(c, Relation) else type(c.primitive).__name__
+
+
+def _values(c: Relation, at: Configuration) -> list[Scalar]:
+    """Return the coordinates of a relation."""
+    return [at.state[f"x {name}"][0] for name in c.weights]
 
 
 def _count(c: Constraint | Relation) -> int:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any, Never
 
@@ -23,6 +23,7 @@ from ...mechanism.drivers import Driver, JointDriver, PointCoordinate
 from ...mechanism.mechanism import GROUND, Mechanism
 from ...mechanism.topology import spanning_tree
 from ...primitives.base import Drive
+from .relation import Relation as Relation
 
 
 @dataclass(frozen=True)
@@ -39,15 +40,6 @@ class Constraint:
     i: str
     j: str
     coordinate: str = ""
-
-
-@dataclass(frozen=True)
-class Relation:
-    """A linear row: the weighted sum of coordinates is the drive's value (zero unless driven)."""
-
-    owner: str
-    weights: Mapping[str, float]
-    drive: Drive = field(default_factory=Drive)
 
 
 @dataclass(frozen=True)
@@ -181,13 +173,8 @@ def constraints(
         composed = joint.scaled(1.0 / frame.unit).primitives(i, j)
         found += [Constraint(joint.name, primitive, joint.i, joint.j) for primitive in composed]
     for coupler in mechanism.couplers:
-        found.append(
-            _relation(
-                coupler.name,
-                {f"{joint}.{freedom}": k for joint, freedom, k in coupler.terms},
-                frame,
-            )
-        )
+        weights = {f"{joint}.{freedom}": k for joint, freedom, k in coupler.terms}
+        found.append(_relation(coupler.name, weights, frame, coupler.curve))
     found += [
         _driven(mechanism, frame, each, drives.get(each.name, Drive()), mixed)
         for each in mechanism.drivers
@@ -233,15 +220,19 @@ def _axial(
     return found + [_relation(joint.name, each, frame) for each in weights]
 
 
-def _relation(owner: str, weights: Mapping[str, float], frame: Frames) -> Relation:
+def _relation(
+    owner: str, weights: Mapping[str, float], frame: Frames, curve: Sequence[float] = ()
+) -> Relation:
     """Convert weights from metres and radians to units and radians, with the largest at one."""
-    scaled = {
-        name: k * (frame.unit if name.endswith(".translation") else 1.0)
-        for name, k in weights.items()
-    }
+    units = [frame.unit if name.endswith(".translation") else 1.0 for name in weights]
+    scaled = [k * unit for k, unit in zip(weights.values(), units, strict=True)]
     # a traced lead is known only later
-    largest = max(abs(k) for k in scaled.values() if hasattr(k, "__abs__"))
-    return Relation(owner, {name: k / largest for name, k in scaled.items()})
+    largest = max(abs(k) for k in scaled if hasattr(k, "__abs__"))
+    return Relation(
+        owner,
+        {name: k / largest for name, k in zip(weights, scaled, strict=True)},
+        curve=tuple(c * units[-1] ** k / largest for k, c in enumerate(curve)),
+    )
 
 
 def _driven(

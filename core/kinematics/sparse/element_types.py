@@ -19,6 +19,7 @@ from ..formulation.constraints import Constraint, Relation
 from ..structure.sparse_lu import Indices
 
 SIDES = ("i", "j")
+POWER = "power "
 WHERE, HOW = "where", "how"
 """The programs of a kind: what follows from where its bodies are, and gamma, which needs to know
 how they move.
@@ -96,6 +97,7 @@ class Member:
         if isinstance(c, Relation):
             return {
                 **{f"x{k}": weight for k, weight in enumerate(c.weights.values())},
+                **{f"{POWER}{k}": each for k, each in enumerate(c.curve)},
                 "drive": c.drive,
             }
         return {each.name: getattr(c.primitive, each.name) for each in fields(c.primitive)}
@@ -107,8 +109,9 @@ class Member:
         zero = tuple(
             not any(value) for value in self.geometry().values() if isinstance(value, Vec3)
         )
-        named = len(self.coordinates), self.driver is not None
         c = self.constraint
+        powers = len(c.curve) if isinstance(c, Relation) else 0
+        named = len(self.coordinates), self.driver is not None, powers
         return (
             Relation if isinstance(c, Relation) else type(c.primitive),
             tuple(self.bodies(moving)),
@@ -195,7 +198,8 @@ class ElementType:
         c = first.constraint
         if isinstance(c, Relation):
             drive = geometry.pop("drive")
-            return Cartesian([Relation("", geometry, drive)], (), tuple(geometry))
+            curve = tuple(geometry.pop(f"{POWER}{k}") for k in range(len(c.curve)))
+            return Cartesian([Relation("", geometry, drive, curve)], (), tuple(geometry))
         i, j = (side if side in first.bodies(moving) else GROUND for side in SIDES)
         lifted = Constraint("", replace(c.primitive, **geometry), i, j, "x" if c.coordinate else "")
         return Cartesian([lifted], tuple(first.bodies(moving)))

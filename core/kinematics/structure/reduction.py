@@ -8,7 +8,7 @@ for every engine.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -118,11 +118,16 @@ class _Held:
         return found
 
 
-def reduce_rows(mechanism: Mechanism, tolerance: float) -> Reduction:
+def reduce_rows(
+    mechanism: Mechanism, tolerance: float, carrying: Collection[str] = ()
+) -> Reduction:
     """Return the mechanism without redundant rows, to a tolerance [m].
 
     Joints of closed loops lose rows; driven and coupled ones, and joints of other primitives than
     points, lines, planes and orientations, keep theirs.
+
+    Args:
+        carrying: joints with all their rows, as long as others can close the loops.
     """
     bare = replace(mechanism, drivers=())
     frame = frames(bare)
@@ -130,7 +135,7 @@ def reduce_rows(mechanism: Mechanism, tolerance: float) -> Reduction:
     matrix, named = jacobian(formulation), dict[str, list[int]]()
     for k, (owner, _) in enumerate(formulation.owners):
         named.setdefault(owner, []).append(k)
-    tree = spanning_tree(mechanism)
+    tree = spanning_tree(mechanism, carrying)
     keeping = {each.joint for each in mechanism.drivers if isinstance(each, JointDriver)}
     keeping |= {joint for coupler in mechanism.couplers for joint in coupler.joints}
     held = {joint.name: _held(joint) for joint in tree.cut if joint.name not in keeping}

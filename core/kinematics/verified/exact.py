@@ -186,6 +186,8 @@ class _Inputs:
             return self._number(value)
         if isinstance(value, Mapping):
             return {key: self.lift(each) for key, each in value.items()}  # pyright: ignore[reportUnknownVariableType]
+        if isinstance(value, tuple):
+            return tuple(map(self.lift, value))  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
         if is_dataclass(value) and not isinstance(value, type):
             return replace(
                 value, **{f.name: self.lift(getattr(value, f.name)) for f in fields(value)}

@@ -1,4 +1,4 @@
-"""The attributes that MJCF has, of the elements that are read; from MuJoCo's own schema
+"""The attributes of MJCF for the elements read here; from MuJoCo's own schema
 (mj_printSchema, MuJoCo 4.0).
 """
 
@@ -77,6 +77,8 @@ KNOWN = {
     "worldbody": (),
     "body": (*_FRAME, "mocap", "gravcomp", "user", "sleep", "fuse", "simple"),
     "frame": _FRAME,
+    "replicate": ("count", "sep", "offset", "euler", "childclass"),
+    "key": ("name", "time", "qpos", "qvel", "act", "mpos", "mquat", "ctrl"),
     "joint": ("name", "class", *_JOINT),
     "freejoint": ("name", "group", "align"),
     "site": (
@@ -122,13 +124,14 @@ IN_BODY = (
 """What a body can hold, besides elements that make bodies."""
 
 MAKE_BODIES = {
-    "include": "the rest of the model is in another file",
-    "replicate": "it makes bodies",
     "composite": "it makes bodies",
     "flexcomp": "it makes bodies",
     "attach": "it takes bodies from another model",
 }
-"""Elements that stand for others; MuJoCo itself can write the model out."""
+"""Elements that stand for others and are not read; MuJoCo itself can write the model out."""
+
+EXPANDED = ("include", "replicate")
+"""Elements that stand for others and are read; see `expand`."""
 
 WRITE_OUT = (
     'let MuJoCo write the model out and give that file: python -c "import mujoco;'

@@ -1,4 +1,4 @@
-"""Default classes of MJCF: what an element has that it does not say itself."""
+"""Default classes of MJCF: attributes of elements beyond their own."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Classes:
 
     def complete(self, element: Element, kind: str, childclass: str) -> Element:
         """The element with the attributes of its class, or of the class of the body around it,
-        added where it has none.
+        added if it has none.
         """
         name = element.attributes.get("class", childclass)
         if name not in self.attributes:

@@ -1,19 +1,19 @@
-"""Drive of a model: MJCF defines none, so the options --drive and --hold do."""
+"""Drive of a model: MJCF defines none, so the options --drive, --hold and --hold-rest do."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from ....errors import CaseError, remedy
+from ....errors import remedy
 from ....trajectory import Array
 from ...io.document import decimal, fault, shown
 from ...io.reader_options import Supplied
 from ...io.schema import MOST_SAMPLES
-from .elements import Element
 from .tree import Tree
 
 SAMPLES = 41
@@ -28,42 +28,51 @@ class Driving:
     """Driven and held joints of a model.
 
     Attributes:
-        joint: swept joint; None if not given.
-        values: its coordinates in the model, reference included [rad or m].
-        held: hinges and slides that keep their coordinate in the pose of the file.
-        fixed: balls, and otherwise free bodies, that keep their place.
+        driven: by joint, its coordinates in the model, reference included [rad or m]; the first
+            one is swept, the others follow it.
+        held: hinges and slides with their coordinate in the start.
+        fixed: balls, and otherwise free bodies, at their place in the start.
     """
 
-    joint: str | None
-    values: Array
+    driven: Mapping[str, Array]
     held: tuple[str, ...]
     fixed: tuple[str, ...]
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Hinges and slides that are driven, the swept one first."""
-        return (*(() if self.joint is None else (self.joint,)), *self.held)
+        """Driven and held hinges and slides, the swept one first."""
+        return (*self.driven, *self.held)
 
 
 def read_driving(file: Path, tree: Tree, supplied: Supplied) -> Driving:
     """Read the options.
 
     Raises:
-        CaseError: they name an unknown joint, name one twice, or sweep several joints.
+        CaseError: they name an unknown joint, name one twice, or give different samples.
     """
-    if len(supplied.drive) > 1:
+    driven: dict[str, Array] = {}
+    given: dict[str, int] = {}
+    for text in supplied.drive:
+        joint, values, samples = _swept(file, tree, text)
+        if joint in driven:
+            raise fault(file, "--drive", f"found {joint!r} twice; give one range")
+        driven[joint] = values
+        if samples is not None:
+            given[joint] = samples
+    if len({*given.values()}) > 1:
+        counts = ", ".join(f"{count} of {joint!r}" for joint, count in given.items())
         raise fault(
             file,
             "--drive",
-            f"found {len(supplied.drive)} joints, expected one that is swept; --hold the others",
+            f"found {counts} samples, expected as many of each; all joints move together",
         )
-    joint, values = None, np.zeros(1)
-    if supplied.drive:
-        joint, values = _swept(file, tree, supplied.drive[0])
+    if given:
+        count = next(iter(given.values()))
+        driven = {name: np.linspace(each[0], each[-1], count) for name, each in driven.items()}
     held: list[str] = []
     fixed: list[str] = []
     for name in dict.fromkeys(supplied.hold):
-        if name == joint:
+        if name in driven:
             raise fault(
                 file,
                 "--hold",
@@ -80,11 +89,11 @@ def read_driving(file: Path, tree: Tree, supplied: Supplied) -> Driving:
                 "--hold",
                 f"found {shown(name)}, expected a joint or a free body; {remedy(name, known)}",
             )
-    return Driving(joint, values, tuple(held), tuple(fixed))
+    return Driving(driven, tuple(held), tuple(fixed))
 
 
-def _swept(file: Path, tree: Tree, text: str) -> tuple[str, Array]:
-    """Return the joint and its values; names may hold colons too."""
+def _swept(file: Path, tree: Tree, text: str) -> tuple[str, Array, int | None]:
+    """Return the joint, its values, and how many were asked for; names may hold colons too."""
     parts = text.split(":")
     named = [
         (":".join(parts[:k]), parts[k:]) for k in range(max(1, len(parts) - 3), len(parts) + 1)
@@ -120,7 +129,7 @@ def _swept(file: Path, tree: Tree, text: str) -> tuple[str, Array]:
             and 1 < steps <= MOST_SAMPLES
         ):
             break
-        return name, np.linspace(start, stop, steps)
+        return name, np.linspace(start, stop, steps), steps if len(numbers) == 3 else None
     else:
         hinges = [name for name, joint in tree.joints.items() if joint.type != "ball"]
         name = named[0][0]
@@ -128,60 +137,3 @@ def _swept(file: Path, tree: Tree, text: str) -> tuple[str, Array]:
             file, "--drive", f"found {shown(text)}, expected {_FORM}; {remedy(name, hinges)}"
         )
     raise fault(file, "--drive", f"found {shown(text)}, expected {_FORM}; correct the numbers")
-
-
-def undriven(file: Path, root: Element, tree: Tree, driving: Driving, dof: int) -> CaseError:
-    """Return the error of a model whose degrees of freedom differ from the driven ones."""
-    driven, actuated = (
-        len(driving.joints),
-        [each.attributes.get("joint") for each in root.below() if each.tag in _ACTUATORS],
-    )
-    free = [
-        name
-        for name, joint in tree.joints.items()
-        if joint.type != "ball" and name not in driving.joints
-    ]
-    free = [
-        *(name for name in free if name in actuated),
-        *(name for name in free if name not in actuated),
-    ]
-    bodies = [body for body in dict.fromkeys(tree.free.values()) if body not in driving.fixed]
-    count = f"{dof} degree{'s' * (dof != 1)} of freedom"
-    what = f"{driven} driven or held" if driven else "nothing said of what drives it"
-    if dof == 0:
-        return fault(
-            file,
-            "",
-            "the model has no freedom in its pose qpos0, expected one that moves; give another"
-            " model",
-        )
-    advice: list[str] = []
-    if driving.joint is None:
-        advice.append("--drive JOINT:START:STOP for the one that moves")
-    if dof > driven:
-        wanted = dof - driven - (driving.joint is None)
-        advice += [
-            f"--hold JOINT for {wanted} more" + " (a free BODY counts for 6)" * bool(bodies)
-        ] * (wanted > 0)
-    elif driven > dof:
-        advice.append(f"fewer --hold, by {driven - dof}")
-    found = f"the model has {count}, and {what}, expected as many of either; say " + " and ".join(
-        advice
-    )
-    listed = f"; joints, actuated ones first: {', '.join(free) or 'none'}" + (
-        f"; free bodies: {', '.join(bodies)}" if bodies else ""
-    )
-    return fault(file, "", found + listed)
-
-
-_ACTUATORS = (
-    "general",
-    "motor",
-    "position",
-    "velocity",
-    "intvelocity",
-    "damper",
-    "cylinder",
-    "muscle",
-    "dcmotor",
-)

@@ -28,7 +28,7 @@ class Element:
     tag: str
     attributes: Mapping[str, str]
     line: int
-    children: list[Element] = field(default_factory=list["Element"])
+    children: Sequence[Element] = field(default_factory=list["Element"])
 
     def __str__(self) -> str:
         name = self.attributes.get("name")
@@ -104,9 +104,11 @@ def parse_xml(file: Path, text: str) -> Element:
     parser = expat.ParserCreate("utf-8")
     roots: list[Element] = []
     open_: list[Element] = []
+    inside: list[list[Element]] = []
 
     def start(tag: str, attributes: Mapping[str, str]) -> None:
-        element = Element(file, tag, attributes, parser.CurrentLineNumber)
+        children: list[Element] = []
+        element = Element(file, tag, attributes, parser.CurrentLineNumber, children)
         if len(open_) >= DEEPEST:
             raise element.fault(
                 f"nested more than {DEEPEST} deep, expected the tree of a mechanism; correct the"
@@ -117,11 +119,13 @@ def parse_xml(file: Path, text: str) -> Element:
                 raise element.fault(
                     f"found {shown(name)}, expected printable text; remove the control characters"
                 )
-        (open_[-1].children if open_ else roots).append(element)
+        (inside[-1] if open_ else roots).append(element)
+        inside.append(children)
         open_.append(element)
 
     def end(_: str) -> None:
         open_.pop()
+        inside.pop()
 
     def refuse(*_: object) -> None:
         line = f"line {parser.CurrentLineNumber}"

@@ -1,4 +1,4 @@
-"""Equalities of a model, which close its loops. They must hold in the pose qpos0 at the start."""
+"""Equalities of a model, which close its loops."""
 
 from __future__ import annotations
 
@@ -7,49 +7,72 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from ....algebra import Vec3, quat, vec
+from ....algebra import Quat, Vec3, quat, vec
 from ....errors import remedy
 from ...io.document import shown
-from .attributes import KNOWN, WRITE_OUT
+from .attributes import KNOWN
 from .classes import MAIN
 from .elements import Element
 from .frames import Place, unit_quaternion
 from .tree import WORLD, Tree
 
-# A larger gap [m, rad] is not the rounding of composed frames (1e-15): the motion of kincheck would
-# differ by as much from the one on which MuJoCo's residual vanishes.
-OPEN = 1e-12
-
 
 @dataclass(frozen=True)
 class Connect:
-    """A common point of two bodies, global at qpos0; a weld also fixes the orientation."""
+    """A point of each of two bodies, which shall coincide, global in the pose of the tree.
 
-    name: str
-    i: str
-    j: str
-    point: Vec3
-    element: Element
-    weld: bool = False
-
-
-@dataclass(frozen=True)
-class Relation:
-    """Joint coordinates with a constant weighted sum, as at qpos0 [rad, m]; weights by joint."""
-
-    name: str
-    weights: Mapping[str, float]
-    element: Element
-
-
-@dataclass(frozen=True)
-class Rod:
-    """Two points of two bodies at constant distance, global at qpos0."""
+    Attributes:
+        turns: of a weld, the turns of a frame on each body, which shall coincide too.
+    """
 
     name: str
     i: str
     j: str
     points: tuple[Vec3, Vec3]
+    element: Element
+    turns: tuple[Quat, Quat] | None = None
+
+
+@dataclass(frozen=True)
+class Relation:
+    """Changes of joint coordinates since qpos0 [rad, m]: a weighted sum, by joint, follows a
+    polynomial of another.
+    """
+
+    name: str
+    driven: Mapping[str, float]
+    driving: Mapping[str, float]
+    coefficients: tuple[float, ...]
+    element: Element
+
+    @property
+    def linear(self) -> bool:
+        """Whether no power above the first takes part."""
+        return not (self.driving and any(self.coefficients[2:]))
+
+    @property
+    def joints(self) -> set[str]:
+        """The joints it ties to one another, or locks."""
+        return {*(self.weights if self.linear else (*self.driven, *self.driving))}
+
+    @property
+    def weights(self) -> dict[str, float]:
+        """Of a linear relation, the weights of the constant sum; without zeros."""
+        found = dict(self.driven)
+        for joint, weight in self.driving.items():
+            found[joint] = found.get(joint, 0.0) - self.coefficients[1] * weight
+        return {joint: weight for joint, weight in found.items() if weight}
+
+
+@dataclass(frozen=True)
+class Rod:
+    """Two points of two bodies at a length [m], global in the pose of the tree."""
+
+    name: str
+    i: str
+    j: str
+    points: tuple[Vec3, Vec3]
+    length: float
     element: Element
 
 
@@ -60,8 +83,7 @@ def read_equalities(root: Element, tree: Tree) -> Iterator[Equality]:
     """Yield the active equalities in order.
 
     Raises:
-        CaseError: an equality refers to a missing element, is open at qpos0, is not linear, or has
-            no equivalent joint.
+        CaseError: an equality refers to a missing element, or has no equivalent joint.
     """
     tendons, names = _tendons(root), set[str]()
     off = any(
@@ -98,12 +120,11 @@ _Tendons = Mapping[str, Element]
 def _connect(name: str, element: Element, tree: Tree, _: _Tendons) -> Connect:
     if "site1" in element.attributes:
         (i, here), (j, there) = _sites(element, tree)
-        gap = there.at - here.at
-        _require_closed(element, math.sqrt(gap @ gap), "m apart")
-        return _closed(Connect(name, i, j, here.at, element))
+        return _of_two(Connect(name, i, j, (here.at, there.at), element))
     first, second = _bodies(element, tree)
     point = tree.places[first].point(vec(element.numbers("anchor", (3,))))
-    return _closed(Connect(name, tree.carriers[first], tree.carriers[second], point, element))
+    ends = tree.carriers[first], tree.carriers[second]
+    return _of_two(Connect(name, *ends, (point, point), element))
 
 
 def _weld(name: str, element: Element, tree: Tree, _: _Tendons) -> Connect:
@@ -127,56 +148,58 @@ def _weld(name: str, element: Element, tree: Tree, _: _Tendons) -> Connect:
             if any(relpose[3:])
             else there.seen_from(here)
         )
-    found = there.seen_from(here)
-    gap, turn = found.at - wanted.at, (wanted.turn.conjugate() * found.turn).e
-    _require_closed(element, math.sqrt(gap @ gap), "m apart")
-    _require_closed(element, 2.0 * math.sqrt(turn @ turn), "rad turned")
-    return _closed(Connect(name, i, j, there.at, element, weld=True))
+    here = here.then(wanted)
+    found = Connect(name, i, j, (here.at, there.at), element, (here.turn, there.turn))
+    return _of_two(found)
 
 
 def _joint(name: str, element: Element, tree: Tree, _: _Tendons) -> Relation:
     first = _axial(element, "joint1", element.attributes.get("joint1"), tree)
+    coefficients = _coefficients(element)
     if "joint2" not in element.attributes:  # there is nothing that higher coefficients could be of
-        _require_closed(element, abs(_coefficients(element)[0]), "rad or m off")
-        return Relation(name, {first: 1.0}, element)
-    slope = _slope(element)
+        return Relation(name, {first: 1.0}, {}, coefficients, element)
     second = _axial(element, "joint2", element.attributes["joint2"], tree)
     if first == second:
         raise element.fault(
             f"couples the joint {first!r} with itself, expected two; correct joint2"
         )
-    return Relation(name, _nonzero({first: 1.0, second: -slope}), element)
+    return Relation(name, {first: 1.0}, {second: 1.0}, coefficients, element)
 
 
 def _tendon(name: str, element: Element, tree: Tree, tendons: _Tendons) -> Relation | Rod:
     single = tendons.get(element.attributes.get("tendon1", ""))
     if single is not None and single.tag == "spatial" and "tendon2" not in element.attributes:
         return _rod(name, element, single, tree)
-    slope = _slope(element)
+    sums = [
+        _sum(element, key, tree, tendons) if key in element.attributes or key == "tendon1" else {}
+        for key in ("tendon1", "tendon2")
+    ]
+    return Relation(name, sums[0], sums[1], _coefficients(element), element)
+
+
+def _sum(element: Element, key: str, tree: Tree, tendons: _Tendons) -> dict[str, float]:
+    """Return the weights of the joints of a fixed tendon."""
+    tendon = element.attributes.get(key, "")
+    if tendon not in tendons:
+        raise element.fault(
+            f"{key}: found {shown(tendon)}, expected a tendon; {remedy(tendon, tendons)}"
+        )
+    found = tendons[tendon]
+    if found.tag != "fixed":
+        problem = (
+            f"{key}: {tendon!r} is a spatial tendon, whose length is not linear in joint"
+            " coordinates"
+        )
+        raise element.fault(
+            f"{problem}, expected a fixed one; only alone, and between two sites, is there a"
+            " joint for it"
+        )
     weights: dict[str, float] = {}
-    for key, factor in (("tendon1", 1.0), ("tendon2", -slope)):
-        if key == "tendon2" and key not in element.attributes:
-            continue
-        tendon = element.attributes.get(key, "")
-        if tendon not in tendons:
-            raise element.fault(
-                f"{key}: found {shown(tendon)}, expected a tendon; {remedy(tendon, tendons)}"
-            )
-        found = tendons[tendon]
-        if found.tag != "fixed":
-            problem = (
-                f"{key}: {tendon!r} is a spatial tendon, whose length is not linear in joint"
-                " coordinates"
-            )
-            raise element.fault(
-                f"{problem}, expected a fixed one; only alone, and between two sites, is there a"
-                " joint for it"
-            )
-        for wrap in found.only("joint"):
-            joint = _axial(wrap, "joint", wrap.attributes.get("joint"), tree)
-            (coefficient,) = wrap.numbers("coef", (1,))
-            weights[joint] = weights.get(joint, 0.0) + factor * coefficient
-    return Relation(name, _nonzero(weights), element)
+    for wrap in found.only("joint"):
+        joint = _axial(wrap, "joint", wrap.attributes.get("joint"), tree)
+        (coefficient,) = wrap.numbers("coef", (1,))
+        weights[joint] = weights.get(joint, 0.0) + coefficient
+    return weights
 
 
 def _rod(name: str, element: Element, tendon: Element, tree: Tree) -> Rod:
@@ -186,7 +209,6 @@ def _rod(name: str, element: Element, tendon: Element, tree: Tree) -> Rod:
         raise element.fault(
             f"tendon1: {tendon} goes over {way}, expected two sites; there is no joint for others"
         )
-    _require_closed(element, abs(_coefficients(element)[0]), "m off")
     ends: list[tuple[str, Place]] = []
     for child in tendon.children:
         site = child.attributes.get("site", "")
@@ -197,7 +219,8 @@ def _rod(name: str, element: Element, tendon: Element, tree: Tree) -> Rod:
         ends.append(tree.sites[site])
     (i, here), (j, there) = ends
     apart = there.at - here.at
-    if i == j or not apart @ apart > 0.0:
+    length = math.sqrt(apart @ apart) + _coefficients(element)[0]
+    if i == j or not (apart @ apart > 0.0 and length > 0.0):
         what = (
             f"is between two points of {i!r}" if i == j else "has no length in the pose of the file"
         )
@@ -205,7 +228,7 @@ def _rod(name: str, element: Element, tendon: Element, tree: Tree) -> Rod:
             f"tendon1: {tendon} {what}, expected two points of two bodies; remove the equality, or"
             " write <connect>"
         )
-    return Rod(name, i, j, (here.at, there.at), element)
+    return Rod(name, i, j, (here.at, there.at), length, element)
 
 
 _READERS = {"connect": _connect, "weld": _weld, "joint": _joint, "tendon": _tendon}
@@ -219,26 +242,10 @@ def _tendons(root: Element) -> dict[str, Element]:
     }
 
 
-def _nonzero(weights: Mapping[str, float]) -> dict[str, float]:
-    return {joint: weight for joint, weight in weights.items() if weight}
-
-
-def _slope(element: Element) -> float:
-    """Return the factor of a linear polynomial through the pose of the file."""
-    constant, slope, *higher = (*_coefficients(element), 0.0, 0.0)[:5]
-    if len(element.attributes.get("polycoef", "0 1").split()) == 1:
-        slope = 1.0  # what is left out of polycoef keeps its default
-    if any(higher):
-        raise element.fault(
-            f"polycoef: found {shown(element.attributes['polycoef'])}, expected a linear one; there"
-            " is no joint for curves"
-        )
-    _require_closed(element, abs(constant), "rad or m off")
-    return slope
-
-
 def _coefficients(element: Element) -> tuple[float, ...]:
-    return element.numbers("polycoef", (1, 2, 3, 4, 5), (0.0, 1.0))
+    """Return five coefficients; omitted ones of polycoef have their defaults."""
+    found = element.numbers("polycoef", (1, 2, 3, 4, 5), (0.0, 1.0))
+    return (*found, *(0.0, 1.0, 0.0, 0.0, 0.0)[len(found) :])
 
 
 def _axial(element: Element, key: str, name: str | None, tree: Tree) -> str:
@@ -281,16 +288,7 @@ def _sites(element: Element, tree: Tree) -> list[tuple[str, Place]]:
     return found
 
 
-def _require_closed(element: Element, gap: float, what: str) -> None:
-    if gap > OPEN:
-        raise element.fault(
-            f"is open in the pose of the file: {gap:.4g} {what}, expected a model that closes"
-            " there; give it the closed pose as pos and quat of its bodies, which are those of"
-            f" qpos0; or {WRITE_OUT.removesuffix(')')} after closing it)"
-        )
-
-
-def _closed(connect: Connect) -> Connect:
+def _of_two(connect: Connect) -> Connect:
     if connect.i == connect.j:
         raise connect.element.fault(
             f"joins {connect.i!r} with itself, expected two bodies that move otherwise; remove it"

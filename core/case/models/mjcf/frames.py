@@ -53,7 +53,7 @@ def read_compiler(root: Element) -> Compiler:
     """The settings of all <compiler> elements, the last of which counts.
 
     Raises:
-        CaseError: an unknown setting, or coordinates that MuJoCo does not read any more.
+        CaseError: an unknown setting, or global coordinates, which MuJoCo does not read any more.
     """
     found = Compiler()
     for element in root.only("compiler"):
@@ -67,6 +67,12 @@ def read_compiler(root: Element) -> Compiler:
             raise element.fault(
                 f"eulerseq: found {shown(sequence)}, expected three of x, y, z, X, Y, Z; correct it"
             )
+        if element.attributes.get("coordinate") == "global":
+            raise element.fault(
+                "coordinate: found 'global', which MuJoCo does not read any more (since 2.3.4),"
+                " expected local coordinates; convert the model by MuJoCo 2.3.3 or older, whose"
+                " mj_saveLastXML writes local ones, and give that file"
+            )
         element.choice("coordinate", ("local",), "local")
         align = (
             element.choice("alignfree", ("true", "false"), "true" if found.align else "false")
@@ -78,7 +84,7 @@ def read_compiler(root: Element) -> Compiler:
 
 @dataclass(frozen=True)
 class Place:
-    """Where a frame is, and how it is turned, in the frame around it or globally [m, -]."""
+    """Position and turn of a frame, in the frame around it or globally [m, -]."""
 
     at: Vec3 = ZERO
     turn: Quat = IDENTITY
@@ -116,12 +122,17 @@ def coordinates(a: Vec3) -> Vector:
 
 
 def read_place(element: Element, compiler: Compiler) -> Place:
-    """The place that an element gives by pos and one kind of orientation.
+    """The place given by pos and one kind of orientation.
 
     Raises:
-        CaseError: several orientations, or one that is none: zero or parallel axes, a zero
+        CaseError: several orientations, or a meaningless one: zero or parallel axes, a zero
             quaternion.
     """
+    if "fromto" in element.attributes:  # of a site; its z axis points from the second to the first
+        numbers = element.numbers("fromto", (6,))
+        first, second = vec(numbers[:3]), vec(numbers[3:])
+        axis = _nonzero(element, "fromto", (*(first - second),))
+        return Place(0.5 * (first + second), _z_towards(axis))
     at = vec(element.numbers("pos", (3,), (0.0, 0.0, 0.0)))
     given = [name for name in ORIENTATION if name in element.attributes]
     if len(given) > 1:
@@ -170,7 +181,7 @@ def _about(axis: Vec3, angle: float) -> Quat:
 
 
 def _z_towards(axis: Vec3) -> Quat:
-    """The shortest turn of z towards the axis; half a turn about x where the axis is opposite."""
+    """The shortest turn of z towards the axis; half a turn about x if the axis is opposite."""
     normal = cross(Z, axis)
     sine = math.sqrt(normal @ normal)
     if sine < 1e-10:

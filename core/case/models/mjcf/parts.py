@@ -5,22 +5,27 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from ....joints import (
     Coupler,
     Distance,
     Fixed,
     Gear,
     Joint,
+    Polynomial,
     RackPinion,
     Revolute,
     Spherical,
     Translational,
 )
-from ....mechanism.mechanism import GROUND
 from .driving import Driving
 from .equalities import Connect, Equality, Relation, Rod
 from .frames import Place, coordinates
+from .rods import Spin
 from .tree import ModelJoint, Tree
+
+FREEDOMS = {"hinge": "rotation", "slide": "translation"}
 
 
 @dataclass
@@ -46,37 +51,32 @@ class Parts:
         return wanted
 
 
-def parts_of(tree: Tree, equalities: Sequence[Equality], driving: Driving) -> Parts:
+def parts_of(
+    tree: Tree, equalities: Sequence[Equality], driving: Driving, spins: Mapping[str, Spin]
+) -> Parts:
     """The parts of a model.
 
     Raises:
         CaseError: an equality for which there is no joint.
     """
-    parts = Parts(
-        dict(tree.moving), {tree.free[name] for name in driving.fixed if name in tree.free}
-    )
-    rods = _rods(tree, equalities, driving)
-    replaced = {id(connect) for _, connect in rods.values()}
-    for name, (rod, connect) in rods.items():
-        del parts.bodies[rod.inner]
-        ends = rod.outer, connect.j if connect.i == rod.inner else connect.i
-        parts.joints[name] = Distance(
-            name, *ends, (coordinates(rod.point), coordinates(connect.point))
-        )
+    fixed = {tree.free.get(name, name) for name in driving.fixed}
+    parts = Parts(dict(tree.moving), {name for name in fixed if name in tree.moving})
+    replaced = {id(end.by) for spin in spins.values() if spin.is_rod for end in spin.ends}
+    for name, spin in spins.items():
+        if not spin.is_rod:
+            continue
+        body = spin.joint.inner
+        del parts.bodies[body]
+        parts.joints[name] = spin.as_distance()
         parts.left_out.append(
-            f"body {rod.inner!r} and its turn about itself: it is a rod of constant length"
+            f"body {body!r} and its turn about itself: it is a rod of constant length"
         )
-    locked = {
-        name: each
-        for each in equalities
-        if isinstance(each, Relation) and len(each.weights) == 1
-        for name in each.weights
-    }
+    locked = _locked(equalities)
     for name, joint in tree.joints.items():
-        if name not in rods:
+        if id(joint) not in replaced:
             parts.joints[name] = (
                 Fixed(name, joint.outer, joint.inner)
-                if name in (*locked, *driving.fixed)
+                if name in locked or name in driving.fixed
                 else _joint(joint)
             )
     for each in equalities:
@@ -84,14 +84,37 @@ def parts_of(tree: Tree, equalities: Sequence[Equality], driving: Driving) -> Pa
             _couple(tree, parts, each)
         elif isinstance(each, Rod):
             name = parts.name(each.name)
-            parts.joints[name] = Distance(
-                name, each.i, each.j, (coordinates(each.points[0]), coordinates(each.points[1]))
-            )
+            points = coordinates(each.points[0]), coordinates(each.points[1])
+            parts.joints[name] = Distance(name, each.i, each.j, points)
         elif id(each) not in replaced:
             name = parts.name(each.name)
-            kind = Fixed if each.weld else Spherical
-            parts.joints[name] = kind(name, each.i, each.j, coordinates(each.point))
+            parts.joints[name] = _closure(each, name)
+    for spin in spins.values():
+        if not spin.is_rod:
+            name = parts.name(f"{spin.joint.inner}: no spin")
+            parts.joints[name] = spin.lock(name)
+            parts.left_out.append(
+                f"turn of body {spin.joint.inner!r} about itself: it is a rod between balls"
+            )
     return parts
+
+
+def _closure(connect: Connect, name: str) -> Joint:
+    """Return the joint of a connect or weld; a remaining gap is divided."""
+    p, q = connect.points
+    kind = Spherical if connect.turns is None else Fixed
+    return kind(name, connect.i, connect.j, coordinates(0.5 * (p + q) if p != q else p))
+
+
+def _locked(equalities: Sequence[Equality]) -> set[str]:
+    """Return the joints locked by relations, alone or by other locked ones."""
+    relations = [each for each in equalities if isinstance(each, Relation)]
+    found: set[str] = set()
+    while new := {
+        name for each in relations for name in each.joints - found if len(each.joints - found) == 1
+    }:
+        found |= new
+    return found
 
 
 def _joint(joint: ModelJoint) -> Joint:
@@ -109,57 +132,40 @@ def _joint(joint: ModelJoint) -> Joint:
             return Spherical(*ends, point)
 
 
-def _rods(
-    tree: Tree, equalities: Sequence[Equality], driving: Driving
-) -> Mapping[str, tuple[ModelJoint, Connect]]:
-    """Bodies between a ball joint and one connect, by the joint's name: they can turn about
-    themselves, which nothing drives.
+def require_coupled(equalities: Sequence[Equality]) -> None:
+    """Refuse relations for which there is no coupler.
+
+    Raises:
+        CaseError: one ties more than two joints, or is a curve between sums of joints.
     """
-    connects: dict[str, list[Connect]] = {}
     for each in equalities:
-        if isinstance(each, Connect):
-            connects.setdefault(each.i, []).append(each)
-            connects.setdefault(each.j, []).append(each)
-    outer = {joint.outer for joint in tree.joints.values()}
-    found: dict[str, tuple[ModelJoint, Connect]] = {}
-    inner: set[str] = set()
-    for name, joint in tree.joints.items():
-        held = connects.get(joint.inner, [])
-        alone = (
-            joint.type == "ball" and joint.inner not in outer and joint.outer not in tree.massless
-        )
-        if not alone or name in driving.fixed or len(held) != 1 or held[0].weld:
+        if not isinstance(each, Relation):
             continue
-        other = held[0].j if held[0].i == joint.inner else held[0].i
-        arm = held[0].point - joint.point
-        # a rod to the body it hangs on moves nothing, and two of them end to end are a chain that
-        # only bodies can carry
-        if other != joint.outer and arm @ arm > 0.0 and other not in inner:
-            found[name] = joint, held[0]
-            inner.add(joint.inner)
-    return found
+        if len(each.joints) > 2:
+            raise each.element.fault(
+                f"couples {len(each.joints)} joints ({', '.join(sorted(each.joints))}), expected"
+                " two; kincheck has no joint for more: remove the equality, and --hold or drive its"
+                " joints"
+            )
+        if not each.linear and not len(each.driven) == len(each.driving) == len(each.joints) - 1:
+            raise each.element.fault(
+                "polycoef: is a curve between sums of joints, expected one joint on either side;"
+                " there is no joint for others"
+            )
 
 
 def _couple(tree: Tree, parts: Parts, relation: Relation) -> None:
-    if len(relation.weights) > 2:
-        problem = (
-            f"couples {len(relation.weights)} joints ({', '.join(relation.weights)}), expected two"
-        )
-        raise relation.element.fault(
-            f"{problem}; kincheck has no joint for more: remove the equality, and --hold or drive"
-            " its joints"
-        )
-    if len(relation.weights) < 2:  # one is locked, none says nothing
+    joints = relation.joints
+    # one is locked, none says nothing
+    if len(joints) < 2 or all(isinstance(parts.joints[each], Fixed) for each in joints):
         return
-    for joint in relation.weights:
-        if isinstance(parts.joints[joint], Fixed):
-            raise relation.element.fault(
-                f"couples {joint!r}, which is locked by another equality; remove this one, and"
-                " --hold its other joint"
-            )
+    name = parts.name(relation.name)
+    if not relation.linear:
+        parts.couplers[name] = _polynomial(tree, relation, name)
+        return
     (first, a), (second, b) = relation.weights.items()
     # a x + b y = 0, for x and y the changes of the two coordinates
-    name, types = parts.name(relation.name), (tree.joints[first].type, tree.joints[second].type)
+    types = tree.joints[first].type, tree.joints[second].type
     if types == ("hinge", "hinge"):
         parts.couplers[name] = Gear(name, (first, second), -b / a)
     elif types == ("hinge", "slide"):
@@ -167,14 +173,16 @@ def _couple(tree: Tree, parts: Parts, relation: Relation) -> None:
     elif types == ("slide", "hinge"):
         parts.couplers[name] = RackPinion(name, (second, first), -b / a)
     else:
-        # two racks on a pinion that turns on the ground, by one radian for a metre of the first
-        # slide; it stands at that slide
-        pinion, other, at = (
-            parts.name(f"{name}.pinion"),
-            parts.name(f"{name}.rack"),
-            tree.joints[first].point,
-        )
-        parts.bodies[pinion] = Place(at)
-        parts.joints[pinion] = Revolute(pinion, GROUND, pinion, coordinates(at), (0.0, 0.0, 1.0))
-        parts.couplers[name] = RackPinion(name, (pinion, first), 1.0)
-        parts.couplers[other] = RackPinion(other, (pinion, second), -a / b)
+        freedoms = "translation", "translation"
+        parts.couplers[name] = Polynomial(name, (first, second), (0.0, -b / a), freedoms=freedoms)
+
+
+def _polynomial(tree: Tree, relation: Relation, name: str) -> Polynomial:
+    """Return a curve between two joints, by their changes since the pose of the tree."""
+    ((driven, a),), ((driving, b),) = relation.driven.items(), relation.driving.items()
+    curve = np.polynomial.Polynomial(relation.coefficients)
+    # a (x0 + x) = p(b (y0 + y)), which holds at x = y = 0
+    argument = np.polynomial.Polynomial([b * tree.joints[driving].moved, b])
+    shifted = (curve(argument) / a).coef.tolist()
+    first, second = (FREEDOMS[tree.joints[joint].type] for joint in (driven, driving))
+    return Polynomial(name, (driven, driving), (0.0, *shifted[1:]), freedoms=(first, second))

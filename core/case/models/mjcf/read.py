@@ -8,21 +8,29 @@ from pathlib import Path
 
 from ....algebra import Quat
 from ....errors import remedy
-from ....joints import Fixed, Revolute
+from ....joints import Revolute
 from ....kinematics import degrees_of_freedom
 from ....mechanism.drivers import JointAngle, JointDisplacement, JointDriver
 from ....mechanism.mechanism import Body, Mechanism, Point
+from ....mechanism.motions import Absolute, Motion, Table
 from ...case import Case, Sweep, Truth
+from ...closing import within_digits
 from ...io.coordinates import with_all_motions
 from ...io.document import explained, fault
 from ...io.reader_options import LEFT_OUT, Supplied
-from .attributes import MAKE_BODIES, ROOT, WRITE_OUT
+from .assembly import Assembled, assemble, size_of
+from .attributes import EXPANDED, MAKE_BODIES, ROOT, WRITE_OUT
 from .classes import read_classes
-from .driving import read_driving, undriven
+from .digits import Digits, digits_of
+from .driving import Driving, read_driving
 from .elements import Element, parse_xml
 from .equalities import read_equalities
+from .expand import expanded
 from .frames import coordinates, read_compiler
-from .parts import Parts, parts_of
+from .freedom import taken
+from .parts import Parts, parts_of, require_coupled
+from .rods import spins
+from .start import read_start
 from .tree import Tree, read_tree
 
 # What these hold is for looks, forces and measurements. Tendons are read where an equality holds
@@ -45,9 +53,11 @@ def read_mjcf(file: Path, text: str, supplied: Supplied) -> Case:
     of joints, and the rotations of bodies.
 
     Raises:
-        CaseError: not a model that can be read, or the options do not say how it moves.
+        CaseError: not a readable model, or the options do not say how it moves.
     """
     root = parse_xml(file, text)
+    _require_model(root)
+    root = expanded(file, root)
     _require_model(root)
     tree = read_tree(root, read_classes(root), read_compiler(root))
     if not tree.moving:
@@ -56,18 +66,26 @@ def read_mjcf(file: Path, text: str, supplied: Supplied) -> Case:
         for element in section.children:
             tree.count(f"{section.tag}: {element.tag}")
     driving = read_driving(file, tree, supplied)
-    parts = parts_of(tree, [*read_equalities(root, tree)], driving)
-    for name in driving.joints:
-        if isinstance(parts.joints[name], Fixed):
-            option, advice = (
-                ("--drive", "name another") if name == driving.joint else ("--hold", "leave it out")
-            )
-            raise fault(
-                file,
-                option,
-                f"found {name!r}, which an equality of the file locks, expected a joint that moves;"
-                f" {advice}",
-            )
+    equalities = [*read_equalities(root, tree)]
+    require_coupled(equalities)
+    start = read_start(file, root, tree, supplied.start)
+    digits = _digits(root, size_of(start.pose, equalities), supplied.closure)
+    model = assemble(file, equalities, start, digits, driving.joints)
+    free = spins(model.tree, model.equalities, driving.fixed)
+    axes = {name: spin.axis for name, spin in free.items()}
+    driving = taken(file, root, model, driving, axes, hold_rest=supplied.hold_rest)
+    parts = parts_of(model.tree, model.equalities, driving, free)
+    return _case(file, root, model, driving, parts)
+
+
+def _digits(root: Element, size: float, closure: float | None) -> Digits:
+    """Return the user's tolerance, or the file's own."""
+    return digits_of(root, size) if closure is None else Digits(closure, "--closure")
+
+
+def _case(file: Path, root: Element, model: Assembled, driving: Driving, parts: Parts) -> Case:
+    """Return the case of the parts, without rows redundant within the digits."""
+    tree, digits = model.tree, model.digits
     points = _points(tree, parts)
     bodies = [
         Body(name, coordinates(at.at), _euler_parameters(at.turn), name in parts.fixed)
@@ -77,27 +95,50 @@ def read_mjcf(file: Path, text: str, supplied: Supplied) -> Case:
         drivers = [_driver(parts, name) for name in driving.joints]
         joints, couplers = list(parts.joints.values()), list(parts.couplers.values())
         mechanism = Mechanism(file.stem, bodies, joints, points, drivers, couplers)
-    dof = degrees_of_freedom(mechanism)
-    if driving.joint is None or dof != len(drivers):
-        raise undriven(file, root, tree, driving, dof)
     others = [*parts.left_out, *(f"{what} ({count})" for what, count in tree.left_out.items())]
-    model = root.attributes.get("model", file.stem)
+    name = root.attributes.get("model", file.stem)
     source = (
-        f"MJCF model {model!r} of {file.name}, from its pose"
-        f" qpos0{LEFT_OUT}{', '.join(others) or 'nothing'}"
+        f"MJCF model {name!r} of {file.name}, from {model.start}"
+        f"{LEFT_OUT}{', '.join(others) or 'nothing'}"
     )
-    sweep = Sweep(driving.joint, driving.values, design=tree.joints[driving.joint].ref)
-    return with_all_motions(Case(file.stem, source, Truth.CONSENSUS_ONLY, mechanism, sweep, ()))
+    sweep = _sweep(tree, driving)
+    case = Case(file.stem, source, Truth.CONSENSUS_ONLY, mechanism, sweep, (), assembly=model.notes)
+    dof = degrees_of_freedom(mechanism)
+    if dof != len(drivers) or not model.exact:
+        case = within_digits(case, digits.tolerance, digits.why, [*tree.joints])
+        dof = degrees_of_freedom(case.mechanism)
+    if dof != len(drivers):
+        raise fault(
+            file,
+            "",
+            f"its joints and equalities leave {len(drivers)} freedoms within {digits.tolerance:.2g}"
+            f" m ({digits.why}), but {dof} as exact ones, expected as many; start farther from a"
+            " singular pose by --start, or give another tolerance by --closure",
+        )
+    return with_all_motions(case)
+
+
+def _sweep(tree: Tree, driving: Driving) -> Sweep:
+    """Return the sweep of the first driven joint; the others move with it, straight."""
+    (swept, values), *others = driving.driven.items()
+    design = tree.joints[swept].value
+    first, last = values[0] - design, values[-1] - design  # times, at a rate of one
+    motions: dict[str, Motion] = {}
+    for name, each in others:
+        ends = [(first, each[0]), (last, each[-1])]
+        times, there = zip(*sorted((float(t), float(x)) for t, x in ends), strict=True)
+        motions[name] = Absolute(Table(times, there), tree.joints[name].value)
+    return Sweep(swept, values, design=design, motions=motions)
 
 
 def _require_model(root: Element) -> None:
-    """Refuse what is no model, or stands for parts that are elsewhere."""
+    """Refuse other documents, and elements in place of parts elsewhere."""
     if root.tag != "mujoco":
         raise root.fault("found another document, expected a model <mujoco>; give an MJCF file")
     for element in root.children:
         if element.tag in MAKE_BODIES:
             raise element.fault(f"cannot be read, because {MAKE_BODIES[element.tag]}; {WRITE_OUT}")
-        if element.tag not in ROOT:
+        if element.tag not in (*ROOT, *EXPANDED):
             raise element.fault(f"unknown in a model; {remedy(element.tag, ROOT)}")
 
 
@@ -112,7 +153,7 @@ def _driver(parts: Parts, joint: str) -> JointDriver:
 
 
 def _points(tree: Tree, parts: Parts) -> list[Point]:
-    """The origins of the bodies of the file that move, and the sites on them."""
+    """The origins of the moving bodies of the file, and the sites on them."""
     moving = [name for name in parts.bodies if name not in parts.fixed]
     points = [
         Point(name, name, coordinates(parts.bodies[name].at))

@@ -7,15 +7,17 @@ massless ones, a joint each.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from ....algebra import Vec3, vec
+from ....algebra import Vec3, X, vec
 from ....errors import remedy
 from ....mechanism.mechanism import GROUND
 from ...io.document import shown
 from .attributes import DYNAMIC, IN_BODY, KNOWN, MAKE_BODIES, WRITE_OUT
 from .classes import MAIN, Classes
 from .elements import Element
+from .expand import COPY
 from .frames import HERE, Compiler, Place, joint_axis, read_place
 
 WORLD = "world"
@@ -27,11 +29,12 @@ MOST_BODIES, MOST_MOVING = 2_000, 150
 
 @dataclass(frozen=True)
 class ModelJoint:
-    """A hinge, slide or ball of a model, global at qpos0 [m].
+    """A hinge, slide, ball or free joint of a model, global in the pose of the tree [m].
 
     Attributes:
         outer, inner: bodies of the mechanism it joins; the inner one moves on the outer.
-        ref: coordinate in the pose of the file [rad or m].
+        ref: coordinate at qpos0 [rad or m].
+        moved: change of the coordinate since qpos0 [rad or m].
     """
 
     name: str
@@ -42,19 +45,26 @@ class ModelJoint:
     axis: Vec3
     ref: float
     element: Element
+    moved: float = 0.0
+
+    @property
+    def value(self) -> float:
+        """Its coordinate in the pose of the tree [rad or m]."""
+        return self.ref + self.moved
 
 
 @dataclass
 class Tree:
-    """What a model's worldbody holds.
+    """Content of a model's worldbody.
 
     Attributes:
         places: of all bodies of the file, global.
         carriers: by body of the file, the body of the mechanism it belongs to.
-        moving: bodies of the mechanism that move, with their places; the massless ones of chains
+        moving: moving bodies of the mechanism, with their places; the massless ones of chains
             too.
         massless: the names of those.
-        free: by name, of the joint or of its body, bodies that no joint holds.
+        free: by name, of the joint or of its body, bodies held by no joint.
+        chain: all joints, free ones too, in the order of MuJoCo's coordinates: outer ones first.
         sites: by name, the body of the mechanism they are on, and their global places.
         names: of all bodies of the file that have one.
         left_out: how many there are of what has no meaning for kinematics, by what it is called.
@@ -68,6 +78,7 @@ class Tree:
     massless: set[str] = field(default_factory=set[str])
     joints: dict[str, ModelJoint] = field(default_factory=dict[str, ModelJoint])
     free: dict[str, str] = field(default_factory=dict[str, str])
+    chain: list[ModelJoint] = field(default_factory=list[ModelJoint])
     sites: dict[str, tuple[str, Place]] = field(default_factory=dict[str, tuple[str, Place]])
     left_out: dict[str, int] = field(default_factory=dict[str, int])
     names: set[str] = field(default_factory=set[str])
@@ -90,19 +101,36 @@ class Tree:
             if element.tag == "body":
                 self._body(element, place, body, childclass)
             elif element.tag == "frame":
-                if any(element.only("joint", "freejoint")):
-                    raise element.fault(f"holds a joint, expected joints in bodies; {WRITE_OUT}")
-                element.require_known(KNOWN["frame"])
-                self.read(
-                    element,
-                    place.then(read_place(element, self.compiler)),
-                    body,
-                    _class(element, childclass),
-                )
+                if around.tag == "worldbody" and any(element.only("joint", "freejoint")):
+                    raise element.fault("holds a joint, expected joints in bodies; remove it")
+                inner = self._frame(element, place)
+                self.read(element, inner, body, _class(element, childclass))
             elif element.tag == "site":
                 self._site(self.classes.complete(element, "site", childclass), place, body)
             elif element.tag not in ("joint", "freejoint"):
                 self.count(f"{element.tag}s" if element.tag != "inertial" else "inertia")
+
+    def _frame(self, element: Element, around: Place) -> Place:
+        """Return the place of a frame; one of a copy lies as often in itself as the copy says."""
+        copies = element.attributes.get(COPY)
+        element.require_known(KNOWN["frame"] if copies is None else (COPY, *KNOWN["frame"]))
+        step = read_place(element, self.compiler)
+        for _ in range(1 if copies is None else int(copies)):
+            around = around.then(step)
+        return around
+
+    def _joints_in(
+        self, around: Element, place: Place, childclass: str
+    ) -> Iterator[tuple[Element, Place]]:
+        """Yield the joints of a body, complete, and the places in which they are given."""
+        for element in around.children:
+            if element.tag == "joint":
+                yield self.classes.complete(element, "joint", childclass), place
+            elif element.tag == "freejoint":
+                yield element, place
+            elif element.tag == "frame":
+                inner = self._frame(element, place)
+                yield from self._joints_in(element, inner, _class(element, childclass))
 
     def count(self, what: str) -> None:
         """Count one more omitted item."""
@@ -123,7 +151,7 @@ class Tree:
             )
         place = around.then(read_place(element, self.compiler))
         childclass = _class(element, childclass)
-        elements = list(element.only("joint", "freejoint"))
+        elements = list(self._joints_in(element, place, childclass))
         for most, count, what in (
             (MOST_BODIES, len(self.places), "bodies; take out what does not move"),
             (
@@ -142,17 +170,15 @@ class Tree:
                 self.count("mocap bodies, which stand still")
         else:
             carrier = name
-            joints = [
-                self.classes.complete(each, "joint", childclass) if each.tag == "joint" else each
-                for each in elements
-            ]
-            self._joints(name, joints, place, outer)
+            self._joints(name, elements, place, outer)
         self.places[name], self.carriers[name] = place, carrier
         self.read(element, place, carrier, childclass)
 
-    def _joints(self, body: str, elements: list[Element], place: Place, outer: str) -> None:
-        kinds = [self._kind(element) for element in elements]
-        for k, (element, kind) in enumerate(zip(elements, kinds, strict=True)):
+    def _joints(
+        self, body: str, elements: list[tuple[Element, Place]], place: Place, outer: str
+    ) -> None:
+        for k, (element, given) in enumerate(elements):
+            kind = self._kind(element)
             last = k == len(elements) - 1
             name = element.attributes.get("name", body if len(elements) == 1 else f"{body}.{k + 1}")
             if name in self.joints or (kind == "free" and name in self.free):
@@ -171,8 +197,11 @@ class Tree:
                         " remove one of them"
                     )
                 self.free |= {name: body, body: body}
+                joint = ModelJoint(name, kind, outer, inner, place.at, X, 0.0, element)
             else:
-                self.joints[name] = self._joint(name, kind, element, place, outer, inner)
+                joint = self._joint(name, kind, element, given, outer, inner)
+                self.joints[name] = joint
+            self.chain.append(joint)
             outer = inner
 
     def _unused(self, wanted: str) -> str:
@@ -220,10 +249,6 @@ class Tree:
             raise element.fault(
                 f"name: found {shown(name)} again, expected a name of its own; rename one of the"
                 " sites"
-            )
-        if "fromto" in element.attributes:
-            raise element.fault(
-                f"fromto: found a site between two points, expected pos and quat; {WRITE_OUT}"
             )
         self.sites[name] = body, place.then(read_place(element, self.compiler))
 

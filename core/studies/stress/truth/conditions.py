@@ -75,4 +75,4 @@ def conditions(mechanism: Mechanism) -> Conditions:
 
 
 def _weights(coupler: Any) -> list[tuple[str, float]]:
-    return list(zip(coupler.freedoms, coupler.coefficients, strict=True))
+    return list(zip(coupler.freedoms, coupler.weights, strict=True))

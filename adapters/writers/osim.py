@@ -1,0 +1,198 @@
+"""A mechanism as .osim, the XML of OpenSim, whose simulator is Simbody.
+
+The file has no state of velocities and its ball joints lock at a right angle, so the model is
+written in the pose of its start: there all coordinates are zero. A body has the frame that the case
+gives it. Loops are closed by Simbody's constraints of a point, a distance or a whole frame;
+coordinate couplers tie coordinates to one another. Names of OpenSim are parts of paths: what has
+another meaning there becomes an underscore.
+"""
+
+from __future__ import annotations
+
+import re
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping
+
+import numpy as np
+
+from ...core.algebra import IDENTITY, Quat, vec
+from ...core.mechanism.body import Body
+from ...core.mechanism.mechanism import GROUND, Mechanism, Vector
+from ...core.trajectory import BodyMotion
+from ..shared.joint_chains import dependence
+from ..shared.opensim_frames import euler_angles, orientation
+from ..shared.poses import about, attitude, local
+from ..shared.start_pose import at_start
+from . import loads
+from .hung_tree import Hung, Tie, hung, require_known
+from .xml_text import document, numbers
+
+NOTE = (
+    " Written by kincheck. Lengths are in m, angles in rad. {} Coordinates are zero at the start,"
+    " which is the pose of this file{}.{} "
+)
+KINDS = {
+    "slide": "SliderJoint",
+    "hinge": "PinJoint",
+    "ball": "BallJoint",
+    "fixed": "WeldJoint",
+    "free": "FreeJoint",
+}
+NONE = (0.0, 0.0, 0.0)
+# A joint's coordinates in the order of OpenSim.
+COORDINATES = {
+    "slide": [""],
+    "hinge": [""],
+    "ball": [".rotation_x", ".rotation_y", ".rotation_z"],
+    "fixed": [],
+    "free": [".rotation_x", ".rotation_y", ".rotation_z", ".x", ".y", ".z"],
+}
+
+
+def write(
+    mechanism: Mechanism, way: Mapping[str, BodyMotion], start: Mapping[str, float]
+) -> Mapping[str, str]:
+    """An .osim file in the pose at the end of the way; see `Writer`.
+
+    Raises:
+        KincheckError: a joint has no counterpart here, or a name cannot be used.
+    """
+    require_known(mechanism, "OpenSim")
+    model = _Model(at_start(mechanism, way), mechanism.gravity if mechanism.has_loads else NONE)
+    at = ", ".join(f"{name} = {value!r}" for name, value in start.items())
+    facts = (loads.PLAIN, "")
+    if mechanism.has_loads:
+        facts = (loads.LOADED, loads.left_out(mechanism, (), True))
+    model.root.insert(0, ET.Comment(NOTE.format(facts[0], at and f" ({at})", facts[1])))
+    sets = [["Body"], [*KINDS.values()], ["Coordinate"], ["Marker"], [*TIES]]
+    return {".osim": document(model.root, sets, reserved=[GROUND])}
+
+
+TIES = (
+    "PointConstraint",
+    "WeldConstraint",
+    "ConstantDistanceConstraint",
+    "CoordinateCouplerConstraint",
+)
+
+
+class _Model:
+    """The document during its construction; the mechanism is at its start."""
+
+    def __init__(self, mechanism: Mechanism, gravity: Vector) -> None:
+        self.tree = hung(mechanism)
+        self.root = ET.Element("OpenSimDocument", Version="40000")
+        model = ET.SubElement(self.root, "Model", name=_name(mechanism.name))
+        ET.SubElement(model, "Ground", name=GROUND)
+        _text(model, "gravity", numbers(gravity))
+        bodies, joints, constraints, markers = (
+            ET.SubElement(ET.SubElement(model, kind, name=kind.lower()), "objects")
+            for kind in ("BodySet", "JointSet", "ConstraintSet", "MarkerSet")
+        )
+        for body in self.tree.frames.values():
+            self.add_body(bodies, body)
+        for joint in self.tree.joints:
+            self.add_joint(joints, joint)
+        for tie in self.tree.ties:
+            self.add_tie(constraints, tie)
+        for k, (name, weights) in enumerate(self.tree.relations):
+            self.relate(constraints, f"{name}.{k}", weights)
+        for point in mechanism.points:
+            marker = ET.SubElement(markers, "Marker", name=_name(point.name))
+            _text(marker, "socket_parent_frame", _path(point.body))
+            _text(marker, "location", numbers(self.local(point.body, point.position)))
+
+    def frame(self, body: str) -> Body:
+        """Return the frame of a link at design."""
+        return self.tree.frames.get(body) or Body(GROUND)
+
+    def local(self, body: str, P: Vector) -> Vector:
+        """Return a point, global at design, in the frame of a link [m]."""
+        return local(self.frame(body), P)
+
+    def add_body(self, bodies: ET.Element, body: Body) -> None:
+        """Add a body with its mass."""
+        element = ET.SubElement(bodies, "Body", name=_name(body.name))
+        _text(element, "mass", numbers([loads.mass_of(body)]))
+        _text(element, "mass_center", numbers(local(body, loads.center_of(body))))
+        # what stands in is the same in all axes, and remains so without rounding
+        matrix = loads.inertia_of(body) if body.inertia is None else loads.own_inertia(body)
+        xx, yy, zz, xy, yz, xz = loads.six(matrix)
+        _text(element, "inertia", numbers([xx, yy, zz, xy, xz, yz]))
+
+    def add_joint(self, joints: ET.Element, joint: Hung) -> None:
+        """Add a joint between a frame of the parent and one of the child, in one place at zero."""
+        element = ET.SubElement(joints, KINDS[joint.move], name=_name(joint.name))
+        _text(element, "socket_parent_frame", "parent")
+        _text(element, "socket_child_frame", "child")
+        suffixes = COORDINATES[joint.move]
+        coordinates = ET.SubElement(element, "coordinates") if suffixes else element
+        for suffix in suffixes:
+            coordinate = ET.SubElement(coordinates, "Coordinate", name=_name(joint.name + suffix))
+            _text(coordinate, "default_value", "0")
+            _text(coordinate, "range", "-1e9 1e9")
+        frames = ET.SubElement(element, "frames")
+        turn = _turns(orientation(joint.move, joint.axis))
+        if joint.move in ("fixed", "free"):
+            turn = attitude(self.frame(joint.child))
+        for end, body in (("parent", joint.parent), ("child", joint.child)):
+            frame = ET.SubElement(frames, "PhysicalOffsetFrame", name=end)
+            _text(frame, "socket_parent", _path(body))
+            _text(frame, "translation", numbers(self.local(body, joint.point)))
+            _text(frame, "orientation", numbers(self.angles(body, turn)))
+
+    def angles(self, body: str, turn: Quat) -> tuple[float, float, float]:
+        """Return the angles of a rotation, global at design, in the axes of a link [rad]."""
+        p = attitude(self.frame(body)).conjugate() * turn
+        return euler_angles([float(each) for each in p])
+
+    def add_tie(self, constraints: ET.Element, tie: Tie) -> None:
+        """Add a constraint between two links."""
+        if tie.whole:
+            element = ET.SubElement(constraints, "WeldConstraint", name=_name(tie.name))
+            frames = ET.SubElement(element, "frames")
+            for k, (link, at) in enumerate(zip(tie.links, tie.points, strict=True), 1):
+                _text(element, f"socket_frame{k}", f"end{k}")
+                frame = ET.SubElement(frames, "PhysicalOffsetFrame", name=f"end{k}")
+                _text(frame, "socket_parent", _path(link))
+                _text(frame, "translation", numbers(self.local(link, at)))
+                _text(frame, "orientation", numbers(self.angles(link, IDENTITY)))
+            return
+        kind = "PointConstraint" if tie.length is None else "ConstantDistanceConstraint"
+        element = ET.SubElement(constraints, kind, name=_name(tie.name))
+        for k, (link, at) in enumerate(zip(tie.links, tie.points, strict=True), 1):
+            _text(element, f"socket_body_{k}", _path(link))
+            _text(element, f"location_body_{k}", numbers(self.local(link, at)))
+        if tie.length is not None:
+            _text(element, "constant_distance", numbers([tie.length]))
+
+    def relate(self, constraints: ET.Element, name: str, weights: Mapping[str, float]) -> None:
+        """Couple two coordinates."""
+        one, other, factor = dependence(weights.items())
+        element = ET.SubElement(constraints, "CoordinateCouplerConstraint", name=_name(name))
+        function = ET.SubElement(
+            ET.SubElement(element, "coupled_coordinates_function"), "LinearFunction"
+        )
+        _text(function, "coefficients", numbers([factor, 0.0]))
+        _text(element, "independent_coordinate_names", _name(other))
+        _text(element, "dependent_coordinate_name", _name(one))
+
+
+def _turns(angles: Vector) -> Quat:
+    """Return the rotation of successive turns about x, y and z."""
+    x, y, z = (
+        about(vec(axis), angle) for axis, angle in zip(np.eye(3).tolist(), angles, strict=True)
+    )
+    return x * y * z
+
+
+def _text(parent: ET.Element, tag: str, text: str) -> None:
+    ET.SubElement(parent, tag).text = text
+
+
+def _name(name: str) -> str:
+    return re.sub(r"[^\w.-]", "_", name, flags=re.ASCII)
+
+
+def _path(body: str) -> str:
+    return "/ground" if body == GROUND else f"/bodyset/{_name(body)}"

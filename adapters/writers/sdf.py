@@ -1,0 +1,192 @@
+"""A mechanism as SDF, with what Drake reads of it: its tree, ball constraints that close the loops,
+and joints that mimic others.
+
+SDF has no state, so the model is written in the pose of its start: there all joints are at zero. A
+link has the frame that the case gives its body. Drake's ball constraint is the only tie that its
+parser knows: a frame is tied by three points, a rod is a link between a cross and a ball. Drake
+has constraints in discrete plants only.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+
+from ...core.errors import KincheckError
+from ...core.joints.base import unit
+from ...core.mechanism.body import Body
+from ...core.mechanism.mechanism import GROUND, Mechanism, Vector
+from ...core.trajectory import BodyMotion
+from ..shared.joint_chains import dependence
+from ..shared.joint_equivalents import cross_of
+from ..shared.poses import attitude, local
+from ..shared.start_pose import at_start
+from . import loads
+from .hung_tree import Hung, Tie, hung, require_known
+from .xml_text import document, numbers
+
+NOTE = (
+    " Written by kincheck. Lengths are in m, angles in rad. {} Joints are at zero at the start,"
+    " which is the pose of this file{}. Read it into a discrete plant of Drake: a continuous one"
+    " has no constraints.{} "
+)
+KINDS = {"slide": "prismatic", "hinge": "revolute", "ball": "ball", "fixed": "fixed"}
+WORLD = "world"
+MIMIC = "drake:mimic"
+DRAKE = "http://drake.mit.edu"
+
+
+def write(
+    mechanism: Mechanism, way: Mapping[str, BodyMotion], start: Mapping[str, float]
+) -> Mapping[str, str]:
+    """An .sdf file in the pose at the end of the way; see `Writer`.
+
+    Raises:
+        KincheckError: a joint has no counterpart here, or a name cannot be used.
+    """
+    require_known(mechanism, "SDF")
+    model = _Model(at_start(mechanism, way))
+    at = ", ".join(f"{name} = {value!r}" for name, value in start.items())
+    facts = (loads.PLAIN, "")
+    if mechanism.has_loads:
+        facts = (loads.LOADED, loads.left_out(mechanism, (), False))
+    model.root.insert(0, ET.Comment(NOTE.format(facts[0], at and f" ({at})", facts[1])))
+    kinds = (["link", "frame", "joint", "drake:ball_constraint"],)
+    return {".sdf": document(model.root, kinds, reserved=[WORLD])}
+
+
+class _Model:
+    """The document during its construction; the mechanism is at its start."""
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self.mechanism, self.tree = mechanism, hung(mechanism)
+        self.root = ET.Element("sdf", {"version": "1.11", "xmlns:drake": DRAKE})
+        self.model = ET.SubElement(self.root, "model", name=mechanism.name)
+        self.joints: dict[str, ET.Element] = {}
+        for tie in self.tree.ties:
+            if tie.length is not None:
+                self.add_rod(tie)
+        # Drake has no ball constraint with the world itself
+        self.tree.frames[GROUND] = Body(GROUND)
+        self.tree.joints.append(Hung(f"{GROUND}.fixed", "fixed", WORLD, GROUND, (0.0, 0.0, 0.0)))
+        for frame in self.tree.frames.values():
+            self.add_link(frame)
+        for joint in self.tree.joints:
+            if joint.move != "free":  # a link without a joint is free
+                self.add_joint(joint)
+        for name, weights in self.tree.relations:
+            self.relate(name, weights)
+        for point in mechanism.points:
+            frame = {"name": f"point.{point.name}", "attached_to": point.body}
+            self.add_pose(ET.SubElement(self.model, "frame", frame), point.position)
+        arm = self.size()
+        for tie in self.tree.ties:
+            if tie.length is None:
+                self.add_tie(tie, arm)
+
+    def size(self) -> float:
+        """Return the largest distance of joints along an axis, or 1 m where all are in one
+        place.
+        """
+        points = np.array([P for tie in self.tree.ties for P in tie.points] or [(0.0, 0.0, 0.0)])
+        places = np.array([each.point for each in self.tree.joints])
+        return float(np.ptp(np.concatenate([points, places]), axis=0).max()) or 1.0
+
+    def add_rod(self, tie: Tie) -> None:
+        """Hang a link on a cross at the first point of a rod, its end tied to the second."""
+        (i, j), (P, Q), length = tie.links, tie.points, tie.length
+        assert length is not None
+        along = np.array([*unit([b - a for a, b in zip(P, Q, strict=True)])])
+        end = _vector(np.array(P) + length * along)
+        names = [f"{tie.name}.first", f"{tie.name}.second"]
+        links = [f"{names[0]}.link", f"{tie.name}.rod"]
+        axes = cross_of(self.mechanism, i, along)
+        for name, parent, child, axis in zip(names, (i, *links), links, axes, strict=False):
+            self.tree.joints.append(Hung(name, "hinge", parent, child, P, axis))
+            self.tree.frames[child] = Body(child, P)
+        self.tree.ties.append(Tie(tie.name, (links[1], j), (end, Q)))
+
+    def add_link(self, body: Body) -> None:
+        """Add a link with the frame and the mass of a body."""
+        link = ET.SubElement(self.model, "link", name=body.name)
+        self.add_pose(link, body.origin, body)
+        inertial = ET.SubElement(link, "inertial")
+        _text(inertial, "pose", f"{numbers(local(body, loads.center_of(body)))} 0 0 0")
+        _text(inertial, "mass", numbers([loads.mass_of(body)]))
+        inertia = ET.SubElement(inertial, "inertia")
+        entries = ("ixx", "iyy", "izz", "ixy", "iyz", "ixz")
+        # what stands in is the same in all axes, and remains so without rounding
+        matrix = loads.inertia_of(body) if body.inertia is None else loads.own_inertia(body)
+        for entry, value in zip(entries, loads.six(matrix), strict=True):
+            _text(inertia, entry, numbers([value]))
+
+    def add_pose(self, element: ET.Element, at: Vector, frame: Body | None = None) -> None:
+        """Add the pose of an element at a point, in global axes or those of a body."""
+        e0, e1, e2, e3 = attitude(frame or Body(GROUND))
+        options = {"relative_to": "__model__", "rotation_format": "quat_xyzw"}
+        _text(element, "pose", f"{numbers(at)} {numbers((e1, e2, e3, e0))}", options)
+
+    def add_joint(self, joint: Hung) -> None:
+        """Add a joint at its point, in global axes."""
+        element = ET.SubElement(
+            self.model, "joint", name=self.joint_name(joint.name), type=KINDS[joint.move]
+        )
+        self.joints[joint.name] = element
+        _text(element, "parent", joint.parent)
+        _text(element, "child", joint.child)
+        self.add_pose(element, joint.point)
+        if joint.move in ("slide", "hinge"):
+            axis = ET.SubElement(element, "axis")
+            _text(axis, "xyz", numbers(joint.axis))
+            limit = ET.SubElement(axis, "limit")
+            _text(limit, "lower", "-inf")
+            _text(limit, "upper", "inf")
+
+    def joint_name(self, name: str) -> str:
+        """Return the name of a joint, which in SDF must not be that of a link."""
+        return f"{name}.joint" if name in self.tree.frames else name
+
+    def add_tie(self, tie: Tie, arm: float) -> None:
+        """Add ball constraints: at the point, and for a whole frame at two further ones."""
+        arms = np.concatenate([np.zeros((1, 3)), arm * np.eye(3)[:2]]) if tie.whole else [(0,) * 3]
+        for k, offset in enumerate(np.array(arms)):
+            element = ET.SubElement(
+                self.model, "drake:ball_constraint", name=f"{tie.name}.tie{k or ''}"
+            )
+            for side, link, P in zip("AB", tie.links, tie.points, strict=True):
+                point = _vector(np.array(P) + offset)
+                end = "P" if side == "A" else "Q"
+                _text(element, f"drake:ball_constraint_body_{side}", link)
+                name = f"drake:ball_constraint_p_{side}{end}"
+                _text(element, name, numbers(local(self.tree.frames[link], point)))
+
+    def relate(self, name: str, weights: Mapping[str, float]) -> None:
+        """Let one coordinate of a relation mimic the other.
+
+        Raises:
+            KincheckError: both mimic others already.
+        """
+        one, other, factor = dependence(weights.items())
+        taken = [self.joints[each].find(MIMIC) is not None for each in (one, other)]
+        if all(taken):
+            raise KincheckError(
+                f"{name!r}: a joint of SDF mimics one other, and {one!r} and {other!r} do already;"
+                " write MJCF or Exudyn instead"
+            )
+        if taken[0]:
+            one, other, factor = other, one, 1.0 / factor
+        options = {"joint": self.joint_name(other), "multiplier": numbers([factor]), "offset": "0"}
+        ET.SubElement(self.joints[one], MIMIC, options)
+
+
+def _text(
+    parent: ET.Element, tag: str, text: str, options: Mapping[str, str] | None = None
+) -> None:
+    ET.SubElement(parent, tag, dict(options or {})).text = text
+
+
+def _vector(a: Iterable[float] | Sequence[float]) -> Vector:
+    x, y, z = map(float, a)
+    return x, y, z
