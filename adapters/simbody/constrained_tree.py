@@ -9,7 +9,6 @@ a name with a blank. Its limits of coordinates play no part: they act on its for
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from math import atan2, hypot
 from typing import Any
 
 import numpy as np

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING
 from typing import Any, TypeAlias
@@ -29,6 +30,9 @@ _EXAMPLES: Mapping[Kind | None, Any] = {
     None: 1.0,
 }
 
+
+_SENTENCES = re.compile(r"(?<=[^.]\.) (?=[A-Z])")
+"""Between two sentences."""
 
 Rows: TypeAlias = list[tuple[str, ...]]
 
@@ -147,8 +151,7 @@ def _meaning(cls: type[Described] | type[Measure]) -> str:
     there.
     """
     paragraph = " ".join((cls.__doc__ or "").strip().partition("\n\n")[0].split())
-    first, point, _ = paragraph.partition(". ")
-    return "" if paragraph.startswith(f"{cls.__name__}(") else first + "." * bool(point)
+    return "" if paragraph.startswith(f"{cls.__name__}(") else _SENTENCES.split(paragraph)[0]
 
 
 def _printed(tables: Mapping[str, Rows]) -> Iterator[str]:
