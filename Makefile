@@ -1,11 +1,12 @@
 # Two commands:  make run   the McPherson strut in every engine, compared and reported
 #                make test  style, types and tests
+# make docs builds the documentation into site/.
 # Plain Python with venv is enough; uv is used when it is there.
 PYTHON ?= python3
 BIN := .venv/bin
 UV := $(shell command -v uv 2>/dev/null)
 
-.PHONY: run test lock fuzz clean
+.PHONY: run test docs lock fuzz clean
 
 run: .venv/ready
 	$(BIN)/kincheck run mcpherson_strut --out report
@@ -15,6 +16,18 @@ test: .venv/ready
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright
 	$(BIN)/pytest --numprocesses auto
+
+# Pages, figures and reference pages; a warning is an error.
+docs: .venv/docs
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict --config-file docs/mkdocs.yml
+
+.venv/docs: .venv/ready
+ifdef UV
+	uv pip install --quiet --python $(BIN)/python --config-settings editable_mode=strict --editable '.[docs]'
+else
+	$(BIN)/python -m pip install --quiet --config-settings editable_mode=strict --editable '.[docs]'
+endif
+	touch $@
 
 # Type checkers see an editable installation only if it is strict: a folder of links, build/, which
 # is made again when a file comes or goes.
@@ -52,4 +65,4 @@ fuzz: .venv/ready
 	for reader in casefile hardpoints mjcf reference results sdf urdf; do nice $(BIN)/python -m tests.fuzz $$reader --seconds 3600 || exit 1; done
 
 clean:
-	rm -rf .venv build report *.egg-info
+	rm -rf .venv build report site *.egg-info

@@ -26,7 +26,7 @@ def add(commands: Any) -> None:
     doctor: argparse.ArgumentParser
     doctor = commands.add_parser(
         "doctor",
-        help="what is installed, what is missing, does it work",
+        help="list installed and missing parts, and test the installation",
         description=_doctor.__doc__,
     )
     doctor.set_defaults(do=_doctor)

@@ -26,7 +26,7 @@ def add_options(parser: argparse.ArgumentParser, positive: Callable[[str], float
         return number
 
     group = parser.add_argument_group(
-        "isolation", "A pair of case and engine is solved in a worker process of its engine."
+        "isolation", "Each case is solved with each engine in a worker process."
     )
     group.add_argument(
         "--jobs",
@@ -34,8 +34,7 @@ def add_options(parser: argparse.ArgumentParser, positive: Callable[[str], float
         metavar="N",
         help=(
             "worker processes at a time; default: half the processors; 0 solves in this process,"
-            " without limits, which is the default where only the native engine takes part and no"
-            " limit is given"
+            " without limits: the default if only the native engine runs and no limit is given"
         ),
     )
     group.add_argument(
@@ -43,8 +42,8 @@ def add_options(parser: argparse.ArgumentParser, positive: Callable[[str], float
         type=limit,
         metavar="SECONDS",
         help=(
-            f"of a pair, from its start; default {TIMEOUT:g}, a hundred times what the built-in"
-            " cases take"
+            f"limit for one case with one engine; default {TIMEOUT:g}, a hundred times as long"
+            " as the built-in cases take"
         ),
     )
     group.add_argument(
@@ -52,8 +51,8 @@ def add_options(parser: argparse.ArgumentParser, positive: Callable[[str], float
         type=limit,
         metavar="GB",
         help=(
-            f"of a worker process, on Linux; default {MEMORY:g}, sixteen times what the built-in"
-            " cases take"
+            f"limit for a worker process, on Linux; default {MEMORY:g}, sixteen times as much as"
+            " the built-in cases take"
         ),
     )
     group.add_argument(

@@ -26,7 +26,9 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     history: argparse.ArgumentParser
     history = commands.add_parser(
-        "history", help="list the runs kept, their trends and steps", description=_history.__doc__
+        "history",
+        help="list the kept runs, with their trends and steps",
+        description=_history.__doc__,
     )
     history.set_defaults(do=_history)
     add_history(history, "the history")

@@ -229,8 +229,8 @@ def add_joint_types(command: argparse.ArgumentParser) -> None:
         default=[],
         metavar="MODULE:CLASS",
         help=(
-            "a joint type of your own, which case files may name then, in a module of this folder"
-            " or an installed one; may be repeated; check-joint checks it"
+            "a joint type of your own for case files, in a module of this folder or an installed"
+            " one; may be repeated; check-joint checks it"
         ),
     )
 

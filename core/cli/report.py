@@ -26,7 +26,7 @@ OUT = ("regressions.json", "regressions.md", "junit.xml", "report.html")
 def add(commands: Any) -> None:
     """Add the command to the parser."""
     report: argparse.ArgumentParser = commands.add_parser(
-        "report", help="what changed since another run", description=_report.__doc__
+        "report", help="report what changed since another run", description=_report.__doc__
     )
     report.set_defaults(do=_report)
     report.add_argument(

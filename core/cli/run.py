@@ -63,8 +63,8 @@ def _run(options: argparse.Namespace, house: House) -> int:
     Exit status: 0 all within tolerance, 1 something deviates or ends in an error, a timeout or a
     crash, 2 the tool could not do its work: a case cannot be read (the others are run), a file
     cannot be written, an engine that is named or required is missing, or nothing at all was solved
-    or compared. Pairs with nothing to compare are not judged, and do not change the status if
-    others are judged.
+    or compared. Results with nothing to compare are not judged, and do not change the
+    status if others are judged.
     """
     from . import destinations as delivery
 

@@ -118,15 +118,15 @@ def add_options(run: argparse.ArgumentParser) -> None:
         metavar="FILE",
         default=os.environ.get(HISTORY) or None,
         help=(
-            "keep the run in this file, each record as it is made; default: the environment"
-            f" variable {HISTORY}, else not at all"
+            "keep the run in this file, each record as it is made; default: the file in the"
+            f" environment variable {HISTORY}, if it is set"
         ),
     )
     run.add_argument(
         "--resume",
         action="store_true",
         help=(
-            "go on with the last run in the history of the same cases, engines, tolerance, limits,"
-            " versions and commit that has no end"
+            "resume the latest unfinished run in the history with identical cases, engines,"
+            " tolerance, limits, versions and commit"
         ),
     )

@@ -29,7 +29,7 @@ def add(commands: Any) -> None:
     stress: argparse.ArgumentParser
     stress = commands.add_parser(
         "stress",
-        help="nasty mechanisms: is any answer silently wrong?",
+        help="stress-test engines with random degenerate mechanisms",
         description=_stress.__doc__,
     )
     stress.set_defaults(do=_stress)

@@ -26,11 +26,15 @@ def add_options(sweep: argparse.ArgumentParser) -> None:
         type=Path,
         required=True,
         metavar="FILE",
-        help="what varies, and by how much (kincheck-vary/1)",
+        help="the file that states what varies, and by how much (kincheck-vary/1)",
     )
-    sweep.add_argument("--samples", type=whole(1), metavar="N", help="variants that are drawn")
+    sweep.add_argument("--samples", type=whole(1), metavar="N", help="number of random variants")
     sweep.add_argument(
-        "--seed", type=whole(0), default=0, metavar="S", help="of the draws; default %(default)s"
+        "--seed",
+        type=whole(0),
+        default=0,
+        metavar="S",
+        help="seed of the random variants; default %(default)s",
     )
     sweep.add_argument(
         "--output",
@@ -45,7 +49,7 @@ def add_options(sweep: argparse.ArgumentParser) -> None:
         type=int,
         choices=(0, 1, 2),
         default=0,
-        help="derivatives of the outputs by time too; default %(default)s",
+        help="also reduce derivatives by time up to this order; default %(default)s",
     )
     sweep.add_argument(
         "--tol",
@@ -90,10 +94,7 @@ def add_options(sweep: argparse.ArgumentParser) -> None:
     sweep.add_argument(
         "--resume",
         action="store_true",
-        help=(
-            f"go on from the finished part of the same sweep, which is {PART} in the folder of"
-            " --out"
-        ),
+        help=(f"continue the same sweep from its finished part, {PART} in the folder of --out"),
     )
     add_verbosity(sweep, quiet="print no progress")
     import_options.add_options(sweep)

@@ -85,9 +85,9 @@ def solve_designs(
 
     Args:
         mechanism: the nominal design.
-        driver, values, rate, points, tol, motions: as for `solve`; drivers are measured from the
-            design position of each design, so that a point that varies can be driven by its change
-            only.
+        driver: as for `solve`, and so are values, rate, points, tol and motions; drivers are
+            measured from the design position of each design, so that a point that varies can be
+            driven by its change only.
         geometry: what varies [m or -]: by place, named as in a case file
             ("joints.tie_rod.points.0", "joints.hinge.axis", "points.wheel_center.position", a
             length), values of shape (V, 3), or (V,) of a length. Places that are one hardpoint are

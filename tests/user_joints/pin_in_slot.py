@@ -1,4 +1,4 @@
-"""A pin in a slot: what the tutorial of the README makes."""
+"""A pin in a slot: as in the tutorial of the documentation."""
 
 from dataclasses import dataclass
 

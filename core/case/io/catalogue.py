@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING
-from typing import Any
+from typing import Any, TypeAlias
 
 from ...errors import MechanismError
 from ...joints import Coupler, Joint, Kind
@@ -30,6 +31,12 @@ _EXAMPLES: Mapping[Kind | None, Any] = {
 }
 
 
+_SENTENCES = re.compile(r"(?<=[^.]\.) (?=[A-Z])")
+"""Between two sentences."""
+
+Rows: TypeAlias = list[tuple[str, ...]]
+
+
 def catalogue() -> Iterator[str]:
     """Yield lines to print: joints, couplers, drivers, motions and force elements, a type each."""
     yield (
@@ -37,32 +44,38 @@ def catalogue() -> Iterator[str]:
         " one on each body"
     )
     yield "keys in brackets may be left out; body i is the first, j the second"
-    yield 'joints: type, bodies = ["first", "second"], and'
-    yield from _columns(
-        [
+    yield from _printed(type_tables())
+
+
+def output_catalogue() -> Iterator[str]:
+    """Yield lines of the output types: unit, keys, needs from [suspension], and signs."""
+    yield from _printed(output_tables())
+    yield (
+        "each with its derivative by wheel travel, jounce: NAME.per_travel [unit/m]; the table"
+        " [suspension] says of which wheel"
+    )
+
+
+def type_tables() -> dict[str, Rows]:
+    """Return joints, couplers, drivers, motions and force elements by heading; a row starts with
+    the name of the type and ends with its meaning.
+    """
+    return {
+        'joints: type, bodies = ["first", "second"], and': [
             (name, _keys(cls), *_counts(cls), _meaning(cls))
             for name, cls in sorted(Joint.registry.items())
-        ]
-    )
-    yield 'joints that couple two others: type, joints = ["first", "second"], and'
-    couplers = sorted(Coupler.registry.items())
-    yield from _columns(
-        [
+        ],
+        'joints that couple two others: type, joints = ["first", "second"], and': [
             (name, _keys(cls), "1 row", f"couples {' and '.join(cls.freedoms)}", _meaning(cls))
-            for name, cls in couplers
-        ]
-    )
-    yield "drivers: type, and"
-    yield from _columns(
-        [(name, _keys(cls), _meaning(cls)) for name, cls in sorted(DRIVERS.items())]
-    )
-    yield "motions of drivers: type, and"
-    yield from _columns(
-        [(name, _keys(cls), _meaning(cls)) for name, cls in sorted(Motion.registry.items())]
-    )
-    yield "force elements: type, and"
-    yield from _columns(
-        [
+            for name, cls in sorted(Coupler.registry.items())
+        ],
+        "drivers: type, and": [
+            (name, _keys(cls), _meaning(cls)) for name, cls in sorted(DRIVERS.items())
+        ],
+        "motions of drivers: type, and": [
+            (name, _keys(cls), _meaning(cls)) for name, cls in sorted(Motion.registry.items())
+        ],
+        "force elements: type, and": [
             (
                 name,
                 f'bodies = ["first", "second"], {_keys(cls)}'
@@ -71,36 +84,32 @@ def catalogue() -> Iterator[str]:
                 _meaning(cls),
             )
             for name, cls in sorted(ELEMENTS.items())
-        ]
-    )
+        ],
+    }
 
 
-def output_catalogue() -> Iterator[str]:
-    """Yield lines of the output types: unit, keys, needs from [suspension], and signs."""
-    yield "outputs: (type) = coordinate, point, component or direction, (relative); or a type, and"
-    yield from _columns(
-        [
-            (name, ", ".join(_measure_keys(cls)), _meaning(cls))
-            for name, cls in sorted(Measure.registry.items())
-        ]
-    )
-    yield "outputs of a wheel: type, and"
-    rows: list[tuple[str, ...]] = []
+def output_tables() -> dict[str, Rows]:
+    """Return the output types by heading: name, keys and meaning; of a wheel: name, unit, keys,
+    sign and needs.
+    """
+    rows: Rows = []
     for name, cls in sorted(SuspensionOutput.registry.items()):
         keys = [
             each.name if each.default is MISSING else f"({each.name})" for each in own_keys(cls)
         ]
         needs = f"needs {', '.join(cls.needs)}" if cls.needs else ""
         rows.append((name, f"[{cls.measure}]", ", ".join(keys), f"positive: {cls.positive}", needs))
-    yield from _columns(rows)
-    yield (
-        "each with its derivative by wheel travel, jounce: NAME.per_travel [unit/m]; the table"
-        " [suspension] says of which wheel"
-    )
+    return {
+        "outputs: (type) = coordinate, point, component or direction, (relative); or a type, and": [
+            (name, ", ".join(_measure_keys(cls)), _meaning(cls))
+            for name, cls in sorted(Measure.registry.items())
+        ],
+        "outputs of a wheel: type, and": rows,
+    }
 
 
 def rows_of(cls: type[Joint]) -> int | None:
-    """Number of constraint equations of a joint type; None if the example geometry is none for
+    """Number of constraint equations of a joint type; None where the example geometry is none for
     it.
     """
     given = {each.name: _EXAMPLES[kind_of(each)] for each in own_fields(cls)}
@@ -138,14 +147,20 @@ def _measure_keys(cls: type[Measure]) -> Iterator[str]:
 
 
 def _meaning(cls: type[Described] | type[Measure]) -> str:
-    """The first line of the docstring of a class; a dataclass without one has its
-    signature there.
+    """Return the first sentence of a class's docstring; a dataclass without one has its signature
+    there.
     """
-    first, *_ = (cls.__doc__ or "").strip().splitlines() or [""]
-    return "" if first.startswith(f"{cls.__name__}(") else first
+    paragraph = " ".join((cls.__doc__ or "").strip().partition("\n\n")[0].split())
+    return "" if paragraph.startswith(f"{cls.__name__}(") else _SENTENCES.split(paragraph)[0]
 
 
-def _columns(rows: list[tuple[str, ...]]) -> Iterator[str]:
+def _printed(tables: Mapping[str, Rows]) -> Iterator[str]:
+    for heading, rows in tables.items():
+        yield heading
+        yield from _columns(rows)
+
+
+def _columns(rows: Rows) -> Iterator[str]:
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for row in rows:
         yield (

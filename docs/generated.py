@@ -1,0 +1,174 @@
+"""Reference pages made from the code: command line, keys and types of case files, joints and
+engines.
+"""
+
+import argparse
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from functools import cache
+from pathlib import Path
+
+from kincheck.core.case.io import loads, schema
+from kincheck.core.case.io.catalogue import output_tables, type_tables
+from kincheck.core.case.variation import variation_schema
+from kincheck.core.cli.main import _parser
+
+ROOT = Path(__file__).parent.parent
+SHARED = {
+    "hardpoints": "Hardpoint tables",
+    "models": "Models",
+    "isolation": "Isolation",
+}
+"""Groups of options that several commands have, by their title in the help."""
+
+
+def PAGES() -> dict[str, str]:  # noqa: N802
+    """Return the generated pages by address."""
+    return {
+        "reference/command-line.md": command_line(),
+        "reference/case-file.md": case_file(),
+        "reference/types.md": types(),
+        "project/changes.md": (ROOT / "CHANGELOG.md").read_text("utf-8"),
+    }
+
+
+def command_line() -> str:
+    """Return the page of all commands and options, from their parsers."""
+    parser = _parser([])
+    (commands,) = (each for each in parser._actions if isinstance(each, argparse._SubParsersAction))
+    helps = {each.dest: each.help or "" for each in commands._choices_actions}
+    shared: dict[str, list[str]] = {}
+    parts = [
+        "# Command line",
+        "The command is `kincheck`, or `python -m kincheck`. This page is made from the help of"
+        " each command. [Exit statuses](judging.md#exit-status) are explained on a page of their"
+        " own.",
+        _table(
+            ("Command", "Purpose"),
+            [(f"[`{name}`](#{name})", f"{helps[name]}") for name in commands.choices],
+        ),
+    ]
+    for name, each in commands.choices.items():
+        parts += [f"## {name}", *_command(each, shared)]
+    for title, lines in shared.items():
+        parts += [f"## {SHARED[title]} {{ #{title} }}", *lines]
+    return "\n\n".join(parts) + "\n"
+
+
+def _command(parser: argparse.ArgumentParser, shared: dict[str, list[str]]) -> Iterator[str]:
+    usage = parser.format_usage().removeprefix("usage: ").rstrip()
+    yield f"```text\n{' '.join(usage.split())}\n```"
+    if parser.description:
+        yield " ".join(parser.description.split())
+    for group in parser._action_groups:
+        actions = [each for each in group._group_actions if each.dest != "help"]
+        nested = [each for each in actions if isinstance(each, argparse._SubParsersAction)]
+        rows = [_row(each) for each in actions if each not in nested]
+        title = group.title or ""
+        if title in SHARED and rows:
+            lines = [group.description] if group.description else []
+            shared.setdefault(title, [*lines, _table(("Option", "Meaning"), rows)])
+            yield f"Also: [{SHARED[title].lower()}](#{title})."
+        elif rows:
+            yield _table(("Option", "Meaning"), rows)
+        for each in nested:
+            for name, sub in each.choices.items():
+                yield f"### {parser.prog.split()[-1]} {name}"
+                yield from _command(sub, shared)
+
+
+def _row(action: argparse.Action) -> tuple[str, str]:
+    name = ", ".join(action.option_strings)
+    value = action.metavar or (action.choices and "{" + ",".join(map(str, action.choices)) + "}")
+    value = value if action.nargs != 0 and value else "" if name else action.dest
+    several = " ..." if action.nargs in ("*", "+") else ""
+    help_text = (action.help or "") % {"default": action.default, "prog": "kincheck"}
+    return f"`{' '.join(filter(None, [name, f'{value}{several}'.strip()]))}`", help_text
+
+
+def case_file() -> str:
+    """Return the page of the keys of case and variation files, from the modules that read them."""
+    parts = [
+        "# Case files",
+        "A case file describes a mechanism, its motion, its outputs and their reference. This page"
+        " is made from the modules that read the files. `kincheck list --schema` prints the same"
+        " text, and `kincheck schema case` a JSON Schema for editors.",
+        "To complete and check keys while you write, save the schema once:\n\n"
+        "```sh\nkincheck schema case > kincheck-case.json\n```\n\n"
+        "and name it in the first line of a case file, for editors with the Even Better TOML"
+        " extension or `taplo`: `#:schema ./kincheck-case.json`.",
+    ]
+    for title, module in (
+        ("All keys", schema),
+        ("Masses, gravity and forces", loads),
+        ("Variation files", variation_schema),
+    ):
+        _, _, text = (module.__doc__ or "").partition("Reference. ")
+        prose, _, keys = text.partition("\n\n    ")
+        parts += [f"## {title}", " ".join(prose.split()), f"```text\n{_dedented(keys)}\n```"]
+    return "\n\n".join(parts) + "\n"
+
+
+def _dedented(keys: str) -> str:
+    return "\n".join(line.removeprefix("    ") for line in keys.rstrip().splitlines())
+
+
+HEADS = {
+    "joints: type": ("Joints", ("Type", "Keys", "Rows", "Free", "Meaning")),
+    "joints that": ("Couplers", ("Type", "Keys", "Rows", "Couples", "Meaning")),
+    "drivers": ("Drivers", ("Type", "Keys", "Meaning")),
+    "motions": ("Motions of drivers", ("Type", "Keys", "Meaning")),
+    "force": ("Force elements", ("Type", "Keys", "Meaning")),
+    "outputs: ": ("Outputs", ("Type", "Keys", "Meaning")),
+    "outputs of a wheel": ("Outputs of a wheel", ("Type", "Unit", "Keys", "Sign", "Needs")),
+}
+"""Title and columns by the start of the heading in `kincheck list`."""
+
+
+def types() -> str:
+    """Return the page of the types that a case file can name, from their classes."""
+    parts = [
+        "# Types in case files",
+        "Keys in brackets may be left out. Points and directions are `[x, y, z]`, global, at the"
+        " design position; a key in the plural has one on each body. Body i is the first of"
+        ' `bodies = ["first", "second"]`, body j the second. `kincheck list --joints` and'
+        " `kincheck list --outputs` print the same tables.",
+    ]
+    for heading, rows in (type_tables() | output_tables()).items():
+        title, head = next(value for key, value in HEADS.items() if heading.startswith(key))
+        parts += [f"## {title}", _table(head, [(f"`{row[0]}`", *row[1:]) for row in rows])]
+    parts.append(
+        "Every output of a wheel has its derivative by wheel travel, `NAME.per_travel`, per metre"
+        " of upward motion of the wheel centre. The table `[suspension]` describes the wheel."
+    )
+    return "\n\n".join(parts) + "\n"
+
+
+@cache
+def joints() -> str:
+    """Return the table of joint types and installed engines, from a run."""
+    with tempfile.TemporaryDirectory() as folder:
+        engines = _installed()
+        file = Path(folder) / "joints.md"
+        command = [sys.executable, "-m", "kincheck", "run", "--joints", "--engine", *engines]
+        subprocess.run(
+            [*command, "--markdown", str(file)], check=True, capture_output=True, cwd=folder
+        )
+        table = [line for line in file.read_text("utf-8").splitlines() if line.startswith("|")]
+    return "\n".join(table)
+
+
+def _installed() -> list[str]:
+    from kincheck import adapters
+
+    return [name for name in adapters.ENGINES if adapters.engine(name).version()]
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    cells = [head, ["---"] * len(head), *rows]
+    return "\n".join(
+        f"| {' | '.join(' '.join(str(cell).split()).replace('|', chr(92) + '|') for cell in row)} |"
+        for row in cells
+    )

@@ -1,0 +1,82 @@
+"""Blocks of a page, and the comparison of shown with printed output."""
+
+import importlib.util
+
+import pytest
+from kincheck.core.cli import COMMANDS
+
+from ..test_architecture import ROOT
+from .page import blocks, commands, differences
+
+PAGE = """
+```toml title="a.toml"
+x = 1
+```
+
+<!-- status: 1 -->
+```console
+$ kincheck run a.toml
+1 fail
+$ ls
+a.toml
+```
+
+- a list
+
+  ```python
+  print(2)
+  ```
+
+  ```text
+  2
+  ```
+
+<!-- not run: takes hours -->
+```sh
+make fuzz
+```
+"""
+
+
+def test_blocks():
+    file, console, python, left_out = blocks(PAGE)
+    assert (file.title, file.text, file.line) == ("a.toml", "x = 1\n", 2)
+    assert (console.status, console.excuse) == (1, None)
+    assert [*commands(console.text)] == [("kincheck run a.toml", "1 fail"), ("ls", "a.toml")]
+    assert (python.text, python.shown) == ("print(2)\n", "2\n")
+    assert left_out.excuse == "takes hours"
+
+
+PRINTED = "case  error\n\nrssr  1.5e-16  pass\nnote: long, and longer\n1 pass\n"
+
+
+@pytest.mark.parametrize(
+    ("shown", "lacks"),
+    [
+        ("case error\nrssr 2e-9 pass", ""),
+        ("...\n1 pass", ""),
+        ("case error\n...\nnote: long ...\n7 pass", ""),
+        ("rssr 2e-9 pass", "rssr # pass"),
+        ("case error\nrssr 2e-9 fail", "rssr # fail"),
+        ("...\n1 pass\ncase error", "case error"),
+    ],
+)
+def test_numbers_may_differ_and_nothing_else(shown, lacks):
+    assert differences(shown, PRINTED) == lacks
+
+
+def test_reference_pages_have_all_commands_and_types():
+    source = ROOT / "docs" / "generated.py"
+    if not source.exists():
+        pytest.skip("the documentation is not here")
+    spec = importlib.util.spec_from_file_location("generated_pages", source)
+    generated = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(generated)
+    pages = generated.PAGES()
+    commands_page = pages["reference/command-line.md"]
+    assert [
+        name for name in COMMANDS if f"\n## {name.replace('_', '-')}\n" not in commands_page
+    ] == []
+    assert "`--missing-is-failure`" in commands_page
+    assert "| `revolute` |" in pages["reference/types.md"]
+    assert "[closure]" in pages["reference/case-file.md"]
