@@ -54,7 +54,7 @@ class Equations:
         bodies: Exudyn's number and the origin [m] of each body; fixed ones are Exudyn's ground.
         nodes: numbers of the nodes, one for each moving body.
         rows: all equations, in order.
-        following: the equations among them that follow a value.
+        following: the equations among them with a given value.
         turning: rows that follow an angle, and their markers on the first and second body; the
             first turns about its z axis.
         bent: rows that follow a polynomial of a value: row, value, polynomial.

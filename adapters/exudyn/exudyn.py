@@ -46,7 +46,7 @@ class Exudyn(ProjectionEngine):
 
     @property
     def described(self) -> Mapping[str, Any]:
-        """Exudyn's coordinates and the calls of its solver that give the rows."""
+        """Exudyn's coordinates and the calls of its solver for the rows."""
         return {
             "coordinates": "absolute, NodeRigidBodyEP, 7 per body",
             "residual": "ComputeAlgebraicEquations",

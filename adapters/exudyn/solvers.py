@@ -71,7 +71,7 @@ class Solver:
         return Exudyn().version()
 
     def unsupported(self, case: Case) -> str | None:
-        """Return the joint, driver or grid of samples that has no counterpart here, or None."""
+        """Return the joint, driver or grid of samples without a counterpart here, or None."""
         return Exudyn().unsupported(case) or limitation_of(Exudyn().known(case))
 
     def efforts(self) -> Mapping[str, Solver]:

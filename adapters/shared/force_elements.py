@@ -1,4 +1,4 @@
-"""Force elements by the frames of a simulator: what each exerts on its bodies.
+"""Force elements by the frames of a simulator: the wrench of each on its bodies.
 
 For simulators without such elements of their own, or whose elements mean something else.
 """
@@ -26,7 +26,7 @@ from .frame_constraints import FrameOnBody
 
 
 def places(each: ForceElement, mechanism: Mechanism) -> Sequence[tuple[str, Vector]]:
-    """Return the bodies that an element acts on, and its points there, global at design [m]."""
+    """Return the bodies of an element, and its points on them, global at design [m]."""
     if isinstance(each, SpringDamper):
         return list(zip(each.bodies, each.points, strict=True))
     if isinstance(each, TorsionSpringDamper):
@@ -45,7 +45,7 @@ class Element:
 
     Attributes:
         frames: one on each of its bodies, at its points.
-        axis: unit vector at design of the joint that a torsional spring-damper acts about.
+        axis: unit vector at design, of the joint of a torsional spring-damper.
         angle: gives the angle of that joint [rad].
     """
 

@@ -22,7 +22,7 @@ from .projection_model import ProjectionModel
 
 @dataclass(frozen=True, eq=False)
 class Dynamics:
-    """What a simulator gives of the forces at a sample, in kg, s and the model's unit of length.
+    """Forces of a simulator at a sample, in kg, s and the model's unit of length.
 
     Attributes:
         demand: M a + h - Q by the unknowns, shape (unknowns,).
@@ -38,10 +38,10 @@ class Dynamics:
 
 @runtime_checkable
 class ForceModel(ProjectionModel, Protocol):
-    """A simulator's model that gives forces too.
+    """A simulator's model with forces.
 
     Attributes:
-        computed_by: for the record, what of the forces the simulator computes by which call.
+        computed_by: for the record, the forces of the simulator itself, with its calls.
     """
 
     @property
@@ -66,7 +66,7 @@ class _Solved:
 def solved_forces(
     model: ForceModel, case: Case, samples: Mapping[int, Sample], unit: float
 ) -> Forces:
-    """Return the forces that the outputs of the case read, at solved samples.
+    """Return the forces read by the outputs of the case, at solved samples.
 
     Args:
         samples: by their place in the sweep.
@@ -124,10 +124,10 @@ def solved_forces(
 
 
 def _solve(J: Array, demand: Array) -> _Solved:
-    """Return the shortest of the multipliers that meet the demand."""
+    """Return the shortest multipliers for the demand."""
     rows, unknowns = J.shape
     u, sizes, vh = np.linalg.svd(J, full_matrices=True)
     if rows < unknowns or sizes[-1] <= RANK_TOLERANCE * sizes[0]:
-        return _Solved(np.full(rows, np.nan, dtype=np.float64), np.zeros((rows, 0)), True)
+        return _Solved(np.full((rows,), np.nan), np.zeros((rows, 0)), True)
     multipliers: Array = np.einsum("ru,u->r", u[:, :unknowns], (vh @ demand) / sizes)
     return _Solved(multipliers, u[:, unknowns:], False)

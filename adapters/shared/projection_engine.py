@@ -72,7 +72,7 @@ class ProjectionEngine(ABC):
         return str(simulator.__version__)
 
     def known(self, case: Case) -> Case:
-        """Return the case with the equivalents of joints that have no counterpart here."""
+        """Return the case with the equivalents of joints without a counterpart here."""
         found = with_equivalents(case.mechanism, self.joints)
         return case if found is case.mechanism else replace(case, mechanism=found)
 

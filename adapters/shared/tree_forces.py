@@ -37,11 +37,11 @@ NO_MASS = 1e-100
 
 
 class LoadedTree(Protocol):
-    """What forces need of a model; see `tree_model.TreeModel`.
+    """Needs of forces from a model; see `tree_model.TreeModel`.
 
     Attributes:
-        parents: number of the body that carries each body.
-        branch_of: joint of the tree -> number of the body that it carries, and its sign.
+        parents: number of the carrier of each body.
+        branch_of: joint of the tree -> number of the carried body, and its sign.
     """
 
     case: Case
@@ -65,7 +65,7 @@ class LoadedTree(Protocol):
         ...
 
     def exerted(self) -> Sequence[RowWrench]:
-        """Return what the multipliers of rows between bodies exert."""
+        """Return the wrenches of multipliers of rows between bodies."""
         ...
 
     def rows_of(self, joint: str) -> Sequence[slice]:
@@ -190,7 +190,7 @@ class TreeForces:
 
 
 def demand_of(body: Body, frame: Any, gravity: Array) -> Array:
-    """Return m (a - g) over I wdot + w x I w, about the centre of mass, where the frame is."""
+    """Return m (a - g) over I wdot + w x I w, about the centre of mass, the place of the frame."""
     force = body.mass * (frame.acceleration[:3] - gravity)
     if body.inertia is None:
         return np.concatenate([force, np.zeros(3)])

@@ -45,10 +45,10 @@ class TreeModel(TreeSimulator):
     Attributes:
         origin: of each body, global at design [m].
         carrier: name of a body of the mechanism -> number of its body here.
-        coordinates: joint and freedom -> body that moves by this coordinate, and its sign.
+        coordinates: joint and freedom -> body moved by this coordinate, and its sign.
         conditions: all rows, the drivers' last.
         closures: name of a cut joint -> its rows, in words.
-        parents: number of the body that carries each body; the ground carries itself.
+        parents: number of the carrier of each body; the ground carries itself.
         branch_of: joint of the tree -> number of the body that it carries, and minus where that is
             the joint's first.
         tied: conditions between frames, their joint and the frames.
@@ -189,7 +189,7 @@ class TreeModel(TreeSimulator):
         """Add the row of a weighted sum of coordinates: joint, freedom and weight of its terms.
 
         Args:
-            curve: coefficients of a polynomial in the last coordinate that is added.
+            curve: coefficients of a polynomial in the last coordinate, which is added.
         """
         moved = [(*self.coordinates[joint, freedom], weight) for joint, freedom, weight in terms]
         weights = np.array([sign * weight for _, sign, weight in moved])
@@ -275,7 +275,7 @@ class TreeModel(TreeSimulator):
         return self.slices[self.conditions.index(condition)]
 
     def exerted(self) -> list[RowWrench]:
-        """Return what the multipliers of conditions between frames exert."""
+        """Return the wrenches of multipliers of conditions between frames."""
         found = [
             RowWrench(self._rows(condition), frame.body, frame.position, wrenches)
             for _, condition, frames in self.tied

@@ -23,7 +23,7 @@ from .frame_constraints import Frame, skew
 
 @dataclass(frozen=True, eq=False)
 class RowWrench:
-    """What multipliers of one exert on a body.
+    """Wrenches on a body by multipliers of one.
 
     Attributes:
         rows: their places.
@@ -43,7 +43,7 @@ class Carried:
     """A joint of the tree.
 
     Attributes:
-        bodies: numbers of all bodies that it carries, its own first.
+        bodies: numbers of all carried bodies, its own first.
         sign: minus where that body is the joint's first.
     """
 
@@ -53,7 +53,7 @@ class Carried:
 
 @dataclass(frozen=True, eq=False)
 class Cut:
-    """A joint that closes a loop.
+    """A joint at the closure of a loop.
 
     Attributes:
         second: number of its second body.
@@ -108,14 +108,14 @@ def about_origin(point: Array, wrenches: Array) -> Array:
 
 
 def from_origin(point: Array) -> Array:
-    """Return the matrix that takes wrenches about the origin to those about a point."""
+    """Return the matrix from wrenches about the origin to those about a point."""
     found = np.eye(6)
     found[3:, :3] = -skew(point)
     return found
 
 
 def carried_by(body: int, parents: Sequence[int]) -> list[int]:
-    """Return a body of a tree and all that it carries; parents are numbered before children."""
+    """Return a body of a tree and all carried bodies; parents are numbered before children."""
     found = [body]
     for child in range(body + 1, len(parents)):
         if parents[child] in found:

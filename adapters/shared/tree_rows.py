@@ -79,7 +79,7 @@ class Linear:
 
 @dataclass(frozen=True, eq=False)
 class Curved:
-    """A linear row, and a polynomial in its last coordinate that is added.
+    """A linear row plus a polynomial in its last coordinate.
 
     Attributes:
         sign: of the coordinate in the tree.
@@ -119,7 +119,7 @@ class DrivenPoint:
 
     @property
     def pull(self) -> Array:
-        """What a multiplier of one exerts at the point, shape (1, 6)."""
+        """Wrench of a multiplier of one at the point, shape (1, 6)."""
         return np.concatenate([self.k, np.zeros(3)])[None]
 
     def rows(self) -> tuple[Any, Array]:

@@ -1,4 +1,4 @@
-"""What a simulator gives to a tree of links; see `tree_model`."""
+"""The part of a simulator in a tree of links; see `tree_model`."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ class TreeSimulator(ABC):
 
     Attributes:
         q: the configuration, never changed in place.
-        recursion: whether it tells what its joints pass on.
-        computed_by: of the forces, what it computes by which call.
+        recursion: whether it gives the wrenches of its joints.
+        computed_by: forces of its own, with its calls.
     """
 
     q: Array

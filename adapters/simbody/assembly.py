@@ -54,7 +54,7 @@ class Assembly:
         return Simbody().version()
 
     def unsupported(self, case: Case) -> str | None:
-        """Return the joint or driver that has no counterpart here, or None."""
+        """Return the joint or driver without a counterpart here, or None."""
         for coupler in case.mechanism.couplers:
             if coupler.curve:
                 return f"{coupler}: OpenSim's assembler gets no polynomial from this adapter"

@@ -35,8 +35,8 @@ class ConstrainedTree(TreeModel):
         o: OpenSim's package.
         model: OpenSim's model, which owns all the rest.
         bodies: of OpenSim, by their numbers; the first is the ground.
-        moves: joint of OpenSim that carries each body after the ground.
-        constraints: what each of OpenSim's constraints keeps: the name of a cut joint, or joint and
+        moves: joint of OpenSim under each body after the ground.
+        constraints: purpose of each of OpenSim's constraints: the name of a cut joint, or joint and
             freedom of the coordinates of a relation.
     """
 

@@ -139,7 +139,7 @@ def measure(
         for case in true.values():
             _measure_work(case, engines, tol, rounds, peak, add, begin)
     name, first = next(iter(true.items()))
-    projections = [engine for engine in engines if engine.mode == "projection"]
+    projections = [each for each in engines if each.mode == "projection"]
     if "loop" in parts:
         add("loops", measure_loops(true.values(), projections, tol, rounds, begin))
     if "batch" in parts:
@@ -158,12 +158,8 @@ def measure(
         begin(f"{first.name}: processes of their own")
         # variants of a simulator take the memory that it takes
         names = {engine.name for engine in projections}
-        add(
-            "processes",
-            measure_processes(
-                first, name, [engine for engine in engines if engine.name in names], tol, rounds
-            ),
-        )
+        own = [engine for engine in engines if engine.name in names]
+        add("processes", measure_processes(first, name, own, tol, rounds))
     run = circumstances([*true.values()], started=started, tol=tol, command=command)
     run |= {
         "cores": os.cpu_count(),
