@@ -62,11 +62,11 @@ def test_no_simulator_steps_over_a_fold():
     15000`.
     """
     engines = [installed(name) for name in SIMULATORS]
-    found, _ = stress([Family.registry["folds"]], engines, samples=60, seed=0, prove=False)
+    found, _ = stress([Family.registry["folds"]], engines, samples=30, seed=0, prove=False)
     for cell in found.cells:
         assert cell.samples[Verdict.SILENTLY_WRONG] == cell.samples[Verdict.REFUSED_WRONGLY] == 0
-        assert cell.samples[Verdict.RIGHT] > 20
-        assert cell.samples[Verdict.REFUSED_RIGHTLY] > 10
+        assert cell.samples[Verdict.RIGHT] > 10
+        assert cell.samples[Verdict.REFUSED_RIGHTLY] > 5
 
 
 # What is asked of a step
