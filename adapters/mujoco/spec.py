@@ -184,7 +184,7 @@ class Sketch:
         # the length is that at design plus a polynomial of another tendon; there is none, which
         # leaves its constant
         equality.data = [rod.rod_length - rod.design_distance, *[0.0] * (len(equality.data) - 1)]
-        self.closures.append(Equality("tendon", ends, rod.rod_length, rod.name))
+        self.closures.append(Equality("tendon", ends, rod.rod_length, joint=rod.name))
 
     def relate(self, terms: Iterable[tuple[str, str, float]]) -> None:
         """Keep the weighted sum of two coordinates (joint, freedom, weight) at zero."""
