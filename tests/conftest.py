@@ -1,5 +1,6 @@
 """What several rooms are tested with."""
 
+import os
 import sys
 from pathlib import Path
 
@@ -12,6 +13,8 @@ from kincheck.core.cli import main as cli
 from kincheck.core.harness.provenance import truth_of
 
 from .support.fakes import Fake, crank
+
+os.environ.pop("COLUMNS", None)  # pytest-xdist sets it for its workers; logs have their own width
 
 NATIVE = Fake("native")
 

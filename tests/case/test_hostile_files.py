@@ -216,7 +216,7 @@ TEXTS: dict[str, tuple[str, str | bytes, str]] = {
         '<?xml version="1.0" encoding="utf-7"?>' + model(""),
         "no body with a joint",
     ),
-    "include": ("a.xml", '<mujoco><include file="/etc/passwd"/></mujoco>', "another file"),
+    "include": ("a.xml", '<mujoco><include file="/etc/passwd"/></mujoco>', "no other is opened"),
     "a name that a terminal obeys": (
         "\x1b[2J\n.xml",
         model("<body><joint/></body>"),
@@ -245,7 +245,7 @@ TEXTS: dict[str, tuple[str, str | bytes, str]] = {
             "file:///etc/passwd": "no such file",
             "large.csv": "larger than 64000000 bytes",
             "lines.csv": "found 2000001 lines",
-            "wide.csv": "expected outputs of the case",
+            "wide.csv": "found column names only",
             "deep.json": "maximum recursion depth",
             "words.json": "expected a decimal number",
         }.items()

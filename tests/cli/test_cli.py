@@ -1,6 +1,7 @@
 """The command line: exit statuses, messages, and what goes to which stream."""
 
 import json
+import re
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -264,9 +265,9 @@ def test_the_other_cases_of_a_bad_one_are_run_and_recorded(
     assert kincheck_main("run", "crank", bad, "--history", "history", engines=engines) == 2
     capsys.readouterr()
     assert kincheck_main("report", "--history", "history") == 1
-    assert capsys.readouterr().out.startswith(
-        "## run 4 against run 3 (last green): 1 case could not be read\n"
-    )
+    told = capsys.readouterr().out.splitlines()[0]
+    told = re.sub(r": \d slower, ", ": ", told)  # of sweeps of 0.05 ms, on a busy machine
+    assert told == "## run 4 against run 3 (last green): 1 case could not be read"
 
 
 def test_a_night_in_which_no_case_can_be_read_is_recorded(

@@ -187,7 +187,7 @@ def test_a_simulator_starts_in_the_assembly_that_was_chosen(to, tmp_path, monkey
         "2",
     ]
     assert main([*argv, "--out", "model"]) == 0
-    main_ending = {"mjcf": ".xml", "exudyn": ".py", "urdf": ".urdf"}[to]
+    main_ending = {"exudyn": ".py", "mjcf": ".xml"}.get(to, f".{to}")
     texts = {
         file.name.removeprefix("model") or main_ending: file.read_text()
         for file in tmp_path.glob("model*")
@@ -211,7 +211,7 @@ def test_a_simulator_starts_in_the_assembly_that_was_chosen(to, tmp_path, monkey
     [
         (["rssr", "--export", "step"], "there is no format 'step'"),
         (["rssr", "--samples", "8", "--export", "mjcf", "--number", "3"], "there is no assembly 3"),
-        (["rssr", "--at", "nan"], "not finite"),
+        (["rssr", "--at", "nan"], "'nan' is not a number"),
         (["rssr", "--samples", "0"], "not a whole number of 1 or more"),
     ],
 )

@@ -173,9 +173,10 @@ def test_a_singular_pose_is_not_stepped_over(compiled):
 
 
 @WAYS
-@pytest.mark.parametrize("loops", [1, 2])
-@pytest.mark.parametrize("count", [2, 9, 50])
-@pytest.mark.parametrize("short", [1e-3, 1e-8])
+@pytest.mark.parametrize(
+    ("short", "count", "loops"),
+    [(1e-3, 9, 1), (1e-3, 50, 2), (1e-8, 2, 2), (1e-8, 9, 2), (1e-8, 50, 2)],
+)
 def test_a_gap_is_the_end_also_of_two_loops_at_once(short, count, loops, compiled):
     """Their determinants change their signs together, and that of the whole keeps it."""
     turn = np.linspace(0.0, 2.0, count)

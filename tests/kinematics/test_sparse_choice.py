@@ -66,11 +66,22 @@ def four_bar(sizes, start, ends):
     )
 
 
-@pytest.mark.parametrize("ends", ["hinges", "universals"])
+PLAIN, KITE, ASIDE = (0.5, 1.5, 1.3, 1.2), (1.25, 1.2, 0.7, 0.7), (1.0, 1.2, 1.000001, 1.2)
+
+
 @pytest.mark.parametrize(
-    "sizes", [(0.5, 1.5, 1.3, 1.2), (1.25, 1.2, 0.7, 0.7), (1.0, 1.2, 1.000001, 1.2)]
+    ("count", "sizes", "ends"),
+    [
+        (9, PLAIN, "hinges"),
+        (9, PLAIN, "universals"),
+        (9, KITE, "hinges"),
+        (9, KITE, "universals"),
+        (9, ASIDE, "hinges"),
+        (9, ASIDE, "universals"),
+        (65, KITE, "universals"),
+        (65, ASIDE, "hinges"),
+    ],
 )
-@pytest.mark.parametrize("count", [9, 65])
 def test_rows_that_come_to_depend_on_each_other_end_nothing(sizes, ends, count):
     """A plain four-bar, a kite off by a twentieth, and one on its side beside its corner."""
     turn = np.linspace(0.0, 1.6, count)
@@ -146,9 +157,19 @@ def inside(off, ends, crank=14, cranks=30, phase=0.7):
 
 # where the rod's arms are in line with it: the parallelogram may go on as another, and what is
 # nearly one turns back
-@pytest.mark.parametrize(("off", "end"), [(0.0, 0.5708), (1e-6, 0.57053), (1e-4, 0.56846)])
-@pytest.mark.parametrize("ends", ["distance", "hinges"])
-@pytest.mark.parametrize("count", [3, 9, 2201])
+@pytest.mark.parametrize(
+    ("count", "ends", "off", "end"),
+    [
+        (3, "distance", 0.0, 0.5708),
+        (9, "hinges", 0.0, 0.5708),
+        (2201, "distance", 0.0, 0.5708),
+        (3, "hinges", 1e-6, 0.57053),
+        (9, "distance", 1e-6, 0.57053),
+        (2201, "hinges", 1e-6, 0.57053),
+        (3, "distance", 1e-4, 0.56846),
+        (9, "hinges", 1e-4, 0.56846),
+    ],
+)
 def test_a_gap_in_the_largest_block_is_not_stepped_over(off, end, ends, count):
     turn = np.linspace(0.0, -1.1, count)
     found = solve(inside(off, ends), "turn", turn, points=["tip29"], order=0)

@@ -52,7 +52,7 @@ def agree(traced, expected, allowed=1e-13):
         assert [*values] == [*others]
         for name in values:
             np.testing.assert_allclose(values[name], others[name], rtol=0.0, atol=allowed * largest)
-    assert found.facts["determined_directions"] == wanted.facts["determined_directions"]
+    assert found.account()["determined_directions"] == wanted.account()["determined_directions"]
     assert np.nanmax(np.abs(found.power)) <= 1e-13 * np.nanmax(found.largest_power)
     np.testing.assert_allclose(found.largest_power, wanted.largest_power, rtol=1e-10)
 

@@ -39,19 +39,27 @@ WITHOUT_EQUIVALENT = ("point_on_parabola", "line_no_twist")
 
 
 pytestmark = pytest.mark.usefixtures("own_joint_types")
+checking = importlib.import_module("kincheck.core.studies.joint_check.check_joint")
+
+
+@pytest.fixture
+def few(monkeypatch):
+    """One specimen of each type, and few starts of Newton's iteration."""
+    monkeypatch.setattr(checking, "SPECIMENS", 1)
+    monkeypatch.setattr(checking, "STARTS", 40)
 
 
 @pytest.mark.parametrize("name", BUILT_IN)
-def test_built_in_joints_pass(name):
-    report = check_joint(Joint.registry[name])
+def test_built_in_joints_pass(few, name):
+    report = check_joint(Joint.registry[name], samples=8)
     assert report.passed, report
     assert len({each.check for each in report.findings}) == len(report.findings)
 
 
 @pytest.mark.parametrize("module", USERS)
-def test_joints_of_users_pass(in_folder, module):
+def test_joints_of_users_pass(few, in_folder, module):
     engines = [adapters.engine(name) for name in adapters.ENGINES]
-    report = check_joint(load_joint(f"{module}:{USERS[module]}"), engines=engines)
+    report = check_joint(load_joint(f"{module}:{USERS[module]}"), samples=8, engines=engines)
     assert report.passed, report
     verdicts = {
         engine.name: report[f"loop: {engine.name}"] for engine in engines if engine.name != "native"
@@ -69,7 +77,7 @@ def test_joints_of_users_pass(in_folder, module):
         )
 
 
-def test_an_engine_whose_residual_is_above_the_tolerance_has_not_solved_the_loop():
+def test_an_engine_whose_residual_is_above_the_tolerance_has_not_solved_the_loop(few):
     native = adapters.engine("native")
 
     def answer(case):
@@ -83,7 +91,7 @@ def test_an_engine_whose_residual_is_above_the_tolerance_has_not_solved_the_loop
     )
 
 
-def test_an_engine_without_derivatives_passes_with_a_note():
+def test_an_engine_without_derivatives_passes_with_a_note(few):
     native = adapters.engine("native")
 
     def answer(case):
@@ -102,7 +110,7 @@ def test_an_engine_without_derivatives_passes_with_a_note():
 # Specimens
 
 
-def test_specimens_given_or_offered():
+def test_specimens_given_or_offered(few):
     one = Universal("u", "a", "ground", (0.0, 0.0, 0.0), ((1.0, 0.0, 0.0), (0.0, 2.0, 0.0)))
     given = check_joint(Universal, specimens=[one])
     assert given.passed, given
@@ -113,7 +121,7 @@ def test_specimens_given_or_offered():
     assert len(offered.specimens) == 1
 
 
-def test_the_seed_reproduces():
+def test_the_seed_reproduces(few):
     first, again, other = (check_joint(Revolute, seed=seed) for seed in (3, 3, 4))
     assert first == again
     assert first.findings != other.findings
@@ -138,7 +146,7 @@ def test_no_specimen():
         check_joint(Revolute, specimens=[])
 
 
-def test_an_equivalent_that_fails_is_not_told_as_missing():
+def test_an_equivalent_that_fails_is_not_told_as_missing(few):
     def equivalent(self):
         raise ValueError("no such bodies")
 
@@ -363,7 +371,7 @@ def test_a_module_that_fails_is_one_message_with_its_place(
     assert str(Path(kincheck.core.__file__).parent) not in line
 
 
-def test_report_names_what_was_not_checked():
+def test_report_names_what_was_not_checked(few):
     report = check_joint(InPlane)
     skipped = {each.check: each.message for each in report.findings if each.verdict is Verdict.SKIP}
     assert set(skipped) == {"exchange", "mixed style", "loop: simulators"}

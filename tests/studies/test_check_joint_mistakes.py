@@ -1,6 +1,7 @@
 """Joints with one mistake each, and the check that must name it."""
 
 import dataclasses
+import importlib
 import math
 from dataclasses import dataclass
 
@@ -21,6 +22,7 @@ from kincheck.core.joints.base import triad, unit
 from kincheck.core.primitives import Row
 
 pytestmark = pytest.mark.usefixtures("own_joint_types")
+checking = importlib.import_module("kincheck.core.studies.joint_check.check_joint")
 
 
 def mistaken(base, primitive=None, **changes):
@@ -201,9 +203,16 @@ MISTAKES = {
 
 
 @pytest.mark.parametrize("mistake", MISTAKES)
-def test_mistakes_are_caught(mistake):
+def test_mistakes_are_caught(mistake, monkeypatch):
+    """One specimen and few poses find them; the two dear checks run where they must find one."""
     check, make = MISTAKES[mistake]
-    report = check_joint(make())
+    monkeypatch.setattr(checking, "SPECIMENS", 1)
+    monkeypatch.setattr(checking, "STARTS", 10)
+    if not check.startswith("loop"):
+        monkeypatch.setattr(checking, "loops", lambda tested, engines: [])
+    if check != "spurious branches":
+        monkeypatch.setattr(checking, "branches", lambda one, starts: [])
+    report = check_joint(make(), samples=8)
     assert check in report.failures, report
     found = report[check]
     assert found.limit is None or found.figure > found.limit

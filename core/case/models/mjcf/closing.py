@@ -113,6 +113,8 @@ class Closing:
 
     def null(self, rows: Array) -> Array:
         """Return an orthonormal basis of the motions left by rows, shape (freedoms, n)."""
+        if len(rows) > rows.shape[1]:  # no matrix of rows by rows, of which a file may have many
+            rows = np.linalg.qr(rows).R
         _, sizes, right = np.linalg.svd(rows, full_matrices=True)
         return right[int((sizes > self.weak).sum()) :]
 
