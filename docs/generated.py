@@ -13,7 +13,7 @@ from pathlib import Path
 from kincheck.core.case.io import loads, schema
 from kincheck.core.case.io.catalogue import output_tables, type_tables
 from kincheck.core.case.variation import variation_schema
-from kincheck.core.cli.main import _parser
+from kincheck.core.cli.main import parser as parser_of
 
 ROOT = Path(__file__).parent.parent
 SHARED = {
@@ -36,7 +36,7 @@ def PAGES() -> dict[str, str]:  # noqa: N802
 
 def command_line() -> str:
     """Return the page of all commands and options, from their parsers."""
-    parser = _parser([])
+    parser = parser_of([])
     (commands,) = (each for each in parser._actions if isinstance(each, argparse._SubParsersAction))
     helps = {each.dest: each.help or "" for each in commands._choices_actions}
     shared: dict[str, list[str]] = {}

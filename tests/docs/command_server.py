@@ -13,24 +13,32 @@ import socket
 import sys
 
 LARGEST = 1 << 20
+IN_PROCESS = ["--jobs", "0"]
+"""Options of `run`: simulators are solved where they are imported already."""
 
 
 def serve(address: str) -> None:
     """Answer callers until the process is ended."""
     import contextlib
+    import gc
     import signal
     import traceback
 
+    import scipy.interpolate  # noqa: F401
+    from kincheck import adapters
     from kincheck.core.cli.main import main
 
+    engines = [name for name in adapters.ENGINES if adapters.engine(name).version()]
     with (
         open(os.devnull, "w") as nowhere,
         contextlib.redirect_stdout(nowhere),
         contextlib.redirect_stderr(nowhere),
     ):
-        main(["run", "rssr", "--engine", "native", "--out", os.path.dirname(address)])
+        report = ["--out", os.path.dirname(address)]
+        main(["run", "five_bar", *IN_PROCESS, "--engine", *engines, *report])
         main(["explain", "rssr", "--samples", "3"])
 
+    gc.freeze()  # what is imported is never searched again
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)
     listening = socket.socket(socket.AF_UNIX)
     listening.bind(address)
@@ -55,7 +63,8 @@ def serve(address: str) -> None:
         os.environ.update(environment)
         sys.path.insert(0, folder)
         try:
-            status = main(arguments)
+            own = IN_PROCESS if arguments[0] == "run" else []
+            status = main([*arguments, *own])
         except BaseException:
             traceback.print_exc()
             status = 99
