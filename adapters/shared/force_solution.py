@@ -56,7 +56,9 @@ class ForceModel(ProjectionModel, Protocol):
 
 @dataclass(frozen=True, eq=False)
 class _Solved:
-    """Multipliers of the rows, shape (rows,), and a basis of their undetermined combinations."""
+    """Multipliers of the rows, shape (rows,), a basis of their undetermined combinations, and
+    whether the pose is singular and has neither.
+    """
 
     multipliers: Array
     null: Array
@@ -128,6 +130,5 @@ def _solve(J: Array, demand: Array) -> _Solved:
     rows, unknowns = J.shape
     u, sizes, vh = np.linalg.svd(J, full_matrices=True)
     if rows < unknowns or sizes[-1] <= RANK_TOLERANCE * sizes[0]:
-        return _Solved(np.full(rows, np.nan), np.zeros((rows, 0)), True)
-    multipliers = np.asarray(u[:, :unknowns] @ ((vh @ demand) / sizes), dtype=np.float64)
-    return _Solved(multipliers, u[:, unknowns:], False)
+        return _Solved(np.zeros(rows), np.zeros((rows, 0)), True)
+    return _Solved(u[:, :unknowns] @ ((vh @ demand) / sizes), u[:, unknowns:], False)
