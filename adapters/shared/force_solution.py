@@ -130,5 +130,6 @@ def _solve(J: Array, demand: Array) -> _Solved:
     rows, unknowns = J.shape
     u, sizes, vh = np.linalg.svd(J, full_matrices=True)
     if rows < unknowns or sizes[-1] <= RANK_TOLERANCE * sizes[0]:
-        return _Solved(np.zeros(rows), np.zeros((rows, 0)), True)
-    return _Solved(u[:, :unknowns] @ ((vh @ demand) / sizes), u[:, unknowns:], False)
+        return _Solved(np.zeros((rows,)), np.zeros((rows, 0)), True)
+    multipliers: Array = u[:, :unknowns] @ ((vh @ demand) / sizes)
+    return _Solved(multipliers, u[:, unknowns:], False)
