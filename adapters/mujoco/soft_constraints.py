@@ -1,0 +1,193 @@
+"""What MuJoCo reports as the forces of its own constraints, beside those of rigid bodies.
+
+MuJoCo's constraints are soft, so these are another product than the engine's forces, which are the
+multipliers of exact rows. At a pose, velocities and applied forces of the exact motion, MuJoCo is
+left to find its own accelerations; its equality of a tendon, which a rod is, has no Jdot v. Run:
+
+    python -m kincheck.adapters.mujoco.soft_constraints CASE.toml
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...core.case.case import Case
+from ...core.case.io.case_file import load_case
+from ...core.errors import CaseError, KincheckError
+from ...core.kinematics import start_of
+from ...core.mechanism.motions import outwards
+from ...core.trajectory import Array
+from ..shared.length_scaling import own_frame
+from ..shared.pose_solver import Sample
+from ..shared.projection import Walk
+from .mujoco import MuJoCo, MuJoCoModel
+
+# solref and solimp of every equality: MuJoCo's own, and nearly rigid.
+SOFTNESS: Mapping[str, tuple[Sequence[float], Sequence[float]]] = {
+    "default": ((0.02, 1.0), (0.9, 0.95, 0.001, 0.5, 2.0)),
+    "stiff": ((0.002, 1.0), (0.9999, 0.9999, 0.001, 0.5, 2.0)),
+}
+# Steps of MuJoCo's constraint solver; it stops before, where nothing is left to gain.
+ITERATIONS = 500
+TOL = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class RodForces:
+    """The compression of a rod over the samples [N], shape (n,) each.
+
+    Attributes:
+        rigid: by the exact accelerations.
+        without_bias: of rigid bodies whose row of the rod has no Jdot v.
+        forward: `efc_force` after `mj_forward`, by softness.
+        inverse: `efc_force` after `mj_inverse` at the exact accelerations, by softness.
+    """
+
+    rigid: Array
+    without_bias: Array
+    forward: Mapping[str, Array]
+    inverse: Mapping[str, Array]
+
+
+def rod_forces(case: Case, rod: str) -> RodForces:
+    """Return the forces of a rod, a distance joint that closes a loop, over the sweep of a case.
+
+    Raises:
+        CaseError: the case reads no forces, its bodies lack masses, or the rod is no tendon.
+        SolveError: the case cannot be built.
+    """
+    if not case.forces:
+        raise CaseError(f"case {case.name!r}: no output reads a force; add one, as joint_force")
+    if (reason := MuJoCo().unsupported(case)) is not None:
+        raise CaseError(f"case {case.name!r}: {reason}")
+    model, unit = MuJoCo().build(case), own_frame(case).unit
+    loaded, m, d, mj = model.loaded, model.m, model.d, model.mj
+    assert loaded is not None
+    tendons = [
+        rows.start for each, rows in loaded.rows if (each.joint, each.kind) == (rod, "tendon")
+    ]
+    if not tendons:
+        known = [each.joint for each, _ in loaded.rows if each.kind == "tendon"]
+        raise CaseError(
+            f"case {case.name!r}: joint {rod!r} is no rod that MuJoCo has as a tendon, expected one"
+            f" of: {', '.join(known) or 'none'}"
+        )
+    row, equalities = tendons[0], model.n
+    m.dof_armature[:] = 0.0
+    rigid, without_bias = list[float](), list[float]()
+    own = {(way, name): list[float]() for way in ("forward", "inverse") for name in SOFTNESS}
+    exact = m.eq_solref.copy(), m.eq_solimp.copy()
+    m.opt.iterations, m.opt.tolerance = ITERATIONS, 0.0
+    samples = list(_samples(model, case))
+    mj.mj_setConst(m, d)
+    for at in samples:
+        model.restore(at.saved)
+        model.residual(at.c)
+        J = np.array(model.jacobian())
+        given = model.dynamics(at.v, at.a)
+        multipliers = np.linalg.lstsq(J.T, given.demand)[0]
+        applied = loaded.inverse_dynamics(at.v, at.a) - given.demand
+        applied += J[equalities:].T @ multipliers[equalities:]
+        bias = model.bias(at.v)[:equalities]
+        bias[row] = 0.0
+        rigid.append(float(multipliers[row]))
+        unbiased = _rigid(model, J[:equalities], bias, applied, at.v, case)
+        without_bias.append(float(unbiased[row]))
+        for name, (solref, solimp) in SOFTNESS.items():
+            m.eq_solref[:], m.eq_solimp[:] = solref, solimp
+            d.qfrc_applied[:] = applied
+            mj.mj_forward(m, d)
+            own["forward", name].append(float(d.efc_force[row]))
+            d.qacc[:] = at.a
+            mj.mj_inverse(m, d)
+            own["inverse", name].append(float(d.efc_force[row]))
+        d.qfrc_applied[:] = 0.0
+        m.eq_solref[:], m.eq_solimp[:] = exact
+    return RodForces(
+        unit * np.array(rigid),
+        unit * np.array(without_bias),
+        {name: unit * np.array(own["forward", name]) for name in SOFTNESS},
+        {name: unit * np.array(own["inverse", name]) for name in SOFTNESS},
+    )
+
+
+def _rigid(
+    model: MuJoCoModel, E: Array, bias: Array, applied: Array, v: Array, case: Case
+) -> Array:
+    """Return the multipliers of rigid rows E qacc = -bias with these applied forces."""
+    n, (rows, _) = len(v), E.shape
+    loaded = model.loaded
+    assert loaded is not None
+    drift = loaded.inverse_dynamics(v, np.zeros(n))
+    columns = [loaded.inverse_dynamics(v, unit) - drift for unit in np.eye(n)]
+    mass = np.array(columns).T
+    if np.linalg.eigvalsh(0.5 * (mass + mass.T))[0] <= 0.0:
+        raise CaseError(
+            f"case {case.name!r}: a body that moves has no mass or no inertia, and MuJoCo finds no"
+            " accelerations; give every body mass and inertia"
+        )
+    system = np.block([[mass, -E.T], [E, np.zeros((rows, rows))]])
+    found = np.linalg.solve(system, np.concatenate([applied - drift, -bias]))
+    return np.asarray(found[n:], dtype=np.float64)
+
+
+def _samples(model: MuJoCoModel, case: Case) -> Iterator[Sample]:
+    """Yield the samples that the engine's walk reaches."""
+    walk, path = Walk(model, case, TOL, None, own_frame(case)), case.sweep.path
+    origin, message = walk.start(path, start_of(case.mechanism, path))
+    if origin is None:
+        raise CaseError(f"case {case.name!r}: {message}")
+    step = float(np.abs(np.diff(path.times)).max(initial=0.0))
+    for side in outwards(path.times, origin.t):
+        at = origin
+        for k in side:
+            at, reached = walk.advance(path, at, float(path.times[k]), step)
+            if not reached:
+                break
+            yield at
+
+
+def told(found: RodForces, rod: str) -> str:
+    """Return the findings as lines of text."""
+    largest, n = float(np.abs(found.rigid).max()), len(found.rigid)
+
+    def off(values: Array, other: Array) -> str:
+        return f"{float(np.abs(values - other).max()):.3g} N"
+
+    lines = [f"{rod}: at most {largest:.4g} N over {n} samples, by exact rows"]
+    for name, values in found.forward.items():
+        lines += [
+            f"{name} equalities, efc_force of mj_forward: off by up to {off(values, found.rigid)};"
+            f" from rigid rows without Jdot v of the tendon by {off(values, found.without_bias)}",
+            f"{name} equalities, efc_force of mj_inverse at the exact accelerations: off by up to"
+            f" {off(found.inverse[name], found.rigid)}",
+        ]
+    return "\n".join(lines)
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Print the forces of every rod of a case file; return the exit status."""
+    if len(arguments) != 1:
+        print(
+            "usage: python -m kincheck.adapters.mujoco.soft_constraints CASE.toml", file=sys.stderr
+        )
+        return 2
+    try:
+        case = load_case(arguments[0])
+        rods = [joint.name for joint in case.mechanism.joints if joint.type == "distance"]
+        if not rods:
+            raise CaseError(f"case {case.name!r}: no joint is a distance, and MuJoCo has no tendon")
+        for rod in rods:
+            print(told(rod_forces(case, rod), rod))
+    except KincheckError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
