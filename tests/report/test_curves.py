@@ -72,8 +72,8 @@ def test_without_pyarrow_nothing_is_solved(tmp_path, monkeypatch, capsys):
     assert main(["run", "rssr", "--engine", "native", "--parquet", str(file)]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert line.endswith(
-        f"--parquet {file}: Parquet needs pyarrow: pip install 'kincheck[parquet]'; or give"
-        " --csv FILE"
+        f"--parquet {file}: Parquet needs pyarrow, which is not installed: pip install"
+        " 'pyarrow>=17'; or give --csv FILE"
     )
     assert not file.exists()
 

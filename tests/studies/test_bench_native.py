@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from kincheck import adapters, cases
 from kincheck.core import SolveError
+from kincheck.core.case.case import without_forces
 from kincheck.core.harness.record import Outcome
 from kincheck.core.studies.bench import (
     batch,
@@ -48,7 +49,7 @@ def test_native_efforts_go_from_coarse_to_fine(monkeypatch):
 
 
 def test_levels_give_what_is_asked_and_no_more():
-    case = cases.load("rssr")
+    case = without_forces(cases.load("rssr"))
     found = {
         each.entry.setting: each.entry
         for each in precision.contestants(case, native_breakdown.LEVELS, TOL)
@@ -60,7 +61,7 @@ def test_levels_give_what_is_asked_and_no_more():
 
 
 def test_forces_are_a_level_of_cases_with_masses():
-    case = cases.load("rssr")
+    case = cases.load("double_cardan")
     assert native_breakdown.levels(case) == native_breakdown.LEVELS
     case = replace(case, mechanism=loaded(case.mechanism))
     engine = native_breakdown.levels(case)[native_breakdown.FORCES]

@@ -269,7 +269,8 @@ def same_after_writing(case, folder):
 
 def test_what_a_case_file_cannot_say_is_named():
     case = cases.load("rssr")
-    uneven = replace(case, sweep=replace(case.sweep, values=np.array([0.0, 1.0, 1.5])))
+    values = np.array([0.0, 1.0, 1.5])
+    uneven = replace(case, sweep=replace(case.sweep, values=values), reference={})
     with pytest.raises(CaseError, match="no even grid"):
         case_text(uneven)
     strut = cases.load("mcpherson_suspension")
