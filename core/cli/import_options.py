@@ -79,7 +79,7 @@ def add_options(command: argparse.ArgumentParser) -> None:
         "--travel", metavar="M[:SAMPLES]", help="of the wheel, up and down [m]; default 0.05:41"
     )
     model = command.add_argument_group(
-        "models", "Models of MuJoCo (.xml); nothing in them says how they are driven."
+        "models", "Models (MJCF, URDF, SDF); nothing in them says how they are driven."
     )
     model.add_argument(
         "--drive",
