@@ -151,7 +151,8 @@ def parser(argv: Sequence[str]) -> Parser:
     takes a millisecond to build.
     """
     found = Parser(
-        prog="kincheck", description="Cross-validation of the kinematics and forces of multibody systems."
+        prog="kincheck",
+        description="Cross-validation of the kinematics and forces of multibody systems.",
     )
     found.add_argument("--version", action="version", version=f"kincheck {VERSION}")
     commands = found.add_subparsers(title="commands", required=True, metavar="COMMAND")
