@@ -47,6 +47,10 @@ def conditions(mechanism: Mechanism) -> Conditions:
             )
         stated(writer, joint)
     for coupler in mechanism.couplers:
+        if coupler.curve:
+            raise NotStatedError(
+                f"{coupler}: the stress truth has no polynomial conditions; use a linear coupler"
+            )
         row = writer.row(coupler.name)
         largest = max(
             abs(k) * (writer.unit if f == "translation" else 1.0) for f, k in _weights(coupler)
