@@ -120,9 +120,9 @@ def test_redundant_rows_of_a_sparse_system_do_not_hide_a_corner_or_a_gap(rod, en
     assert found.solved.all() or "singular pose ahead" in found.message
 
 
-@pytest.mark.parametrize("cranks", [12, 22])
-@pytest.mark.parametrize("turns", [1, 2, -4])
-@pytest.mark.parametrize("count", [2, 11])
+@pytest.mark.parametrize(
+    ("cranks", "turns", "count"), [(12, 2, 2), (12, -4, 11), (22, 1, 2), (22, -4, 2), (22, 2, 11)]
+)
 def test_turns_between_two_samples_are_not_lost(cranks, turns, count):
     """A nut stands at both: where it stands says nothing of the turns, which its driver makes
     between them, but its lead does.
