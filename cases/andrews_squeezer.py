@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ..core.mechanism.mechanism import Mechanism
-from .dynamics import Three, effort, standing
+from .dynamics import Three, effort
 from .jet import Jet, Lanes, Motion, cos, sin
 from .vectors import Vec, fixed, meet_in_plane
 
@@ -47,4 +47,4 @@ def bodies(turn: Jet) -> Mapping[str, Three]:
 
 def forces(mechanism: Mechanism, turn: Jet) -> Mapping[str, Lanes]:
     """Return the torque of the crank."""
-    return {"crank_torque": effort(mechanism, turn, bodies(turn), bodies(standing(turn)))}
+    return {"crank_torque": effort(mechanism, turn, bodies)}

@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ..core.mechanism.mechanism import Mechanism
-from .dynamics import Three, effort, standing
+from .dynamics import Three, effort
 from .jet import Jet, Lanes, Motion, cos, sin, sqrt
 from .vectors import cross, fixed
 
@@ -57,4 +57,4 @@ def bodies(turn: Jet) -> Mapping[str, Three]:
 
 def forces(mechanism: Mechanism, turn: Jet) -> Mapping[str, Lanes]:
     """Return the torque of the driven hinge."""
-    return {"hinge_torque": effort(mechanism, turn, bodies(turn), bodies(standing(turn)))}
+    return {"hinge_torque": effort(mechanism, turn, bodies)}

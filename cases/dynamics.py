@@ -7,7 +7,7 @@ the case's closed form: each body by three points of it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TypeAlias
 
 import numpy as np
@@ -15,20 +15,19 @@ import numpy as np
 from ..core.mechanism.loads import SpringDamper
 from ..core.mechanism.mechanism import GROUND, Mechanism
 from .jet import Jet, Lanes, sqrt
-from .vectors import Numbers, Vec, carried, cross, fixed
+from .vectors import Numbers, Vec, carried, fixed
 
 Three: TypeAlias = tuple[Vec, Vec, Vec]
 
 
-def effort(
-    mechanism: Mechanism, turn: Jet, now: Mapping[str, Three], design: Mapping[str, Three]
-) -> Lanes:
+def effort(mechanism: Mechanism, turn: Jet, bodies: Callable[[Jet], Mapping[str, Three]]) -> Lanes:
     """Return the effort of the only driver over the samples [N or N m].
 
     Args:
-        turn: the driver's coordinate, which moves at every sample.
-        now, design: three points of each moving body, not on one line.
+        turn: change of the driver's coordinate since design, which moves at every sample.
+        bodies: takes the change to three points of each moving body, not on one line.
     """
+    now, design = bodies(turn), bodies(standing(turn))
     power = np.zeros_like(turn.x)
     gravity = fixed(mechanism.gravity, turn)
     for body in mechanism.moving:
@@ -65,17 +64,15 @@ def turning_power(inertia: Numbers, design: Three, now: Three) -> Lanes:
     origin = fixed((0.0, 0.0, 0.0), like)
     base = carried(design, now, origin)
     axes = [carried(design, now, fixed(axis, like)) - base for axis in np.eye(3).tolist()]
+    e, rates, seconds = (
+        np.array([[getattr(x, order) for x in axis] for axis in axes]) for order in ("x", "v", "a")
+    )
+    omega, omega_t = (
+        np.einsum("kxn,xn->kn", e, 0.5 * np.cross(e, each, axis=1).sum(axis=0))
+        for each in (rates, seconds)
+    )
     xx, yy, zz, xy, yz, xz = inertia
     matrix = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    spin, change = origin, origin
-    for axis in axes:
-        rate, second = (
-            Vec(*(constant_like(each) for each in values))
-            for values in ([x.v for x in axis], [x.a for x in axis])
-        )
-        spin, change = spin + 0.5 * cross(axis, rate), change + 0.5 * cross(axis, second)
-    omega = np.array([(axis @ spin).x for axis in axes])
-    omega_t = np.array([(axis @ change).x for axis in axes])
     return np.einsum("in,ij,jn->n", omega, matrix, omega_t)
 
 
@@ -83,9 +80,3 @@ def standing(like: Jet) -> Jet:
     """Return a coordinate at the design position, without motion, one sample."""
     zero = np.zeros_like(like.x[:1])
     return Jet(zero, zero, zero)
-
-
-def constant_like(values: Lanes) -> Jet:
-    """Return numbers as jets without derivatives."""
-    zero = np.zeros_like(values)
-    return Jet(values, zero, zero)

@@ -102,8 +102,7 @@ def forces(mechanism: Mechanism, turn: Jet) -> Mapping[str, Lanes]:
         f"coupler_pin_force_{axis}": -(of_coupler * b.x + of_rocker * c.x) / turns
         for axis, b, c in (("e1", u.x, w.x), ("e2", u.y, w.y))
     }
-    at_design = bodies(standing(turn))
-    return found | {"crank_torque": effort(mechanism, turn, bodies(turn), at_design)}
+    return found | {"crank_torque": effort(mechanism, turn, bodies)}
 
 
 def in_plane(vector: Numbers) -> tuple[float, float]:

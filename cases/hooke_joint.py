@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ..core.mechanism.mechanism import Mechanism
-from .dynamics import Three, effort, standing
+from .dynamics import Three, effort
 from .jet import Jet, Lanes, Motion, cos, sin, sqrt
 from .vectors import Numbers, Vec, fixed
 
@@ -62,4 +62,4 @@ def bodies(turn: Jet) -> Mapping[str, Three]:
 
 def forces(mechanism: Mechanism, turn: Jet) -> Mapping[str, Lanes]:
     """Return the torque of the driving shaft."""
-    return {"shaft_torque": effort(mechanism, turn, bodies(turn), bodies(standing(turn)))}
+    return {"shaft_torque": effort(mechanism, turn, bodies)}

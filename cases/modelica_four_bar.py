@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ..core.mechanism.mechanism import Mechanism
-from .dynamics import Three, effort, standing
+from .dynamics import Three, effort
 from .jet import Jet, Lanes, Motion, constant, cos, sin, sqrt
 from .vectors import Vec, fixed
 
@@ -43,5 +43,5 @@ def forces(mechanism: Mechanism, turn: Jet) -> Mapping[str, Lanes]:
     """Return the torque of the crank, and the push of a massless rod on the slider."""
     slider = mechanism.moving[1]
     push = slider.mass * (next(iter(motion(turn)["slider_pin"])).a - mechanism.gravity[0])
-    torque = effort(mechanism, turn, bodies(turn), bodies(standing(turn)))
+    torque = effort(mechanism, turn, bodies)
     return {"crank_torque": torque, "rod_force_x": push}

@@ -8,6 +8,7 @@ two assemblies. The crank turns fully in both, so neither ever comes to the othe
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 
 from ..core.mechanism.mechanism import Mechanism
 from .dynamics import Three, effort, standing
@@ -55,7 +56,7 @@ def forces(mechanism: Mechanism, turn: Jet, side: float = 1.0) -> Mapping[str, L
     _, gy, gz = mechanism.gravity
     moment = inertia * turned - rocker.mass * (center_y.x * gz - center_z.x * gy)
     tension = moment / (arm.y * rod.z - arm.z * rod.y).x  # per length of the rod
-    torque = effort(mechanism, turn, bodies(turn, side), bodies(standing(turn), side))
+    torque = effort(mechanism, turn, partial(bodies, side=side))
     return {
         "crank_torque": torque,
         "rod_force_y": tension * rod.y.x,
