@@ -19,6 +19,7 @@ SINE_TERMS, COSINE_TERMS = 9, 9
 # pi / 2 in three parts of 33 bits: a multiple of up to 2^20 times each is exact (Cody and Waite).
 HALF_PI = (1.57079632673412561417e00, 6.07710050630396597660e-11, 2.02226624879595063154e-21)
 BINARY = {"+": "fadd", "-": "fsub", "*": "fmul", "/": "fdiv"}
+EXTREMES = frozenset({"minimum", "maximum"})
 CALLS = {"sqrt": "sqrt", "abs": "fabs", "min": "minimum", "max": "maximum"}
 
 
@@ -94,8 +95,11 @@ class Lines:
     def call(self, name: str, *operands: str) -> str:
         """Call one of LLVM's vector functions."""
         arguments = ", ".join(f"{self.vector} {x}" for x in operands)
-        # # nsz: the order of the two zeros does not matter, and costs three more instructions
-        return self.let(f"call nsz {self.vector} @llvm.{name}.v{self.width}f64({arguments})")
+        # of two zeros either may be the smaller: their order costs three more instructions.
+        # Elsewhere nsz would let LLVM turn the sign of a zero in compiled programs, which would
+        # then differ from interpreted ones.
+        flags = " nsz" if name in EXTREMES else ""
+        return self.let(f"call{flags} {self.vector} @llvm.{name}.v{self.width}f64({arguments})")
 
     def umax(self, a: str, b: str) -> str:
         """Return the larger of two numbers without a sign, or NaN: their bits have the same order,
@@ -135,7 +139,7 @@ class Lines:
         k = self.call("rint", self.arithmetic("*", x, self.constant(2.0 / math.pi)))
         y = x
         for part in HALF_PI:
-            # # not fused: the products are exact, and the differences must see them as such
+            # not fused: the products are exact, and the differences must see them as such
             y = self.arithmetic("-", y, self.arithmetic("*", k, self.constant(part)))
         z = self.arithmetic("*", y, y)
         odd = [(-1.0) ** n / math.factorial(2 * n + 1) for n in range(SINE_TERMS)]
