@@ -15,7 +15,7 @@ def unit(a: Sequence[Scalar]) -> Vec3:
     return (1.0 / root(v @ v)) * v
 
 
-# # Hardpoint tables carry three digits or more, so rounding tilts an axis by less than this; more
+# Hardpoint tables carry three digits or more, so rounding tilts an axis by less than this; more
 # is a mistake in the table. Within it the axes keep their design angle, as the two hinges of a
 # simulator do.
 ROUNDED_RIGHT_ANGLE = 1e-2

@@ -25,7 +25,7 @@ from .loads import ForceElement, TorsionSpringDamper
 GROUND = "ground"
 """The name of the global frame; it can be used like a body and needs no declaration."""
 
-# # Largest gap of a joint between fixed bodies [m]: the tightest default tolerance of any output.
+# Largest gap of a joint between fixed bodies [m]: the tightest default tolerance of any output.
 HOLDS = 1e-9
 
 

@@ -49,7 +49,7 @@ def spanning_tree(mechanism: Mechanism, first: Collection[str] = ()) -> Spanning
     }
     named |= {joint for coupler in mechanism.couplers for joint in coupler.joints}
     candidates = [joint for joint in mechanism.joints if joint.rows >= 3]
-    # # the smallest is taken first
+    # the smallest is taken first
     ranks = [(joint.name not in named, -joint.rows, k) for k, joint in enumerate(candidates)]
     touching: dict[str, list[int]] = {}
     for k, joint in enumerate(candidates):

@@ -49,7 +49,7 @@ def bytecode(program: Program, slots: int, width: int) -> Bytecode:
     """
     program = lowered(unrolled(program))
     nodes, vector = [*program.nodes], 8 * width
-    # # an input that goes to another slot must survive the output that overwrites its own
+    # an input that goes to another slot must survive the output that overwrites its own
     inputs = {k for k in program.outputs.values() if nodes[k][0] == "input"}
     copied = {k: len(nodes) + at for at, k in enumerate(inputs)}
     nodes += [("copy", k) for k in inputs]
@@ -57,7 +57,7 @@ def bytecode(program: Program, slots: int, width: int) -> Bytecode:
     read = {int(node[1]) * vector for node in nodes if node[0] in ("input", "node")}
     goes = {k: at for at, k in outputs.items() if at not in read}
     operated = [operands(node) for node in nodes]
-    # # output places are never free
+    # output places are never free
     uses = counts(len(nodes), *operated, outputs.values())
     place = [int(node[1]) * vector if node[0] == "input" else 0 for node in nodes]
     words, free, cells = list[int](), list[int](), slots
@@ -117,7 +117,7 @@ def _stretches(
     while ready:
         kind = max(ready, key=lambda op: len(ready[op]))
         stretch = ready.pop(kind)
-        for k in stretch:  # # the list grows during the loop
+        for k in stretch:  # the list grows during the loop
             for x in readers[k]:
                 missing[x] -= 1
                 if not missing[x]:

@@ -67,14 +67,14 @@ def _entry(content: bytes) -> Path | None:
 
 def _write(entry: Path, made: bytes) -> None:
     """Store an entry; without write access the next process only has to make it again."""
-    import tempfile  # # slow to import, and not needed for existing entries
+    import tempfile  # slow to import, and not needed for existing entries
 
     try:
         entry.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=entry.parent) as folder:
             whole = Path(folder) / entry.name
             whole.write_bytes(_checksum(entry, made) + made)
-            whole.replace(entry)  # # atomic, also with concurrent writers
+            whole.replace(entry)  # atomic, also with concurrent writers
         _shrink(entry.parent)
     except OSError:
         return
@@ -91,7 +91,7 @@ def _shrink(here: Path) -> None:
     sizes = accumulate(status.st_size for _, status in entries)
     for (path, _), size in zip(entries, sizes, strict=True):
         if size > MOST:
-            path.unlink(missing_ok=True)  # # another process may delete it too
+            path.unlink(missing_ok=True)  # another process may delete it too
 
 
 def size() -> int:
@@ -103,7 +103,7 @@ def size() -> int:
 def _entries(here: Path) -> Iterator[tuple[Path, os.stat_result]]:
     with os.scandir(here) as found:
         for each in found:
-            with suppress(FileNotFoundError):  # # another process has just deleted it
+            with suppress(FileNotFoundError):  # another process has just deleted it
                 if each.is_file():
                     yield Path(each), each.stat()
 

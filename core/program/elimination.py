@@ -22,7 +22,7 @@ from .dense_core import Core
 from .tape import Traced, absolute, minimum, where_larger
 
 SAFE_LITERAL = 0.5
-# # Signs of more blocks share digits: as digits of a double they are exact up to this number.
+# Signs of more blocks share digits: as digits of a double they are exact up to this number.
 DIGITS = 50
 
 
@@ -49,7 +49,7 @@ class Elimination:
     def __init__(self, rows: Sequence[Mapping[int, Scalar]]) -> None:
         self.n = len(rows)
         self.pivots: list[Scalar] = []
-        self._alone: list[tuple[int, Scalar]] = []  # # traced pivots outside cores, with their rows
+        self._alone: list[tuple[int, Scalar]] = []  # traced pivots outside cores, with their rows
         self._block_of_row: dict[int, int] = {}
         entries = [dict(row) for row in rows]
         self._sparse = self._eliminate_sparse(entries)
@@ -184,7 +184,7 @@ def _blocks(
     entries: Sequence[Mapping[int, Scalar]], rows: Sequence[int]
 ) -> list[tuple[list[int], list[int]]]:
     """Return rows and columns of the blocks; each block needs only earlier ones."""
-    # # scipy.sparse.csgraph has this, but its import takes longer than all other imports here
+    # scipy.sparse.csgraph has this, but its import takes longer than all other imports here
     row_of = _matched({i: list(entries[i]) for i in rows})
     column_of = {i: j for j, i in row_of.items()}
     place = {i: k for k, i in enumerate(rows)}
@@ -194,7 +194,7 @@ def _blocks(
     for _ in range(len(rows).bit_length()):  # paths of twice the length
         needs = np.minimum(needs @ needs, 1.0)
     found: dict[bytes, list[int]] = {}
-    # # a block needs more columns than each of its prerequisites
+    # a block needs more columns than each of its prerequisites
     order: list[int] = np.argsort(needs.sum(axis=1), kind="stable").tolist()
     for k in order:
         found.setdefault((needs[k] * needs[:, k]).tobytes(), []).append(rows[k])

@@ -74,7 +74,7 @@ class Linker:
                 np.argsort(stage, kind="stable"),
             )
             words[start[some]], words[start[some] + 1] = KINDS[op], 4 * size * count[some]
-            # # position of each row within its stage
+            # position of each row within its stage
             before = np.arange(len(stage)) - (np.cumsum(count) - count)[stage[order]]
             at = start[stage[order]] + 2 + size * before
             words[at[:, None] + np.arange(size)] = (
@@ -90,9 +90,9 @@ class Linker:
             memory: allocates the rows of intermediate values.
         """
         count, lanes = len(slots), len(slots.T)
-        table = bytecode(program, count, 1)  # # any width will do: offsets are scaled below
+        table = bytecode(program, count, 1)  # any width will do: offsets are scaled below
         abreast = min(ABREAST, lanes)
-        # # the last group repeats the last lane, which gives the same result again
+        # the last group repeats the last lane, which gives the same result again
         groups = np.minimum(np.arange(-(-lanes // abreast) * abreast), lanes - 1).reshape(
             -1, abreast
         )
@@ -109,7 +109,7 @@ class Linker:
             op, size = _OPS[int(words[at])], int(words[at + 1]) // 4
             rows = words[at + 2 : at + 2 + size].reshape(-1, 1 + ARITY[op])
             placed = np.empty((len(groups), len(rows), abreast, rows.shape[1]), np.intp)
-            # # the operands of a constant are its value
+            # the operands of a constant are its value
             named = 1 if op == "const" else rows.shape[1]
             placed[..., :named] = where[rows[:, :named] // 8].transpose(2, 0, 3, 1)
             placed[..., named:] = rows[:, None, named:]

@@ -30,7 +30,7 @@ def lowered(program: Program) -> Program:
     taken: dict[int, int] = {}
     for k, node in enumerate(nodes):
         if node[0] in SUMS:
-            # # of two products the later one: the earlier has had more time to finish
+            # of two products the later one: the earlier has had more time to finish
             products = [x for x in operated[k] if nodes[x][0] == "*" and uses[x] == 1]
             if products:
                 taken[k] = max(products)

@@ -15,7 +15,7 @@ from .tape import LEAVES, operands, place_of
 
 
 def _min(a: Array, b: Array, out: Array) -> None:
-    np.minimum(a, b, out=out)  # # by keyword: numpy rejects a third positional array
+    np.minimum(a, b, out=out)  # by keyword: numpy rejects a third positional array
 
 
 def _max(a: Array, b: Array, out: Array) -> None:
@@ -179,7 +179,7 @@ class NumpyLanes:
                     free[np.bool_ if program.nodes[x][0] == "larger" else np.float64].append(
                         place[x]
                     )
-        # # an input that goes to another slot must survive the output that overwrites its own
+        # an input that goes to another slot must survive the output that overwrites its own
         for node in kept:
             if program.nodes[node][0] in ("input", "node"):
                 copy = np.empty(shape)

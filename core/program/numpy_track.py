@@ -47,7 +47,7 @@ class NumpyTrack:
         executor.heads[:] = [0, *ends[:-1]]
         try:
             executor.settle("predict", plan.joined)
-        finally:  # # after an interrupt the executor is used again
+        finally:  # after an interrupt the executor is used again
             executor.heads[:] = [0]
         lanes = [block[:, end - count : end] for count, end in zip(counts, ends, strict=True)]
         reached = [_leading(each[plan.slots[MARGIN]]) for each in lanes]
@@ -77,7 +77,7 @@ class NumpyTrack:
         sampled, smooth, whole = list(plan.sampled), False, False
         block[carried[1]] = (self._start if anew else self.anchors[side])[:, None]
         while at < stop:
-            # # extrapolation needs groups that begin at a multiple of the lanes: a shorter group
+            # extrapolation needs groups that begin at a multiple of the lanes: a shorter group
             # goes up to there
             count = min(lanes - at % lanes if whole and extrapolates else lanes, stop - at)
             block[sampled, :count] = samples[:, at : at + count]
@@ -86,7 +86,7 @@ class NumpyTrack:
             accepted = _leading(block[plan.slots[MARGIN], :count])
             if accepted:
                 self._keep(self._sides[side], at, block[:, :accepted])
-            elif smooth:  # # continue from the last accepted sample by its rates
+            elif smooth:  # continue from the last accepted sample by its rates
                 executor.go_back(samples[:, at - 1 : at])
             else:
                 break

@@ -68,7 +68,7 @@ class FixedOrder:
             np.array(pivots),
             max(level, default=0),
         )
-        # # each with its pivot: entries of L with their rows, entries of U with theirs, and updated
+        # each with its pivot: entries of L with their rows, entries of U with theirs, and updated
         # entries with their two factors
         self._below, self._above = (
             np.array(each, np.intp).reshape(-1, 3).T for each in (below, above)
@@ -124,7 +124,7 @@ class FixedOrder:
             return at[row], entries.start + entry, at[pivot], at[row]
 
         stages, back = self._last + 1, self._last - self._level
-        if transposed:  # # dependencies are reversed
+        if transposed:  # dependencies are reversed
             (j, i, upper), (k, below, lower) = self._above, self._below
             return [
                 link.staged(

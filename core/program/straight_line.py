@@ -96,7 +96,7 @@ class Prepared:
     def node(self, number: int) -> Node:
         """Return the node; for a prepared term, the input of its slot."""
         node = self.tape.nodes[number]
-        # # a decision is not a number and has no slot: it is computed again from prepared terms
+        # a decision is not a number and has no slot: it is computed again from prepared terms
         if (
             not self._given
             or node[0] in LEAVES

@@ -33,7 +33,7 @@ class Code:
             if elf_loader.possible()
             else compiler.loaded(code)
         )
-        # # integers are passed as addresses: ctypes takes a third of the time for those
+        # integers are passed as addresses: ctypes takes a third of the time for those
         types = {
             name: ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_void_p] * count)
             for name, count in signatures.items()

@@ -37,9 +37,9 @@ def available() -> bool:
 @cache
 def _loads() -> bool:
     try:
-        # # asks LLVM only without a cached answer
+        # asks LLVM only without a cached answer
         processor()
-    except (ImportError, OSError):  # # `kincheck doctor` reports it
+    except (ImportError, OSError):  # `kincheck doctor` reports it
         return False
     return True
 
@@ -77,7 +77,7 @@ def vector_width() -> int:
 def emitted(text: str) -> bytes:
     """Return the machine code of a text: an object file."""
     here = processor()
-    # # level 1: the optimiser's passes cost ten times the time and gain nothing on straight-line
+    # level 1: the optimiser's passes cost ten times the time and gain nothing on straight-line
     # code
     options = (
         {"opt": 1, "reloc": "pic", "codemodel": "small"} if elf_loader.possible() else {"opt": 1}
@@ -123,7 +123,7 @@ def _described() -> bytes | None:
     if found is None or found.origin is None:
         return None
     try:
-        # # the import of importlib.metadata takes longer than loading a cached model
+        # the import of importlib.metadata takes longer than loading a cached model
         version = Path(found.origin).with_name("_version.py").read_bytes()
         with Path("/proc/cpuinfo").open("rb") as file:
             lines = iter(file.readline, b"\n")

@@ -67,7 +67,7 @@ def possible() -> bool:
         return False
     try:
         _runnable(b"\0")
-    except OSError:  # # some systems forbid it
+    except OSError:  # some systems forbid it
         return False
     return True
 

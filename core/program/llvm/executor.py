@@ -41,7 +41,7 @@ class LlvmExecutor:
 
     def put(self, slots: Sequence[int], values: Array) -> None:
         """See `Executor`."""
-        # # equal values of all lanes need no arrangement
+        # equal values of all lanes need no arrangement
         self._memory[:, _places(slots)] = values if values.shape[1] == 1 else self.arranged(values)
 
     def get(self, slots: Sequence[int]) -> Array:
@@ -162,7 +162,7 @@ class LlvmTrack:
             (address(table), table.shape[1], margin + side.first, side.step, side.count, anchor, 0)
             for side, table, anchor in zip(sides, tables, anchors, strict=True)
         ]
-        # # never empty: an empty array has no address
+        # never empty: an empty array has no address
         self._sides = np.array([*fields, (0,) * len(SIDE)], np.int64)
         self._counts, motion = [side.count for side in sides], address(self._motion)
         self._run = partial(code.call("follow", "run"), motion, address(self._sides))
@@ -175,7 +175,7 @@ class LlvmTrack:
             for at, anchor in places
         ]
         self._code, self._groups = code, sum(-(-side.count // width) for side in sides)
-        self._alive = memory, tables  # # keeps their addresses valid
+        self._alive = memory, tables  # keeps their addresses valid
 
     def begin(self) -> Array:
         """See `Track`."""

@@ -71,7 +71,7 @@ class LlvmCode:
 
     def __init__(self, plan: Plan) -> None:
         self.width, self.plan, self._lock = compiler.vector_width(), plan, Lock()
-        # # content of the code as a key: writing the text takes longer than loading the code
+        # content of the code as a key: writing the text takes longer than loading the code
         self._content = repr([plan.programs, self.width, _sources()])
         code = code_cache.find(self._content)
         again = code is None and disk_cache.known(self._of_tables)
@@ -97,9 +97,9 @@ class LlvmCode:
         """Count groups of lanes run so far, and compile at the limit."""
         if not self.interpreted:
             return
-        self._left -= groups  # # an update lost between two threads only delays compilation
+        self._left -= groups  # an update lost between two threads only delays compilation
         if self._left <= 0:
-            with self._lock:  # # do not replace compiled code that other threads run
+            with self._lock:  # do not replace compiled code that other threads run
                 if self.interpreted:
                     self._take(code_cache.load(self._content, self._text))
                     self.interpreted = False
@@ -107,7 +107,7 @@ class LlvmCode:
     def _take(self, code: code_cache.Code) -> None:
         self._code = code
         for name, at in self.memory.calls.items():
-            # # a compiled function needs no table
+            # a compiled function needs no table
             self.memory.entries[at, 0] = code.address(name)
 
     def _tables(self) -> dict[str, bytecode.Bytecode]:

@@ -113,13 +113,13 @@ def _kept(width: int) -> str:
     motions in the worst.
     """
     keep, lose, remember = Rows(width), Rows(width), Rows(width, TOGETHER)
-    # # whole cache lines bypass the caches: a fetch before each overwrite takes a third of all time
+    # whole cache lines bypass the caches: a fetch before each overwrite takes a third of all time
     whole = width == LINE
     past_caches = ", !nontemporal !{i32 1}" if whole else ""
     place = keep.number("%numbers", keep.product("%stride", "%row"))
     value = keep.choose("%still", keep.read(keep.entry()), keep.constant(math.nan))
     keep.lines.append(f"store {keep.vector} {value}, ptr {place}, align {8 * width}{past_caches}")
-    # # partial lines are prefetched a sample ahead; collecting them into whole lines takes as long
+    # partial lines are prefetched a sample ahead; collecting them into whole lines takes as long
     # as waiting
     if not whole:
         keep.lines.append(

@@ -31,7 +31,7 @@ TABLES: Mapping[str, int] = {
     **dict.fromkeys(PAIRS, 2),
     **dict.fromkeys(("targets", "sampled", "kept", "fixed", "taken"), 1),
     "left": 2,
-    "worst": 3,  # # slot; 1, or -1 for the smallest; start value
+    "worst": 3,  # slot; 1, or -1 for the smallest; start value
 }
 """Columns of each table. A table takes two numbers of the plan: its address and its number of rows.
 """

@@ -10,10 +10,10 @@ from ..tape import LEAVES, Node, operands, place_of
 from .ir_writer import Lines
 from .ordering import ordered
 
-# # Values held at once, of 32 registers: LLVM's own schedule moves lines. With 16 registers and
+# Values held at once, of 32 registers: LLVM's own schedule moves lines. With 16 registers and
 # narrower vectors, LLVM alone does as well.
 HELD, WIDE = 24, 8
-# # Spill and reload lines per node that cost as much as waiting for divisions.
+# Spill and reload lines per node that cost as much as waiting for divisions.
 PUT_AWAY = 0.4
 
 
@@ -180,7 +180,7 @@ def _uses(program: Program) -> tuple[list[list[int]], dict[int, list[tuple[int, 
         for slot, k in program.outputs.items()
         if nodes[k][0] in ("input", "node")
     }
-    # # an input with another slot as output is written at its last use, if its target has no reader
+    # an input with another slot as output is written at its last use, if its target has no reader
     read = last_read.keys() | stands.values()
     early = {slot for slot in stands if due[program.outputs[slot]] and slot not in read}
     last_read |= {source: end for slot, source in stands.items() if slot not in early}
