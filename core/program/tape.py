@@ -14,6 +14,7 @@ from typing import TypeAlias, cast
 import numpy as np
 
 from ..algebra import Scalar
+from ..trajectory import Array
 
 Node: TypeAlias = tuple[str, *tuple[float, ...]]
 """An operation and its operands: node numbers; for "input" a slot, for "const" a value; see
@@ -84,7 +85,7 @@ class Traced:
         return _sub(a, self)
 
     def __mul__(self, b: Scalar) -> Scalar:
-        # # Vec3.__rmul__ computes the product with a vector
+        # Vec3.__rmul__ computes the product with a vector
         return _scale("*", self, b) if isinstance(b, Traced | float | int) else NotImplemented
 
     def __rmul__(self, a: Scalar) -> Scalar:
@@ -179,6 +180,11 @@ def _scale(op: str, a: Scalar, b: Scalar) -> Scalar:
     return _operation(op, a, b)
 
 
+def _lanes(*scalars: Scalar) -> bool:
+    """Return whether any scalar is an array of lanes."""
+    return any(isinstance(x, np.ndarray) for x in scalars)
+
+
 def _unary(op: str, a: Scalar, value: Callable[[float], float]) -> Scalar:
     return a.tape.node(op, a.number) if isinstance(a, Traced) else value(a)
 
@@ -198,24 +204,30 @@ def absolute(a: Scalar) -> Scalar:
     return _unary("abs", a, abs)
 
 
-def _extreme(op: str, a: Scalar, b: Scalar, value: Callable[[float, float], float]) -> Scalar:
+def _extreme(
+    op: str, a: Scalar, b: Scalar, value: Callable[[float, float], float], of_lanes: np.ufunc
+) -> Scalar:
     if isinstance(a, Traced) or isinstance(b, Traced):
         return a if _same(a, b) else _operation(op, a, b)
-    return value(a, b) if b == b else b  # # Python's min and max keep a if b is NaN
+    if _lanes(a, b):
+        return cast("Array", of_lanes(a, b))
+    return value(a, b) if b == b else b  # Python's min and max keep a if b is NaN
 
 
 def minimum(a: Scalar, b: Scalar) -> Scalar:
     """Return the smaller of a and b; NaN if either is."""
-    return _extreme("min", a, b, min)
+    return _extreme("min", a, b, min, np.minimum)
 
 
 def maximum(a: Scalar, b: Scalar) -> Scalar:
     """Return the larger of a and b; NaN if either is."""
-    return _extreme("max", a, b, max)
+    return _extreme("max", a, b, max, np.maximum)
 
 
 def where_larger(a: Scalar, b: Scalar, p: Scalar, q: Scalar) -> Scalar:
     """Return p if |a| > |b|, else q; each lane decides by its own values."""
+    if _lanes(a, b, p, q):
+        return cast("Array", np.where(np.abs(a) > np.abs(b), p, q))
     if _same(p, q) or (not isinstance(p, Traced) and not isinstance(q, Traced) and p == q):
         return p
     tape = next((x.tape for x in (a, b) if isinstance(x, Traced)), None)
@@ -225,8 +237,12 @@ def where_larger(a: Scalar, b: Scalar, p: Scalar, q: Scalar) -> Scalar:
     return tape.node("where", larger.number, tape.number(p), tape.number(q))
 
 
-def before(x: Traced, first: Traced) -> Scalar:
-    """Return x of the previous lane; in the first lane, `first`."""
+def before(x: Scalar, first: Scalar) -> Scalar:
+    """Return x of the previous lane; in the first lane, `first`. The last axis of an array counts
+    lanes.
+    """
+    if _lanes(x):
+        return np.concatenate([np.asarray(first)[..., None], x[..., :-1]], axis=-1)
     return x.tape.node("before", x.number, first.number)
 
 

@@ -5,6 +5,7 @@ accepted by every component.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -12,10 +13,11 @@ import numpy as np
 from ...failures import FailureKind
 from ...mechanism.motions import Path, outwards
 from ...program import ITERATIONS
-from ...trajectory import QUANTITIES, Array, BodyMotion, PointMotion, Trajectory, largest_found
+from ...trajectory import QUANTITIES, Array, Trajectory, largest_found
 from ..compiled.compiled_model import CLOSED
 from ..compiled.motion_start import Start, solve_from_start, start_of
 from ..compiled.request import SIGMA, accept_by
+from ..compiled.solution import Columns, solution
 from ..continuation.singularity import CONTINUED, listed
 from .block_solver import Cascade
 from .component_lanes import WORST, Lanes
@@ -26,6 +28,14 @@ BODY = ("r", "p", "rdot", "omega", "rddot", "omega_t")
 STILL = 0.0, 0.0, 0.0
 
 
+@dataclass
+class Outputs:
+    """Columns of the table of samples, and the rows of the world that go there."""
+
+    columns: list[int] = field(default_factory=list[int])
+    rows: list[int] = field(default_factory=list[int])
+
+
 class CascadeSweep:
     """A path through a cascade; solved as often as wanted."""
 
@@ -33,34 +43,41 @@ class CascadeSweep:
         self.cascade, self.path = cascade, path
         self.start = start or start_of(cascade.mechanism, path)
         self._lanes = Lanes(cascade, LANES)
+        self._columns = Columns.of(cascade.request)
         self._outputs, self._still = self._places()
 
-    def _places(self) -> tuple[dict[str, list[int]], dict[str, Sequence[float]]]:
-        """Return the rows of the world for each wanted motion by name, and the motions at rest."""
-        cascade, m = self.cascade, self.cascade.mechanism
-        found, still = dict[str, list[int]](), dict[str, Sequence[float]]()
-        for name in cascade.request.points:
-            point = m.point(name)
-            if point.body not in cascade.part_of:
-                still |= {f"{label} {name}": STILL for label in QUANTITIES} | {
-                    f"position {name}": point.position
-                }
-                continue
-            kind, member = cascade.place[cascade.part_of[point.body]]
-            own = f"p{cascade.points[cascade.part_of[point.body]].index(name)}"
-            found |= {
-                f"{label} {name}": [*kind.rows(f"{label} {own}", member)] for label in QUANTITIES
-            }
-        for name in cascade.request.bodies:
-            if name not in cascade.part_of:
-                body = m.body(name)
-                still |= {f"{label} {name}": STILL for label in BODY}
-                still |= {f"r {name}": body.origin, f"p {name}": body.euler_parameters}
-                continue
-            kind, member = cascade.place[cascade.part_of[name]]
-            own = f"b{cascade.parts[kind.members[member]].bodies.index(name)}"
-            found |= {f"{label} {name}": [*kind.rows(f"{label} {own}", member)] for label in BODY}
-        return found, still
+    def _places(self) -> tuple[Outputs, dict[int, float]]:
+        """Return the columns of moving outputs with their rows of the world, and the numbers of
+        outputs at rest by column.
+        """
+        cascade, request = self.cascade, self.cascade.request
+        moving, still = Outputs(), dict[int, float]()
+
+        def add(vector: str, part: int | None, own: str, at_rest: Sequence[float]) -> None:
+            columns = self._columns.by_vector[vector]
+            here = range(columns.start, columns.stop)
+            if part is None:
+                still.update(zip(here, at_rest, strict=True))
+                return
+            kind, member = cascade.place[part]
+            moving.columns += here
+            moving.rows += kind.rows(own, member)
+
+        for name in request.points:
+            point = cascade.mechanism.point(name)
+            part = cascade.part_of.get(point.body)
+            own = "" if part is None else f"p{cascade.points[part].index(name)}"
+            at_rest = {"position": point.position}
+            for label in QUANTITIES[: request.order + 1]:
+                add(f"{label} {name}", part, f"{label} {own}", at_rest.get(label, STILL))
+        for name in request.bodies:
+            body = cascade.mechanism.body(name)
+            part = cascade.part_of.get(name)
+            own = "" if part is None else f"b{cascade.parts[part].bodies.index(name)}"
+            at_rest = {"r": body.origin, "p": body.euler_parameters}
+            for label in BODY[: 2 * (request.order + 1)]:
+                add(f"{label} {name}", part, f"{label} {own}", at_rest.get(label, STILL))
+        return moving, still
 
     def solve(self, tol: float) -> Trajectory:
         """The motion at all samples; see `solve`."""
@@ -77,8 +94,9 @@ class CascadeSweep:
     def _solve(self, tol: float) -> Trajectory:
         path, lanes = self.path, self._lanes
         n = len(path.times)
-        rows = [row for each in self._outputs.values() for row in each]
-        table, worst = np.full((len(rows), n), np.nan), np.full((len(WORST), n), np.nan)
+        columns, rows = np.array(self._outputs.columns, np.intp), self._outputs.rows
+        table = np.full((self._columns.count, n), np.nan)
+        worst = np.full((len(WORST), n), np.nan)
         departure, message, notes, failures = self._departure
         self._notes, self._failures = [*notes], [*failures]
         messages = [message] if message else []
@@ -86,18 +104,14 @@ class CascadeSweep:
 
             def keep(samples: Indices, order: Indices = order) -> None:
                 at = order[samples]
-                table[:, at] = lanes.world[rows][:, : len(at)]
+                table[columns[:, None], at] = lanes.world[rows][:, : len(at)]
                 worst[:, at] = lanes.worst[:, : len(at)]
 
             lanes.anchor = departure
             lanes.accept_by(accept_by(tol))
             message = self._follow(path.times[order], given, self.start.time, path, keep, tol)
             messages += [message] if message else []
-        found, at = dict[str, Array](), 0
-        for name, each in self._outputs.items():
-            found[name] = table[at : at + len(each)].T
-            at += len(each)
-        return self._trajectory(found, dict(zip(WORST, worst, strict=True)), messages)
+        return self._trajectory(table, dict(zip(WORST, worst, strict=True)), messages)
 
     @cached_property
     def _sides(self) -> list[tuple[Indices, list[Array]]]:
@@ -171,45 +185,30 @@ class CascadeSweep:
             )
         return ""
 
-    def _trajectory(
-        self, found: dict[str, Array], tests: dict[str, Array], messages: list[str]
-    ) -> Trajectory:
-        request, solved = self.cascade.request, ~np.isnan(tests["closure"])
-        order, unit = request.order + 1, self.cascade.unit
-        found |= {
-            name: np.where(solved[:, None], value, np.nan) for name, value in self._still.items()
-        }
-
-        def motion(name: str) -> PointMotion:
-            series = [found[f"{label} {name}"] for label in QUANTITIES[:order]]
-            return PointMotion(*series, *[None] * (3 - len(series)))
-
-        def body(name: str) -> BodyMotion:
-            v, a = (
-                np.hstack([found[f"{label} {name}"] for label in pair])
-                for pair in (("rdot", "omega"), ("rddot", "omega_t"))
-            )
-            return BodyMotion(
-                found[f"r {name}"],
-                found[f"p {name}"],
-                v if order > 1 else None,
-                a if order > 2 else None,
-            )
-
-        return Trajectory(
-            points={name: motion(name) for name in request.points},
+    def _trajectory(self, table: Array, tests: dict[str, Array], messages: list[str]) -> Trajectory:
+        solved = ~np.isnan(tests["closure"])
+        for column, value in self._still.items():
+            table[column, solved] = value
+        closure, leftover, sigma = (
+            largest_found(each[solved])
+            for each in (tests["closure"], tests["leftover"], -tests[SIGMA])
+        )
+        return solution(
+            table.T,
+            self._columns.points,
+            self._columns.bodies,
+            unit=self.cascade.unit,
             solved=solved,
-            iterations=np.where(solved, tests[ITERATIONS], 0.0).astype(np.int64),
-            residual=largest_found(tests["closure"][solved]) * unit,
+            iterations=tests[ITERATIONS],
+            closure=closure,
+            leftover=leftover,
             message="; ".join(messages),
-            details={
-                **self.cascade.details,
-                "redundant_residual": largest_found(tests["leftover"][solved]) * unit,
-                "smallest_singular_value": min(-largest_found(-tests[SIGMA][solved]), 1.0),
-            }
-            | ({"notes": self._notes} if self._notes else {}),
-            bodies={name: body(name) for name in request.bodies},
             failures=self._failures,
+            account=self.cascade.details,
+            findings={
+                "smallest_singular_value": min(-sigma, 1.0),
+                **({"notes": self._notes} if self._notes else {}),
+            },
         )
 
 

@@ -8,11 +8,12 @@ import numpy as np
 
 from ...failures import FailureKind, PoseFailure
 from ...trajectory import Array
-from ..compiled.acceptance import margins, steepness
+from ..compiled.acceptance import candidate, limits
 from ..compiled.compiled_model import Model
 from ..compiled.request import FROM, LARGEST_SIGMA, ORIENTATION, SIGMA, SLOPE, by_block
 from ..formulation.acceptance_criteria import ROUNDING
 from ..formulation.driver_inputs import turns
+from ..formulation.margins import Block, known_slope, margins
 
 SINGULAR = ("as regular", "on this side", "regular between", "certain", "not turned by rounding")
 """Criteria that a lane does not meet if a singular pose is ahead."""
@@ -30,13 +31,18 @@ def pose_failure(model: Model, lane: Array) -> PoseFailure:
 
     names = zip(by_block(SIGMA, model.blocks), by_block(SLOPE, model.blocks), strict=True)
     blocks = [
-        (read(name), read(FROM + name), max(steepness(read, label), read(label)))
+        Block(read(name), read(FROM + name), max(known_slope(read(FROM + label)), read(label)))
         for name, label in names
     ]
-    angles = turns(model.mechanism, model.request.drivers)
-    found = margins(
-        read, read(FROM + SIGMA), read(FROM + ORIENTATION), read(LARGEST_SIGMA), blocks, angles
+    pose = candidate(
+        read,
+        before=read(FROM + SIGMA),
+        reversal=read(ORIENTATION) - read(FROM + ORIENTATION),
+        largest=read(LARGEST_SIGMA),
+        blocks=blocks,
+        turns=turns(model.mechanism, model.request.drivers),
     )
+    found = margins(pose, limits(read))
     failed = [name for name, margin in found.items() if not margin > 0.0]
     closure, leftover, branch, tol = (
         read(name) for name in ("closure", "leftover", "branch", "tolerance")
@@ -46,10 +52,10 @@ def pose_failure(model: Model, lane: Array) -> PoseFailure:
 
 
 def failure_kind(failed: Sequence[str], closure: float) -> FailureKind:
-    """Return the kind of a failure by the criteria that a pose does not meet.
+    """Return the kind of a failure by the criteria not met.
 
     Args:
-        failed: names of those criteria, see `acceptance.margins`.
+        failed: names of the criteria, see `margins`.
         closure: largest residual of the solved rows [units of the mechanism's size].
     """
     if not np.isfinite(closure):

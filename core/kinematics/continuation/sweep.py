@@ -1,4 +1,4 @@
-"""Run a compiled model along a path: the march, a closer look at what is doubtful, and the motions
+"""Run a compiled model along a path: the march, a closer look at doubtful samples, and the motions
 of points and bodies.
 """
 
@@ -14,11 +14,12 @@ from ...failures import FailureKind
 from ...forces import Forces
 from ...mechanism.motions import Path
 from ...program import ITERATIONS
-from ...trajectory import Array, BodyMotion, Motions, PointMotion, Trajectory
+from ...trajectory import Array, Trajectory
 from ..compiled.compiled_model import Model
 from ..compiled.motion_start import solve_from_start
 from ..compiled.request import SIGMA
 from ..compiled.samples import Route
+from ..compiled.solution import solution
 from ..formulation.acceptance_criteria import LOW, in_question
 from .walk import march
 
@@ -61,29 +62,26 @@ def _follow(route: Route, tol: float) -> Trajectory:
         failures = scrutiny.failures
     if not (found.solved.any() if message else found.solved.size):
         closure = leftover = sigma = math.nan
-    iterations, table, unit = found.kept[rows[ITERATIONS].start], found.kept.T, model.frame.unit
-    return Trajectory(
-        points=Motions(PointMotion, table, model.of_points),
+    table = found.kept.T
+    return solution(
+        table,
+        model.of_points,
+        model.of_bodies,
+        unit=model.frame.unit,
         solved=found.solved,
-        iterations=(np.where(found.solved, iterations, 0.0) if message else iterations).astype(
-            np.int64
-        ),
-        residual=closure * unit,
+        iterations=found.kept[rows[ITERATIONS].start],
+        closure=closure,
+        leftover=leftover,
         message=message,
-        details={
-            **route.details,
-            "redundant_residual": leftover * unit,
-            "smallest_singular_value": min(sigma, 1.0),
-            **findings,
-        },
-        bodies=Motions(BodyMotion, table, model.of_bodies),
-        forces=_forces(model, table, sigma) if not message and "notes" not in findings else None,
         failures=failures,
+        account=route.details,
+        findings={"smallest_singular_value": min(sigma, 1.0), **findings},
+        forces=_forces(model, table, sigma) if not message and "notes" not in findings else None,
     )
 
 
 def _forces(model: Model, table: Array, sigma: float) -> Forces | None:
-    """Return the forces that a model computes; None if none are wanted, or some may not be finite.
+    """Return the forces computed by a model; None if none are wanted, or some may not be finite.
 
     At a singular pose rigid bodies determine no finite force. Samples there are interpolated, or
     not reached because forces cannot be interpolated: both leave notes or messages.

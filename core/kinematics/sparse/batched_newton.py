@@ -1,9 +1,9 @@
 """Several samples of a sparse system at once, each in a lane of vectors.
 
-A group of samples is predicted by the polynomial through eight that came before it, at first by a
-Taylor step, and solved by Newton's iteration with factors in the order that served one pose. What
-is believed is what `SparseModel.reach` believes, and less near a singular pose: no pivot was chosen
-here. Samples are accepted up to the first that is not.
+A group of samples is predicted by the polynomial through the last eight, at first by a Taylor step,
+and solved by Newton's iteration with factors in an order made for one pose. The acceptance criteria
+are those of `SparseModel.reach`, and fewer samples near singular poses meet them: no pivots are
+chosen here. Samples are accepted up to the first refused one.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ...program import before
 from ...trajectory import Array
 from ..compiled.interpolation import lagrange
 from ..structure.sparse_lu import PIVOT_THRESHOLD
@@ -33,12 +34,12 @@ time, and saved no order of large mechanisms."""
 
 
 class Batch:
-    """Samples of a model, as many as a vector has lanes.
+    """Samples of a model, one for each lane of a vector.
 
     Attributes:
-        width: how many.
-        outgrown: whether a sample was refused for what the order made of its factors: another would
-            serve it.
+        width: number of samples.
+        outgrown: whether a sample was refused only because its factors grew in the present order:
+            another order would serve it.
     """
 
     def __init__(self, model: SparseEquations) -> None:
@@ -55,9 +56,7 @@ class Batch:
         self.order(model)
 
     def order(self, model: SparseEquations) -> None:
-        """Eliminate from now on in the order that serves the pose where the model was last
-        evaluated.
-        """
+        """Use the elimination order of the model's last evaluated pose from now on."""
         tables, self.outgrown = self._tables, False
         model.factors.update(model.elements.entries[model.solved])
         model.factors.factor()
@@ -68,23 +67,21 @@ class Batch:
         # the sign of the determinant is that of the model's factors, or always the opposite
         self._sign = np.sign(model.factors.signed_pivot) * np.sign(tables.pivots).prod(axis=0)
 
-    def reach(
-        self, before: Sequence[Stand], times: Array, drives: Array, tol: float
-    ) -> list[Stand]:
-        """Follow a motion to the next samples, as far as can be believed.
+    def reach(self, known: Sequence[Stand], times: Array, drives: Array, tol: float) -> list[Stand]:
+        """Follow a motion to the next samples, up to the first refused one.
 
         Args:
-            before: where it stood, at different times, up to where it stands; `REMEMBERED` of them
-                where there were as many.
+            known: the last `REMEMBERED` poses at different times, or all if fewer, the present one
+                last.
             times, drives: of the samples, one or more; those beyond a group are left out.
             tol: largest accepted residual.
         """
-        count, here, tables = min(len(times), self.width), before[-1], self._tables
+        count, here, tables = min(len(times), self.width), known[-1], self._tables
         lanes = np.minimum(np.arange(self.width), count - 1)
         times, tables["drives"][:] = times[lanes], drives[:, lanes]
         earlier = np.append(here.time, times[:-1])
         with np.errstate(all="ignore"):  # lanes that diverge are found by their residuals
-            self._predict(before, times)
+            self._predict(known, times)
             closure, iterations, done = self._iterated(tol)
             tables.motion()
             state, rates, accelerations = (
@@ -97,16 +94,16 @@ class Batch:
             )
             branch: Array = tables["branch"].min(axis=0, initial=1.0)
             (pivot, turned), sigmas = self._pivots(here), self._sigmas()
-            past = _past(here.state, state)
+            past = before(state, here.state)
             taylor = self._taylor(
                 past,
-                _past(here.rates, rates),
-                _past(here.accelerations, accelerations),
+                before(rates, here.rates),
+                before(accelerations, here.accelerations),
                 times - earlier,
             )
             gap, step = distance(state - taylor, self._scale), distance(state - past, self._scale)
             angles = tables["drives"][self._angles]
-            turn = np.abs(angles - _past(here.turns, angles)).max(axis=0, initial=0.0)
+            turn = np.abs(angles - before(angles, here.turns)).max(axis=0, initial=0.0)
             poses = Poses(
                 done,
                 closure,
@@ -136,8 +133,8 @@ class Batch:
         ]
 
     def _pivots(self, here: Stand) -> tuple[Array, NDArray[np.bool_]]:
-        """Where all was last factored the smallest in size, and whether the orientation is another
-        than where the motion stands.
+        """Return the smallest pivot of each pose, and whether its orientation differs from the
+        present pose's, by the last factors.
         """
         pivots = self._tables.pivots
         entries = self._tables["entries"].take(self._solved, axis=0)
@@ -147,7 +144,7 @@ class Batch:
         )
 
     def _sigmas(self) -> Array:
-        """As of `SparseModel`, where all was last factored."""
+        """Return the sigmas of `SparseModel` by the last factors."""
         if not len(self._dropped):
             return np.abs(self._tables.pivots).min(axis=0)[:, None]
         tables = self._tables
@@ -156,8 +153,8 @@ class Batch:
         )
 
     def _predict(self, before: Sequence[Stand], times: Array) -> None:
-        """By the polynomial through the samples before, or by a Taylor step and what the last such
-        step lacked.
+        """Predict by the polynomial through the last samples, or by a Taylor step with the error of
+        the last one.
         """
         here = before[-1]
         if len(before) == REMEMBERED:
@@ -199,8 +196,3 @@ class Batch:
     def _evaluated(self) -> Array:
         self._tables.evaluate()
         return np.abs(self._tables["phi"].take(self._kept, axis=0)).max(axis=0)
-
-
-def _past(first: Array, each: Array) -> Array:
-    """Of each lane what the one before it has, of the first what was before all."""
-    return np.column_stack([first, each[:, :-1]])

@@ -9,6 +9,8 @@ import numpy as np
 from ...algebra import Quat, Vec3, quat, vec
 from ...primitives.base import Pose, Twist
 from ...trajectory import Array
+from ..compiled.request import Request
+from ..compiled.solution import Columns
 from ..formulation.body_kinematics import motion_of_frame, motion_of_point
 from ..formulation.formulation import Acceleration
 from .sparse_equations import SparseEquations
@@ -16,32 +18,56 @@ from .step_state import Stand
 
 
 class OutputMotions:
-    """Points whose motion is an output: given points, or origins and frames of bodies."""
+    """Motions of the points and bodies of a request.
+
+    Attributes:
+        columns: their columns in the table of samples.
+    """
+
+    def __init__(self, model: SparseEquations, request: Request) -> None:
+        m = model.mechanism
+        self.columns, self._order = Columns.of(request), request.order
+        points = [(m.point(name).body, m.point(name).position) for name in request.points]
+        origins = [(name, m.body(name).origin) for name in request.bodies]
+        self._points = _Places(model, points)
+        self._bodies = _Places(model, origins)
+        self._frame = _columns([m.body(name).euler_parameters for name in request.bodies], 4)
+
+    def motions(self, at: Sequence[Stand]) -> Array:
+        """Return the motions at solved poses, shape (stands, columns)."""
+        order = self._order
+        of_points = self._points.motions(self._points.moving(at))[: order + 1]
+        moving = self._bodies.moving(at)
+        r, *rates = self._bodies.motions(moving)
+        p, *turning = motion_of_frame(quat(self._frame), *moving)
+        pairs = [each for pair in zip(rates, turning, strict=True) for each in pair]
+        of_bodies = [r, p, *pairs[: 2 * order]]
+        return np.hstack(
+            [
+                _side_by_side(of_points, (len(at), self._points.count)),
+                _side_by_side(of_bodies, (len(at), self._bodies.count)),
+            ]
+        )
+
+
+class _Places:
+    """Points fixed in bodies."""
 
     def __init__(
-        self, model: SparseEquations, names: Sequence[str], *, frames: bool = False
+        self, model: SparseEquations, places: Sequence[tuple[str, Sequence[float]]]
     ) -> None:
-        m, self.names, self._model = model.mechanism, names, model
-        found = [
-            (name, m.body(name).origin) if frames else (m.point(name).body, m.point(name).position)
-            for name in names
-        ]
+        self._moving, self._unit, self.count = model.bodies, model.frame.unit, len(places)
         number = {name: k for k, name in enumerate(model.frame.moving)}
-        # what is not among the moving bodies comes after them, and stands still
-        self._body = np.array([number.get(body, len(number)) for body, _ in found], np.intp)
-        self._position = _columns([position for _, position in found], 3)
-        self._arm = _columns(
-            [tuple(model.frame.arm(body, position)) for body, position in found], 3
-        )
-        self._frame = (
-            _columns([m.body(name).euler_parameters for name in names], 4) if frames else None
-        )
+        # bodies at rest follow the moving ones
+        self._body = np.array([number.get(body, len(number)) for body, _ in places], np.intp)
+        self._position = _columns([position for _, position in places], 3)
+        self._arm = _columns([tuple(model.frame.arm(*place)) for place in places], 3)
 
-    def _taken(self, at: Sequence[Stand]) -> list[Array]:
-        """What their motion follows from: poses, rates and accelerations of their bodies, shapes (7
-        or 6, stands, names).
+    def moving(self, at: Sequence[Stand]) -> tuple[Pose, Twist, Acceleration]:
+        """Return poses, rates and accelerations of the bodies, each component of shape (stands,
+        places).
         """
-        n, found = self._model.bodies, list[Array]()
+        n, found = self._moving, list[Array]()
         for rows, each in (
             (7, [k.state for k in at]),
             (6, [k.rates for k in at]),
@@ -51,27 +77,22 @@ class OutputMotions:
             whole[:, :, :n] = np.array(each)[:, : rows * n].reshape(len(at), rows, n).swapaxes(0, 1)
             found.append(whole)
         found[0][3, :, n] = 1.0
-        return [each[:, :, self._body] for each in found]
-
-    def motions(self, at: Sequence[Stand]) -> Array:
-        """Position, velocity and acceleration; of bodies then p, omega' and omega'dot, shape
-        (stands, components, names).
-        """
-        poses, rates, accelerations = self._taken(at)
-        moving = (
+        poses, rates, accelerations = (each[:, :, self._body] for each in found)
+        return (
             Pose.of(vec([*poses[:3]]), quat(poses[3:])),
             Twist(vec([*rates[:3]]), vec([*rates[3:]])),
             Acceleration(vec([*accelerations[:3]]), vec([*accelerations[3:]])),
         )
-        found: list[Vec3 | Quat] = [
-            *motion_of_point([*self._position], vec([*self._arm]), self._model.frame.unit, *moving)
-        ]
-        if self._frame is not None:
-            found += motion_of_frame(quat(self._frame), *moving)
-        shape = len(at), len(self.names)
-        return np.stack(
-            [np.broadcast_to(component, shape) for each in found for component in each], axis=1
-        )
+
+    def motions(self, moving: tuple[Pose, Twist, Acceleration]) -> Sequence[Vec3]:
+        """Return position, velocity and acceleration of the points."""
+        return motion_of_point([*self._position], vec([*self._arm]), self._unit, *moving)
+
+
+def _side_by_side(found: Sequence[Vec3 | Quat], shape: tuple[int, int]) -> Array:
+    """Return components of vectors, of each place side by side, shape (stands, columns)."""
+    components = [np.broadcast_to(component, shape) for each in found for component in each]
+    return np.stack(components, axis=-1).reshape(shape[0], -1)
 
 
 def _columns(rows: Sequence[Sequence[float]], count: int) -> Array:

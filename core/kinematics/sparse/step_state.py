@@ -1,6 +1,4 @@
-"""Where a motion of a sparse system stands, when Newton's iteration for the next pose may end, and
-whether that is believed.
-"""
+"""State of a motion of a sparse system, and the acceptance of its next poses."""
 
 from __future__ import annotations
 
@@ -10,22 +8,19 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from ...program import before, maximum
 from ...trajectory import Array
 from ..compiled.predictor import ABOUT
 from ..compiled.request import CONSISTENT
-from ..formulation.acceptance_criteria import (
-    EPSILON,
-    FALLS,
-    FOLLOWED,
-    LARGEST_CORRECTION,
-    LARGEST_RATIO,
-    LONGEST_STEP,
-    LONGEST_TURN,
-    NEGLIGIBLE,
-    STEEPER,
-    STEEPEST,
-    TURNED_BY_PIVOTS,
-    WORSE_BY_PIVOTS,
+from ..formulation.acceptance_criteria import TURNED_BY_PIVOTS, WORSE_BY_PIVOTS
+from ..formulation.margins import (
+    Block,
+    Candidate,
+    Limits,
+    known_slope,
+    least_slope,
+    margins,
+    slope_between,
 )
 
 # An iteration with old factors costs half of one with new ones; it is worth it where it gains two
@@ -42,21 +37,20 @@ def _none() -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Stand:
-    """Where a motion stands.
+    """A pose of the motion with its rates and tests.
 
     Attributes:
-        time: of the pose; earlier: of the one before it, the same where there is none.
-        state, predicted: the pose, and what a Taylor step made of the one before; see `Numbering`.
+        time: of the pose; earlier: of the previous pose, the same without one.
+        state, predicted: the pose, and the Taylor step to it from the previous pose; see
+            `Numbering`.
         rates, accelerations: of the unknowns.
-        turns: angles of the drivers that turn [rad from the design].
-        closure, leftover, branch: largest residual of the rows solved and of the redundant ones,
+        turns: angles of turning drivers [rad from the design].
+        closure, leftover, branch: largest residual of the solved and of the redundant rows,
             smallest branch test.
-        pivot: size of the smallest; largest_pivot: the largest that it was so far; orientation: see
-            `Blocks`.
-        sigmas: of the blocks (`Blocks.sigmas`); where all rows are solved, which keep the signs of
-            their determinants, the smallest pivot stands for all; slopes: how steeply they change,
-            zero where nothing is known of that; high: the largest that each was since rows were
-            last looked for.
+        pivot: smallest size; largest_pivot: its largest value so far; orientation: see `Blocks`.
+        sigmas: of the blocks (`Blocks.sigmas`); the smallest pivot if all rows are solved, which
+            keep the signs of their determinants; slopes: their change by the pose, zero if unknown;
+            high: the largest value of each since the last choice of rows.
     """
 
     time: float
@@ -80,16 +74,15 @@ class Stand:
 
 @dataclass(frozen=True, eq=False)
 class Poses:
-    """Poses that a motion may have come to, each by the one before it, and what the tests of them
-    are of; shape (poses,) each.
+    """Candidates for the next poses, each reached from the one before it; shape (poses,) each.
 
     Attributes:
         done: whether Newton's iteration ended.
         closure, leftover, branch: see `Stand`.
-        gap: to what a Taylor step made of the pose before; step: to that; turn: of a driver from
-            there, the largest.
+        gap: distance from the Taylor step of the previous pose; step: from the previous pose; turn:
+            largest change of a driver's angle from there.
         pivot: see `Stand`; chosen: whether pivots were chosen at each pose.
-        turned: whether the orientation is another.
+        turned: whether the orientation differs.
         sigmas: shape (poses, blocks).
     """
 
@@ -106,59 +99,71 @@ class Poses:
     sigmas: Array
 
     def passed(self, here: Stand, tol: float) -> Mapping[str, NDArray[np.bool_]]:
-        """Which passed each test of a solution, by the names of `acceptance.margins`; less is known
-        here, and more asked of it.
+        """Return whether each pose meets each criterion, by the names of `margins`, shape (poses,).
+
+        The limits are narrower than those of compiled programs, because pivots bound sigma less
+        sharply than estimates do.
 
         Args:
-            here: where the first of them is predicted from.
+            here: the pose before the first one.
             tol: largest accepted residual.
         """
-        largest = np.maximum(self.pivot, here.largest_pivot)
-        uncertain = (WORSE_BY_PIVOTS * largest) * np.maximum(self.closure, EPSILON)
-        least = np.minimum(self.pivot, self.sigmas.min(axis=1, initial=np.inf))
-        # where SuperLU exchanges rows its pivots jump tenfold: their change is not held to
-        falls = self.chosen & (least < min(here.pivot, here.sigmas.min(initial=np.inf)))
-        before, known = np.vstack([here.sigmas, self.sigmas[:-1]]), np.maximum(*self._slopes(here))
-        steepest = np.minimum(STEEPER * known, STEEPEST)
-        ratio = np.maximum(self.sigmas, before) < LARGEST_RATIO * np.minimum(self.sigmas, before)
+        poses = len(self.done)
+        with np.errstate(all="ignore"):
+            found = margins(self._candidate(here), _limits(tol))
         return {
-            "converged": self.done,
-            "closed": self.closure <= tol,
-            "consistent": self.leftover <= max(CONSISTENT, tol),
-            "on the branch": self.branch > 0.0,
-            "continued": self.gap <= LARGEST_CORRECTION * self.step + NEGLIGIBLE,
-            "near": self.step <= LONGEST_STEP,
-            "not turned round": self.turn <= LONGEST_TURN,
-            "as regular": np.all(ratio, axis=1),
-            "on this side": ~self.turned,
-            # the signs of determinants do not say so where rows are chosen from more: they change
-            # by the choice too
-            "regular between": np.all(self.sigmas + before > steepest * self.step[:, None], axis=1),
-            "certain": FOLLOWED * least**2 > uncertain,
-            "not turned by rounding": (TURNED_BY_PIVOTS * least**2 > uncertain) | falls,
+            name: (margin > 0.0).reshape(-1, poses).all(axis=0) for name, margin in found.items()
         }
 
+    def _candidate(self, here: Stand) -> Candidate:
+        """Return the poses as one candidate; arrays of blocks have shape (blocks, poses)."""
+        sigmas = self.sigmas.T
+        least = np.minimum(self.pivot, sigmas.min(axis=0, initial=np.inf))
+        # SuperLU's exchange of rows makes pivots jump tenfold: their increase is no sign of a
+        # motion away from a singular pose
+        falls = min(here.pivot, here.sigmas.min(initial=np.inf)) if self.chosen else -np.inf
+        return Candidate(
+            done=self.done.astype(float),
+            closure=self.closure,
+            leftover=self.leftover,
+            branch=self.branch,
+            gap=self.gap,
+            moved=self.step,
+            reach=self.step,
+            turns=[self.turn],
+            sigma=least,
+            before=falls,
+            largest=np.maximum(self.pivot, here.largest_pivot),
+            # signs of determinants change with the choice of rows too, so they do not replace the
+            # test of sigma
+            reversal=self.turned.astype(float),
+            blocks=[Block(sigmas, before(sigmas, here.sigmas), np.maximum(*self._slopes(here)))],
+        )
+
     def remembered(self, here: Stand) -> list[tuple[Array, Array, Array]]:
-        """Of each pose sigmas, slopes and high, as of `Stand`."""
+        """Return sigmas, slopes and high of each pose, see `Stand`."""
         slopes, _ = self._slopes(here)
         high = np.maximum.accumulate(np.vstack([here.high, self.sigmas]))[1:]
-        return [*zip(self.sigmas, slopes, high, strict=True)]
+        return [*zip(self.sigmas, slopes.T, high, strict=True)]
 
     def _slopes(self, here: Stand) -> tuple[Array, Array]:
-        """How steeply sigmas change at each pose, and what was known of that before; shape (poses,
-        blocks) each.
+        """Return the slopes of sigmas at each pose, and those known before it, shape (blocks,
+        poses) each.
         """
-        before = np.vstack([here.sigmas, self.sigmas[:-1]])
-        change, moved = np.abs(self.sigmas - before), self.step[:, None]
-        found = np.divide(change, moved, out=np.zeros_like(change), where=moved > NEGLIGIBLE)
-        slopes = np.where(here.slopes > 0.0, here.slopes, STEEPEST)
-        least = np.maximum(FALLS * slopes, EPSILON)
-        return np.maximum(found, least), np.maximum(np.vstack([slopes, found[:-1]]), least)
+        sigmas, slope = self.sigmas.T, known_slope(here.slopes)
+        with np.errstate(all="ignore"):
+            found = slope_between(sigmas, before(sigmas, here.sigmas), self.step)
+        least = least_slope(slope)[:, None]
+        return maximum(found, least), maximum(before(found, slope), least)
+
+
+def _limits(tol: float) -> Limits:
+    return Limits(tol, max(CONSISTENT, tol), 0.0, worse=WORSE_BY_PIVOTS, turned=TURNED_BY_PIVOTS)
 
 
 def lacked(h: Array, before: float) -> Array:
-    """By how much what a Taylor step lacked grows from the last step to others: by the cube, where
-    they are not much longer.
+    """Return the growth of the error of the last Taylor step for other steps: the cube of their
+    ratio, if they are not much longer.
     """
     return np.where(ABOUT * abs(before) > np.abs(h), (h / (before or 1.0)) ** 3, 0.0)
 

@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 from ...failures import FailureKind, PoseFailure
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path, outwards
-from ...trajectory import Array, BodyMotion, PointMotion, Trajectory, largest_found
+from ...trajectory import Array, Trajectory, largest_found
 from ..compiled.motion_start import Start, solve_from_start, start_of
+from ..compiled.request import Request
+from ..compiled.solution import solution
 from ..formulation.acceptance_criteria import AMPLIFIED, EPSILON, LOW, WORSE_BY_PIVOTS
 from .batched_newton import REMEMBERED
 from .error_bound import uncertain
@@ -37,25 +39,22 @@ def solve_sparse(
     """Solve a mechanism over the samples of a path, as one sparse system.
 
     Args:
-        mechanism: what to solve; made ready (`SparseModel`) where it is to be solved more than
-            once.
-        points, bodies: names whose motion is wanted.
+        mechanism: the mechanism, or for repeated use its `SparseModel`.
+        points, bodies: names of the points and bodies whose motion is wanted.
         order: 0 for positions, 1 for velocities too, 2 for accelerations too.
         tol: largest accepted constraint residual, relative to the size of the bodies.
 
     Returns:
-        The motion; NaN where a sample cannot be reached, and the reason in its message.
+        The motion; NaN at samples out of reach, with the reason in its message.
 
     Raises:
         SolveError: drivers and degrees of freedom do not match, or the mechanism does not close at
             the design position.
     """
     model = mechanism if isinstance(mechanism, SparseModel) else SparseModel(mechanism)
-    wanted = OutputMotions(model, points), OutputMotions(model, bodies, frames=True)
-    sweep, start = (
-        partial(_Sweep, model, path, tol, *wanted, order),
-        start_of(model.mechanism, path),
-    )
+    outputs = OutputMotions(model, Request((), tuple(points), tuple(bodies), order))
+    sweep = partial(_Sweep, model, path, tol, outputs, order)
+    start = start_of(model.mechanism, path)
     return solve_from_start(
         start, model.mechanism, path, lambda each: sweep(each).solve(), compare=np.isfinite(tol)
     )
@@ -71,15 +70,12 @@ WORTH = 4
 
 @dataclass
 class _Sweep:
-    """A path through a model, and what is found along it; refused: by sample, how uncertain what is
-    found there is.
-    """
+    """A path through a model, and its results; refused: error bound by refused sample."""
 
     model: SparseModel
     path: Path
     tol: float
-    points: OutputMotions
-    bodies: OutputMotions
+    outputs: OutputMotions
     order: int
     start: Start
     messages: list[str] = field(default_factory=list[str])
@@ -96,11 +92,7 @@ class _Sweep:
         """The motion at all samples."""
         path, n = self.path, len(self.path.times)
         stands = {name: np.full(n, np.nan) for name in ("closure", "leftover", "iterations")}
-        wanted = (self.points, self.bodies)
-        found = [
-            np.full((n, size, len(each.names)), np.nan)
-            for each, size in zip(wanted, (9, 19), strict=True)
-        ]
+        table = np.full((n, self.outputs.columns.count), np.nan)
         departure = self._departure()
         for side in outwards(path.times, self.start.time):
             if departure is None or not len(side):
@@ -113,14 +105,12 @@ class _Sweep:
                 reached = [k for _, k in some]
                 for name, values in stands.items():
                     values[reached] = [getattr(at, name) for at, _ in some]
-                for into, each in zip(found, wanted, strict=True):
-                    if each.names:
-                        into[reached] = each.motions([at for at, _ in some])
+                table[reached] = self.outputs.motions([at for at, _ in some])
         self._tell_refused()
-        return self._trajectory(found, stands)
+        return self._trajectory(table, stands)
 
     def _departure(self) -> Stand | None:
-        """Return where the samples are followed from; None if that cannot be reached."""
+        """Return the pose from which the samples are followed; None if it cannot be reached."""
         model, path, here, start = self.model, self.path, self.model.design, self.start.time
         try:
             if way := self.start.lead:
@@ -137,9 +127,7 @@ class _Sweep:
             return None
 
     def _follow(self, here: Stand, path: Path, times: Array) -> Iterable[Stand]:
-        """Where the motion stands at each of the times, outwards, until it ends; then there is a
-        message.
-        """
+        """Yield the pose at each time, outwards, until the motion ends; then add a message."""
         drives, many = self.model.drives(path, times), len(times) >= WORTH
         self.by = self.model
         before: deque[Stand] = deque([here], REMEMBERED)
@@ -186,10 +174,9 @@ class _Sweep:
         return StepWalk(here, time, reach, lambda at: self._by_better_rows(at, path))
 
     def _certain(self, followed: Iterable[tuple[Stand, int]]) -> Iterator[tuple[Stand, int]]:
-        """Samples, each as soon as the motion stands there, without those that residuals leave
-        uncertain.
+        """Yield samples as the motion reaches them, without those left uncertain by residuals.
 
-        That pivots are small is no reason to refuse one: in large mechanisms many are.
+        Small pivots alone are no reason to refuse a sample: large mechanisms have many.
         """
         limit = AMPLIFIED * self.tol
         for here, k in followed:
@@ -218,8 +205,8 @@ class _Sweep:
             self.failures.append(FailureKind.UNCERTAIN)
 
     def _by_better_rows(self, here: Stand, path: Path) -> Stand:
-        """Where it stands; by other rows, where its own are much nearer to singular than they were
-        and others are not.
+        """Return the pose, by other rows if its own have become much more singular and others are
+        better.
         """
         if not (here.sigmas < LOW * here.high).any():
             return here
@@ -242,42 +229,23 @@ class _Sweep:
             path.ended(here.time, float(times[k]), float(times[k - 1]) if k else None, reason)
         )
 
-    def _trajectory(self, found: Sequence[Array], tests: Mapping[str, Array]) -> Trajectory:
-        (points, bodies), unit, order = found, self.model.frame.unit, self.order
+    def _trajectory(self, table: Array, tests: Mapping[str, Array]) -> Trajectory:
         solved: NDArray[np.bool_] = ~np.isnan(tests["closure"])
-        closure, leftover = (
-            largest_found(tests[name][solved]) * unit for name in ("closure", "leftover")
-        )
-        # rates of place and of rotation stand side by side
-        rates = [
-            np.concatenate([bodies[:, k : k + 3], bodies[:, k + 10 : k + 13]], axis=1)
-            for k in (3, 6)
-        ]
-        series = [points[:, 3 * k : 3 * k + 3] for k in range(order + 1)]
-        missing = [None] * (2 - order)
-        return Trajectory(
-            points={
-                name: PointMotion(*(each[:, :, k] for each in series), *missing)
-                for k, name in enumerate(self.points.names)
-            },
+        closure, leftover = (largest_found(tests[name][solved]) for name in ("closure", "leftover"))
+        return solution(
+            table,
+            self.outputs.columns.points,
+            self.outputs.columns.bodies,
+            unit=self.model.frame.unit,
             solved=solved,
-            iterations=np.where(solved, tests["iterations"], 0.0).astype(np.int64),
-            residual=closure,
+            iterations=tests["iterations"],
+            closure=closure,
+            leftover=leftover,
             message="; ".join(self.messages),
-            details={
-                **self.model.details,
-                "redundant_residual": leftover,
+            failures=self.failures,
+            account=self.model.details,
+            findings={
                 "smallest_pivot": self.smallest_pivot,
                 **({"rows_chosen_anew": self.renewed} if self.renewed else {}),
             },
-            bodies={
-                name: BodyMotion(
-                    bodies[:, :3, k],
-                    bodies[:, 9:13, k],
-                    *(each[:, :, k] for each in rates[:order]),
-                    *missing,
-                )
-                for k, name in enumerate(self.bodies.names)
-            },
-            failures=self.failures,
         )
