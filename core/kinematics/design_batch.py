@@ -1,10 +1,10 @@
-"""Many variants of one mechanism along one path: the programs' lanes are variants, and geometry is
-an input.
+"""Many variants of one mechanism along one path: lanes of the programs are variants, and geometry
+is an input.
 
-All variants take the same samples, predicted each from its own poses at the samples before. Those
-that are not accepted somewhere are solved again in parts of steps, and then alone, by the march
-that divides steps; what that does not reach either is NaN, with the reason. Of many bodies tied
-together each variant is solved by itself.
+All variants take the same samples, each predicted from its own earlier poses. Variants with a
+refused sample are solved again in parts of steps, and then alone, by the march with divided steps.
+Samples still out of reach are NaN, with the reason. With many bodies tied together each variant is
+solved by itself.
 """
 
 from __future__ import annotations
@@ -53,14 +53,14 @@ OTHER_ROWS = (
 
 @dataclass(frozen=True, eq=False)
 class Variants:
-    """What became of V variants at n samples, in the order of the path.
+    """Solutions of V variants at n samples, in the order of the path.
 
     Attributes:
-        kept: the kept rows of the model (`Model.rows`), shape (kept, n, V); NaN where a sample was
-            not reached.
+        kept: the kept rows of the model (`Model.rows`), shape (kept, n, V); NaN at samples not
+            reached.
         solved: whether each sample of each variant was reached, shape (n, V).
-        retried: how many variants were solved again.
-        messages: by variant, why samples are missing; of every one that misses some.
+        retried: number of variants solved again.
+        messages: by variant with missing samples, the reason.
     """
 
     kept: Array
@@ -151,8 +151,8 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
 
 
 def _by_itself(route: Route, numbers: Array, tol: float) -> tuple[Array, NDArray[np.bool_], str]:
-    """What is kept of a variant that is solved as any mechanism of its size, by time; which
-    samples, and why others are missing.
+    """Return the kept rows of a variant solved alone, as any mechanism of its size, by time; the
+    solved samples, and the reason of missing ones.
     """
     model, n = route.model, len(route.path.times)
     kept = np.full((model.kept, n), np.nan)
@@ -177,11 +177,11 @@ def _by_itself(route: Route, numbers: Array, tol: float) -> tuple[Array, NDArray
 
 
 def _held(route: Route, geometry: Array, solved: NDArray[np.bool_]) -> dict[int, str]:
-    """Variants that cannot move, and what holds them.
+    """Return the variants that cannot move, with the rows that hold them.
 
-    At its design every variant closes. Where rows that are redundant at the nominal design hold it
-    there, those that are solved give it rates all the same, and the residuals do not tell: only
-    where it has gone somewhere do they.
+    At its design every variant closes. If rows redundant at the nominal design hold it there, the
+    solved rows still give it rates, and the residuals do not show it: only at a distance from the
+    design do they.
 
     Args:
         solved: shape (n, V), by time.
@@ -213,8 +213,8 @@ def _together(
     """Follow variants through all samples, each step in as many parts.
 
     Returns:
-        The kept rows, by time; which variants close at their design; and the worst of each by test,
-        NaN where a sample is missing.
+        The kept rows, by time; which variants close at their design; and the worst value of each
+        test, NaN for missing samples.
     """
     model, count = route.model, geometry.shape[1]
     executor = model.executor(count)
@@ -243,17 +243,15 @@ def _together(
 
 @cache
 def _recycle() -> None:
-    """Have freed blocks kept for the next ones, else the system clears every page of every table
-    anew: that takes half as long as filling it. glibc keeps them up to the size of the largest that
-    was ever freed.
+    """Let the allocator keep freed blocks for the next ones. Otherwise the system clears every page
+    of every table again, which takes half as long as filling it. glibc keeps blocks up to the size
+    of the largest one ever freed.
     """
     np.empty(RECYCLED, dtype=np.uint8)
 
 
 def _lead(executor: Executor, route: Route, count: int) -> NDArray[np.bool_]:
-    """Take lanes straight from the design to the start, where they stand afterwards; which of them
-    arrived there.
-    """
+    """Take lanes straight from the design to the start; return which of them arrived."""
     model, last = route.model, route.path.lead_in(route.start)
     way = Route(model, Path(last.motions, np.arange(1, LEAD + 1) / LEAD))
     model.depart(executor, way.origin)

@@ -34,11 +34,10 @@ class Designs(Tabular):
     """The motion of V designs over n samples.
 
     Attributes:
-        points: motion by point name, each array of shape (V, n, 3); NaN where a sample was not
-            reached.
+        points: motion by point name, each array of shape (V, n, 3); NaN at samples not reached.
         solved: whether each sample of each design was reached, shape (V, n).
-        messages: by design, why samples are missing.
-        notes: what is assumed of where all are followed from, as of the nominal design.
+        messages: by design, the reason of missing samples.
+        notes: on the assumed start of all designs, by the nominal design.
         drive: driver values, times and their units.
     """
 
@@ -79,20 +78,19 @@ def solve_designs(
     """Sweep one driver over values for many designs, each with its own hardpoints, directions and
     lengths.
 
-    The geometry is an input of the compiled programs, so that a design costs about a tenth of a
-    microsecond per sample; what is not varied is a constant in them. All results are held at once:
+    The geometry is an input of the compiled programs: a design costs about a tenth of a microsecond
+    per sample. Geometry without variation is constant in them. All results are held at once:
     `kincheck sweep` reduces them on the way.
 
     Args:
         mechanism: the nominal design.
-        driver: as for `solve`, and so are values, rate, points, tol and motions; drivers are
-            measured from the design position of each design, so that a point that varies can be
-            driven by its change only.
-        geometry: what varies [m or -]: by place, named as in a case file
-            ("joints.tie_rod.points.0", "joints.hinge.axis", "points.wheel_center.position", a
-            length), values of shape (V, 3), or (V,) of a length. Places that are one hardpoint are
-            each to be given. They are not checked as a joint checks its own: two axes of a cross
-            may be askew.
+        driver: as for `solve`, and so are values, rate, points, tol and motions. Drivers are
+            measured from the design position of each design: only the change of a varied point can
+            be driven.
+        geometry: varied places [m or -] with names as in a case file ("joints.tie_rod.points.0",
+            "joints.hinge.axis", "points.wheel_center.position", a length); values of shape (V, 3),
+            or (V,) for a length. Give every place of a shared hardpoint. They are not checked as a
+            joint checks its own: two axes of a cross may be askew.
         order: 0 for positions, 1 for velocities too, 2 for accelerations too.
 
     Raises:

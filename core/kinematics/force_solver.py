@@ -18,7 +18,7 @@ Solver = Callable[[float], Trajectory]
 
 
 def motion_only(mechanism: Mechanism, request: Request) -> Request:
-    """Return the request for the motion that forces follow from: all bodies, with accelerations."""
+    """Return the request for the motion behind the forces: all bodies, with accelerations."""
     if request.forces is None:
         return request
     moving = tuple(body.name for body in mechanism.moving)
@@ -26,7 +26,7 @@ def motion_only(mechanism: Mechanism, request: Request) -> Request:
 
 
 def by_motion(mechanism: Mechanism, request: Request, path: Path, motion: Solver) -> Solver:
-    """Return a solver that computes forces from the motion of all bodies, if any are wanted."""
+    """Return a solver for forces from the motion of all bodies, if any are wanted."""
     wanted = request.forces
     if wanted is None:
         return motion
@@ -43,7 +43,7 @@ def by_program(
     path: Path,
     route: Callable[[Request], Route],
 ) -> Solver:
-    """Return a solver that runs a program for the whole mechanism, with the forces wanted.
+    """Return a solver by a program of the whole mechanism, with the forces wanted.
 
     Singular values decide on forces near singular poses: sweeps with such samples are solved again
     by `by_motion`, as are mechanisms whose forces cannot be traced.

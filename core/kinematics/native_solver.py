@@ -23,7 +23,7 @@ from .solver_selection import prepare
 
 
 class Method(StrEnum):
-    """The system of equations that is solved at once; the solutions are the same to round-off."""
+    """The system of equations solved at once; the solutions are the same to round-off."""
 
     BY_SIZE = "by size"
     ONE_PROGRAM = "one program"
@@ -38,12 +38,12 @@ class NativeSolver:
     Attributes:
         order: 0 positions, 1 and velocities, 2 and accelerations.
         style: form of the rows.
-        compiled: run by machine code where llvmlite is installed, else by numpy; the results are
-            the same to round-off.
-        last_iteration: the iteration of a sample that starts from a residual below this is its last
-            [units of the mechanism's size]; a sparse system iterates as long as it gains by it.
-        method: the system that is solved at once. `BY_SIZE` keeps the last few mechanisms ready in
-            the process; the others make them ready anew.
+        compiled: run by machine code if llvmlite is installed, else by numpy; the results are the
+            same to round-off.
+        last_iteration: a sample's iteration from a residual below this is its last [units of the
+            mechanism's size]; a sparse system iterates as long as it gains by it.
+        method: the system solved at once. `BY_SIZE` keeps the last few mechanisms ready in the
+            process; the others make them ready anew.
     """
 
     order: int = 2
@@ -108,9 +108,9 @@ class NativeSolver:
         Args:
             mechanism: the nominal design.
             path: as for `prepare`.
-            varied: places of the geometry that vary, see `places`; all others are constants in the
+            varied: varied places of the geometry, see `places`; all others are constants in the
                 programs.
-            points: names of those whose motion is wanted.
+            points: names of the points whose motion is wanted.
 
         Raises:
             SolveError: as `prepare`.

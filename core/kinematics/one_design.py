@@ -36,36 +36,35 @@ def solve(
 ) -> Trajectory:
     """Sweep one driver over values.
 
-    What was made ready for the last few mechanisms is kept in the process: the next call for one of
-    them costs a fraction.
+    The last few mechanisms stay ready in the process: the next call for one of them costs a
+    fraction.
 
     Args:
-        mechanism: what to solve.
-        driver: name of the driver that moves; the others hold their design value.
+        mechanism: the mechanism to solve.
+        driver: name of the moving driver; the others hold their design value.
         values: driver values [m or rad], in any order: measured from the design position, or the
-            coordinate itself where the driver is not relative. They are solved from the design
+            coordinate itself if the driver is not relative. They are solved from the design
             position outwards.
         rate: driver units per second; velocities and accelerations are per second at this constant
             rate.
-        points: points whose motion is wanted; all of them unless given.
+        points: points whose motion is wanted; all of them by default.
         bodies: bodies whose motion is wanted, in the paper's variables.
-        order: 0 for positions, 1 for velocities too, 2 for accelerations too. What is not asked for
-            is not computed.
+        order: 0 for positions, 1 for velocities too, 2 for accelerations too. Nothing else is
+            computed.
         tol: largest accepted constraint residual, relative to the mechanism's size; positive and
             finite.
-        style: how the rows are written: "native" (global axes), "paper" (Tables 1-2, body axes),
+        style: form of the rows: "native" (global axes), "paper" (Tables 1-2, body axes),
             "conventional" (full products), "mixed" (joint coordinates as further unknowns) or
             "relative" (joint coordinates of a tree as the only ones); the solutions are the same.
-        motions: of further drivers, their values measured likewise, over the time in which the
-            swept one goes from its design value at the rate; the others hold. They are asked at the
-            samples, and between them where a step is divided: what goes away and comes back between
-            two samples is not seen.
+        motions: of further drivers, with values measured likewise, over the time in which the swept
+            one goes from its design value at the rate; the others hold. They are evaluated at the
+            samples, and between them in divided steps: a motion there and back between two samples
+            is not noticed.
         forces: joints, drivers and force elements whose forces are wanted; True for all of them.
-            They need masses, and the motion of all bodies with accelerations, whatever is asked for
-            besides.
+            They need masses, and take the motion of all bodies with accelerations in any case.
 
     Returns:
-        The motion; NaN where a sample cannot be reached, and the reason in its message.
+        The motion; NaN at samples out of reach, with the reason in its message.
 
     Raises:
         SolveError: drivers and degrees of freedom do not match, the mechanism does not close at the
@@ -119,10 +118,10 @@ def asked(
     bodies: Sequence[str] = (),
     style: str = "native",
 ) -> tuple[Path, Request]:
-    """The path and the request that the arguments of `solve` mean.
+    """Return the path and the request for the arguments of `solve`.
 
     Raises:
-        SolveError: an argument makes no sense; the message begins with who asks.
+        SolveError: an argument makes no sense; the message begins with the caller's name.
     """
     wanted = tuple(point.name for point in mechanism.points) if points is None else tuple(points)
     values = real(who, "values", values, "one driver value for each sample")
@@ -154,8 +153,8 @@ def asked(
 def _problem(
     driver: str, values: Array, motions: Mapping[str, Motion], rate: float, order: int, tol: float
 ) -> str:
-    """What makes no sense about arguments, or nothing; told only where there is something, because
-    telling takes its time.
+    """Return the problem with the arguments, or an empty text; composed only if there is one,
+    because that takes time.
     """
     if not finite(order) or order not in (0, 1, 2):
         return f"order is {order!r}, expected 0, 1 or 2"

@@ -70,8 +70,6 @@ class PreparedDesigns:
         return found.kept[self.route.model.rows[ITERATIONS].start]
 
     def start_notes(self, tol: float) -> list[str]:
-        """Return notes on the assumed start of the nominal design; empty where the design decides
-        it.
-        """
+        """Return notes on the assumed start of the nominal design; none if it is certain."""
         model = self.route.model
         return start_notes(model.mechanism, model.request, self.route.path, tol)

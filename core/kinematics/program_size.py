@@ -16,7 +16,7 @@ class ProgramSize:
     Attributes:
         unknowns: number of unknowns.
         rows: number of solved rows.
-        redundant: rows that are only checked, as "joint: primitive".
+        redundant: rows only checked, as "joint: primitive".
         flops: floating-point operations of each program.
     """
 

@@ -1,15 +1,15 @@
-"""How a mechanism is solved is chosen by its size: as one program, component by component, or as
-one sparse system.
+"""Choice of the solver by the size of a mechanism: one program, component by component, or one
+sparse system.
 
-The answers are the same to round-off. One program costs least for each sample, and more to trace:
-it grows faster than what it ties together. Components share programs, so that a chain of thousands
-is made ready in seconds; what is irreducible and too large for one program is a sparse system.
-Measured on chains of four-bars, one program against components, both interpreted: 17 bodies 3 and
-13 us a sample; 33 bodies 7 and 23 us, made ready in 0.5 and 0.1 s; 65 bodies 15 and 57 us, 1.6 and
-0.2 s. Compiled, 33 bodies take 3 and 8 us, after 6 s and 0.1. On rings of loops, one program
-against a sparse system: 31 bodies 21 and 180 us, made ready in 1.3 and 0.04 s; 39 bodies 42 and 275
-us, 2.2 and 0.06 s. Near singular poses the one knows sigma, the other pivots only, and refuses more
-of what could be solved.
+The solutions are the same to round-off. One program costs least for each sample, and most to trace:
+its size grows faster than the mechanism. Components share programs, so a chain of thousands is made
+ready in seconds. An indivisible mechanism too large for one program is a sparse system. Measured on
+chains of four-bars, one program against components, both interpreted: 17 bodies 3 and 13 us a
+sample; 33 bodies 7 and 23 us, made ready in 0.5 and 0.1 s; 65 bodies 15 and 57 us, 1.6 and 0.2 s.
+Compiled, 33 bodies take 3 and 8 us, after 6 s and 0.1. On rings of loops, one program against a
+sparse system: 31 bodies 21 and 180 us, made ready in 1.3 and 0.04 s; 39 bodies 42 and 275 us, 2.2
+and 0.06 s. Near singular poses one program knows sigma; a sparse system knows only pivots, and
+refuses more of the solvable samples.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ IRREDUCIBLE = 40
 def prepare(mechanism: Mechanism, request: Request, path: Path) -> Solver:
     """Make a mechanism ready to be solved along a path.
 
-    Forces are computed by the program where there is one for the whole mechanism, else from the
-    motion of all bodies.
+    Forces are computed by the program of the whole mechanism if there is one, else from the motion
+    of all bodies.
 
     Raises:
         SolveError: drivers and degrees of freedom do not match, or the mechanism does not close at
@@ -56,7 +56,7 @@ def prepare(mechanism: Mechanism, request: Request, path: Path) -> Solver:
 
 
 def start_notes(mechanism: Mechanism, request: Request, path: Path, tol: float) -> list[str]:
-    """Say what is assumed of the start of many designs, by the nominal one; empty where the design
+    """Return notes on the assumed start of many designs, by the nominal one; none if the design
     decides it.
     """
     start = start_of(mechanism, path)
@@ -66,7 +66,7 @@ def start_notes(mechanism: Mechanism, request: Request, path: Path, tol: float) 
 
 
 def _large(mechanism: Mechanism, request: Request) -> Callable[[Path], Solver] | None:
-    """Component by component, or as a sparse system; None where one program is better."""
+    """Return a solver by components or by a sparse system; None if one program is better."""
     # few mechanisms are so large: the others need not wait for the import
     from .by_components.block_solver import Cascade
     from .by_components.sweep import CascadeSweep

@@ -42,7 +42,7 @@ NONE_VARIED = np.empty((0, 1))
 
 
 def compile_model(mechanism: Mechanism, request: Request, section: Section | None = None) -> Model:
-    """Select the rows and trace the programs that the request needs.
+    """Select the rows and trace the programs of a request.
 
     Raises:
         SolveError: drivers and degrees of freedom do not match, or the mechanism does not close at
@@ -59,10 +59,9 @@ def _recent(mechanism: Mechanism, request: Request) -> Model:
 
 
 def recent_model(mechanism: Mechanism, request: Request) -> Model:
-    """As `compile_model`, and the same for the same mechanism and request as long as it is among
-    the last few asked for.
+    """Return the compiled model of a mechanism and a request; the last few are kept.
 
-    Threads that ask for it at the same time may each make one.
+    Threads with the same request at the same time may each make one.
     """
     return (
         _recent(mechanism, request) if is_builtin(mechanism) else compile_model(mechanism, request)
@@ -75,11 +74,10 @@ class Model:
     Attributes:
         plan, vectors, state, prescribed, sampled, rows, blocks, selection, frame: see `Tracing`.
         programs, slots: of the plan.
-        geometry: the slots of all varied places.
+        geometry: slots of all varied places.
         kept: number of rows kept of a sample.
-        design: all slots of a lane that stands at the design position; NaN where the rows were
-            chosen elsewhere.
-        bound: what is made of it for a thread.
+        design: all slots of a lane at the design position; NaN if the rows were chosen elsewhere.
+        bound: cache for each thread.
     """
 
     def __init__(self, mechanism: Mechanism, request: Request, tracing: Tracing) -> None:
@@ -122,7 +120,7 @@ class Model:
 
     @cached_property
     def details(self) -> dict[str, Any]:
-        """What the record of every solution says of the model."""
+        """Details of the model for the record of a solution."""
         return {**self.selection.account.details, "program": self.sizes}
 
     @property
@@ -131,10 +129,11 @@ class Model:
         return {name: each.size for name, each in self.programs.items()}
 
     def executor(self, lanes: int) -> Executor:
-        """The programs bound to that many lanes of this thread; kept, because binding costs as much
-        as running.
+        """Return the programs bound to lanes of this thread; kept, because binding costs as much as
+        running.
 
-        Whoever asks for as many gets the same memory, and sets all that it reads.
+        Every caller with the same number of lanes gets the same memory, and sets every slot it
+        reads.
         """
         return self.bound(
             lanes,
@@ -144,7 +143,7 @@ class Model:
         )
 
     def samples(self, times: Array, drive: Array) -> Array:
-        """What `sampled` holds at the times, shape (sampled, n).
+        """Return the values of the slots `sampled` at the times, shape (sampled, n).
 
         Args:
             drive: value from the design, velocity and acceleration of every moving driver [SI],
@@ -154,8 +153,8 @@ class Model:
         return np.concatenate([times[None], drive_numbers(drivers, drive, self.frame.unit)])
 
     def departing(self, lane: Array, sample: Array) -> Array:
-        """A lane that goes on from where a solved lane stands, with the rates that a sample of the
-        drives gives it there.
+        """Return a lane ready for predictions from a solved lane, with rates by a sample of the
+        drives.
         """
         executor = self.executor(1)
         every = range(len(self.slots))
@@ -165,13 +164,11 @@ class Model:
 
     @cached_property
     def ahead(self) -> list[int]:
-        """The places of what lanes are predicted from."""
+        """Slots of the start of a prediction."""
         return [target for _, target in self.plan.carried]
 
     def depart(self, executor: Executor, sample: Array) -> None:
-        """Make solved lanes those that go on from where they stand, with the rates that a sample of
-        the drives gives them.
-        """
+        """Make solved lanes ready for predictions, with rates by a sample of the drives."""
         executor.put(self.sampled, sample[:, None])
         executor.run(*self.plan.onward)
         executor.carry()
@@ -179,24 +176,22 @@ class Model:
         executor.put([self.slots[EARLIER + TIME]], executor.get([self.slots[FROM + TIME]]))
 
     def standing(self, geometry: Array) -> Array:
-        """All slots of lanes that stand at the design position of variants, all drivers at their
-        design value.
+        """Return all slots of lanes at the design position of variants, shape (slots, variants).
 
-        Normally that is the design itself. Lanes that do not close there, or are on a wrong branch,
-        are NaN.
+        All drivers have their design value. Lanes that do not close there, or are on a wrong
+        branch, are NaN.
 
         Args:
-            geometry: the numbers of all varied places, shape (numbers, variants).
-
-        Returns:
-            Shape (slots, variants).
+            geometry: numbers of all varied places, shape (numbers, variants).
         """
         executor = self.executor(geometry.shape[1])
         closes = self.stand(executor, geometry)
         return np.where(closes, executor.get(range(len(self.slots))), np.nan)
 
     def stand(self, executor: Executor, geometry: Array) -> NDArray[np.bool_]:
-        """Put the lanes of an executor where `standing` says; which of them close there."""
+        """Put the lanes of an executor at the design position, see `standing`; return which of them
+        close.
+        """
         return self.stand_at(
             executor,
             self.state,
@@ -211,8 +206,8 @@ class Model:
         sample: Array,
         geometry: Array = NONE_VARIED,
     ) -> NDArray[np.bool_]:
-        """Put the lanes of an executor where a sample of the drives has them, near a state; which
-        of them close there.
+        """Solve the lanes of an executor for a sample of the drives, near a state; return which of
+        them close.
         """
         executor.clear()
         for name, value in (*state.items(), *self.prescribed.items()):

@@ -1,8 +1,7 @@
-"""The equations of a model at poses of any kind, outside the march: residuals, Jacobian and
-right-hand sides as plain matrices.
+"""Equations of a model at arbitrary poses: residuals, Jacobian and right-hand sides as matrices.
 
-For what is rare: a pose that is nearly singular, a curve that turns back. Many poses at once are
-lanes, run by numpy.
+For rare tasks outside the walk: poses near singular ones, curves beyond limits of travel. Many
+poses at once are lanes, run by numpy.
 """
 
 from __future__ import annotations
@@ -30,9 +29,9 @@ class Equations:
     Attributes:
         phi: residuals, shape (m, n).
         jacobian: by the unknowns, shape (m, n, n).
-        nu: right-hand sides of the velocity equations: the residuals' loss by time where the pose
-            stands, shape (m, n).
-        redundant: Jacobian of the rows that are left out, shape (m, dropped, n).
+        nu: right-hand sides of the velocity equations: minus the rate of the residuals at rest,
+            shape (m, n).
+        redundant: Jacobian of the rows left out, shape (m, dropped, n).
     """
 
     phi: Array
@@ -42,22 +41,20 @@ class Equations:
 
     @property
     def closure(self) -> Array:
-        """Largest residual of each pose, shape (m,); infinite where it is not a number."""
+        """Return the largest residual of each pose, shape (m,); infinite instead of NaN."""
         return np.nan_to_num(np.abs(self.phi).max(axis=1), nan=np.inf)
 
 
 def system_of(model: Model) -> System:
-    """The equations of a model; kept with it, because to trace them anew takes longer than what
-    they are for.
-    """
+    """Return the equations of a model; kept with it, because tracing takes longer than the use."""
     return model.bound("system", lambda: System(model))
 
 
 class System:
-    """The equations of a model whose geometry is given in numbers.
+    """The equations of a model with constant geometry.
 
-    A state is one column of numbers [units, rad, -]; what moves the drivers is a sample, as
-    `Model.samples` gives it.
+    A state is one column of numbers [units, rad, -]. Values of the drivers come from a sample, see
+    `Model.samples`.
 
     Attributes:
         owners: joint or driver of every kept row.
@@ -117,7 +114,7 @@ class System:
         self._executors: dict[int, NumpyExecutor] = {}
 
     def state(self, lanes: Array, ahead: str = FROM) -> Array:
-        """States of lanes of the model, where they are predicted from unless said otherwise; shape
+        """Return the states of lanes of the model, by default those they are predicted from, shape
         (numbers, lanes).
         """
         return np.concatenate([lanes[self.model.vectors[f"{ahead}{name}"]] for name in self._names])
@@ -163,8 +160,7 @@ class System:
         """Return the poses of all bodies in one state, shape (numbers, 1): displacements [units]
         and Euler parameters, (bodies, 7).
 
-        Two states mean the same pose also where an angle among their numbers differs by whole
-        turns.
+        Two states with angles that differ by whole turns have the same poses.
         """
         found = self._configuration(state[:, 0]).poses.values()
         return np.array([[*pose.u, *pose.q] for pose in found], dtype=np.float64)

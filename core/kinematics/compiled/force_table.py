@@ -65,12 +65,12 @@ class ForceTable:
         self._least = WELL_CHOSEN if self.redundant else REGULAR
 
     def read(self, table: Array, sigma: float) -> Forces | None:
-        """Return the forces of a table, shape (n, columns); NaN where it is. None where rows are so
-        nearly singular that singular values must decide.
+        """Return the forces of a table, shape (n, columns), with its NaN; None near a singular
+        pose, to be decided by singular values.
 
         Args:
-            sigma: the smallest estimate of the smallest singular value of the rows that the motion
-                is solved by.
+            sigma: smallest estimate, over the sweep, of the smallest singular value of the solved
+                rows.
         """
         if FORCE_SIGMA in self.rows:
             own = table[:, self.rows[FORCE_SIGMA]]
@@ -94,8 +94,8 @@ class ForceTable:
 class _Samples:
     """The forces of the samples in one table.
 
-    Of all multipliers that redundant rows allow the shortest are taken, as by singular values: they
-    do not depend on which rows are left out.
+    Redundant rows allow many multipliers. The shortest are taken, as by singular values: they do
+    not depend on the choice of rows.
     """
 
     def __init__(self, of: ForceTable, table: Array) -> None:
@@ -113,7 +113,7 @@ class _Samples:
         return Reaction(found[:, :3], found[:, 3:], free)
 
     def effort(self, name: str) -> Array:
-        """Return the effort of a driver, shape (n,); NaN where it is undetermined."""
+        """Return the effort of a driver, shape (n,); NaN if undetermined."""
         found, free = self._shortest(self._vector(EFFORT, name)[:, None], np.ones(1))
         unit = 1.0 if self._of.mechanism.driver(name).turns else self._of.unit
         loose = unit * np.abs(free[:, 0]).max(axis=1, initial=0.0)
@@ -124,8 +124,8 @@ class _Samples:
 
     @cached_property
     def _basis(self) -> tuple[Array, Array]:
-        """What makes the undetermined directions orthonormal, shape (n, r, r), and the part of each
-        in the multipliers, shape (n, r); NaN at samples that were not reached.
+        """Matrices to orthonormalise the undetermined directions, shape (n, r, r), and the part of
+        each direction in the multipliers, shape (n, r); NaN at samples that were not reached.
         """
         r, values = self._of.redundant, self._vector(REDUNDANT, "")
         known = np.isfinite(values).all(axis=1)

@@ -1,6 +1,4 @@
-"""Weights of the polynomial through earlier samples, by Lagrange's formula: what the next samples
-are predicted by.
-"""
+"""Weights of the polynomial through earlier samples, by Lagrange's formula, for predictions."""
 
 from __future__ import annotations
 
@@ -11,14 +9,14 @@ from ...trajectory import Array
 
 
 def weights_of_groups(times: Array, lanes: int) -> Array:
-    """Weights of `NODES` lanes of the group before, or several, for samples in groups of so many
+    """Return the weights of `NODES` lanes of the previous groups, for samples in groups of so many
     lanes.
 
     Args:
-        times: of samples in the order in which they are gone through, shape (n,).
+        times: of the samples in the order of the walk, shape (n,).
 
     Returns:
-        Shape (NODES, n): zero for the first groups, not finite where two nodes share a time.
+        Shape (NODES, n): zero for the first groups, not finite if two nodes share a time.
     """
     behind = groups_behind(lanes) * lanes
     found, wanted = np.zeros((NODES, len(times))), np.arange(behind, len(times))

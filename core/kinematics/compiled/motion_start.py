@@ -1,10 +1,9 @@
-"""Where the samples of a path are followed from, and how the drivers come there from the design
-position.
+"""The start of the samples on a path, and the way of the drivers from the design position to there.
 
-The design position belongs to the path where the drivers' values are those of the design, up to
-what six typed digits leave: at time zero, or else at a sample. Elsewhere a straight way of all
-drivers is assumed. Every engine takes the same start. What is left between the design and the path
-is travelled, never ignored.
+The design position is on the path if the drivers have their design values there, up to six typed
+digits: at time zero, or else at a sample. Otherwise all drivers are assumed to go straight to the
+start. Every engine takes the same start. Any difference between design and path is travelled, never
+ignored.
 """
 
 from __future__ import annotations
@@ -39,12 +38,12 @@ class Start:
 
     Attributes:
         time: the samples are followed from here, both ways [s].
-        name: of that time, to read.
-        lead: the straight way to there, which ends at its time one; None where the design position
-            is there up to rounding.
+        name: of the time, for messages.
+        lead: straight way to the start, which ends at its time one; None if the design position is
+            there up to rounding.
         stands: whether the design position is there up to typed digits.
-        other: another start; None where there is none.
-        ambiguous: whether nothing but a rule prefers this start to the other.
+        other: another possible start, or None.
+        ambiguous: whether only a rule prefers this start to the other.
     """
 
     time: float = 0.0
@@ -69,12 +68,11 @@ AT_DESIGN = Start()
 
 
 def start_of(mechanism: Mechanism, path: Path) -> Start:
-    """Return where the samples of a path are followed from.
+    """Return the start of the samples of a path.
 
-    The design position decides if it belongs to the path, at time zero or else at the sample
-    nearest to that. If it does not, all drivers go straight to their values at time zero if the
-    samples lie around it, else to those at the first sample: a sample's pose must not depend on
-    where the sweep begins.
+    The design position decides if it is on the path, at time zero or else at the nearest sample. If
+    not, all drivers go straight to their values at time zero if the samples lie around it, else to
+    those at the first sample: the pose of a sample must not depend on the first sample of a sweep.
     """
     times = path.times
     known = path.covers(0.0)
@@ -115,9 +113,8 @@ def start_of(mechanism: Mechanism, path: Path) -> Start:
 
 
 def _scales(mechanism: Mechanism, path: Path, values: Array) -> Array:
-    """Return what the moving drivers' values are measured by [m or rad], shape (drivers,).
-
-    It is a radian or the mechanism's size, or the largest number that the values are made of.
+    """Return the scales of the moving drivers' values [m or rad], shape (drivers,): a radian or the
+    mechanism's size, or the largest number in the values.
     """
     size, given = (
         size_of(mechanism),
@@ -149,12 +146,12 @@ def solve_from_start(
     *,
     compare: bool = True,
 ) -> Trajectory:
-    """Solve from a start, or from the other one if nothing can be reached from it; say what was
-    assumed.
+    """Solve from a start, or from the other one if no sample is reached; add notes on the
+    assumptions.
 
     Args:
         solve: solves all samples from a start.
-        compare: whether the numbers are exact enough for two starts to be compared.
+        compare: whether the numbers are exact enough to compare two starts.
     """
     found, taken, other = solve(start), start, start.other
     notes: list[str] = []
@@ -177,8 +174,8 @@ def solve_from_start(
 
 
 def notes_on_start(start: Start, path: Path) -> list[str]:
-    """Say what way was assumed from the design position to the path; empty where the design
-    position is on it.
+    """Return notes on the assumed way from the design position to the path; none if it is on the
+    path.
     """
     if start.stands:
         return []
@@ -192,7 +189,7 @@ def notes_on_start(start: Start, path: Path) -> list[str]:
 def _differ(
     start: Start, other: Start, found: Trajectory, second: Trajectory, size: float
 ) -> list[str]:
-    """Say by how much the motions from two starts differ; empty where they are one."""
+    """Return a note on the difference of the motions from two starts; none if they are one."""
     both = found.solved & second.solved
     apart = [
         motion.position - second.points[name].position for name, motion in found.points.items()

@@ -32,7 +32,7 @@ ABOUT = 1.5
 
 
 def carried(tracer: Tracer) -> list[tuple[int, int]]:
-    """Slots of a solved lane, and of what the lanes after it are predicted from."""
+    """Return pairs of slots to copy from a solved lane to the start of the next prediction."""
     sizes = {name: len(value) for name, value in tracer.formulation.design.items()}
     sizes |= {PREDICTED + name: count for name, count in sizes.items()}
     sizes |= {RATE: tracer.unknowns, RATE_T: tracer.unknowns}
@@ -48,11 +48,10 @@ def carried(tracer: Tracer) -> list[tuple[int, int]]:
 
 
 def continued(tracer: Tracer) -> list[tuple[int, int]]:
-    """What of that is carried where the lanes after are continued through those before: tests need
-    it, predictions do not.
+    """Return the pairs of `carried` still needed if lanes are continued through earlier ones.
 
-    Where they are predicted after all there is no step behind, and nothing is made of what it
-    lacked.
+    Tests need them, predictions do not. A Taylor step after such lanes has no step behind it, and
+    no correction.
     """
     time, unknowns = tracer.layout.scalar(TIME), tracer.unknowns
     ahead = [
@@ -68,10 +67,11 @@ def continued(tracer: Tracer) -> list[tuple[int, int]]:
 
 
 def predict(tracer: Tracer) -> Program:
-    """The state at the time by a Taylor step of second order, and what the last such step lacked.
+    """Return the program of a Taylor step of second order, corrected by the error of the last such
+    step.
 
-    That is of third order, whatever the coordinates: it grows by the cube of the step. It is known
-    where the step before was about as long as this one, or longer.
+    The error is of third order in any coordinates: it grows by the cube of the step. The correction
+    applies if the last step was about as long as this one, or longer.
     """
     read, vector = tracer.read, tracer.vector
     time, here, earlier = (read(label + TIME) for label in ("", FROM, EARLIER))
@@ -98,8 +98,8 @@ def predict(tracer: Tracer) -> Program:
 
 
 def extrapolate(tracer: Tracer, lanes: int) -> Program:
-    """The state from what it is in the group of so many lanes before, or several, by the weights of
-    those: `weights_of_groups`.
+    """Return the program of the state by its values in the previous groups of so many lanes, see
+    `weights_of_groups`.
     """
     # and what is carried of the last of them, which is at hand here; but its time and drives are no
     # longer there
@@ -125,7 +125,7 @@ def extrapolate(tracer: Tracer, lanes: int) -> Program:
 
 
 def extend(tracer: Tracer) -> Program:
-    """The state from what it was at the last `NODES` samples, by the weights of those; see
+    """Return the program of the state by its values at the last `NODES` samples, see
     `weights_of_samples`.
     """
     state, past = _state_slots(tracer), _past_slots(tracer)
@@ -141,17 +141,15 @@ def _state_slots(tracer: Tracer) -> list[int]:
 
 
 def _past_slots(tracer: Tracer) -> list[int]:
-    """The slots in which what was there at up to `NODES` samples, or in groups of lanes, is
-    remembered.
-    """
+    """Return the slots of the stored states, of up to `NODES` samples or groups of lanes."""
     return tracer.layout.vector(PAST, NODES * len(_state_slots(tracer)))
 
 
 def _continued(
     tracer: Tracer, name: str, at: Callable[[int, int], Scalar], further: Mapping[int, Scalar]
 ) -> Program:
-    """The state by Lagrange's formula, without v and a; at(k, slot) is what a slot was at node k.
-    And what else is put out.
+    """Return the program of the state by Lagrange's formula, without v and a, with further outputs;
+    at(k, slot) is the value of a slot at node k.
     """
     weights = tracer.vector(WEIGHT, NODES)
     out = dict(further)
@@ -164,8 +162,8 @@ def _continued(
 
 
 def _of_length_one(value: list[Scalar]) -> list[Scalar]:
-    """Euler parameters of length one, up to the square of what they lack; any other vector as it
-    is.
+    """Return Euler parameters of length one, to second order in their error; any other vector
+    unchanged.
     """
     if len(value) != EULER_PARAMETERS:
         return value

@@ -1,9 +1,8 @@
-"""A mechanism traced: its programs and how they are laid out, kept on disk beside the machine code
-that is made of them.
+"""Traced mechanisms: programs with their layout, kept on disk beside their machine code.
 
-What is kept is found again by the mechanism, the request and the source of all that traces: where
-any of it differs, it is traced anew. Joints of the user's own are traced every time, for their
-source may be anywhere.
+The key of an entry is the mechanism, the request and all source files of tracing: a change of any
+of them traces anew. Joint types of the user are traced every time, because their source may be
+anywhere.
 """
 
 from __future__ import annotations
@@ -41,10 +40,10 @@ PACKAGE = __name__.split(".kinematics.")[0]
 
 @dataclass(frozen=True, eq=False)
 class Tracing:
-    """What tracing a mechanism for a request gives.
+    """The programs of a mechanism for a request, and the layout of their lanes.
 
     Attributes:
-        plan: the programs, the slots of a lane, and how the programs are looped.
+        plan: the programs, the slots of a lane, and the loops over the programs.
         vectors: name of a vector -> its slots.
         state: name of a vector of the state -> its value at design.
         geometry: name of a varied place -> its values at design.
@@ -68,8 +67,7 @@ class Tracing:
 
 
 def traced(mechanism: Mechanism, request: Request, section: Section | None = None) -> Tracing:
-    """Select the rows and trace the programs that the request needs, or take what is known of an
-    earlier time.
+    """Select the rows and trace the programs of a request, or load them from the disk cache.
 
     Raises:
         SolveError: drivers and degrees of freedom do not match.
@@ -86,14 +84,14 @@ def traced(mechanism: Mechanism, request: Request, section: Section | None = Non
 
 
 def is_builtin(mechanism: Mechanism) -> bool:
-    """Whether all it is made of is of this package: what is equal then means the same."""
+    """Return whether all parts are of this package: equal parts then mean the same."""
     parts = (*mechanism.joints, *mechanism.couplers, *mechanism.drivers, *mechanism.forces)
     return all(type(each).__module__.startswith(f"{PACKAGE}.") for each in parts)
 
 
 @cache
 def _source() -> bytes:
-    """Return a digest of the source that tracing runs through."""
+    """Return a digest of the source files of tracing."""
     digest = hashlib.sha256()
     for file in source_files():
         digest.update(file.read_bytes())
@@ -101,7 +99,7 @@ def _source() -> bytes:
 
 
 def source_files() -> list[Path]:
-    """Return the files of every folder that tracing imports from; a test compares them."""
+    """Return the files of every folder imported by tracing; a test compares them."""
     folders = [
         CORE / name for name in ("primitives", "joints", "mechanism", "program", "kinematics")
     ]

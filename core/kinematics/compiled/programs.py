@@ -50,7 +50,7 @@ from .traced_forces import Rows, TracedForces, angles, native_rows
 
 
 class Tracer:
-    """One tape for all programs: what they share is written down once.
+    """One tape for all programs: shared operations are recorded once.
 
     Raises:
         SolveError: the mechanism cannot be solved as described (see `select_rows`).
@@ -119,12 +119,12 @@ class Tracer:
         return [self.tape.input(slot) for slot in self.layout.vector(name, count)]
 
     def store(self, out: dict[int, Scalar], name: str, value: Iterable[Scalar]) -> None:
-        """Add the components of a vector to what is put out."""
+        """Add the components of a vector to the outputs."""
         scalars = list(value)
         out.update(zip(self.layout.vector(name, len(scalars)), scalars, strict=True))
 
     def store_state(self, out: dict[int, Scalar], state: State) -> None:
-        """Add a state to what is put out."""
+        """Add a state to the outputs."""
         for name, value in state.items():
             self.store(out, name, value)
 
@@ -133,14 +133,12 @@ class Tracer:
 
     @cached_property
     def factor(self) -> Elimination:
-        """The rows at the state, factored: to iterate, and where the iteration ends for the
-        rates.
-        """
+        """The factored rows at the state, for iterations and, at the solution, for the rates."""
         return Elimination(self._kept(self.formulation.rows(self.at)))
 
     @property
     def turns(self) -> Sequence[str]:
-        """The scalars that hold the angles of drivers that turn."""
+        """Names of the angles of turning drivers."""
         return turns(self.mechanism, self.request.drivers)
 
     @property
@@ -190,7 +188,7 @@ class Tracer:
 
     @property
     def at_rest(self) -> Mapping[str, Sequence[float]]:
-        """The vectors that tell how prescribed bodies move, at rest at the design position."""
+        """The vectors of prescribed bodies' motions, at rest at the design position."""
         values = {
             label: (1.0, 0.0, 0.0, 0.0) if label == "q" else (0.0, 0.0, 0.0) for label in PRESCRIBED
         }
@@ -201,17 +199,17 @@ class Tracer:
         }
 
     def outputs(self) -> Program:
-        """The wanted motions with the rates they need, and the tests of a solution: closure,
-        redundant rows, branch.
+        """Return the program of the wanted motions with their rates, and the tests of a solution:
+        closure, redundant rows, branch.
 
-        All in one: what follows from the pose is computed once, and beside the elimination, whose
-        pivots wait for one another.
+        One program for all: operations on the pose are shared, and fill the waits between the
+        pivots of the elimination.
         """
         v, a, rates = self._solve_rates(self.request.order)
         return self._outputs(v, a, rates)
 
     def outputs_of_rates(self) -> Program:
-        """Return the program of `outputs` for rates that are given, instead of those that solve the
+        """Return the program of `outputs` for given rates, instead of the solution of the
         mechanism's equations.
         """
         return self._outputs(

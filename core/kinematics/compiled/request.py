@@ -1,4 +1,4 @@
-"""What a sweep is asked for, and how the slots of its lanes are named."""
+"""Requests of a sweep, and the names of the slots of its lanes."""
 
 from __future__ import annotations
 
@@ -18,24 +18,22 @@ MAX_ITERATIONS = 12
 
 @dataclass(frozen=True)
 class Request:
-    """What a sweep is to give.
+    """The wanted results of a sweep, and the form of its programs.
 
     Attributes:
-        drivers: names of the drivers that move; the others hold their design value, and cost
-            nothing.
-        points, bodies: names whose motion is wanted.
+        drivers: names of the moving drivers; the others hold their design value, and cost nothing.
+        points, bodies: names of the points and bodies whose motion is wanted.
         order: 0 positions, 1 and velocities, 2 and accelerations.
-        style: how the rows are written.
-        compiled: run by machine code where llvmlite is installed, else by numpy; the same results
-            to round-off.
+        style: form of the rows.
+        compiled: run by machine code if llvmlite is installed, else by numpy; the results are the
+            same to round-off.
         state: keep the whole state of every sample, and its rates.
-        varied: places of the geometry (see `places`) that are inputs of the programs; all others
-            are constants in them.
-        last_iteration: of a sample, the one that starts from a residual below this [units of the
+        varied: varied places of the geometry (see `places`), inputs of the programs; all others are
+            constants in them.
+        last_iteration: a sample's iteration from a residual below this is its last [units of the
             mechanism's size]; a sparse system iterates as long as it gains by it.
-        rows: of the formulation, which are solved; those that are independent at the design
-            position unless given.
-        forces: what forces are wanted; they take order 2.
+        rows: solved rows of the formulation; by default those independent at the design position.
+        forces: wanted forces; they take order 2.
     """
 
     drivers: tuple[str, ...]
@@ -87,8 +85,8 @@ def by_block(label: str, blocks: int) -> Sequence[str]:
 
 
 def remembered(blocks: int) -> Sequence[str]:
-    """The slots that tests know of what a lane is predicted from, where the rows fall into so many
-    blocks.
+    """Return the slots of tests to remember of the start of a prediction, for this number of blocks
+    of the rows.
     """
     return [
         *dict.fromkeys(
@@ -108,10 +106,10 @@ CROSSING = 1e18
 
 @lru_cache
 def accept_by(tol: float, *, crossing: bool = False) -> Mapping[str, float]:
-    """The numbers of `ACCEPT`: the largest residual of rows, that of redundant rows, and whether a
-    singular pose may be crossed.
+    """Return the numbers of `ACCEPT`: largest residual of solved and of redundant rows, and whether
+    to cross singular poses.
 
-    The last is more than all that the tests of sigma and of orientation can lack to be accepted.
+    The last one exceeds every possible shortfall of the tests of sigma and of orientation.
     """
     return dict(
         zip(ACCEPT, (tol, max(CONSISTENT, tol), CROSSING if crossing else 0.0), strict=True)
@@ -124,7 +122,7 @@ def slots_of(vectors: Mapping[str, Sequence[int]], names: Iterable[str]) -> list
 
 
 class Layout:
-    """Where everything stands in a lane: slots are numbered as they are first asked for."""
+    """Slots of a lane, numbered in the order of their first request."""
 
     def __init__(self) -> None:
         self.slots: dict[str, int] = {}

@@ -33,15 +33,12 @@ AS_THEY_ARE = slice(None)
 
 @dataclass(frozen=True, eq=False)
 class Route:
-    """A path made ready for a model: everything about the samples that does not depend on the
-    motion.
+    """A path made ready for a model, independent of the motion.
 
     Attributes:
-        design: all slots of a lane at the design position of a variant; the model's own unless
-            given.
-        since: the time at which that lane stands on the path, where that is not at the design
-            position but on the way.
-        given: where the samples are followed from, where that is not `start_of` the path.
+        design: all slots of a lane at the design position of a variant; the model's own by default.
+        since: time of that lane on the path, if it is not at the design position but on the way.
+        given: start of the samples, if not `start_of` the path.
     """
 
     model: Model
@@ -52,7 +49,7 @@ class Route:
 
     @cached_property
     def begin(self) -> Start:
-        """Where the samples are followed from, if its lane does not stand on the way."""
+        """The start of the samples, if its lane is not on the way."""
         return self.given or start_of(self.model.mechanism, self.path)
 
     @cached_property
@@ -69,7 +66,7 @@ class Route:
 
     @cached_property
     def details(self) -> Mapping[str, Any]:
-        """What the record of every solution says of the model and of the start."""
+        """Details of the model and the start for the record of a solution."""
         return {**self.model.details, "start": self.begin.facts}
 
     @cached_property
@@ -90,7 +87,7 @@ class Route:
 
     @cached_property
     def back(self) -> NDArray[np.intp] | slice:
-        """What puts samples that are sorted by time back into the order wanted."""
+        """Order or slice from samples sorted by time back to the wanted order."""
         n = len(self.path.times)
         for simple in (AS_THEY_ARE, slice(None, None, -1)):
             if (self.by_time == np.arange(n)[simple]).all():
@@ -99,12 +96,12 @@ class Route:
 
     @cached_property
     def origin(self) -> Array:
-        """What is given at the start, shape (sampled,)."""
+        """The given values at the start, shape (sampled,)."""
         return self.sampled(np.array([self.start]))[:, 0]
 
     @cached_property
     def departure(self) -> Array:
-        """All slots of a lane that stands at the design position and moves as the start says."""
+        """All slots of a lane at the design position, with the rates of the start."""
         return self.model.departing(
             self.model.design if self.design is None else self.design, self.origin
         )
@@ -139,12 +136,12 @@ class Route:
         return tuple(found)
 
     def ends(self, parts: int) -> NDArray[np.intp]:
-        """The samples by time among those where every step is in equal parts."""
+        """Return the samples by time, as positions among the equal parts of all steps."""
         n = len(self.path.times)
         return parts * np.arange(n) + np.where(np.arange(n) < self.below, 0, parts - 1)
 
     def for_motions(self, parts: int = 1) -> tuple[Array, ...]:
-        """The samples of each side for lanes that are motions of their own."""
+        """Return the samples of each side, for lanes with motions of their own."""
         return self.bound(parts, lambda: self._for_motions(parts))
 
     def _for_motions(self, parts: int) -> tuple[Array, ...]:
@@ -158,18 +155,16 @@ class Route:
 
     @cached_property
     def bound(self) -> ThreadCache:
-        """What is made of it."""
+        """Cache for each thread."""
         return ThreadCache()
 
     @cached_property
     def settled(self) -> set[float]:
-        """The tolerances at which its samples were found to be as good as any rows make them: that
-        need not be asked again.
-        """
+        """Tolerances at which other rows do not improve the samples: not to be tried again."""
         return set()
 
     def sampled(self, times: Array) -> Array:
-        """What is given at the times, shape (sampled, n)."""
+        """Return the given values at the times, shape (sampled, n)."""
         return self.model.samples(times, self.path.drive(self.model.request.drivers, times))
 
 

@@ -1,9 +1,8 @@
 """Forces as traced operations: reactions, efforts and the balance of power, beside accelerations.
 
-The rows are factored already: the multipliers of a sample are one transposed solve. Rows that are
-left out as redundant may carry any multipliers, which the others balance. Each gives a direction of
-the multipliers that is not determined, by one more transposed solve; `force_table` orthonormalises
-these directions.
+The rows are factored already: the multipliers of a sample are one transposed solve. Redundant rows
+may carry any multipliers, balanced by the others. Each gives an undetermined direction of the
+multipliers, by one more transposed solve; `force_table` orthonormalises these directions.
 """
 
 from __future__ import annotations
@@ -30,9 +29,7 @@ from .sample_rows import EFFORT, ELEMENT, FORCE_SIGMA, POWER, REACTION, REDUNDAN
 
 
 def can_trace(mechanism: Mechanism) -> bool:
-    """Return whether programs can follow all that forces depend on: the angles of torsional
-    springs.
-    """
+    """Return whether programs can follow all inputs of forces: the angles of torsional springs."""
     return all(
         isinstance(mechanism.joint(each.joint), AxialJoint)
         for each in mechanism.forces
@@ -41,7 +38,7 @@ def can_trace(mechanism: Mechanism) -> bool:
 
 
 def angles(mechanism: Mechanism) -> list[str]:
-    """Return the coordinates of joints that torsional springs measure."""
+    """Return the joint coordinates of torsional springs."""
     return [
         f"{each.joint}.rotation"
         for each in mechanism.forces
@@ -51,10 +48,10 @@ def angles(mechanism: Mechanism) -> list[str]:
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Native rows, those of them that are solved, and their factors.
+    """Native rows, the solved ones among them, and their factors.
 
     Attributes:
-        own: whether they are not the rows that the motion is solved by.
+        own: whether the motion is solved by other rows.
     """
 
     formulation: Cartesian
@@ -79,9 +76,9 @@ class TracedForces:
     """The forces of a traced mechanism.
 
     Args:
-        states: how its bodies move.
-        at: the configuration, with the coordinates of `angles`.
-        drives: of the drivers that move.
+        states: motion of its bodies.
+        at: configuration, with the coordinates of `angles`.
+        drives: of the moving drivers.
     """
 
     def __init__(
@@ -103,7 +100,7 @@ class TracedForces:
 
     @cached_property
     def _loose(self) -> list[list[Scalar]]:
-        """Multipliers of all rows that balance each other, by row left out."""
+        """Return balanced multipliers of all rows, by row left out."""
         found = list[list[Scalar]]()
         for left_out in self._rows.selection.dropped:
             row = self._equations.rows[left_out]

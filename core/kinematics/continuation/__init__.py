@@ -1,3 +1,3 @@
-"""Where a motion meets a singular pose: what is there, how it goes on beyond it, and by its length
-where the driver turns back.
+"""The walk along a motion: step halving, singular poses, passage over them, and curves by arc
+length.
 """

@@ -18,9 +18,9 @@ class Event:
     """A singular pose on a curve.
 
     Attributes:
-        arc: length from where the curve begins.
+        arc: length from the beginning of the curve.
         value: of the driver, from the design position [m or rad].
-        singularity: which rows depend on each other there, and what moves with the driver held.
+        singularity: dependent rows, and motions possible with the driver held.
         points: position of the wanted points [m], shape (3,) each.
     """
 
@@ -31,8 +31,8 @@ class Event:
 
     @property
     def kind(self) -> str:
-        """ "limit point" where the driver locks up and turns back; "branch point" where the motion
-        may branch.
+        """ "limit point" if the driver locks up and turns back; "branch point" if the motion may
+        branch.
         """
         return "limit point" if self.singularity.lock_up else "branch point"
 
@@ -43,16 +43,16 @@ class Curve(Tabular):
 
     Attributes:
         driver: its name.
-        arc: length from the design position, falling from zero where the curve was traced
-            backwards, shape (n,). The length of a step is that of all unknowns: displacements in
-            units of the mechanism's size, turns in radians.
+        arc: length from the design position, shape (n,); it falls from zero if the curve was traced
+            backwards. The length of a step is the change of all unknowns: displacements in units of
+            the mechanism's size, turns in radians.
         values: of the driver, from its design value [m or rad], shape (n,).
-        sigma: smallest singular value of the rows, drivers included: how near a singular pose is
+        sigma: smallest singular value of the rows, drivers included: distance from a singular pose
             [-], shape (n,).
         points: position by name [m], shape (n, 3).
         events: limit points and branch points, in order.
-        closed: whether it came back to the design position, which then is the last pose too.
-        message: empty, or why it ends before its length.
+        closed: whether the curve came back to the design position, which is then the last pose too.
+        message: empty, or the reason of an early end.
         unit: of the driver, m or rad.
     """
 

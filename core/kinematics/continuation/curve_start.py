@@ -1,5 +1,5 @@
-"""The beginning of a curve of poses: where the curve passes it again, going the same way, the curve
-is closed.
+"""The beginning of a curve of poses: a curve is closed if it passes its beginning again, in the
+same direction.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ class Beginning:
         self._way = (after - self._poses) / SMALL
 
     def passed(self, before: Spot, after: Spot) -> Spot | None:
-        """Return the beginning as a spot at its length on the curve where the step between two
-        spots passes it, else None.
+        """Return the beginning as a spot at its length on the curve if the step between two spots
+        passes it, else None.
         """
         if float(self.first.dq @ after.dq) < SAME_WAY:
             return None
@@ -62,8 +62,8 @@ class Beginning:
         return replace(self.first, arc=before.arc + h, time=turned)
 
     def _change(self, spot: Spot) -> Array:
-        """Return the change from the pose of a spot to that of the beginning; Euler parameters p
-        and -p are the same.
+        """Return the change from the pose of a spot to the beginning; Euler parameters p and -p are
+        the same.
         """
         there = self.walk.system.poses(spot.state)
         there[:, 3:] *= np.where(

@@ -1,14 +1,14 @@
-"""Follow the curve of poses by its length, not by a driver: beyond lock-ups, where the driver turns
-back, and over bifurcations.
+"""Follow the curve of poses by its length, not by a driver: beyond lock-ups, at which the driver
+turns back, and over bifurcations.
 
-Pseudo-arclength continuation. The unknowns are the pose q and the path's time t. A step of length
-h along the tangent (dq, dt), |dq| = 1 [units of the mechanism's size, rad], is corrected across the
+Pseudo-arclength continuation. The unknowns are the pose q and the path's time t. A step of length h
+along the tangent (dq, dt), |dq| = 1 [units of the mechanism's size, rad], is corrected across the
 tangent by Newton's iteration on
 
     phi(q, t) = 0,   dq . (q - q_predicted) = 0        Jacobian  B = [ J  -nu ; dq^T  0 ]
 
-B is regular at limit points, where J is not. Limit points are zeros of dt along the curve. At
-bifurcations [J -nu] loses rank, and the determinant of B changes its sign where an odd number of
+B is regular at limit points, J is not. Limit points are zeros of dt along the curve. At
+bifurcations [J -nu] loses rank, and the determinant of B changes its sign if an odd number of
 branches cross.
 """
 
@@ -52,9 +52,9 @@ class Spot:
     Attributes:
         state: shape (numbers, 1).
         time: of the path.
-        dq, dt: unit tangent, shape (n,), and the time's part of it.
-        arc: length from where the walk began.
-        sigma: smallest singular value of [J -nu]: zero where the curve branches.
+        dq, dt: unit tangent, shape (n,), and its component along time.
+        arc: length from the beginning of the walk.
+        sigma: smallest singular value of [J -nu]: zero at branch points.
         sign: of the determinant of B.
     """
 
@@ -69,8 +69,8 @@ class Spot:
 
 @dataclass(frozen=True, eq=False)
 class Beside:
-    """A singular pose on the curve: its length and time, and the spot nearest to it that
-    corrections lead to.
+    """A singular pose on the curve: its length and time, and the nearest spot reached by
+    corrections.
     """
 
     spot: Spot
@@ -85,7 +85,7 @@ class ArclengthWalk:
         self.system, self.path, self.tol = system, path, tol
 
     def sample(self, time: float) -> Array:
-        """What moves the drivers, shape (sampled, 1)."""
+        """Return a sample of the drivers, shape (sampled, 1)."""
         times = np.array([time])
         model = self.system.model
         return model.samples(times, self.path.drive(model.request.drivers, times))
@@ -101,8 +101,8 @@ class ArclengthWalk:
         return self._spot(state, time, dq / np.linalg.norm(dq), 0.0)
 
     def advance(self, spot: Spot, h: float) -> Spot | None:
-        """The pose at about the length h from a spot; None where corrections do not converge
-        nearby, or it is no solution.
+        """Return the pose at about the length h from a spot; None if corrections do not converge
+        nearby, or not to a solution.
 
         Corrections are across the tangent of the spot: h is measured along it.
         """
@@ -148,8 +148,8 @@ class ArclengthWalk:
     def along(
         self, spot: Spot, length: float, longest: float, attempts: int | None = None
     ) -> Iterator[Spot]:
-        """Spots after one, up to a length from where the walk began; ends before it where steps get
-        too short, or are too many.
+        """Yield spots after one, up to a length from the beginning of the walk; stop early if steps
+        get too short or too many.
         """
         h = 0.1 * longest
         for _ in count() if attempts is None else range(attempts):
@@ -167,10 +167,10 @@ class ArclengthWalk:
             yield spot
 
     def limit(self, before: Spot, after: Spot) -> Beside:
-        """Where the driver turns back between two spots: the zero of dt, by false position
-        (Illinois), to round-off.
+        """Return the turning point of the driver between two spots: the zero of dt, by false
+        position (Illinois), to round-off.
 
-        Where the curve also branches there, corrections do not converge: the zero is interpolated.
+        If the curve also branches there, corrections do not converge: the zero is interpolated.
         """
         a, b, f_a, f_b = 0.0, after.arc - before.arc, before.dt, after.dt
         # which end the last spot replaced: an end that stays twice weighs half
@@ -201,11 +201,11 @@ class ArclengthWalk:
         return Beside(best, best.arc, best.time)
 
     def branching(self, before: Spot, after: Spot) -> Beside | None:
-        """Where the curve branches between two spots, if it does.
+        """Return the branch point between two spots, or None.
 
-        Corrections do not converge there, but on both sides sigma falls to zero like a line: with
-        its sign turned on one side it is smooth, and its zero is interpolated. Where sigma has a
-        least value other than zero there is no such line.
+        Corrections do not converge there, but sigma falls to zero linearly on both sides: with its
+        sign changed on one side it is smooth, and its zero is interpolated. A minimum of sigma
+        other than zero has no such line.
         """
         centre = self._least(before, after.arc - before.arc)
         nodes = self._nodes(before, after, centre)
@@ -221,8 +221,8 @@ class ArclengthWalk:
         return Beside(spots[3], before.arc + centre + root, _between(offsets, spots, root))
 
     def _nodes(self, before: Spot, after: Spot, centre: float) -> tuple[Array, list[Spot]] | None:
-        """Spots on both sides of a length from the first, and where they are; None where any is not
-        reached.
+        """Return spots on both sides of a length from the first, and their lengths; None if any is
+        not reached.
         """
         offsets = min(NODE, 0.125 * (after.arc - before.arc)) * np.array(
             [-4.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0]
@@ -232,8 +232,8 @@ class ArclengthWalk:
         return (offsets, spots) if len(spots) == len(found) else None
 
     def _least(self, before: Spot, length: float) -> float:
-        """The length from a spot at which sigma is least, by golden section; where no correction
-        converges, sigma is zero.
+        """Return the length from a spot to the minimum of sigma, by golden section; sigma counts as
+        zero if no correction converges.
         """
         part = 0.5 * (np.sqrt(5.0) - 1.0)
         a, b = 0.0, length
@@ -261,7 +261,7 @@ def _between(offsets: Array, spots: Sequence[Spot], at: float) -> float:
 
 
 def _root(x: Array, y: Array) -> float:
-    """The zero nearest to zero of the polynomial through points; NaN where it has none."""
+    """Return the zero nearest to zero of the polynomial through points, or NaN."""
     roots = np.polynomial.Polynomial.fit(x, y, len(x) - 1).roots()
     real = roots.real[np.abs(roots.imag) <= MEETS]
     return float(real[np.abs(real).argmin()]) if len(real) else np.nan

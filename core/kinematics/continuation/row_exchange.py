@@ -1,10 +1,10 @@
-"""Which rows a motion is followed by: those chosen at the design position, and where they depend on
-each other later, others.
+"""Exchange of rows along a motion: rows chosen at the design position are replaced if they become
+dependent.
 
-A mechanism with more rows than it needs has many choices of as many as are independent, and none
-may be good everywhere: the rods of a locomotive, a Bennett loop. Where the rows that were chosen
-become singular, though all rows together do not, the mechanism knows nothing of it, and the motion
-goes on by rows that are chosen there.
+A mechanism with redundant rows has many choices of independent ones, and none may be good
+everywhere: the rods of a locomotive, a Bennett loop. If the chosen rows become singular, but all
+rows together do not, the mechanism is regular, and the motion continues with rows chosen at the new
+pose.
 """
 
 from __future__ import annotations
@@ -43,25 +43,25 @@ AS_GOOD = 0.3
 
 @dataclass(frozen=True, eq=False)
 class Standing:
-    """A lane of a model: where a motion goes on by the model's rows."""
+    """A lane of a model at a pose: the motion continues from there with the model's rows."""
 
     model: Model
     lane: Array
 
 
 class Choice:
-    """The rows that a motion was followed by so far.
+    """The rows of a motion so far.
 
     Attributes:
-        models: of each choice of rows; the first is the motion's own.
+        models: one for each choice of rows; the first is the motion's own.
     """
 
     def __init__(self, model: Model) -> None:
         self.models = [model]
 
     def anew(self, route: Route, lane: Array) -> Standing | None:
-        """Rows chosen where a lane stands on a route, and a lane that stands there by them; None
-        where none are better.
+        """Return rows chosen at the pose of a lane on a route, and a lane there with these rows;
+        None if none are better.
         """
         model, slots = route.model, route.model.slots
         if not model.selection.dropped:
@@ -108,11 +108,11 @@ class Choice:
 def chosen(
     matrix: Array, known: Sequence[tuple[int, ...]], drivers: int, conditions: Sequence[Condition]
 ) -> tuple[int, ...]:
-    """The rows to solve at a pose: the best of those known where others are hardly better, else
-    those that are chosen there.
+    """Return the rows to solve at a pose: the best known ones if others are hardly better, else
+    those chosen there.
 
     Args:
-        matrix: the Jacobian of all rows, those of the drivers last.
+        matrix: Jacobian of all rows, the drivers' last.
         conditions: see `Formulation`.
     """
     best = max(known, key=lambda rows: _sigma(matrix, rows))
@@ -149,10 +149,10 @@ def _sigma(matrix: Array, rows: Sequence[int]) -> float:
 
 
 def _standing(model: Model, state: dict[str, Array], sample: Array, nearby: float) -> Array | None:
-    """A lane of a model that stands at a sample, no farther from a state than so; None where there
-    is none.
+    """Return a lane of a model at a sample, no farther from a state than the given distance, or
+    None.
 
-    Another solution is as far away as the smallest singular value is large, or farther.
+    The distance to another solution is the smallest singular value or more.
     """
     executor = model.executor(1)
     (closes,) = model.stand_at(executor, state, sample)

@@ -1,5 +1,6 @@
-"""What was followed of a motion, part by part: a singular pose that the motion passes ends one
-part, and begins the next; so does one where only the rows are singular that it was followed by."""
+"""The followed parts of a motion: a singular pose on the motion ends one part and begins the next,
+and so does a pose at which only the solved rows are singular.
+"""
 
 from __future__ import annotations
 
@@ -37,12 +38,12 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class Passage:
-    """A singular pose that the motion passes.
+    """A singular pose on the motion.
 
     Attributes:
         lane: all slots of the last pose before it.
-        time: of that pose.
-        route: on which.
+        time: of this pose.
+        route: the route with the passage.
     """
 
     lane: Array
@@ -52,11 +53,11 @@ class Passage:
 
 @dataclass(frozen=True, eq=False)
 class Stuck:
-    """A sample beside a passage that is too near for either side to reach it.
+    """A sample too near to a passage to be reached from either side.
 
     Attributes:
-        sample: which.
-        route: on which the passage is.
+        sample: its number.
+        route: the route with the passage.
         before, near: lanes: a good one before the passage, and the last one there.
     """
 
@@ -67,15 +68,15 @@ class Stuck:
 
 
 class Followed:
-    """A march, and its going on beyond its ends.
+    """A march, continued beyond its ends.
 
     Attributes:
-        found: the samples; those beyond ends are put in as they are reached.
-        parts: the first is the route asked for, from where it stands on its path.
+        found: the samples, with those reached beyond ends.
+        parts: the first is the wanted route, from its start on the path.
         part_of: the part of each sample, shape (n,).
         choice: of rows.
-        ends: those that remain.
-        passages, stuck: what was passed.
+        ends: the remaining ends.
+        passages, stuck: passed singular poses, and samples near them.
     """
 
     def __init__(self, route: Route, found: March, tol: float) -> None:
@@ -94,12 +95,12 @@ class Followed:
 
     @property
     def doubtful(self) -> NDArray[np.bool_]:
-        """Samples that were reached and may be wrong, shape (n,)."""
+        """Return whether each reached sample may be wrong, shape (n,)."""
         return self.found.solved & doubtful(*self._tests, self.tol)
 
     @property
     def in_question(self) -> NDArray[np.bool_]:
-        """Those, and samples that may be better by other rows, shape (n,)."""
+        """Return whether each sample is doubtful or may be better with other rows, shape (n,)."""
         model = self.route.model
         largest = (
             np.fmax.reduce(self.found.kept[model.rows[LARGEST_SIGMA].start], initial=0.0)
@@ -116,7 +117,7 @@ class Followed:
         return sigma, closure
 
     def go_on(self) -> None:
-        """Pass the singular poses at ends, one after the other, where the motion passes them."""
+        """Pass the singular poses at ends, one after the other, if the motion continues there."""
         waiting = list(self.found.ends)
         while waiting:
             end = waiting.pop(0)
@@ -127,7 +128,7 @@ class Followed:
                 waiting = [*further, *waiting]
 
     def renew(self, lanes: Mapping[int, Array]) -> None:
-        """Follow samples by rows that are chosen there, from lanes that stand at them."""
+        """Follow samples with rows chosen there, from lanes at these samples."""
         left: list[int] = list(lanes)
         routes = {k: self.parts[int(self.part_of[k])].route for k in left}
         without = 0
@@ -149,7 +150,7 @@ class Followed:
                 left = [k for k in left[1:] if self.in_question[k]]
 
     def _beyond(self, end: End) -> list[End] | None:
-        """What ends the motion beyond an end; None where it does not go on."""
+        """Return the next end of the motion beyond an end; None if the motion does not continue."""
         slots = end.route.model.slots
         if (
             end.failure is not FailureKind.LEFT_OFF
@@ -203,7 +204,7 @@ class Followed:
         return [each for each in ends if side * (each.wanted - beyond) >= 0.0]
 
     def _further(self, end: End, number: int, side: float) -> list[End]:
-        """Go along a route again, and where it left off on."""
+        """Run a route again, and continue it beyond its earlier end."""
         samples, slots = self.parts[number].samples, end.route.model.slots
         low = LOW * float(end.lane[slots[FROM + SIGMA]] / end.lane[slots[FROM + LARGEST_SIGMA]])
         found = march(end.route, self.tol, low=low)
@@ -217,7 +218,7 @@ class Followed:
         return [each for each in found.ends if side * (each.wanted - end.route.start) >= 0.0]
 
     def _missing(self, number: int, side: float, wanted: float) -> NDArray[np.intp]:
-        """The samples that a part did not reach on a side, from the first that was wanted on."""
+        """Return the samples of a side not reached by a part, from the first wanted one on."""
         start = self.parts[number].route.start
         return np.flatnonzero(
             ~self.found.solved & (side * (self.times - start) >= side * (wanted - start))
@@ -240,9 +241,7 @@ class Followed:
         )
 
     def _follow(self, route: Route, samples: NDArray[np.intp]) -> list[End]:
-        """Put what a route reaches of samples in their place, where there was nothing or it was
-        much nearer to singular.
-        """
+        """Store the samples reached by a route if they were missing, or much nearer to singular."""
         found, sigma = march(route, self.tol, low=LOW), self.route.model.rows[SIGMA].start
         nearer = BETTER * self.found.kept[sigma, samples] < found.kept[sigma]
         reached = found.solved & (nearer | ~self.found.solved[samples])
@@ -253,7 +252,7 @@ class Followed:
         return list(found.ends)
 
     def visit(self, samples: Collection[int]) -> dict[int, Array]:
-        """Lanes that stand at samples; those that are not reached again are missing."""
+        """Return lanes at samples; samples not reached again are absent."""
         found: dict[int, Array] = {}
         for number, part in enumerate(self.parts):
             wanted = {
@@ -269,8 +268,8 @@ class Followed:
         return found
 
     def before(self, time: float, side: float, number: int) -> Array | None:
-        """The lane of the last sample of a part before a time, going outwards, that is not in
-        doubt; or of its start, if known.
+        """Return the lane of the last certain sample of a part before a time, going outwards; or of
+        its start, if known.
         """
         route = self.parts[number].route
         away = side * (self.times - route.start)
@@ -284,9 +283,7 @@ class Followed:
         return self._stood.get(nearest)
 
     def _number(self, route: Route) -> int | None:
-        """Return the number of the part that is followed on a route; None on the way to the
-        start.
-        """
+        """Return the number of the part on a route; None on the way to the start."""
         return next((k for k, part in enumerate(self.parts) if part.route is route), None)
 
 

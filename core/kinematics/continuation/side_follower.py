@@ -1,7 +1,7 @@
 """Follow the sides of a route sample by sample, with parts of the steps that fail.
 
-A failed step is first tried in equal parts, which the executor follows by itself, then in parts
-that are found one by one. The motion ends where no part of a step succeeds.
+A failed step is first tried in equal parts, followed by the executor alone, then in parts found one
+by one. The motion ends if no part of a step succeeds.
 """
 
 from __future__ import annotations
@@ -32,16 +32,15 @@ FEW = 4
 
 
 class March(NamedTuple):
-    """What a march found, sample by sample in the order given.
+    """Results of a march by sample, in the given order.
 
     Attributes:
         kept: the kept rows of every sample (`Model.rows`), shape (kept, n); NaN if not reached.
         worst: see `Track`: the largest residuals of kept and redundant rows, and the smallest
             estimate of sigma.
         solved: shape (n,).
-        ends: one for each side that ended before its last sample.
-        visited: by sample, all slots of a lane that stands there and goes on from it; those asked
-            for.
+        ends: one for each side not followed to its last sample.
+        visited: by requested sample, all slots of a lane there, ready to continue.
     """
 
     kept: Array
@@ -63,10 +62,10 @@ class March(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class End:
-    """Where a side ended before its last sample.
+    """The end of a side before its last sample.
 
     Attributes:
-        message: where, and why.
+        message: place and reason.
         route: the given one, or the straight way to its start.
         lane: all slots of the last pose.
         wanted: time of the sample out of reach [s].
@@ -104,7 +103,7 @@ class Grid:
 
     @cached_property
     def kept(self) -> Array:
-        """What is kept of all its samples, again and again in the same memory."""
+        """The table of all samples, in memory used again by the next run."""
         return self.track.begin()
 
 
@@ -172,7 +171,7 @@ class Marcher:
         return None
 
     def worsen(self, columns: NDArray[np.intp]) -> None:
-        """Take account of samples that a finer grid reached."""
+        """Add the tests of samples reached on a finer grid."""
         plan, worst = self.model.plan, self.track.worst
         for k, slot in enumerate([*plan.largest, *plan.smallest]):
             if slot in plan.kept:
@@ -184,7 +183,7 @@ class Marcher:
                 )
 
     def anchor(self, number: int) -> Array:
-        """All slots of a lane where the motion stands on a side."""
+        """All slots of the last lane on a side."""
         found = self.departure.copy()
         found[self.model.ahead] = self.track.anchors[number]
         return found
@@ -194,7 +193,7 @@ class Marcher:
         return float(lane[self.slots[FROM + TIME]])
 
     def _stops(self, side: Side) -> list[int]:
-        """How many samples of a side have passed where one to visit has."""
+        """Return the number of samples of a side up to each one to visit."""
         place = np.argsort(self.route.by_time)
         passed = {int((place[k] - side.first) * side.step) + 1 for k in self.visit}
         return sorted(count for count in passed if 1 <= count <= side.count)
@@ -214,7 +213,7 @@ class Marcher:
 
 
 class SideWalk(Walk):
-    """The walk along one side of a marcher, after a step that has failed."""
+    """The walk along one side of a marcher, after a failed step."""
 
     def __init__(self, marcher: Marcher, number: int) -> None:
         self.marcher, self.number, self.track = marcher, number, marcher.track
@@ -260,7 +259,7 @@ class SideWalk(Walk):
         return self.marcher.crossing or bool(sigma < self.marcher.low * largest)
 
     def _in_parts(self, at: int, stop: int) -> int:
-        """Follow samples in equal parts of their steps, and a step that fails in more; return the
+        """Follow samples in equal parts of their steps, and a failed step in more; return the
         number passed.
         """
         anchors, number = self.track.anchors, self.number

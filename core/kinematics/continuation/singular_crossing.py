@@ -1,11 +1,11 @@
-"""Over a singular pose: the motion on both sides of it, and by interpolation the pose itself, where
-the motion goes on.
+"""Passage over a singular pose: the motion on both sides, and the pose itself by interpolation, if
+the motion continues.
 
-At the pose its own equations say too little, but the motion is smooth there. Eight poses beside it,
-followed from before to beyond, give it by Lagrange's formula. If they are of two different motions,
-or the motion turns back, the formula does not hold or there are no eight. If the motion turns round
-a corner that is too narrow to be seen from there, or there is a gap as narrow, a pose that the
-motion was followed to right before it is not where the formula has it.
+The equations at the pose do not determine it, but the motion is smooth there. Eight poses around
+it, followed from before to beyond, give it by Lagrange's formula. If they belong to two different
+motions, or the motion turns back, the formula does not hold or there are no eight. If the motion
+turns a corner too narrow for these poses, or has a gap as narrow, the last followed pose before the
+singular one does not lie on the polynomial.
 """
 
 from __future__ import annotations
@@ -41,13 +41,13 @@ COVERED = 30.0
 
 @dataclass(frozen=True, eq=False)
 class Bridge:
-    """A singular pose that a motion passes.
+    """A singular pose on a motion.
 
     Attributes:
         kept: the kept rows there (`Model.rows`), shape (kept,); its tests are those of a pose right
             before it.
         off: bound of its errors: of the pose by the mechanism's size, of rates by their own.
-        beyond: a lane that stands beyond it.
+        beyond: a lane beyond it.
     """
 
     kept: Array
@@ -56,7 +56,7 @@ class Bridge:
 
 
 def onward(route: Route, lane: Array, times: Array) -> Route:
-    """Return the route to other times that sets off where a lane stands on this one."""
+    """Return the route from a lane on this one to other times."""
     since = float(lane[route.model.slots[FROM + TIME]])
     return Route(
         route.model,
@@ -69,15 +69,15 @@ def onward(route: Route, lane: Array, times: Array) -> Route:
 def bridge(
     route: Route, lane: Array, time: float, tol: float, near: Array | None, *, rates: bool = True
 ) -> Bridge | None:
-    """Pass a time on a route, coming from a lane; None where the motion does not go on, or is not
+    """Pass a time on a route, from a lane; return None if the motion does not continue, or is not
     known well enough.
 
     Args:
-        near: a lane that stands there, where the motion was followed to, at or right before the
-            singular pose: it must be on the same curve. Without one, only what is interpolated may
-            be believed, and not that the motion goes on.
-        rates: whether they are wanted there too. To go on beyond the pose itself is enough,
-            whatever a request wants elsewhere.
+        near: last followed lane at or right before the singular pose: it must be on the same curve.
+            Without one, the interpolated pose may be accepted, but not the continuation of the
+            motion.
+        rates: whether they are wanted there too. A passage needs only the pose, even if the request
+            wants rates elsewhere.
     """
     model = route.model
     speed = float(np.abs(lane[model.vectors[FROM + RATE]]).max())
@@ -103,8 +103,8 @@ def bridge(
 
 
 def _eight(route: Route, lane: Array, times: Array, tol: float) -> tuple[Array, Array] | None:
-    """What is kept of poses at eight times, and lanes that stand there; a singular pose lies
-    between the fourth and the fifth.
+    """Return the kept rows of poses at eight times, and their lanes; a singular pose lies between
+    the fourth and the fifth.
     """
     before = march(onward(route, lane, times[:4]), tol, visit=range(4))
     if not before.solved.all():
@@ -118,7 +118,7 @@ def _eight(route: Route, lane: Array, times: Array, tol: float) -> tuple[Array, 
 
 
 def _on_curve(route: Route, lanes: Array, near: Array) -> bool:
-    """Whether the pose of a lane at the middle time is that of the polynomial through eight
+    """Return whether the pose of a lane at the middle time is on the polynomial through eight
     others.
     """
     system, time = system_of(route.model), near[[route.model.slots[FROM + TIME]]]
@@ -131,8 +131,8 @@ def _on_curve(route: Route, lanes: Array, near: Array) -> bool:
 def _scales(
     model: Model, kept: Array, speed: float, *, rates: bool
 ) -> Iterator[tuple[slice, float]]:
-    """Rows of every motion and what errors of it are measured by: the mechanism's size, and the
-    motion's own where it is a rate.
+    """Return the rows of every motion and the scales of their errors: the mechanism's size, and for
+    rates their own size.
     """
     for name, rows in model.rows.items():
         label = name.split(" ")[0]

@@ -30,18 +30,18 @@ BESIDE = 1e-6
 
 @dataclass
 class Findings:
-    """What there is to say of a march.
+    """Findings of a march.
 
     Attributes:
-        notes: of samples that are right, but at or beyond singular poses.
-        messages: why samples are missing.
-        failures: the kinds of these failures.
+        notes: on correct samples at or beyond singular poses.
+        messages: reasons of missing samples.
+        failures: kinds of these failures.
         poses: the singular poses, for the record.
-        retried: samples that were solved again.
+        retried: number of samples solved again.
         sigma: smallest singular value among those.
-        renewed: how often rows were chosen anew.
-        uncertain: samples that are refused because their pose or rates are uncertain; the motion
-            does not end there.
+        renewed: number of new choices of rows.
+        uncertain: samples refused because of an uncertain pose or rates; the motion does not end
+            there.
     """
 
     notes: list[str] = field(default_factory=list[str])
@@ -55,7 +55,7 @@ class Findings:
 
     @property
     def details(self) -> dict[str, Any]:
-        """The findings as a record has them; empty where nothing was found."""
+        """The findings for the record; empty without findings."""
         found: dict[str, Any] = {}
         if self.retried:
             found |= {"retried_samples": self.retried, "smallest_singular_value": self.sigma}
@@ -93,7 +93,7 @@ class Findings:
 
 
 def add_passages(findings: Findings, followed: Followed) -> None:
-    """Add the singular poses that the motion passed between samples."""
+    """Add the singular poses passed between samples."""
     said = [pose["time"] for pose in findings.poses if pose["outcome"] == "passed"]
     others = [
         each

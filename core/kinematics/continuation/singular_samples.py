@@ -1,10 +1,10 @@
-"""Samples of a march that are nearly singular, and singular poses that it crossed or ended at: none
-is passed in silence.
+"""Nearly singular samples of a march, and the singular poses it crossed or ended at: none is passed
+in silence.
 
-A pose is wrong by up to its residual over the smallest singular value sigma of its rows. The march
-sees residuals, and of sigma only an estimate. Where that leaves room for an error sigma is
-computed; where sigma does, the sample is solved again by orthogonal factors, and its errors are
-computed; where they are too large it is interpolated, if the motion goes on beyond, or else
+The error of a pose is up to its residual over the smallest singular value sigma of its rows. The
+march knows residuals, and an estimate of sigma. If these allow too large an error, sigma is
+computed; if sigma allows it too, the sample is solved again by orthogonal factors, and its errors
+are computed. If they are too large it is interpolated, if the motion continues beyond, or else
 refused.
 """
 
@@ -44,9 +44,7 @@ LARGEST = 1000
 
 
 def scrutinise(route: Route, found: March, tol: float) -> Findings:
-    """Solve doubtful samples again, in place, and those beyond an end that the motion passes; say
-    what was found.
-    """
+    """Solve doubtful samples again, in place, and those beyond passed ends; return the findings."""
     scrutiny = _Scrutiny(Followed(route, found, tol))
     if len(route.model.selection.chosen) > LARGEST:
         return scrutiny.too_large()
@@ -74,7 +72,7 @@ class _Scrutiny:
         self.findings = Findings()
 
     def too_large(self) -> Findings:
-        """Say that nothing was examined."""
+        """Add the message of a mechanism too large to be examined."""
         count, unknowns = int(self.followed.doubtful.sum()), len(self.route.model.selection.chosen)
         if count:
             self.findings.notes.append(
@@ -88,8 +86,8 @@ class _Scrutiny:
     # Samples
 
     def samples(self) -> None:
-        """Follow samples by better rows, solve those in doubt closely, and interpolate or refuse
-        those that remain in doubt.
+        """Follow samples with better rows, solve doubtful ones closely, and interpolate or refuse
+        the rest.
         """
         indices, doubtful = np.flatnonzero(self.followed.in_question), self.followed.doubtful
         visited = self.followed.visit(indices.tolist()) if len(indices) else {}
@@ -114,7 +112,7 @@ class _Scrutiny:
             self._closely(system_of(model), samples, self._lanes(visited, samples))
 
     def _by_model(self, samples: Iterable[int]) -> Iterator[tuple[Model, NDArray[np.intp]]]:
-        """Samples by the model that they were followed by."""
+        """Return the samples by the model they were followed with."""
         found: dict[Model, list[int]] = {}
         for k in sorted(samples):
             found.setdefault(self._followed_on(k).model, []).append(k)
@@ -167,9 +165,7 @@ class _Scrutiny:
             )
 
     def _lost(self, samples: list[int]) -> None:
-        """Refuse doubtful samples that are not reached a second time: rounding alone had them
-        accepted.
-        """
+        """Refuse doubtful samples not reached a second time: rounding made them acceptable."""
         if samples:
             self.found.kept[:, samples], self.found.solved[samples] = np.nan, False
             self.findings.uncertain += samples
@@ -182,7 +178,7 @@ class _Scrutiny:
             self.findings.failures.append(FailureKind.UNREPEATABLE)
 
     def stuck(self) -> None:
-        """Interpolate samples beside passages that neither side could reach, or refuse them."""
+        """Interpolate samples not reached from either side of a passage, or refuse them."""
         stuck = [each for each in self.followed.stuck if not self.found.solved[each.sample]]
         for each in stuck[:BRIDGED]:
             self.found.solved[each.sample] = self._bridged(
@@ -201,7 +197,7 @@ class _Scrutiny:
                 )
 
     def _passed(self, k: int, near: Array) -> bool:
-        """Put what the motion has on both sides of a sample in its place, where it goes on."""
+        """Replace a sample by interpolation between both sides of it, if the motion continues."""
         time, number = float(self.times[k]), int(self.followed.part_of[k])
         side = 1.0 if time >= self.followed.parts[number].route.start else -1.0
         lane = self.followed.before(time, side, number)

@@ -1,12 +1,10 @@
-"""Singular poses: how near one is, which rows depend on which there, and what could move with the
-drivers held.
+"""Singular poses: distance from one, dependent rows, and motions possible with the drivers held.
 
-J is the Jacobian of the kept rows, in units in which rows and unknowns are of size one. Its
-smallest singular value sigma belongs to a motion z of all bodies that the rows hardly notice, J z =
-sigma y, and to a combination y of rows that hardly holds anything. Where the rows of the joints
-alone are independent, a driver is among those of y: it has come to the end of its travel (lock-up,
-a limit point of the motion). Where they are not, the motion may go on in several ways
-(bifurcation).
+J is the Jacobian of the kept rows, in units with rows and unknowns of size one. Its smallest
+singular value sigma belongs to a motion z of all bodies, hardly resisted by the rows, J z = sigma
+y, and to a nearly dependent combination y of rows. If the rows of the joints alone are independent,
+a driver is among those of y: it has come to the end of its travel (lock-up, a limit point of the
+motion). If they are not, the motion may continue in several ways (bifurcation).
 """
 
 from __future__ import annotations
@@ -38,17 +36,16 @@ CONTINUED = "the branch followed is the continuation of the motion"
 
 @dataclass(frozen=True)
 class Singularity:
-    """What is singular, or nearly, at a pose.
+    """The smallest singular value at a pose and its vectors.
 
     Attributes:
         lock_up: a driver's row depends on the joints'; else the joints' rows on each other.
         sigma: smallest singular value of the kept rows.
-        of_all: of all rows, those that are redundant among them: where that is not small the
-            mechanism is regular, and only the rows that were chosen at the design depend on each
-            other.
-        owners: joints and drivers whose rows depend on each other, those that matter most first.
-        moves: bodies that move: velocity of a point of theirs [m] and angular velocity [rad], the
-            largest number one.
+        of_all: smallest singular value of all rows, redundant ones included: if it is not small the
+            mechanism is regular, and only the rows chosen at the design depend on each other.
+        owners: joints and drivers of the dependent rows, the largest shares first.
+        moves: moving bodies: velocity of a point [m] and angular velocity [rad], the largest number
+            one.
     """
 
     lock_up: bool
@@ -59,17 +56,17 @@ class Singularity:
 
     @property
     def regular(self) -> bool:
-        """Whether it is the choice of rows that is singular, and not the mechanism."""
+        """Whether the choice of rows is singular, and the mechanism is not."""
         return self.sigma < REGULAR < self.of_all
 
     @property
     def kind(self) -> str:
-        """What is singular, in a word or two."""
+        """The kind of singularity in a word or two."""
         return "choice of rows" if self.regular else "lock-up" if self.lock_up else "bifurcation"
 
     @property
     def words(self) -> str:
-        """What is singular and what moves there, as a message says it after a place."""
+        """The dependent rows and the moving bodies, for a message after a place."""
         if self.regular:
             return (
                 f"smallest singular value {self.sigma:.3g} of the rows that were chosen at the"
@@ -111,7 +108,7 @@ def listed(names: Sequence[str]) -> str:
 
 
 def examine(system: System, state: Array, sample: Array) -> Singularity:
-    """What is nearest to singular at one pose; shapes (numbers, 1) and (sampled, 1)."""
+    """Return the singularity nearest to one pose; shapes (numbers, 1) and (sampled, 1)."""
     found = system.equations(state, sample)
     jacobian = found.jacobian[0]
     y, sigma, z = np.linalg.svd(jacobian)
@@ -141,7 +138,7 @@ def _shares(weights: Mapping[str, float]) -> list[str]:
 def _moves(
     system: System, state: Array, z: Array
 ) -> dict[str, tuple[tuple[float, ...], tuple[float, ...]]]:
-    """Bodies by name, those that move most first; shares that are not worth a name are zero."""
+    """Return the bodies by name, the fastest first; negligible shares are zero."""
     unit = system.model.frame.unit
     rates = {
         name: (np.array([*twist.v]), np.array([*twist.w]))
@@ -201,11 +198,11 @@ def smallest_singular_values(system: System, state: Array, sample: Array) -> tup
 
 
 def solve_closely(system: System, state: Array, sample: Array) -> Solved:
-    """Poses near states, iterated until their residuals get no smaller; and how wrong they may
-    still be.
+    """Iterate poses near states until their residuals get no smaller; return them with bounds of
+    their errors.
 
-    Residuals of rows of size one are known to EPSILON; along z that is EPSILON / sigma of the pose.
-    What such an error does to the rates is found by differences along z.
+    Residuals of rows of size one are known to EPSILON, which along z is EPSILON / sigma of the
+    pose. Differences along z give the effect of such an error on the rates.
     """
     best, closure = state, np.full(state.shape[1], np.inf)
     for _ in range(POLISH):
@@ -243,7 +240,7 @@ def _rates(system: System, state: Array, sample: Array) -> tuple[Array, Array]:
 
 
 def _solved(jacobian: Array, b: Array) -> Array:
-    """The least solution by singular values, those of no more than rounding left out; NaN where
+    """Return the least solution by singular values, without those at the level of rounding; NaN if
     anything is not finite.
     """
     y, sigma, z = np.linalg.svd(_finite(jacobian))

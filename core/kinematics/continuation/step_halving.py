@@ -1,4 +1,4 @@
-"""The walk along a motion, sample by sample, with parts of the steps that fail.
+"""The walk along a motion, sample by sample, with parts of failed steps.
 
 The compiled solver, the solver by components and the sparse solver share it. Each predicts, solves
 and accepts poses in its own way: many samples in a call, all components at once, or a sparse
@@ -45,8 +45,8 @@ class Walk(ABC):
     def advance(self, at: int, stop: int) -> tuple[int, PoseFailure | None]:
         """Follow samples to the last one, or to the first one out of reach.
 
-        A step that fails is divided: the longest part that succeeds is followed, and the rest of
-        the step is tried again.
+        A failed step is divided: the longest successful part is followed, and the rest of the step
+        is tried again.
 
         Returns:
             The number of samples passed, and the failure if it is not `stop`.
@@ -67,11 +67,11 @@ class Walk(ABC):
 
 
 def longest(margins: Array) -> int | None:
-    """The longest part of a step to go, of parts each half of the one before: one that was
-    accepted, and its half too.
+    """Return the longest part of a step, of parts each half of the one before, with both it and its
+    half accepted; None without one.
 
-    Of so many parts one may be accepted by chance, at a pose of another assembly; two such are not
-    halves of each other.
+    One of many parts may be accepted by chance, at a pose of another assembly; two such parts are
+    not halves of each other.
     """
     good = np.flatnonzero((margins[:-1] > 0.0) & (margins[1:] > 0.0))
     return int(good[0]) if len(good) else None
@@ -84,8 +84,7 @@ def part_of_step(
     lanes: int,
     length: float = math.inf,
 ) -> tuple[int, float] | None:
-    """A part of a step that can be gone: the lane that goes it, and the time where it stands then;
-    None where none can.
+    """Return a part of a step: the lane that reaches it, and its end time; None without one.
 
     Args:
         attempt: sends as many lanes to as many times, longest part first; returns their margins.

@@ -1,9 +1,9 @@
 """March from the design position outwards, along the samples of a path on both sides of it.
 
-The executor follows each side as far as sample after sample continues the motion. A step that fails
-is gone in parts, so a coarse grid costs steps: in equal ones, which the executor follows by itself,
-or else one by one, as long as may be. Where no part of a step succeeds the motion ends, and a
-message says where and why.
+The executor follows each side while the samples continue the motion. A failed step is divided, so a
+coarse grid costs steps: into equal parts, followed by the executor alone, or else into parts found
+one by one. If no part of a step succeeds the motion ends, and a message gives the place and the
+reason.
 """
 
 from __future__ import annotations
@@ -32,12 +32,11 @@ def march(
     tolerance.
 
     Args:
-        visit: samples at which the lane that stands there is wanted, and beyond which nothing is.
-        crossing: accept steps across singular poses, whatever is there, whole or not at all: parts
-            of them end at the pose.
-        low: leave off at a step that fails where the smallest singular value is below this part of
-            the largest that it has had, if there are more rows than are solved: others may be
-            better.
+        visit: samples whose lanes are wanted; nothing beyond them is.
+        crossing: accept steps across singular poses, as a whole or not at all: parts of them end at
+            the pose.
+        low: with redundant rows, leave off at a failed step if the smallest singular value is below
+            this fraction of its largest value so far: other rows may be better.
     """
     stands = route if route.stands else led(route, tol)
     if isinstance(stands, Route):
@@ -48,8 +47,8 @@ def march(
 
 
 def led(route: Route, tol: float) -> Route | End:
-    """Return the route from a lane that stands on its path, or where the straight way to there
-    ends; kept with the route.
+    """Return the route from a lane on its path, or the end of the straight way to there; kept with
+    the route.
     """
     return route if route.stands else route.bound(("led", tol), lambda: _led(route, tol))
 
@@ -64,8 +63,8 @@ def _led(route: Route, tol: float) -> Route | End:
 
 
 def marcher(route: Route, tol: float, *, crossing: bool) -> Marcher:
-    """What goes along a route from its departure; kept with it, because binding takes as long as
-    going.
+    """Return the marcher of a route from its departure; kept with it, because binding takes as long
+    as a run.
     """
     return route.bound(
         (tol, crossing), lambda: Marcher(route, route.departure, accept_by(tol, crossing=crossing))
@@ -73,7 +72,7 @@ def marcher(route: Route, tol: float, *, crossing: bool) -> Marcher:
 
 
 def arrived(model: Model, lane: Array) -> Array:
-    """A lane that stands where the given one would be predicted from."""
+    """Return a lane at the start of the given lane's prediction."""
     found = lane.copy()
     for name in model.state:
         found[model.vectors[name]] = lane[model.vectors[FROM + name]]

@@ -1,1 +1,1 @@
-"""Large mechanisms that cannot be divided: one sparse system."""
+"""Large indivisible mechanisms as one sparse system."""

@@ -15,13 +15,13 @@ from ..structure.sparse_lu import Indices
 
 
 class Blocks:
-    """The blocks of a pattern that can be solved one after the other.
+    """The blocks of a pattern to be solved one after the other.
 
-    All but the largest are taken to be small: they are made dense.
+    All but the largest are assumed to be small: they are made dense.
 
     Attributes:
-        rows, columns: those that the largest has are one, all others zero, shape (n, 1).
-        start: some vector that is of no direction in particular, shape (n, 1).
+        rows, columns: one for those of the largest block, zero for all others, shape (n, 1).
+        start: a vector without a preferred direction, shape (n, 1).
     """
 
     def __init__(
@@ -64,13 +64,12 @@ class Blocks:
             self._groups.append((size, entries, at))
 
     def orientation(self, values: Array, whole: Array) -> list[bytes]:
-        """Of several poses the sign of each block's determinant, each right at all values, or at
-        none.
+        """Return the sign of each block's determinant for several poses; each sign is right at all
+        values, or at none.
 
         Args:
             values: of the entries, in the order of the pattern, shape (entries, poses).
-            whole: of the sign of the whole determinant, from which that of the largest block
-                follows, shape (poses,).
+            whole: sign of the whole determinant, which gives the largest block's, shape (poses,).
         """
         signs = [np.ones((len(whole), 1))]
         # most blocks are of one row
@@ -88,11 +87,13 @@ class Blocks:
         solve: Callable[[Array], Array],
         solve_transposed: Callable[[Array], Array],
     ) -> Array:
-        """Of several poses the smallest singular value of each block, shape (poses, blocks).
+        """Return the smallest singular value of each block for several poses, shape (poses,
+        blocks).
 
-        Of the largest, which comes first, it is an estimate by a step of inverse iteration: no
-        less, and the nearer the more singular the block is. The whole matrix gives it: blocks
-        before have no part in what is asked of one, and what it says of those behind is left out.
+        The value of the largest block, which comes first, is an estimate by a step of inverse
+        iteration: never smaller, and closer the more singular the block is. It uses the whole
+        matrix: blocks before have no effect on the right-hand side, and results of blocks behind
+        are left out.
 
         Args:
             solve, solve_transposed: solve for right-hand sides of all poses, shape (n, poses).

@@ -1,4 +1,4 @@
-"""Constraints of one kind: what they share, as one small program; see `elements`."""
+"""Constraints of one kind, with their shared equations as one small program; see `elements`."""
 
 from __future__ import annotations
 
@@ -62,9 +62,7 @@ class Numbering:
 
 @dataclass(frozen=True)
 class Member:
-    """A constraint, the number of its first row, and of the driver that moves it; None where none
-    does.
-    """
+    """A constraint, the number of its first row, and of its driver; None without a driver."""
 
     constraint: Constraint | Relation
     row: int
@@ -85,14 +83,14 @@ class Member:
         )
 
     def bodies(self, moving: Mapping[str, int]) -> dict[str, str]:
-        """Those of its bodies that move, by side."""
+        """Its moving bodies by side."""
         c = self.constraint
         if isinstance(c, Relation):
             return {}
         return {side: body for side, body in zip(SIDES, (c.i, c.j), strict=True) if body in moving}
 
     def geometry(self) -> dict[str, Any]:
-        """What it is made of, by name."""
+        """Its geometry by name."""
         c = self.constraint
         if isinstance(c, Relation):
             return {
@@ -103,7 +101,7 @@ class Member:
         return {each.name: getattr(c.primitive, each.name) for each in fields(c.primitive)}
 
     def kind(self, moving: Mapping[str, int]) -> Any:
-        """What constraints must have in common to share a program."""
+        """Return the common features of constraints with one program."""
         # vectors, not their components: axes that happen to lie in a global plane would make a kind
         # each
         zero = tuple(
@@ -121,7 +119,7 @@ class Member:
 
 
 class ElementType:
-    """The constraints of one kind: what their programs read, and what they give, as traced.
+    """The constraints of one kind, with the traced inputs and outputs of their programs.
 
     Slots of a lane: the numbers of its state and drive, those of its rates, its geometry, its
     outputs.
@@ -186,8 +184,8 @@ class ElementType:
         return [self._tape.input(slot) for slot in islice(slots, count)]
 
     def _formulation(self, members: Sequence[Member], moving: Mapping[str, int]) -> Cartesian:
-        """The equations of one of them, over numbers that are known when the program runs, but for
-        those all have in common.
+        """Return the equations of one constraint over numbers known at run time, except those
+        common to all.
         """
         first, drive = members[0], self.inputs[WHERE][-5:]
         geometry = {
@@ -228,7 +226,7 @@ class ElementType:
         return len(self._values[quantity]) * self.lanes
 
     def _written(self) -> Iterator[tuple[str, str, Indices, Scalar]]:
-        """What it gives, of all constraints at a time: the name of a program, quantity and places
+        """Return the outputs of all constraints at a time: name of a program, quantity and places
         in it, and the value.
         """
         for name, quantities in ((WHERE, ("phi", "nu", "branch", "entries")), (HOW, ("gamma",))):
@@ -252,7 +250,7 @@ class ElementType:
         return {name: np.array(rows) for name, rows in found.items()}
 
     def constants(self, starts: Mapping[str, int]) -> Iterator[tuple[Indices, float]]:
-        """What else it gives, likewise: the same whatever the pose."""
+        """Return the constant outputs likewise: the same at every pose."""
         for _, quantity, rows, value in self._written():
             if not isinstance(value, Traced):
                 yield starts[quantity] + rows, value

@@ -1,9 +1,9 @@
 """The constraints of a large mechanism as elements: constraints of one kind share one small
 program, its lanes are the constraints.
 
-Constraints are of one kind where their primitives have the same type, the same of their bodies move
-and the same vectors are zero (the arm of a joint at a body's origin). What all of a kind have in
-common is a constant of its program; all else is an input: geometry once, poses and drives at every
+Constraints are of one kind if their primitives have the same type, the same of their bodies move
+and the same vectors are zero (the arm of a joint at a body's origin). Values common to all of a
+kind are constants of its program. All others are inputs: geometry once, poses and drives at every
 evaluation, rates for the accelerations.
 """
 
@@ -24,18 +24,18 @@ from .element_types import HOW, QUANTITIES, WHERE, ElementType, Member, Numberin
 
 
 class Elements:
-    """All constraints. What they evaluate to stands in arrays that the next evaluation overwrites.
+    """All constraints. Their values are in arrays overwritten by the next evaluation.
 
     Attributes:
         numbering: of states and rates.
-        owners: for every row the joint or driver, and the primitive, it belongs to.
+        owners: for every row its joint or driver, and its primitive.
         phi, nu, gamma: shape (rows,), in the order of the constraints.
         branch: all branch tests, shape (tests,).
         entries: of the Jacobian, shape (entries,); each place occurs once.
-        rows, columns: where the entries belong, shape (entries,).
-        results, parts: all of these, one after the other, and where each of them is.
-        drivers: how many there are.
-        kinds, starts: see `ElementType`, and where the quantities of each start among the results.
+        rows, columns: of the entries, shape (entries,).
+        results, parts: all of these, one after the other, and the place of each.
+        drivers: their number.
+        kinds, starts: see `ElementType`, and the start of each quantity among the results.
         compiled: whether they are evaluated by machine code.
     """
 
@@ -108,7 +108,7 @@ class Elements:
             kind.run(WHERE, given)
 
     def accelerate(self, rates: Array) -> None:
-        """Update gamma at the rates, where the bodies were last evaluated."""
+        """Update gamma at the rates, for the last evaluated pose."""
         for kind in self._bound:
             kind.run(HOW, rates)
 
@@ -119,8 +119,8 @@ class _Bound:
     def __init__(
         self, kind: ElementType, results: Array, starts: Mapping[str, int], *, compiled: bool
     ) -> None:
-        """Write what is constant, and prepare to write the rest, into an array where every quantity
-        has its start.
+        """Write the constants into an array with a start for every quantity, and prepare to write
+        the rest.
         """
         self._results, lanes = results, kind.lanes
         self._executor: Executor = (
@@ -146,7 +146,7 @@ class _Bound:
             self._executor.put(slots, np.array(kind.geometry))
 
     def run(self, name: str, given: Array) -> None:
-        """Run a program over numbers of the whole mechanism, and write what it gives."""
+        """Run a program over numbers of the whole mechanism, and write its results."""
         window, places = self._taken[name]
         window[:] = given[places]
         if name in self._written:

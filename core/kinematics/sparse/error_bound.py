@@ -1,4 +1,4 @@
-"""How well a motion of a sparse system is known where it stands."""
+"""Bounds of the errors of a solved pose of a sparse system."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ STEPS = 3
 
 
 def uncertain(model: SparseEquations, at: Stand, drives: Array) -> Sequence[float]:
-    """By how much what is left of residuals may have moved a pose [of the mechanism's size], its
+    """Return bounds of the errors of a pose by its residuals [of the mechanism's size], and of its
     rates and accelerations [of their own].
 
-    That is seen where the pose is moved as far as they can move it, in the direction that the rows
-    determine least. By the smallest singular value itself all samples of a large ring would be in
-    doubt, which are known well.
+    The pose is displaced as far as the residuals allow, in the direction least determined by the
+    rows. The smallest singular value alone would put all samples of a large ring in doubt, although
+    they are known well.
     """
     residual, left = max(at.closure, EPSILON), np.ones(len(model.kept))
     try:

@@ -23,8 +23,8 @@ def turned() -> Program:
 
 
 class Turn:
-    """Turns Euler parameters by small global rotations; to compute that with arrays took an eighth
-    of a sparse sweep.
+    """Rotate Euler parameters by small global rotations; by single array operations this took an
+    eighth of a sparse sweep.
     """
 
     def __init__(self, bodies: int, *, compiled: bool) -> None:

@@ -1,19 +1,18 @@
-"""Which rows of a large mechanism to solve for: nothing dense, and where redundant rows are many
-nothing quadratic.
+"""Choice of the solved rows of a large mechanism: nothing dense, and nothing quadratic in many
+redundant rows.
 
-They are seen in J J^T, sparse and in a sparse order, with a little added to the diagonal, so that
-the elimination can go on after a row that has no pivot. Multiplied by the inverse of that, any
-vectors become such as make J vanish: the weights of sums of rows that are zero. Rows are left out
-by pivoted QR of these (rank-revealing): where they have most weight, those kept are well
+Redundancy shows in J J^T, sparse and in a sparse order, with a small addition to the diagonal so
+that the elimination can continue after a row without a pivot. The inverse of this matrix turns any
+vectors into null vectors of J^T: weights of sums of rows equal to zero. Pivoted QR of these vectors
+(rank-revealing) selects the rows to leave out: those with most weight, so the kept ones are well
 conditioned.
 
-Where redundant rows are many the pivots themselves are taken: that of a row of length one is its
-squared distance from the rows eliminated before it. What is kept is independent, and may be badly
+If redundant rows are many, the pivots themselves are used: the pivot of a row of length one is its
+squared distance from the rows eliminated before it. The kept rows are independent, and may be badly
 conditioned: in a chain of loops rows are left out at one end.
 
-Squares lose half the digits: that the rows kept are independent is for their own factorisation to
-say, which has all of them. Refused for this: orthogonal factorisation of J, which scipy has dense
-only.
+Squares lose half the digits: the factorisation of the kept rows, with all digits, decides on their
+independence. Rejected: orthogonal factorisation of J, which scipy has for dense matrices only.
 """
 
 from __future__ import annotations
@@ -56,24 +55,24 @@ class Jacobian:
         return Jacobian(elements.rows, elements.columns, elements.entries.copy(), shape)
 
     def among(self, kept: Indices) -> Indices:
-        """The row of each entry in the order of the rows kept; -1 in rows that are not."""
+        """Return the row of each entry in the order of the kept rows; -1 for rows left out."""
         place = np.full(self.shape[0], -1, np.intp)
         place[kept] = np.arange(len(kept))
         return place[self.rows]
 
     @property
     def well_chosen(self) -> bool:
-        """Whether rows are few enough for those that are kept to be well conditioned."""
+        """Whether redundant rows are few enough for the kept ones to be well conditioned."""
         count, wanted = self.shape
         return (count - wanted) * count <= TOGETHER
 
     def independent(self, last: int) -> Indices:
-        """As many rows as there are columns, the most independent of them; all where there are no
-        more.
+        """Return as many rows as there are columns, the most independent ones; all rows if there
+        are no more.
 
         Args:
-            last: so many rows at the end (the drivers) are judged after all others, and not at
-                their expense.
+            last: number of rows at the end (the drivers), judged after all others and not at their
+                expense.
         """
         count, wanted = self.shape
         if count <= wanted:

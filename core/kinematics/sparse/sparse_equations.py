@@ -32,7 +32,7 @@ from .step_state import Stand
 
 
 class PoseError(ArithmeticError):
-    """A pose that is not reached."""
+    """A pose out of reach."""
 
     def __init__(self, failure: PoseFailure) -> None:
         super().__init__(str(failure))
@@ -118,12 +118,14 @@ class SparseEquations:
 
     @property
     def redundant(self) -> list[str]:
-        """The rows that are left out, as "joint: primitive"."""
+        """The rows left out, as "joint: primitive"."""
         rows: list[int] = self.dropped.tolist()
         return [": ".join(self.elements.owners[row]) for row in rows]
 
     def drives(self, path: Path, times: Array) -> Array:
-        """What `Elements.evaluate` wants of all drivers at the times, shape (5 * drivers, n)."""
+        """Return the inputs of `Elements.evaluate` for all drivers at the times, shape (5 *
+        drivers, n).
+        """
         drivers = self.mechanism.drivers
         drive = (
             path.drive([driver.name for driver in drivers], times)
@@ -139,7 +141,7 @@ class SparseEquations:
         return np.concatenate([state[: 3 * n] + step[: 3 * n], q, state[7 * n :] + step[6 * n :]])
 
     def evaluate(self, state: Array, drives: Array) -> float:
-        """Evaluate all rows, and the largest residual of those that are solved."""
+        """Evaluate all rows, and return the largest residual of the solved ones."""
         self.elements.evaluate(state, drives)
         self.factors.update(self.elements.entries[self.solved])
         return float(np.abs(self.elements.phi[self.kept]).max())
@@ -169,9 +171,7 @@ class SparseEquations:
         return Stand(0.0, 0.0, state, state, zero, zero)
 
     def moving(self, at: Stand, time: float, drives: Array) -> Stand:
-        """What stands, with the rates that the drives give it there, and no step behind it. Raises
-        PoseError.
-        """
+        """Return a pose with rates by the drives there, and no step behind it. Raises PoseError."""
         self.evaluate(at.state, drives)
         rates, accelerations = self.motion()
         now = replace(
@@ -198,13 +198,13 @@ class SparseEquations:
         )
 
     def _pivots(self) -> tuple[float, bytes]:
-        """The smallest in size, and the orientation, where all was last factored."""
+        """Return the smallest pivot, and the orientation, by the last factors."""
         pivot, entries = self.factors.signed_pivot, self.elements.entries[self.solved]
         return abs(pivot), self.blocks.orientation(entries[:, None], np.array([pivot]))[0]
 
     def _sigmas(self) -> Array:
-        """Those of the blocks where all was last factored; where all rows are solved the smallest
-        pivot stands for all.
+        """Return the sigmas of the blocks by the last factors; the smallest pivot instead if all
+        rows are solved.
         """
         if not len(self.dropped):
             return np.array([abs(self.factors.signed_pivot)])
@@ -218,8 +218,8 @@ class SparseEquations:
             raise PoseError(PoseFailure(FailureKind.SINGULAR_ROWS)) from error
 
     def motion(self) -> tuple[Array, Array]:
-        """Rates and accelerations of the unknowns where all was last evaluated: one factorisation
-        for both.
+        """Return rates and accelerations of the unknowns at the last evaluated pose: one
+        factorisation for both.
         """
         self._factor()
         rates = self.factors.solve(self.elements.nu[self.kept])
@@ -228,7 +228,7 @@ class SparseEquations:
 
     @property
     def details(self) -> dict[str, Any]:
-        """What the record of every solution says of the model."""
+        """Details of the model for the record of a solution."""
         rows = len(self.elements.owners) - len(self.mechanism.drivers)
         return {
             **counted(self.mechanism, len(self.kept), rows, self.redundant).details,

@@ -1,13 +1,12 @@
-"""A large mechanism as one sparse system, where components cannot be solved one after the other and
+"""A large mechanism as one sparse system, if components cannot be solved one after the other and
 one compiled program would be too large.
 
-With machine code several samples are solved at once (see `together`). Samples that this rejects,
-and all samples without machine code, are solved here one by one: constraints in bulk (see
-`elements`), SuperLU in a fixed order (see `sparse_lu`). A sample is predicted by a Taylor step and
-takes two factorisations: at the predicted pose for Newton's iterations, as long as they converge
-fast, and at the solution for velocities and accelerations. One factorisation for all, with
-refinement for the last two, takes a third longer on a ring of 3,000 cranks and a tenth less on a
-chain of 5,000 loops.
+With machine code several samples are solved at once (see `together`). Samples refused there, and
+all samples without machine code, are solved here one by one: constraints in bulk (see `elements`),
+SuperLU in a fixed order (see `sparse_lu`). A sample is predicted by a Taylor step and takes two
+factorisations: at the predicted pose for Newton's iterations, as long as they converge fast, and at
+the solution for velocities and accelerations. One factorisation for all, with refinement for the
+last two, takes a third longer on a ring of 3,000 cranks and a tenth less on a chain of 5,000 loops.
 """
 
 from __future__ import annotations
@@ -42,14 +41,14 @@ class SparseModel(SparseEquations):
     def anew(
         self, at: Stand, drives: Array, known: Sequence[SparseModel]
     ) -> tuple[SparseModel, Stand] | None:
-        """The same by rows that are better where a motion stands, and how it stands by them; None
-        where none are better.
+        """Return the model with better rows at a pose, and the pose by these rows; None if none are
+        better.
 
         Args:
-            known: others that are made already.
+            known: models with other rows, made earlier.
 
         Raises:
-            PoseError: it is too near to a singular pose for that to be seen.
+            PoseError: the pose is too near to a singular one to compare rows.
         """
         self.evaluate(at.state, drives)
         self._factor()
@@ -74,12 +73,12 @@ class SparseModel(SparseEquations):
 
     @cached_property
     def together(self) -> Batch | None:
-        """Several samples at once, by machine code; None where there is none."""
+        """Batch of samples by machine code; None without machine code."""
         return Batch(self) if self.elements.compiled else None
 
     def _predicted(self, here: Stand, time: float) -> tuple[Array, Array]:
-        """A Taylor step of second order, and that with what the last such step lacked, which grows
-        by the cube of the step.
+        """Return a Taylor step of second order, without and with the error of the last such step,
+        which grows by the cube of the step.
         """
         h = time - here.time
         taylor = self.moved(here.state, h * (here.rates + (0.5 * h) * here.accelerations))
@@ -89,10 +88,10 @@ class SparseModel(SparseEquations):
         return taylor, self.moved(corrected, np.zeros_like(here.rates))
 
     def reach(self, here: Stand, time: float, drives: Array, tol: float) -> Stand:
-        """Go from where a motion stands to a time.
+        """Go from a pose of the motion to a time.
 
         Raises:
-            PoseError: what is there is no solution, or does not continue the motion.
+            PoseError: there is no solution, or it does not continue the motion.
         """
         # a lost iteration may overflow; it is found by its residual
         with np.errstate(all="ignore"):
@@ -164,7 +163,7 @@ class SparseModel(SparseEquations):
         leftover: float = 0.0,
         branch: float = 1.0,
     ) -> PoseError:
-        """Return the failure of a pose by the criteria that it does not meet."""
+        """Return the failure of a pose by the criteria not met."""
         names = self.redundant
         few = [*names[:FEW], "..."] if len(names) > FEW else names
         kind = failure_kind(failed, closure)

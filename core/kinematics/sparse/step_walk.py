@@ -11,16 +11,16 @@ from .step_state import Stand
 
 
 class StepWalk(Walk):
-    """The walk to a time, from where the motion stands.
+    """The walk from the present pose of the motion to a time.
 
     Args:
-        here: where it stands.
+        here: the present pose.
         time: of the sample [s].
-        reach: goes from there to a time, or raises PoseError.
-        improve: changes to better rows where it stands, or raises PoseError.
+        reach: goes from a pose to a time, or raises PoseError.
+        improve: changes to better rows at a pose, or raises PoseError.
 
     Attributes:
-        here: where it stands now.
+        here: the present pose, updated by the walk.
     """
 
     def __init__(
@@ -41,7 +41,7 @@ class StepWalk(Walk):
         return stop
 
     def follow_part(self, at: int) -> PoseFailure | None:
-        """Follow the longest part that succeeds, and change to better rows there."""
+        """Follow the longest successful part, and change to better rows there."""
         try:
             self.here = self.improve(self._part())
         except PoseError as error:
@@ -52,7 +52,7 @@ class StepWalk(Walk):
         """Return the end of the longest part that succeeds along with its half (see `longest`).
 
         Raises:
-            PoseError: there is none.
+            PoseError: no part succeeds.
         """
         here, last, longer = self.here, None, None
         for k in range(1, HALVINGS + 1):

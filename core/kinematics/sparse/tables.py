@@ -1,5 +1,5 @@
-"""All that is done for several poses of a sparse system, as tables: elements, elimination and steps
-linked over one memory.
+"""Operations on several poses of a sparse system, as tables: elements, elimination and steps linked
+over one memory.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from .rotation_update import BY, TO, turned
 
 
 class SparseTables:
-    """Numbers of as many poses as a vector has lanes, a row for each, and what is done with them.
+    """Numbers of as many poses as a vector has lanes, a row for each, and the operations on them.
 
-    There are the state (see `Numbering`) and then the drives, rates, accelerations and a step of
-    the unknowns, and the results of all elements with their parts.
+    Rows: the state (see `Numbering`) and then the drives, rates, accelerations and a step of the
+    unknowns, and the results of all elements with their parts.
 
     Attributes:
-        width: how many poses.
+        width: number of poses.
     """
 
     def __init__(self, elements: Elements, bodies: int) -> None:
@@ -94,7 +94,7 @@ class SparseTables:
         """Eliminate in this order.
 
         Args:
-            entries, rows: of the matrix in that order, their places among those of all constraints.
+            entries, rows: of the matrix in this order, their places among those of all constraints.
         """
         given, link = Memory(), self._link
         given.take(self._base)
@@ -144,8 +144,8 @@ class SparseTables:
         return numbers(self._rows[name])
 
     def __getitem__(self, name: str) -> Array:
-        """Numbers of all poses, shape (numbers, width), to be read and written: of the state and
-        what else has rows.
+        """Numbers of all poses, shape (numbers, width), for reading and writing: of the state and
+        all other rows.
         """
         return self._memory[self._rows[name]]
 
@@ -157,9 +157,7 @@ class SparseTables:
 
     @property
     def growth(self) -> Array:
-        """The largest entry of L, shape (width,): by how much rounding errors may grow; NaN where
-        there is one.
-        """
+        """The largest entry of L, shape (width,), growth of rounding errors; NaN if any is."""
         found: Array = self._memory.take(self._multipliers, axis=0)
         return np.abs(found).max(axis=0, initial=0.0)
 
@@ -176,18 +174,18 @@ class SparseTables:
         self._go(self._factor)
 
     def newton(self) -> None:
-        """Take the step that phi asks for, by the factors as they are."""
+        """Take the Newton step for phi, by the present factors."""
         self._go(self._newton)
         self._go(self._move)
 
     def motion(self) -> None:
-        """Rates and accelerations where all was last evaluated."""
+        """Compute rates and accelerations at the last evaluated pose."""
         for table in (self._factor, self._velocity, self._how, self._acceleration):
             self._go(table)
 
     def solve(self, b: Array) -> Array:
-        """By the factors as they are, of all poses: shape (n, width), in the order of the rows that
-        are solved.
+        """Solve by the present factors for all poses: shape (n, width), in the order of the solved
+        rows.
         """
         self._memory[self._sums][self._place] = b
         self._go(self._solved)
