@@ -46,7 +46,7 @@ ANGLES = [
     60.0,
     45.0,
     180.0,
-    *np.random.default_rng(7).uniform(-180.0, 180.0, 2).round(3).tolist(),
+    round(np.random.default_rng(7).uniform(-180.0, 180.0), 3),
 ]
 
 
