@@ -36,10 +36,10 @@ def test_a_large_mechanism_that_is_not_driven_is_told_what_can_move(cranks):
 
 @pytest.mark.parametrize("order", [0, 2])
 def test_designs_of_many_bodies_tied_together_are_solved_each_by_itself(order):
-    """What is known of sigma of many variants at once leaves all samples of such a ring in
-    doubt.
+    """What is known of sigma of many variants at once leaves all samples of such a ring in doubt.
+    Designs that end early say why.
     """
-    whole, turn = ring(24), np.array([0.1, -0.2, 0.0])
+    whole, turn = ring(21), np.array([0.1, -0.2, 0.0])
     (hinge,) = (joint.point for joint in whole.joints if joint.name == "pivot0")
     hinges = np.array(hinge) + [[0.0, 0.0, 0.0], [0.0, 0.0, 0.1]]
     found = solve_designs(whole, "turn", turn, {"joints.pivot0.point": hinges}, order=order)
@@ -54,12 +54,8 @@ def test_designs_of_many_bodies_tied_together_are_solved_each_by_itself(order):
         assert (motion.acceleration is None) == (order < 2)
         if alone.acceleration is not None:
             assert np.abs(motion.acceleration[k] - alone.acceleration).max() <= 1e-13
-
-
-def test_designs_of_many_bodies_that_end_early_say_why():
-    whole = ring(24)
-    (hinge,) = (joint.point for joint in whole.joints if joint.name == "pivot0")
-    found = solve_designs(whole, "turn", [0.1, 3.0], {"joints.pivot0.point": [hinge]})
+    # the same programs
+    found = solve_designs(whole, "turn", [0.1, 3.0], {"joints.pivot0.point": [hinge]}, order=order)
     assert found.solved.tolist() == [[True, False]]
     assert "cannot be followed beyond turn = " in found.messages[0]
 
@@ -121,7 +117,7 @@ def test_redundant_rows_of_a_sparse_system_do_not_hide_a_corner_or_a_gap(rod, en
 
 
 @pytest.mark.parametrize(
-    ("cranks", "turns", "count"), [(12, 2, 2), (12, -4, 11), (22, 1, 2), (22, -4, 2), (22, 2, 11)]
+    ("cranks", "turns", "count"), [(9, 2, 2), (9, -4, 11), (20, 1, 2), (20, -4, 2), (20, 2, 11)]
 )
 def test_turns_between_two_samples_are_not_lost(cranks, turns, count):
     """A nut stands at both: where it stands says nothing of the turns, which its driver makes
@@ -149,7 +145,7 @@ def test_turns_between_two_samples_are_not_lost(cranks, turns, count):
         mechanism, "clock", np.linspace(0.0, last, count), rate=last, motions={"index": index}
     )
     assert found.solved.all(), found.message
-    assert ("factor_entries" in found.details) == (cranks > 20)
+    assert ("factor_entries" in found.details) == (cranks == 20)
     assert found.points["mark"].position[-1] == pytest.approx([0.2, 0.0, lead * turns], abs=1e-14)
 
 
