@@ -11,6 +11,7 @@ from ...case.io.tolerance import DEFAULT_ATOL
 from ...harness.labels import UNMADE, motion_unit, number
 from ...harness.record import Outcome, OutputSeries, Record
 from ...trajectory import QUANTITIES
+from ...unit_text import value_text
 from ..queries import History, Pair
 from .circumstance_changes import same_machine
 from .findings import Finding, Kind, finding_of
@@ -151,8 +152,8 @@ def _moved(now: Record, before: Record) -> Iterator[Finding]:
                 else DEFAULT_ATOL + UNJUDGED * _largest(before, motion)
             )
             if off > limit:
-                unit = motion_unit(old.unit, motion)
-                told = f"{output} {motion} differs by up to {number(off)} {unit} from what it was"
+                size = value_text(number(off), motion_unit(old.unit, motion))
+                told = f"{output} {motion} differs by up to {size} from what it was"
                 yield finding_of(
                     Kind.MOVED, now, told, now=off, limit=limit, output=output, motion=motion
                 )
@@ -215,7 +216,7 @@ def _errors(now: Record, before: Record) -> Iterator[Finding]:
                     motion_unit(now.outputs[output].unit, motion) if output in now.outputs else ""
                 )
                 times = f"×{number(b.max_abs / a.max_abs)}, " if a.max_abs else ""
-                size = f"{number(a.max_abs)} → {number(b.max_abs)} {unit}"
+                size = f"{number(a.max_abs)} → {value_text(number(b.max_abs), unit)}"
                 told = f"{output} {motion} error {size} ({times}tolerance {number(b.tolerance)})"
                 ratio = b.max_abs / a.max_abs if a.max_abs else None
                 yield finding_of(

@@ -11,6 +11,7 @@ import numpy as np
 
 from ...harness.labels import motion_unit, number
 from ...trajectory import QUANTITIES
+from ...unit_text import value_text
 from ..queries import History
 from .change_points import above_floor, errors_of
 from .findings import Finding, Kind
@@ -61,7 +62,7 @@ def crept(subject: Subject, around: History, told: Sequence[Finding]) -> Iterato
                     if output in record.outputs
                     else ""
                 )
-                size = f"{number(least.max_abs)} → {number(now.max_abs)} {unit}".rstrip()
+                size = f"{number(least.max_abs)} → {value_text(number(now.max_abs), unit)}"
                 yield Finding(
                     kind=Kind.DRIFTED,
                     case=record.case,

@@ -13,6 +13,7 @@ from ...case.case import Case
 from ...harness.labels import motion_unit
 from ...report.sections import Report, Section
 from ...trajectory import QUANTITIES
+from ...unit_text import with_unit
 from . import formulation_runtime as bench_whole
 from . import operations as bench_operations
 from . import roundoff as bench_roundoff
@@ -155,7 +156,11 @@ def report(found: Formulation) -> Report:
             "Errors of the whole sweep",
             found.verdicts["sweeps"],
             ("Largest error over outputs and samples, against the reference of the case.",),
-            ("row style", "place", *(f"{name} [{motion_unit('m', name)}]" for name in QUANTITIES)),
+            (
+                "row style",
+                "place",
+                *(with_unit(name, motion_unit("m", name)) for name in QUANTITIES),
+            ),
             2,
             [
                 (s.style, s.place, *(f"{getattr(s, name):.1e}" for name in QUANTITIES))

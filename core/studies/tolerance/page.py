@@ -4,24 +4,20 @@ script.
 
 from __future__ import annotations
 
-import importlib
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-from ...harness.labels import known, notes, number, output_label, signs
+from ...harness.labels import notes, number, output_label, signs
 from ...harness.record import Outcome, Record
 from ...report.axis import DISPLAY, Axis, driver_axis
-from ...report.figures import Figure, plain
-from ...report.report import packed
+from ...report.figures import Figure
+from ...report.page_parts import environment, figure_parts
+from ...unit_text import with_unit
 from .results import Envelope, Gradient, Numbers, SweepResults
 
 _HERE = Path(__file__).parent
-_LOOK = _HERE.parents[1] / "report"
 
 # Bars of a tornado diagram: what is left out is smaller than all of these.
 MOST_BARS = 15
@@ -63,8 +59,6 @@ class OutputView:
 
 def page(results: SweepResults) -> str:
     """The page as HTML text."""
-    # loaded here, for sweeps that write no page; the package has no types
-    plotly: Any = importlib.import_module("plotly.offline")
     axis = _axis(results)
     figures: dict[str, Figure] = {}
     outputs: list[OutputView] = []
@@ -87,9 +81,8 @@ def page(results: SweepResults) -> str:
         figures[view.spread] = envelope_figure(view, axis, about_nominal=True)
         figures[view.tornado] = tornado_figure(view)
         outputs.append(view)
-    data = {"drivers": {"sweep": axis.shown}, "figures": figures, "scenes": {}}
     return (
-        _environment()
+        environment(_HERE)
         .get_template("sweep.html")
         .render(
             results=results,
@@ -102,10 +95,7 @@ def page(results: SweepResults) -> str:
                 key: value for key, value in results.run.items() if key not in ("cases", "engines")
             },
             effect=effect,
-            css=(_LOOK / "report.css").read_text("utf-8"),
-            script=(_LOOK / "report.js").read_text("utf-8"),
-            data=packed(json.dumps(data, allow_nan=False, separators=(",", ":"))),
-            plotlyjs=packed(plotly.get_plotlyjs()),
+            **figure_parts(figures, drivers={"sweep": axis.shown}),
         )
     )
 
@@ -132,20 +122,6 @@ def effect(gradient: Gradient) -> float:
     output].
     """
     return abs(gradient.largest or 0.0) * gradient.scale
-
-
-def _environment() -> Environment:
-    environment = Environment(
-        loader=FileSystemLoader([_HERE, _LOOK]),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    cast("dict[str, Any]", environment.filters).update(
-        number=number, label=output_label, known=known
-    )
-    return environment
 
 
 def _axis(results: SweepResults) -> Axis:
@@ -219,9 +195,11 @@ def envelope_figure(view: OutputView, axis: Axis, *, about_nominal: bool) -> Fig
         line={"width": 1.5, "color": "#D55E00", "dash": "12px,5px"},
         uid="s1",
     )
-    what = f"{output_label(view.name)}{' less nominal' if about_nominal else ''} [{view.unit}]"
-    value_axis: Figure = {"title": {"text": plain(what)}, "hoverformat": ".5g"}
-    moved_axis: Figure = {"title": {"text": plain(axis.title)}, "hoverformat": ".6~g"}
+    what = with_unit(
+        output_label(view.name) + (" less nominal" if about_nominal else ""), view.unit
+    )
+    value_axis: Figure = {"title": {"text": what}, "hoverformat": ".5g"}
+    moved_axis: Figure = {"title": {"text": axis.title}, "hoverformat": ".6~g"}
     if axis.up < 0:
         moved_axis["autorange"] = "reversed"
     sides = (
@@ -241,7 +219,7 @@ def tornado_figure(view: OutputView) -> Figure:
     """
     bars = view.gradients[:MOST_BARS][::-1]
     lengths = [float(f"{view.scale * effect(each):.{DIGITS}g}") for each in bars]
-    names = [plain(each.coordinate) for each in bars]
+    names = [each.coordinate for each in bars]
     look: Figure = {
         "type": "bar",
         "orientation": "h",
@@ -253,10 +231,10 @@ def tornado_figure(view: OutputView) -> Figure:
         {**look, "x": [sign * length for length in lengths], "uid": f"bars{sign}"}
         for sign in (-1, 1)
     ]
-    title = f"change of {output_label(view.name)} [{view.unit}]"
+    title = with_unit(f"change of {output_label(view.name)}", view.unit)
     layout: Figure = {
         "barmode": "overlay",
-        "xaxis": {"title": {"text": plain(title)}, "zeroline": True},
+        "xaxis": {"title": {"text": title}, "zeroline": True},
         "yaxis": {"type": "category"},
     }
     return {"data": traces, "layout": layout}
