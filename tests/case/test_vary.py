@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from kincheck.cases import load
 from kincheck.core import CaseError
-from kincheck.core.case.variation.variation import DRAWN, Law
+from kincheck.core.case.variation.distributions import Law
+from kincheck.core.case.variation.sampling import DRAWN
 from kincheck.core.case.variation.variation_file import read_variation
 
 from ..support.fakes import crank

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import IntEnum, StrEnum
+from enum import StrEnum
 from functools import cached_property
 from itertools import groupby
 
@@ -18,10 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...trajectory import Array
-
-DRAWN = 256
-"""Number of variants drawn together. It is part of the meaning of a seed, and therefore no setting.
-"""
+from .correlations import Correlation
+from .distributions import Law, normal_quantile, normal_share, quantile
+from .sampling import DRAWN, Sampling, Stream, generator, points
 
 
 class Mode(StrEnum):
@@ -30,21 +29,6 @@ class Mode(StrEnum):
     MONTE_CARLO = "monte_carlo"
     GRID = "grid"
     ONE_AT_A_TIME = "one_at_a_time"
-
-
-class Law(StrEnum):
-    """Distribution of a coordinate."""
-
-    NORMAL = "normal"
-    UNIFORM = "uniform"
-    VALUES = "values"
-
-
-class Stream(IntEnum):
-    """Purpose of random numbers; each purpose has its own generators."""
-
-    GEOMETRY = 0
-    SUBSET = 1
 
 
 @dataclass(frozen=True)
@@ -59,6 +43,7 @@ class Coordinate:
         law: distribution of the offsets from the nominal value.
         scale: standard deviation, half width, or largest offset [unit].
         values: offsets in a grid or one at a time [unit]; empty if drawn.
+        bound: largest offset of a truncated normal distribution [unit]; zero of all others.
     """
 
     hardpoint: str
@@ -67,6 +52,7 @@ class Coordinate:
     law: Law
     scale: float
     values: tuple[float, ...] = ()
+    bound: float = 0.0
 
     @property
     def name(self) -> str:
@@ -83,6 +69,9 @@ class Variation:
             the count of numbers of each.
         nominal: numbers of the varied places at the nominal design [m or -], shape (numbers,).
         moves: changes of these numbers per unit offset, shape (numbers, coordinates).
+        correlations: of coordinates that are drawn, each in one of them at most.
+        sampling: choice of the points that are drawn.
+        drawn: number of variants that are drawn; a Latin hypercube depends on it.
     """
 
     mode: Mode
@@ -90,6 +79,9 @@ class Variation:
     places: Mapping[str, int]
     nominal: Array
     moves: Array
+    correlations: tuple[Correlation, ...] = ()
+    sampling: Sampling = Sampling.RANDOM
+    drawn: int = 0
 
     @property
     def count(self) -> int | None:
@@ -135,16 +127,34 @@ class Variation:
 
     def _drawn(self, seed: int, first: int, count: int) -> Array:
         places = range(first // DRAWN, -(-(first + count) // DRAWN))
-        found = np.concatenate(
-            [self._draw(generator(seed, place, Stream.GEOMETRY)) for place in places], axis=1
-        )
+        found = np.concatenate([self._draw(seed, place) for place in places], axis=1)
         skipped = first - places.start * DRAWN
         return found[:, skipped : skipped + count]
 
-    def _draw(self, random: np.random.Generator) -> Array:
+    def _draw(self, seed: int, block: int) -> Array:
         """Draw a whole block, even if only part of it is needed: a variant must not depend on the
         number of variants.
         """
+        laws = {each.law for each in self.coordinates}
+        plain = self.sampling is Sampling.RANDOM and laws <= {Law.NORMAL, Law.UNIFORM}
+        if plain and not self.correlations:
+            return self._independent(generator(seed, block, Stream.GEOMETRY))
+        at = points(self.sampling, seed, block, len(self.coordinates), self.drawn)
+        normal = dict[int, Array]()
+        for each in self.correlations:
+            rows = [*each.rows]
+            normal |= zip(rows, each.mixed(normal_quantile(at[rows])), strict=True)
+        found = np.empty_like(at)
+        for row, each in enumerate(self.coordinates):
+            if each.law is Law.NORMAL and row in normal:
+                found[row] = each.scale * normal[row]
+                continue
+            share = normal_share(normal[row]) if row in normal else at[row]
+            found[row] = quantile(each.law, share, each.scale, each.bound or each.scale)
+        return found
+
+    def _independent(self, random: np.random.Generator) -> Array:
+        """Draw normal and uniform coordinates directly."""
         rows = list[Array]()
         # one call for all coordinates of one law, without Python's lock
         for law, some in groupby(self.coordinates, lambda each: each.law):
@@ -180,10 +190,3 @@ class Variation:
         return np.array([row for row, _ in pairs], dtype=np.int64), np.array(
             [value for _, value in pairs]
         )
-
-
-def generator(seed: int, place: int, stream: Stream) -> np.random.Generator:
-    """Return the Philox generator of a draw of a stream, seeded by a child of the study's seed."""
-    return np.random.Generator(
-        np.random.Philox(np.random.SeedSequence(seed, spawn_key=(place, int(stream))))
-    )

@@ -15,8 +15,9 @@ from ...trajectory import Array
 from ..case import Case
 from ..io.document import fault, join, parse, read_text, shown
 from ..io.typed_tables import typed
+from .distributions import Law
 from .places import Geometry, PlaceError
-from .variation import Coordinate, Law, Mode, Variation
+from .variation import Coordinate, Mode, Variation
 from .variation_schema import SCHEMA, HardpointKeys, LineKeys, VaryKeys, VaryUnits
 
 LARGEST_FILE = 1_000_000

@@ -12,12 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...algebra import Vec3
-from ...case.case import Case, Quantity
+from ...case.case import Case, Quantity, without_forces
 from ...case.held import require_no_held
+from ...case.measures import ForceMeasure
 from ...case.rotation import counted
-from ...case.variation.variation import Mode, Stream, Variation, generator
+from ...case.variation.sampling import Stream, generator
+from ...case.variation.variation import Mode, Variation
 from ...jet import Jet
-from ...kinematics import NativeSolver, PreparedDesigns, Variants, placed
+from ...kinematics import ForcesOfDesigns, NativeSolver, PreparedDesigns, Variants, placed
 from ...mechanism.motions import Path
 from ...trajectory import PER_TIME, QUANTITIES, Array
 from .reduce import Summary
@@ -166,9 +168,10 @@ class Ready:
         )
         varied = tuple(study.variation.places)
         solver = NativeSolver(order=order)
-        return Ready(
-            study, solver.prepare_designs(case.mechanism, case.sweep.path, varied, case.points)
+        designs = solver.prepare_designs(
+            case.mechanism, case.sweep.path, varied, without_forces(case).points, case.forces
         )
+        return Ready(study, designs)
 
     def along(self, path: Path) -> Ready:
         """The same model on another path of the same drivers."""
@@ -190,14 +193,16 @@ class Ready:
         """
         geometry = self.study.variation.geometry(offsets)
         found = self.designs.solve(geometry, self.study.tol)
-        return self._rows(found, geometry), found.solved, found.retried, found.messages
+        forces = self.designs.forces(found, geometry, self.study.tol)
+        rows = self._rows(found, geometry, forces)
+        return rows, found.solved, found.retried, found.messages
 
-    def _rows(self, found: Variants, geometry: Array) -> Array:
+    def _rows(self, found: Variants, geometry: Array, forces: ForcesOfDesigns | None) -> Array:
         at: dict[str, Vec3] = {}
         design: dict[str, Vec3] = {}
         numbers = self._numbers
         unknown = np.full((1, 1), np.nan)
-        for name in self.study.case.points:
+        for name in without_forces(self.study.case).points:
             known = self.designs.motion(found, name)
             x, v, a = (known[k] if k < len(known) else (unknown,) * 3 for k in range(3))
             at[name] = Vec3(*(Jet(*each) for each in zip(x, v, a, strict=True)))
@@ -213,8 +218,13 @@ class Ready:
         with np.errstate(all="ignore"):
             case = self.study.case
             path = case.sweep.path
-            jets = {o.name: counted(o.of(at, design), o.period, path) for o in case.outputs}
+            moved = without_forces(case).outputs
+            jets = {o.name: counted(o.of(at, design), o.period, path) for o in moved}
             for k, row in enumerate(self.study.rows):
+                if isinstance(row.output, ForceMeasure):
+                    assert forces is not None  # the case asks for them
+                    values[k] = forces.read(row.output.values)
+                    continue
                 jet = jets[row.output.name]
                 values[k] = (jet.x, jet.v, jet.a)[row.derivative]
         if not np.isfinite(values.sum()):
