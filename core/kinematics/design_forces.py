@@ -102,10 +102,12 @@ class DesignForces:
         model = self._route.model
         if model.forces is None:
             return np.zeros(found.solved.shape[1], dtype=np.bool_)
-        sigma = found.kept[model.rows[SIGMA]].min(axis=(0, 1))  # NaN where a sample is missing
+        # NaN where a sample is missing
+        sigma: Array = found.kept[model.rows[SIGMA]].min(axis=(0, 1))
         if FORCE_SIGMA in model.rows:
             sigma = np.minimum(sigma, found.kept[model.rows[FORCE_SIGMA]].min(axis=(0, 1)))
-        return found.solved.all(axis=0) & (sigma > model.forces.least)
+        reached: NDArray[np.bool_] = found.solved.all(axis=0)
+        return reached & (sigma > model.forces.least)
 
     def _together(self, found: Variants, decided: NDArray[np.bool_]) -> Forces | None:
         forces = self._route.model.forces

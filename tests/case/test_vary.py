@@ -191,7 +191,10 @@ FAULTS = [
     ({"tip": {"at": "tip", "sigma": 1.0, "law": "normal"}}, "hardpoints.tip.law: unknown key"),
     (
         {"tip": {"at": "tipp", "sigma": 1.0}},
-        "hardpoints.tip.at: found 'tipp', expected a position, direction or length of the case;",
+        (
+            "hardpoints.tip.at: found 'tipp', expected a position, direction, length, mass or load"
+            " of the case;"
+        ),
     ),
     (
         {"tip": {"at": "tip", "sigma": -1.0}},

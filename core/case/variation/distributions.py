@@ -55,6 +55,7 @@ def normal_share(value: Array) -> Array:
 
 
 def _special() -> Any:
-    import scipy.special  # few studies need it
+    """Return the module, which few studies need."""
+    import scipy.special  # pyright: ignore[reportMissingTypeStubs]
 
     return scipy.special

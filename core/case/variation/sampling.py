@@ -63,18 +63,14 @@ def points(sampling: Sampling, seed: int, block: int, coordinates: int, count: i
     Args:
         count: number of all points of a Latin hypercube; what a block has beyond is of no use.
     """
-    random = generator(seed, block, Stream.GEOMETRY).random((coordinates, DRAWN))
-    match sampling:
-        case Sampling.RANDOM:
-            found = random
-        case Sampling.LATIN:
-            first = block * DRAWN
-            orders = _orders(seed, coordinates, count)[:, first : first + DRAWN]
-            found = random
-            found[:, : orders.shape[1]] += orders
-            found[:, : orders.shape[1]] /= count
-        case Sampling.SOBOL:
-            found = _sobol(seed, coordinates).block(block)
+    if sampling is Sampling.SOBOL:
+        found = _sobol(seed, coordinates).block(block)
+    else:
+        found = generator(seed, block, Stream.GEOMETRY).random((coordinates, DRAWN))
+    if sampling is Sampling.LATIN:
+        intervals = _orders(seed, coordinates, count)[:, block * DRAWN : (block + 1) * DRAWN]
+        some = slice(0, intervals.shape[1])
+        found[:, some] = (intervals + found[:, some]) / count
     cells = 2.0**52
     return np.minimum(np.floor(found * cells), cells - 1.0) / cells + MIDDLE
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import StrEnum
 from functools import cached_property
 from itertools import groupby
 
@@ -20,15 +19,10 @@ from numpy.typing import NDArray
 from ...trajectory import Array
 from .correlations import Correlation
 from .distributions import Law, normal_quantile, normal_share, quantile
+from .file_units import SI, FileUnits
+from .limits import Limit
+from .modes import Mode
 from .sampling import DRAWN, Sampling, Stream, generator, points
-
-
-class Mode(StrEnum):
-    """Choice of the variants."""
-
-    MONTE_CARLO = "monte_carlo"
-    GRID = "grid"
-    ONE_AT_A_TIME = "one_at_a_time"
 
 
 @dataclass(frozen=True)
@@ -72,6 +66,8 @@ class Variation:
         correlations: of coordinates that are drawn, each in one of them at most.
         sampling: choice of the points that are drawn.
         drawn: number of variants that are drawn; a Latin hypercube depends on it.
+        limits: specification limits of outputs.
+        units: of the file, in which outputs are shown.
     """
 
     mode: Mode
@@ -82,6 +78,8 @@ class Variation:
     correlations: tuple[Correlation, ...] = ()
     sampling: Sampling = Sampling.RANDOM
     drawn: int = 0
+    limits: tuple[Limit, ...] = ()
+    units: FileUnits = SI
 
     @property
     def count(self) -> int | None:

@@ -84,7 +84,7 @@ class ForceTable:
         return self.of(table)
 
     def of(self, table: Array) -> Forces:
-        """Return the forces of a table of samples that are all far from singular poses; see `read`."""
+        """Return the forces of samples that are all far from singular poses; see `read`."""
         samples, wanted = _Samples(self, table), self.wanted
         power, largest = table[:, self._power], table[:, self._power + 1]
         if self.redundant:
