@@ -106,7 +106,8 @@ class _Sobol:
         first = index * DRAWN
         if first < self._engine.num_generated:
             self._engine.reset()
-        self._engine.fast_forward(first - self._engine.num_generated)
+        if ahead := first - self._engine.num_generated:
+            self._engine.fast_forward(ahead)
         return np.ascontiguousarray(self._engine.random(DRAWN).T)
 
 

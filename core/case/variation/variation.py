@@ -9,20 +9,21 @@ and a single variant can be reproduced.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...errors import KincheckError
 from ...trajectory import Array
 from .correlations import Correlation
 from .distributions import Law, normal_quantile, normal_share, quantile
 from .file_units import SI, FileUnits
 from .limits import Limit
 from .modes import Mode
-from .sampling import DRAWN, Sampling, Stream, generator, points
+from .sampling import DRAWN, Sampling, Stream, check_count, generator, points
 
 
 @dataclass(frozen=True)
@@ -93,6 +94,25 @@ class Variation:
         for size in sizes:  # unbounded integers: a grid soon outgrows 64 bits
             count *= size
         return count
+
+    def sampled(self, sampling: Sampling, count: int) -> Variation:
+        """Return the variation with another choice of the points that are drawn.
+
+        Args:
+            count: number of variants.
+
+        Raises:
+            KincheckError: nothing is drawn, or the sampling cannot have as many points.
+        """
+        if sampling is not Sampling.RANDOM and self.mode is not Mode.MONTE_CARLO:
+            raise KincheckError(
+                f"--sampling {sampling}: {self.mode} draws nothing; leave it out, or set mode ="
+                ' "monte_carlo"'
+            )
+        check_count(sampling, len(self.coordinates), count)
+        # what does not depend on the number is the same for any number
+        drawn = count if sampling is Sampling.LATIN else 0
+        return replace(self, sampling=sampling, drawn=drawn)
 
     def geometry(self, offsets: Array) -> Array:
         """Return numbers of the varied places, shape (numbers, V), from offsets, shape
