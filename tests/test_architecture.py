@@ -111,8 +111,8 @@ IMPORTS = {
         ". primitives joints case harness harness/workers studies studies/joint_check"
     ),
     "studies/tolerance": (
-        ". program program/llvm mechanism kinematics case case/io case/variation "
-        "harness harness/workers history report"
+        ". program program/llvm mechanism kinematics case case/measures case/io "
+        "case/variation harness harness/workers history report"
     ),
     "studies/stress": (
         ". joints mechanism kinematics case case/io harness harness/workers report "

@@ -52,7 +52,7 @@ class ForceEquations:
         gravity = vec(self.mechanism.gravity)
         for name, first in self.formulation.columns.items():
             body = self.mechanism.body(name)
-            total = inertial(body, self.states, gravity) if body.mass > 0.0 else NO_WRENCH
+            total = inertial(body, self.states, gravity) if body.mass != 0.0 else NO_WRENCH
             for each in self.applied.values():
                 if name in each.wrenches:
                     total += -each.wrenches[name]
