@@ -19,10 +19,13 @@ from .default_outputs import wheel_of, with_suspension_outputs
 from .own_names import read_own_names
 from .table import HardpointTable, coordinate, placed, require_size, unit_of
 from .templates import TEMPLATES, Template
-from .templates.base import WHEEL_CONTACT, normal
+from .templates.base import WHEEL_CONTACT, normal, side_of
 from .travels import read_travels
 
 WHEEL = "wheel_center"
+# Racks with joints near the middle have them a little beyond it; no point of one wheel's
+# suspension is farther across than this part of the half track.
+ACROSS = 0.25
 # Cars have some tens of hardpoints at a corner; names of many more are not searched for those that
 # are missing.
 MOST_POINTS = 10_000
@@ -112,8 +115,12 @@ def _filled(table: HardpointTable, template: Template, own: Path | None) -> dict
         own: file of the user's own names.
     """
     by_normal_name: dict[str, list[str]] = {}
+    by_left_name: dict[str, list[str]] = {}
     for name in table.points:
         by_normal_name.setdefault(normal(name), []).append(name)
+        plain, side = side_of(name)
+        if side == "left":
+            by_left_name.setdefault(plain, []).append(name)
     filled: dict[str, str] = {}
     if own is not None:
         filled |= read_own_names(
@@ -122,9 +129,9 @@ def _filled(table: HardpointTable, template: Template, own: Path | None) -> dict
     for role in (*template.roles, *template.optional):
         if role.name in filled:
             continue
-        found = [
-            name for each in dict.fromkeys(role.names) for name in by_normal_name.get(each, ())
-        ]
+        names = dict.fromkeys(role.names)
+        found = [name for each in names for name in by_normal_name.get(each, ())]
+        found = found or [name for each in names for name in by_left_name.get(each, ())]
         if len(found) > 1:
             places = " and ".join(f"{name!r} ({table.points[name].where})" for name in found)
             raise fault(
@@ -179,7 +186,16 @@ def _require_left_and_upright(
             table.file,
             named[WHEEL],
             f"found {written(WHEEL, 1)}, not left of the middle, expected the left side; {advice},"
-            " or give the left points",
+            " or give the left points; those of the right side are read as left ones if --axes"
+            " says left for right",
+        )
+    across = [role for role, (_, y, _) in at.items() if y < -ACROSS * at[WHEEL][1]]
+    for role in across[:1]:
+        raise fault(
+            table.file,
+            named[role],
+            f"found {written(role, 1)}, on the other side than {named[WHEEL]} with"
+            f" {written(WHEEL, 1)}, expected all points on one side; correct its sign",
         )
     arms = [(f"{role.removesuffix('_rear')}_front", role) for role in at if role.endswith("_rear")]
     for front, rear in (*arms, *template.ahead):
