@@ -159,9 +159,10 @@ def read_text(file: Path, limit: int, why_limit: str, *, of_spreadsheet: bool = 
         if of_spreadsheet and not marked and not binary(data):
             with suppress(UnicodeDecodeError):
                 return data.decode("cp1252")
-        what = "found a binary file, expected text: " if not marked and binary(data) else ""
-        problem = f"{what}byte {error.start} is not UTF-{16 if marked else 8}"
-        raise fault(file, "", f"{problem}; save the file as UTF-8") from None
+        problem = f"byte {error.start} is not UTF-{16 if marked else 8}; save the file as UTF-8"
+        if not marked and binary(data):
+            problem = "found a binary file, expected text; give what the program exports as text"
+        raise fault(file, "", problem) from None
 
 
 def sha256(file: Path) -> str:

@@ -15,7 +15,7 @@ from typing import Any, TypeAlias
 from ...errors import MOST_NAMED, KincheckError, brief, remedy, shortened
 from ...extras import library
 from .document import fault, read_bytes, shown
-from .foreign import foreign
+from .foreign import binary, foreign
 
 WORKBOOKS = (".xlsx", ".xlsm")
 Cell: TypeAlias = str | float
@@ -114,12 +114,16 @@ def one_sheet(file: Path, sheets: Sequence[Sheet], option: str) -> Sheet:
 
 def _require_workbook(file: Path, data: bytes) -> None:
     """Refuse a file that is no zip archive, or one that unpacks to an unreasonable size."""
-    if not data.startswith(_ZIP):
-        problem = foreign(data).replace("expected text", "expected a workbook")
-        what = "an empty file" if not data else "no workbook"
-        raise fault(
-            file, "", problem or f"found {what}, expected one (.xlsx); save the file as .xlsx"
-        )
+    problem = foreign(data)
+    if data.startswith(_ZIP) and "Excel" in problem:
+        problem = ""
+    elif not problem and not data:
+        problem = "is empty, expected text; save the workbook anew"
+    elif not problem:
+        kind = "another binary file" if binary(data) else "a text"
+        problem = f"found {kind}, expected text; save it as .xlsx, or name a table of text .csv"
+    if problem:
+        raise fault(file, "", problem.replace("expected text", "expected a workbook (.xlsx)"))
     try:
         size = sum(each.file_size for each in zipfile.ZipFile(io.BytesIO(data)).infolist())
     except (zipfile.BadZipFile, ValueError, NotImplementedError, OSError) as error:

@@ -1,5 +1,5 @@
-"""The head of a table of hardpoints, `name,x,y,z`: its place among rows of cells, its columns and its
-unit.
+"""The head of a table of hardpoints, `name,x,y,z`: its place among rows of cells, its columns and
+its unit.
 """
 
 from __future__ import annotations
