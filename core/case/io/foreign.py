@@ -11,6 +11,7 @@ import zipfile
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 
+EXCEL, ARCHIVE = "an Excel workbook", "a zip archive"
 _TABLE = "export the table as CSV or .xlsx"
 _OFFICE = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
 _ZIP = b"PK\x03\x04"
@@ -44,7 +45,7 @@ _HTML = re.compile(rb"\s*(?:<!doctype\s+html|<html|<table|<meta)\b", re.IGNORECA
 _MEMBERS: Sequence[tuple[Callable[[str], bool], str, str]] = (
     (
         lambda name: name.startswith("xl/"),
-        "an Excel workbook",
+        EXCEL,
         "name it .xlsx, or save the sheet as CSV",
     ),
     (
@@ -71,7 +72,7 @@ def foreign(data: bytes) -> str:
     """Return what a file is if it is known to be no text, and what to do: "found a PDF document,
     expected text; export ..."; empty for any other.
     """
-    what, advice = _recognised(data)
+    what, advice = recognised(data)
     return f"found {what}, expected text; {advice}" if what else ""
 
 
@@ -80,7 +81,8 @@ def binary(data: bytes) -> bool:
     return _CONTROL.search(data) is not None
 
 
-def _recognised(data: bytes) -> tuple[str, str]:
+def recognised(data: bytes) -> tuple[str, str]:
+    """Return what a file is, and what to do; empty texts if it may be a text."""
     if data.startswith(_ZIP):
         return _archive(data)
     for start, what, advice in _SIGNATURES:
@@ -98,4 +100,4 @@ def _archive(data: bytes) -> tuple[str, str]:
         for known, what, advice in _MEMBERS:
             if any(map(known, names)):
                 return what, advice
-    return "a zip archive", "unpack it and give the file inside"
+    return ARCHIVE, "unpack it and give the file inside"

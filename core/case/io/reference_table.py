@@ -17,7 +17,7 @@ from pathlib import Path
 
 from ..printed import Printed
 from .decimal_sign import find_decimal_sign
-from .document import LARGEST, decimal, fault, read_text, shown
+from .document import LARGEST, SMALLEST, decimal, fault, read_text, shown
 from .reference_samples import ROWS, ReferenceKeys, Samples, check_width, only_beside
 from .workbook import WORKBOOKS, Cell, Row, one_sheet, read_sheets
 
@@ -183,4 +183,4 @@ def _number(file: Path, where: str, column: str, cell: Cell, sign: str) -> float
             f"{where}, column {column}",
             f"found {shown(cell)}, {expected}; correct it or leave the column out",
         )
-    return number
+    return number if abs(number) >= SMALLEST else 0.0  # no tolerance is so small

@@ -15,7 +15,7 @@ from typing import Any, TypeAlias
 from ...errors import MOST_NAMED, KincheckError, brief, remedy, shortened
 from ...extras import library
 from .document import fault, read_bytes, shown
-from .foreign import binary, foreign
+from .foreign import ARCHIVE, EXCEL, binary, recognised
 
 WORKBOOKS = (".xlsx", ".xlsm")
 Cell: TypeAlias = str | float
@@ -28,7 +28,6 @@ LARGEST_FILE = 64_000_000
 MOST_BYTES = 512_000_000
 # A sheet can have 16384 columns; a table of so many is none of points or of curves.
 MOST_COLUMNS = 1000
-_ZIP = b"PK"
 
 
 @dataclass(frozen=True)
@@ -114,16 +113,13 @@ def one_sheet(file: Path, sheets: Sequence[Sheet], option: str) -> Sheet:
 
 def _require_workbook(file: Path, data: bytes) -> None:
     """Refuse a file that is no zip archive, or one that unpacks to an unreasonable size."""
-    problem = foreign(data)
-    if data.startswith(_ZIP) and "Excel" in problem:
-        problem = ""
-    elif not problem and not data:
-        problem = "is empty, expected text; save the workbook anew"
-    elif not problem:
-        kind = "another binary file" if binary(data) else "a text"
-        problem = f"found {kind}, expected text; save it as .xlsx, or name a table of text .csv"
-    if problem:
-        raise fault(file, "", problem.replace("expected text", "expected a workbook (.xlsx)"))
+    what, advice = recognised(data)
+    if not data:
+        raise fault(file, "", "is empty, expected a workbook (.xlsx); save the workbook anew")
+    if what not in (EXCEL, ARCHIVE):
+        what = what or ("another binary file" if binary(data) else "a text")
+        advice = advice or "save it as .xlsx, or name a table of text .csv"
+        raise fault(file, "", f"found {what}, expected a workbook (.xlsx); {advice}")
     try:
         size = sum(each.file_size for each in zipfile.ZipFile(io.BytesIO(data)).infolist())
     except (zipfile.BadZipFile, ValueError, NotImplementedError, OSError) as error:

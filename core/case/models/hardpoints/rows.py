@@ -23,7 +23,7 @@ from .templates import TEMPLATES
 from .templates.base import normal
 
 _UNIT = re.compile(r"[\[(]?\s*([a-z]+)\s*[\])]?", re.IGNORECASE)
-_REMARK = re.compile(r"(#?)\s*(unit|axes|template)s?\s*[:=,]\s*(.+)", re.IGNORECASE)
+_REMARK = re.compile(r"(#?)\s*(unit|axes|template)s?\s*[:=,]+\s*(.+)", re.IGNORECASE)
 _ROLES = {
     name
     for template in TEMPLATES.values()
