@@ -31,6 +31,7 @@ PURPOSES = {
     "fast": "machine code",
     "proofs": "proved references",
     "parquet": "history as Parquet",
+    "xlsx": "tables of spreadsheets",
     "distributed": "runs on many machines",
 }
 # Modules of distributions whose import name differs; of other simulators it is the engine's name.
