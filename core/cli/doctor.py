@@ -1,7 +1,4 @@
-"""kincheck doctor: list installed and missing parts with remedies, and check that the tool works.
-
-The self-check solves one case.
-"""
+"""kincheck doctor: list installed and missing parts with remedies, and solve one case."""
 
 from __future__ import annotations
 
