@@ -189,7 +189,7 @@ def largest_found(values: Array) -> float:
 def as_variables(
     points: Mapping[str, PointMotion], dims: tuple[str, ...], drive: Driving | None
 ) -> tuple[dict[str, Variable], dict[str, Variable], str]:
-    """Return coordinates and variables of the motion of points, and the coordinate along the axis of
+    """Return coordinates and variables of the motion of points, and the coordinate of the axis of
     curves, by its name.
 
     Args:
