@@ -32,11 +32,16 @@ PURPOSES = {
     "proofs": "proved references",
     "parquet": "history as Parquet",
     "distributed": "runs on many machines",
+    "yaml": "loops of URDF files",
+    "pandas": "results as tables",
+    "xarray": "results as datasets",
+    "matplotlib": "results as figures",
 }
 # Modules of distributions whose import name differs; of other simulators it is the engine's name.
 MODULES = {
     "python-flint": "flint",
     "llvmlite": "llvmlite.binding",
+    "pyyaml": "yaml",
     "drake": "pydrake.multibody.plant",
     "dartpy": "dartpy",
     "opensim": "opensim",
