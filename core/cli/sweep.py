@@ -191,8 +191,8 @@ def _solver(options: argparse.Namespace, engine: Engine) -> Solver:
 
 
 def _part(options: argparse.Namespace) -> Part:
-    """Return the file of the finished part, with the facts besides the study that its
-    numbers depend on.
+    """Return the file of the finished part, with all facts besides the study behind its
+    numbers.
     """
     import numpy as np
 

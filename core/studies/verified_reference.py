@@ -147,7 +147,7 @@ def _drives(case: Case, numbers: str) -> Drives:
 
 
 def _grid(values: Array, numbers: str) -> list[Fraction]:
-    """Return the sweep's samples; decimals of a grid that is even up to rounding are made even."""
+    """Return the sweep's samples; a grid even up to its decimals is made even."""
     each, last = list(map(NUMBERS[numbers], values.tolist())), len(values) - 1
     if numbers == "double" or last < 1:
         return each
