@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from itertools import accumulate
-from typing import Any
+from typing import Any, cast
 
 from ...algebra import Quat, Scalar, quat, vec
 from ...joints.base import unit
@@ -37,8 +37,7 @@ def converted(item: Any, change: Callable[[Any], Any]) -> Any:
 
     They are checked already; their own checks take doubles.
     """
-    kind: type[Any] = type(item)
-    new: Any = object.__new__(kind)
+    new: Any = object.__new__(cast("type[Any]", type(item)))
     for each in fields(item):
         object.__setattr__(new, each.name, change(getattr(item, each.name)))
     return new
