@@ -64,8 +64,8 @@ IMPORTS = {
         ". program mechanism kinematics/formulation kinematics/structure kinematics/compiled"
     ),
     "kinematics/verified": (
-        ". primitives program mechanism kinematics/formulation kinematics/structure "
-        "kinematics/compiled kinematics/continuation"
+        ". primitives program joints mechanism kinematics/formulation kinematics/forces "
+        "kinematics/structure kinematics/compiled kinematics/continuation"
     ),
     "kinematics/by_components": (
         ". program mechanism kinematics/formulation kinematics/structure "

@@ -106,8 +106,9 @@ if TYPE_CHECKING:
     from .verified.exact import Reading as Reading
     from .verified.exact import as_decimal as as_decimal
     from .verified.exact import as_double as as_double
+    from .verified.force_enclosure import EnclosedForces as EnclosedForces
+    from .verified.force_enclosure import UnprovedError as UnprovedError
     from .verified.krawczyk import Enclosure as Enclosure
-    from .verified.krawczyk import UnprovedError as UnprovedError
     from .verified.pose_proof import PoseState as PoseState
     from .verified.pose_proof import prove_pose as prove_pose
     from .verified.verified_sweep import Drives as Drives
@@ -143,7 +144,8 @@ _NAMES = {
     "structure.driver_count": "degrees_of_freedom require_driven",
     "structure.reduction": "largest_residual reduce_rows",
     "verified.exact": "Exact Reading as_decimal as_double",
-    "verified.krawczyk": "Enclosure UnprovedError",
+    "verified.force_enclosure": "EnclosedForces UnprovedError",
+    "verified.krawczyk": "Enclosure",
     "verified.pose_proof": "PoseState prove_pose",
     "verified.verified_sweep": "Drives Proofs prove",
 }
