@@ -308,10 +308,14 @@ def test_earlier_runs_and_work_precision_are_drawn_where_there_are_any(visit: An
     read = (
         READ
         + """
-        return { error: told("case-0-trend-error", 2), time: told("case-0-trend-time", 3), zeros: all("[data-figure=case-0-trend-error] .zeros").length,
-          precision: told("case-0-precision-projection", 2), drawn: all("[data-figure=case-0-precision-projection] .curve").map((each) => each.dataset.series) };
+        const found = { error: told("case-0-trend-error", 2), time: told("case-0-trend-time", 3) };
+        found.precision = told("case-0-precision-projection", 2);
+        found.zeros = all("[data-figure=case-0-trend-error] .zeros").length;
+        found.drawn = all("[data-figure=case-0-precision-projection] .curve").map(
+          (each) => each.dataset.series);
+        return found;
     """
-    )  # noqa: E501
+    )
     told = visit(results(), read, history={"strut": past}, precision={"strut": efforts})
     assert told["error"] == [["2026-11-01", "one 1e−12 m"], ["2026-11-02", "one 0 m"]]
     assert told["time"] == [[f"2026-11-0{k}", "one 10 µs"] for k in (1, 2, 3)]
