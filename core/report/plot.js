@@ -56,7 +56,7 @@ function plot(box, { data, layout }) {
       return [axis, bars ? { rangemode: "tozero", ...layout[`${axis}axis`] } : layout[`${axis}axis`]];
     }));
     const rows = Math.max(2, Math.floor((height - 60) / (isCategory(sides.y, values("y")) ? 16 : 42)));
-    const labels = scaled(sides.y, values("y"), 1, 0, rows, view && view.y).ticks.map(([, text]) => text);
+    const labels = scaled(sides.y, values("y"), height, 0, rows, view && view.y).ticks.map(([, text]) => text);
     const left = 32 + Math.min(0.5 * width, longest(labels)), slanted = isCategory(sides.x, values("x"));
     const bottom = slanted ? 14 + Math.min(90, 0.55 * longest([...new Set(values("x"))])) : 42;
     frame = { left, right: width - 14, top: 12, bottom: height - bottom, width, height };
@@ -134,12 +134,12 @@ function plot(box, { data, layout }) {
   function drawn(trace) {
     if (trace.type === "bar") return bars(trace);
     if (trace.type !== "scatter") throw new Error(`figures have no traces of type ${trace.type}`);
-    const made = [], places = trace.x.map((_, k) => place(trace, k)), known = { "data-series": trace.meta };
+    const made = [], points = layout.hovermode === "closest", places = trace.x.map((_, k) => place(trace, k, points)), known = { "data-series": trace.meta };
     const lines = (trace.mode || "lines").includes("lines");
     const path = places.map((at, k) => (at ? `${k && places[k - 1] ? "L" : "M"}${at[0].toFixed(1)} ${at[1].toFixed(1)}` : "")).join("");
     if (trace.fill) made.push(element("path", { class: "band", d: path && `${path}Z`, style: `fill: ${trace.fillcolor}` }));
     else if (lines) made.push(element("path", { ...known, class: "curve", d: path, ...stroke(trace.line) }));
-    if (floor) made.push(element("path", { ...known, class: "zeros", d: trace.y.flatMap((y, k) => (y === 0 ? [place(trace, k, true)] : [])).map(([x, y]) => `M${x.toFixed(1)} ${y - 4}v8`).join(""), ...stroke({ color: trace.line && trace.line.color, width: 1.2 }) }));
+    if (floor && !points) made.push(element("path", { ...known, class: "zeros", d: trace.y.flatMap((y, k) => (y === 0 ? [place(trace, k, true)] : [])).map(([x, y]) => `M${x.toFixed(1)} ${y - 4}v8`).join(""), ...stroke({ color: trace.line && trace.line.color, width: 1.2 }) }));
     const marker = trace.marker || {}, stride = Math.ceil(places.length / (marker.maxdisplayed || Infinity)) || 1;
     if ((trace.mode || "").includes("markers") || (lines && !trace.fill && places.some((at, k) => at && !places[k - 1] && !places[k + 1]))) {
       const mark = symbol(marker.symbol || "circle-open", (marker.size || 6) / 2), alone = !(trace.mode || "").includes("markers");
