@@ -67,7 +67,7 @@ def _diagrams(data: Dataset) -> Iterator[str]:
 
 
 def _diagram(label: str, below: str, x: NDArray[Any], columns: Mapping[str, NDArray[Any]]) -> str:
-    """Return one diagram as SVG; gaps where there is no number."""
+    """Return one diagram as SVG, with gaps for missing numbers."""
     lines = [
         (name, line)
         for name, values in columns.items()

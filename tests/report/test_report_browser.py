@@ -308,12 +308,15 @@ def test_earlier_runs_and_work_precision_are_drawn_where_there_are_any(visit: An
     read = (
         READ
         + """
-        const found = { error: told("case-0-trend-error", 2), time: told("case-0-trend-time", 3) };
-        found.precision = told("case-0-precision-projection", 2);
-        found.zeros = all("[data-figure=case-0-trend-error] .zeros").length;
-        found.drawn = all("[data-figure=case-0-precision-projection] .curve").map(
-          (each) => each.dataset.series);
-        return found;
+        const precision = "case-0-precision-projection";
+        const curves = all(`[data-figure=${precision}] .curve`);
+        return {
+          error: told("case-0-trend-error", 2),
+          time: told("case-0-trend-time", 3),
+          zeros: all("[data-figure=case-0-trend-error] .zeros").length,
+          precision: told(precision, 2),
+          drawn: curves.map((each) => each.dataset.series),
+        };
     """
     )
     told = visit(results(), read, history={"strut": past}, precision={"strut": efforts})

@@ -74,7 +74,7 @@ def unmade(now: Subject) -> list[Finding]:
 
 
 def by_pair(records: Sequence[Record]) -> dict[Pair, Record]:
-    """The records by case, engine and mode."""
+    """Return the records by case, engine and mode."""
     return {(record.case, record.engine, record.mode): record for record in records}
 
 
@@ -90,7 +90,7 @@ def _outcomes(now: Record, before: Record) -> Iterator[Finding]:
 
 
 def _lost(now: Record, before: Record) -> Iterator[Finding]:
-    """Phases, samples, motions, standards."""
+    """Return findings on lost phases, samples, motions and standards."""
     phases = [phase for phase in PHASES if _reached(before, phase) and not _reached(now, phase)]
     if phases:
         why = f": {_said(now)}" if now.outcome is not Outcome.PASS else ""
@@ -161,8 +161,8 @@ def _moved(now: Record, before: Record) -> Iterator[Finding]:
 
 
 def same_samples(now: Record, before: Record) -> bool:
-    """Whether all drivers have the values they had, but for the last digits of sines and splines on
-    another processor.
+    """Return whether all drivers have equal values, up to the last digits of sines and splines
+    on another processor.
     """
     here, there = now.driver, before.driver
     if {name: len(values) for name, values in here.items()} != {
@@ -189,7 +189,7 @@ def _apart(a: Sequence[float | None], b: Sequence[float | None]) -> float:
 
 
 def _largest(record: Record, motion: str) -> float:
-    """The largest value of any output."""
+    """Return the largest value of any output."""
     values = (x for output in record.outputs.values() for x in values_of(output, motion))
     return max((abs(x) for x in values if x is not None), default=0.0)
 

@@ -1,5 +1,6 @@
-"""Errors that grow by less than a digit a night, and by more than one over many: no step, and
-nothing against last night.
+"""Slow drift: errors grow by less than a digit a night, and by more than one over many nights.
+
+Neither a step nor the comparison with last night shows it.
 """
 
 from __future__ import annotations

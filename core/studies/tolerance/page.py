@@ -5,16 +5,20 @@ script.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from ...harness.labels import notes, number, output_label, signs
 from ...harness.record import Outcome, Record
-from ...report.axis import DISPLAY, Axis, driver_axis
+from ...report.axis import Axis, driver_axis
 from ...report.figures import Figure
 from ...report.page_parts import environment, figure_parts
 from ...unit_text import with_unit
+from .conformance import Capability
+from .histogram_figure import LIMIT, histogram_figure
+from .limit_words import interval, limit_notes, percent
 from .results import Envelope, Gradient, Numbers, SweepResults
 
 _HERE = Path(__file__).parent
@@ -38,11 +42,23 @@ class OutputView:
     figure: str
     spread: str
     tornado: str
+    histogram: str
     gradients: Sequence[Gradient]
+    limit: Capability | None
 
     def shown(self, value: float | None) -> str:
         """A value in display units."""
-        return number(None if value is None else self.scale * value)
+        return scaled_number(self.scale, value)
+
+    @property
+    def limits(self) -> dict[str, float]:
+        """The limits in display units, by their names."""
+        ends = (None, None) if self.limit is None else (self.limit.low, self.limit.high)
+        return {
+            name: float(f"{self.scale * value:.{DIGITS}g}")
+            for name, value in zip(("low limit", "high limit"), ends, strict=True)
+            if value is not None
+        }
 
     def ends(self) -> tuple[str, str, str]:
         """The least, the most, and the largest standard deviation, over all samples."""
@@ -66,7 +82,8 @@ def page(results: SweepResults) -> str:
         mine = sorted(
             (each for each in results.gradients if each.output == name), key=effect, reverse=True
         )
-        unit, scale = DISPLAY.get(envelope.unit, (envelope.unit, 1.0))
+        unit, scale = results.shown_unit(envelope.unit)
+        limit = next((each for each in results.limits if each.output == name), None)
         view = OutputView(
             name,
             unit,
@@ -75,12 +92,25 @@ def page(results: SweepResults) -> str:
             f"envelope-{index}",
             f"spread-{index}",
             f"tornado-{index}",
+            f"histogram-{index}" if envelope.histogram else "",
             mine,
+            limit,
         )
         figures[view.figure] = envelope_figure(view, axis, about_nominal=False)
         figures[view.spread] = envelope_figure(view, axis, about_nominal=True)
         figures[view.tornado] = tornado_figure(view)
+        if envelope.histogram:
+            figures[view.histogram] = histogram_figure(
+                view.name, unit, scale, envelope.histogram, view.limits
+            )
         outputs.append(view)
+
+    def shown(unit: str, value: float | None) -> str:
+        return scaled_number(results.shown_unit(unit)[1], value)
+
+    def shown_unit(unit: str) -> str:
+        return results.shown_unit(unit)[0]
+
     return (
         environment(_HERE)
         .get_template("sweep.html")
@@ -95,6 +125,12 @@ def page(results: SweepResults) -> str:
                 key: value for key, value in results.run.items() if key not in ("cases", "engines")
             },
             effect=effect,
+            slopes=partial(slopes, results),
+            shown=shown,
+            shown_unit=shown_unit,
+            limit_notes=limit_notes(results),
+            percent=percent,
+            interval=interval,
             **figure_parts(figures, drivers={"sweep": axis.shown}),
         )
     )
@@ -117,6 +153,19 @@ def headline(results: SweepResults) -> str:
     return said
 
 
+def slopes(results: SweepResults, view: OutputView, each: Gradient) -> dict[str, str]:
+    """Return the numbers of a gradient and their unit, in units of the file."""
+    its, factor = results.shown_unit(results.unit_of(each.coordinate))
+    names = ("at_design", "largest", "error")
+    found = {name: scaled_number(view.scale / factor, getattr(each, name)) for name in names}
+    return {**found, "unit": f"({view.unit})/({its})"}
+
+
+def scaled_number(scale: float, value: float | None) -> str:
+    """Return a number times a factor, to three digits; a dash if there is none."""
+    return number(None if value is None else scale * value)
+
+
 def effect(gradient: Gradient) -> float:
     """The size of a bar: the largest gradient times what its coordinate varies by [unit of the
     output].
@@ -136,7 +185,12 @@ def _axis(results: SweepResults) -> Axis:
         message="",
         driver=results.driver,
     )
-    return driver_axis(results.run["cases"].get(results.case, {}), [record], ())
+    axis = driver_axis(results.run["cases"].get(results.case, {}), [record], ())
+    unit, scale = results.shown_driver
+    if not unit:
+        return axis
+    title = axis.title.replace(f"[{axis.unit}]", f"[{unit}]")
+    return replace(axis, unit=unit, scale=scale, title=title)
 
 
 def envelope_figure(view: OutputView, axis: Axis, *, about_nominal: bool) -> Figure:
@@ -195,6 +249,9 @@ def envelope_figure(view: OutputView, axis: Axis, *, about_nominal: bool) -> Fig
         line={"width": 1.5, "color": "#D55E00", "dash": "12px,5px"},
         uid="s1",
     )
+    if not about_nominal:
+        for name, limit in view.limits.items():
+            curve([limit, limit], [axis.shown[0], axis.shown[-1]], name=name, line=LIMIT, uid=name)
     what = with_unit(
         output_label(view.name) + (" less nominal" if about_nominal else ""), view.unit
     )
