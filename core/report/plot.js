@@ -48,7 +48,7 @@ function plot(box, { data, layout }) {
     pointed = null;
     readout.hidden = true;
     ends = stacked();
-    const drawnValues = (axis) => seen().flatMap((trace) => (ends.get(trace) || {})[axis] || trace[axis]);
+    const drawnValues = (axis) => seen().flatMap((trace) => (ends.get(trace) || {})[axis] || (trace.type === "bar" && barWidth(trace, axis) ? edges(trace, axis) : trace[axis]));
     const values = (axis) => drawnValues(axis).filter((value) => value !== null && value !== undefined && !(floor && axis === "y" && value === 0));
     // bars stand on zero
     const sides = Object.fromEntries(["x", "y"].map((axis) => {
@@ -151,13 +151,21 @@ function plot(box, { data, layout }) {
     return made;
   }
 
+  // The width of bars at numbers [unit of the axis]: the least distance of two; 0 for one bar, of categories, and across the bars.
+  function barWidth(trace, axis) {
+    const at = trace[axis];
+    if (axis !== (trace.orientation === "h" ? "y" : "x") || at.length < 2 || typeof at[0] === "string") return 0;
+    return Math.min(...at.slice(1).map((value, k) => Math.abs(value - at[k])));
+  }
+
+  const edges = (trace, axis) => trace[axis].flatMap((at) => [at - 0.5 * barWidth(trace, axis), at + 0.5 * barWidth(trace, axis)]);
+
   function bars(trace) {
     const flat = trace.orientation === "h", [along, up] = flat ? ["y", "x"] : ["x", "y"];
-    const steps = frame[along].width ? 0 : Math.min(...trace[along].slice(1).map((value, k) => Math.abs(value - trace[along][k])), Infinity);
     return trace[along].flatMap((at, k) => {
       if (trace[up][k] === null) return [];
-      const middle = frame[along].place(at), width = (trace.width && (trace.width[k] || trace.width)) || steps;
-      const half = frame[along].width ? 0.36 * frame[along].width : width < Infinity ? 0.47 * Math.abs(frame[along].place(at + width) - middle) : 8;
+      const middle = frame[along].place(at), width = barWidth(trace, along);
+      const half = frame[along].width ? 0.36 * frame[along].width : width ? 0.47 * Math.abs(frame[along].place(at + width) - middle) : 8;
       const end = ends.has(trace) ? ends.get(trace)[up][k] : trace[up][k], base = ends.has(trace) ? end - trace[up][k] : 0;
       const [from, to] = [base, end].map(frame[up].place).sort((a, b) => a - b);
       const size = flat ? { x: from, y: middle - half, width: to - from, height: 2 * half } : { x: middle - half, y: from, width: 2 * half, height: to - from };
