@@ -273,15 +273,18 @@ def test_large_mechanisms_have_fewer_frames_and_the_largest_no_scene():
 
 def test_a_suspension_has_its_wheel_about_the_axis_of_rotation():
     shown = scene(cases.load("mcpherson_suspension"), poses=False)
-    drawn = drawing(shown, AXIS)
+    [wheel] = shown.wheels
+    # a right wheel in axes x rearward, y outboard and z up, without static angles
+    assert wheel.spin == pytest.approx((0.0, 1.0, 0.0), abs=1e-12)
+    aslant = msgspec.structs.replace(wheel, spin=[0.6, 0.8, 0.0])
+    drawn = drawing(msgspec.structs.replace(shown, wheels=[aslant]), AXIS)
     [(body, center, spin, up, radius)] = drawn.wheels
     assert drawn.bodies[body]["name"] == "knuckle"
     turn = A(np.array(drawn.bodies[body]["p"][0]))
     assert np.array(drawn.bodies[body]["r"][0]) + turn @ center == pytest.approx(
         (0.975, 0.715, 0.101)
     )
-    # a right wheel in axes x rearward, y outboard and z up, without static angles
-    assert turn @ spin == pytest.approx((0.0, 1.0, 0.0), abs=1e-12)
+    assert turn @ spin == pytest.approx((0.6, 0.8, 0.0), abs=1e-12)
     assert (up, radius) == ([0.0, 0.0, 1.0], 0.3)
     assert drawn.layers == ["names", "frames", "paths", "wheels"]
     assert drawing(scene(STRUT, poses=False), AXIS).wheels == []
