@@ -1,4 +1,6 @@
-"""Results in a notebook: a table and curves as HTML without scripts."""
+"""Results in a notebook: a table and curves as HTML and SVG, without scripts, so that they are seen
+offline, in notebooks that are not trusted and in exports.
+"""
 
 from __future__ import annotations
 
@@ -12,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .dataset import Dataset
+from .palette import COLOURS
 from .unit_text import with_unit
 
 MOST_ROWS, MOST_COLUMNS, MOST_LINES, MOST_DIAGRAMS = 10, 10, 24, 9
 """Rows and columns of a table, lines of a diagram, and diagrams; the rest is left out, and said."""
 WIDTH, HEIGHT, LEFT, BOTTOM = 320, 170, 58, 30
-COLOURS = ("#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#ff7f0e", "#17becf", "#8c564b", "#7f7f7f")
 CELL = "text-align:right;padding:2px 8px;white-space:nowrap"
 
 

@@ -10,13 +10,17 @@ import msgspec
 import numpy as np
 
 from ..case.case import MARKER, Case
+from ..case.measures.force import DriverEffort, JointForce
+from ..case.suspension import SuspensionOutput
 from ..errors import KincheckError
 from ..joints import Kind
+from ..joints.base import unit
 from ..kinematics import NativeSolver
+from ..mechanism.drivers import PointCoordinate
 from ..mechanism.mechanism import Vector
 from ..trajectory import Array, BodyMotion
 from .record import Record, Results
-from .scene_record import Scene, SceneBody, SceneJoint, ScenePoint
+from .scene_record import Scene, SceneBody, SceneForce, SceneJoint, ScenePoint, SceneWheel
 from .standard import STANDARD
 
 FRAMES = 61  # a few seconds of animation, and a few kilobytes a body
@@ -103,9 +107,53 @@ def scene(case: Case, *, poses: bool = True, asked: bool = True) -> Scene:
             for point in mechanism.points
             if not point.name.startswith(MARKER)
         ],
+        wheels=_wheels(case),
+        forces=_forces(case),
         frames=frames,
         message=message,
     )
+
+
+def _wheels(case: Case) -> list[SceneWheel]:
+    """Return the wheels of suspension outputs; without a radius there is nothing to draw."""
+    outputs = [each for each in case.outputs if isinstance(each, SuspensionOutput)]
+    found: dict[str, SceneWheel] = {}
+    for vehicle in (vehicle for output in outputs for vehicle in output.vehicles):
+        if vehicle.wheel_radius is not None:
+            center = case.mechanism.point(vehicle.wheel_center)
+            found[center.name] = SceneWheel(
+                body=center.body,
+                center=list(center.position),
+                spin=[float(x) for x in vehicle.spin],
+                up=list(vehicle.up),
+                radius=vehicle.wheel_radius,
+            )
+    return list(found.values())
+
+
+def _forces(case: Case) -> list[SceneForce]:
+    """Return the outputs of forces that act at a point along a fixed direction."""
+    found: list[SceneForce] = []
+    for output in case.outputs:
+        if isinstance(output, JointForce):
+            direction = output.along
+        elif isinstance(output, DriverEffort) and isinstance(
+            driver := case.mechanism.driver(output.driver), PointCoordinate
+        ):
+            direction = unit(driver.direction)
+        else:
+            continue
+        body, position = output.place(case.mechanism)
+        found.append(
+            SceneForce(
+                output=output.name,
+                name=output.read,
+                body=body,
+                position=list(position),
+                direction=[float(x) for x in direction],
+            )
+        )
+    return found
 
 
 def _poses(case: Case) -> tuple[list[int], dict[str, BodyMotion], str]:

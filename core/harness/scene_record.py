@@ -52,10 +52,47 @@ class ScenePoint(msgspec.Struct, frozen=True, kw_only=True):
     output: bool
 
 
+class SceneWheel(msgspec.Struct, frozen=True, kw_only=True):
+    """A wheel, global at the design.
+
+    Attributes:
+        body: the wheel carrier.
+        center: wheel centre [m].
+        spin, up: unit vectors along the axis of rotation and away from the road [-].
+        radius: from the wheel centre to the contact centre [m].
+    """
+
+    body: str
+    center: list[float]
+    spin: list[float]
+    up: list[float]
+    radius: float
+
+
+class SceneForce(msgspec.Struct, frozen=True, kw_only=True):
+    """A force that an output measures along one direction.
+
+    Attributes:
+        output: the output with its values [N].
+        name: the joint or driver.
+        body: the body that it acts on.
+        position: the point of that body where it acts, global at the design [m].
+        direction: global unit vector [-].
+    """
+
+    output: str
+    name: str
+    body: str
+    position: list[float]
+    direction: list[float]
+
+
 class Scene(msgspec.Struct, frozen=True, kw_only=True):
     """A case's mechanism as drawn. Poses are rounded for the screen, and never compared.
 
     Attributes:
+        wheels: those of suspension outputs whose radius is known.
+        forces: outputs of joints' forces and of the efforts of driven points.
         frames: indices of the samples with poses; empty if only the design position is known.
         message: empty, or the reason why samples have no pose.
     """
@@ -63,5 +100,7 @@ class Scene(msgspec.Struct, frozen=True, kw_only=True):
     bodies: list[SceneBody]
     joints: list[SceneJoint]
     points: list[ScenePoint]
+    wheels: list[SceneWheel] = []
+    forces: list[SceneForce] = []
     frames: list[int] = []
     message: str = ""

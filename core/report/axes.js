@@ -36,7 +36,13 @@ function scaled(side, values, from, to, count, view) {
     return log ? 10 ** value : value;
   };
   const ticks = side.tickvals && !view ? side.tickvals.map((at, k) => [at, side.ticktext[k]]) : log ? logTicks(low, high, count) : linearTicks(low, high, count, side.dtick);
-  return { place, back, ticks: ticks.filter(([at]) => ahead(at) >= low - 1e-9 * (high - low) && ahead(at) <= high + 1e-9 * (high - low)) };
+  const inside = ([at]) => ahead(at) >= low - 1e-9 * (high - low) && ahead(at) <= high + 1e-9 * (high - low);
+  return { place, back, ticks: apart(ticks.filter(inside), place) };
+}
+
+// Ticks with room between them, the first one always.
+function apart(ticks, place) {
+  return ticks.reduce((kept, tick) => (kept.length && Math.abs(place(tick[0]) - place(kept.at(-1)[0])) < 13 ? kept : [...kept, tick]), []);
 }
 
 const isCategory = (side, values) => side.type === "category" || values.some((value) => typeof value === "string");
@@ -54,7 +60,7 @@ function around(values, side) {
 }
 
 function linearTicks(low, high, count, given) {
-  let step = given || niceStep((high - low) / count);
+  let step = given || niceStep((0.75 * (high - low)) / count);
   while ((high - low) / step > 2 * count) step *= 2;
   const found = [];
   for (let k = Math.ceil(low / step - 1e-9); k <= high / step + 1e-9 && found.length < 100; k++) {

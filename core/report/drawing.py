@@ -6,13 +6,13 @@ Hardpoints are in body coordinates; the page places them by the poses of the bod
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
-from typing import Any
+from typing import Any, TypeAlias
 
 from ..algebra import Vec3, quat, rotation_less_identity, vec
-from ..harness.scene_record import Scene, SceneBody, SceneJoint
+from ..harness.scene_record import Scene, SceneBody, SceneForce, SceneJoint, SceneWheel
 from ..joints.base import unit
 from ..mechanism.mechanism import GROUND
 from .axis import Axis
@@ -36,6 +36,9 @@ ALL_JOINED = 4
 SAME = 1e-6
 
 
+Numbers: TypeAlias = list[float]
+
+
 @dataclass
 class Drawing:
     """A drawing as the page's script reads it; places are indices of `nodes`, bodies indices of
@@ -50,6 +53,10 @@ class Drawing:
         marks: node, kind of mark, axis in the body's frame or null, whether the joint is on
             something fixed.
         labels: two nodes, with the text between them.
+        wheels: body, centre [m] and axis of rotation in its frame, upward direction, global, and
+            radius [m].
+        arrows: body, place in its frame [m], label, and force [N], global, in each frame of the
+            scene; null where it is unknown.
         paths: nodes with a path over the frames.
         steps: the caption of each frame.
         start: the frame closest to the design position, shown first.
@@ -67,16 +74,36 @@ class Drawing:
         default_factory=list[tuple[int, str, list[float] | None, bool]]
     )
     labels: list[tuple[int, int, str]] = field(default_factory=list[tuple[int, int, str]])
+    wheels: list[tuple[int, Numbers, Numbers, Numbers, float]] = field(
+        default_factory=list[tuple[int, Numbers, Numbers, Numbers, float]]
+    )
+    arrows: list[tuple[int, Numbers, str, list[Numbers | None]]] = field(
+        default_factory=list[tuple[int, Numbers, str, list["Numbers | None"]]]
+    )
     paths: list[int] = field(default_factory=list[int])
     steps: list[str] = field(default_factory=list[str])
     start: int = 0
     joints: list[tuple[str, str, str]] = field(default_factory=list[tuple[str, str, str]])
     caption: str = ""
 
+    @property
+    def layers(self) -> list[str]:
+        """What can be switched on and off."""
+        there = {"wheels": self.wheels, "forces": self.arrows}
+        return ["names", "frames", "paths", *(name for name, each in there.items() if each)]
 
-def drawing(scene: Scene, axis: Axis) -> Drawing:
-    """The drawing of a scene, its frames told by the values of the axis."""
-    return _Draughtsman(scene, axis).drawn
+
+def drawing(
+    scene: Scene, axis: Axis, outputs: Mapping[str, Sequence[float | None]] | None = None
+) -> Drawing:
+    """Return the drawing of a scene, its frames named by the values of the axis.
+
+    Args:
+        outputs: values over the samples, for the arrows of forces, by output.
+    """
+    made = _Draughtsman(scene, axis)
+    made.add_arrows(outputs or {})
+    return made.drawn
 
 
 class _Draughtsman:
@@ -84,6 +111,7 @@ class _Draughtsman:
         ground = SceneBody(
             name=GROUND, fixed=True, origin=[0.0, 0.0, 0.0], euler_parameters=[1.0, 0.0, 0.0, 0.0]
         )
+        self.scene = scene
         self.bodies = [ground, *scene.bodies]
         self.numbers = {body.name: k for k, body in enumerate(self.bodies)}
         self.drawn = Drawing()
@@ -94,6 +122,7 @@ class _Draughtsman:
             self._label(node, node, point.name)
             if point.output and scene.frames:
                 self.drawn.paths.append(node)
+        self.drawn.wheels = [self._wheel(wheel) for wheel in scene.wheels]
         self.drawn.bodies = [self._body(k) for k in range(len(self.bodies))]
         self.drawn.steps = [f"sample {k} · {axis.at(k)}".removesuffix(" · ") for k in scene.frames]
         self.drawn.start = min(range(len(scene.frames)), key=self._from_design, default=0)
@@ -106,6 +135,34 @@ class _Draughtsman:
             f"{scene.message[0].upper()}{scene.message[1:]}." if scene.message else ""
         )
 
+    def add_arrows(self, outputs: Mapping[str, Sequence[float | None]]) -> None:
+        """Add an arrow for the components of each joint or driver along global axes, and one for
+        every other direction.
+        """
+        groups: dict[str, list[SceneForce]] = {}
+        for force in self.scene.forces:
+            along_axis = sum(map(bool, force.direction)) == 1
+            if force.output in outputs:
+                groups.setdefault(force.name if along_axis else force.output, []).append(force)
+        for name, forces in groups.items():
+            vectors = [
+                _sum(forces, [outputs[force.output][frame] for force in forces])
+                for frame in self.scene.frames
+            ]
+            body, place = self._local(forces[0].body, forces[0].position)
+            self.drawn.arrows.append((body, place, name, vectors))
+
+    def _local(self, body: str, position: Sequence[float]) -> tuple[int, Numbers]:
+        """Return the number of a body, and a point of it in its frame [m]."""
+        number = self.numbers[body]
+        arm = vec(position) - vec(self.bodies[number].origin)
+        return number, list(_in_body(self.bodies[number], arm))
+
+    def _wheel(self, wheel: SceneWheel) -> tuple[int, Numbers, Numbers, Numbers, float]:
+        number, center = self._local(wheel.body, wheel.center)
+        spin = list(_in_body(self.bodies[number], vec(wheel.spin)))
+        return number, center, spin, wheel.up, wheel.radius
+
     def _from_design(self, frame: int) -> float:
         """How far the bodies are from the design position [m + -], to compare frames by."""
         posed = [body for body in self.bodies if body.r]
@@ -116,15 +173,14 @@ class _Draughtsman:
 
     def _node(self, body: str, position: Sequence[float]) -> int:
         """The hardpoint of a body there, a new one if there is none."""
-        number = self.numbers[body]
-        arm = vec(position) - vec(self.bodies[number].origin)
-        local = _in_body(self.bodies[number], arm)
+        number, local = self._local(body, position)
         for k, (other, *place) in enumerate(self.drawn.nodes):
             if other == number and all(
                 abs(a - b) < SAME for a, b in zip(place, local, strict=True)
             ):
                 return k
-        self.drawn.nodes.append((number, *local))
+        x, y, z = local
+        self.drawn.nodes.append((number, x, y, z))
         return len(self.drawn.nodes) - 1
 
     def _joint(self, joint: SceneJoint) -> None:
@@ -192,6 +248,16 @@ class _Draughtsman:
         middle = _middle(hardpoints)
         reach = max(math.dist([*point], middle) for point in hardpoints)
         return [0.0, 0.0, 0.0] if math.hypot(*middle) <= reach + SAME else [*middle]
+
+
+def _sum(forces: Sequence[SceneForce], values: Sequence[float | None]) -> Numbers | None:
+    """Return the vector of components along their directions [N]; None if one is unknown."""
+    known = [value for value in values if value is not None and math.isfinite(value)]
+    if len(known) < len(values):
+        return None
+    parts = zip(known, forces, strict=True)
+    products = [[value * x for x in force.direction] for value, force in parts]
+    return [float(f"{sum(each):.4g}") for each in zip(*products, strict=True)]
 
 
 def _middle(points: Sequence[Vec3]) -> tuple[float, float, float]:

@@ -15,6 +15,7 @@ from typing import Any, TypeAlias
 
 from ..harness.labels import output_label
 from ..harness.record import OutputSeries
+from ..palette import COLOURS
 from ..unit_text import with_unit
 from .axis import DISPLAY, Axis
 
@@ -26,8 +27,6 @@ MARKERS = 9  # per curve, staggered, so that coincident curves stay tellable
 DIGITS = 10
 THIN = 1 / 2000  # a band narrower than this part of the curve's range is less than a pixel
 
-# Okabe and Ito: told apart by colour-blind readers
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 DASHES = ("solid", "12px,5px", "3px,3px", "12px,4px,3px,4px", "7px,7px")
 SYMBOLS = (
     "circle-open",

@@ -10,6 +10,7 @@ from ..case.case import Truth
 from ..harness.evidence import Evidence
 from ..harness.labels import against, engine_name, motion_unit, number, output_label
 from ..harness.record import Deviation, OutputSeries, Record, Results
+from ..harness.standard import STANDARD
 from ..trajectory import QUANTITIES
 from ..unit_text import value_text
 from .axis import Axis, driver_axis
@@ -158,10 +159,23 @@ def case_view(
         account=next(
             (r.details["dof_account"] for r in records if r.details.get("dof_account")), None
         ),
-        scene=drawing(results.scenes[name], axis) if name in results.scenes else None,
+        scene=drawing(results.scenes[name], axis, _values(records))
+        if name in results.scenes
+        else None,
         trends=_trends(anchor, given.history.get(name, ()), styles, figures),
         precision=_precision(anchor, given.precision.get(name, ()), styles, figures),
     )
+
+
+def _values(records: Sequence[Record]) -> dict[str, Sequence[float | None]]:
+    """Return the values of the first engine with outputs, the native one if it has any: the scene
+    shows its poses.
+    """
+    solved = sorted(
+        (record for record in records if record.outputs),
+        key=lambda record: record.engine != STANDARD,
+    )
+    return {name: each.position for name, each in solved[0].outputs.items()} if solved else {}
 
 
 def _output(

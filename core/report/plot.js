@@ -48,7 +48,7 @@ function plot(box, { data, layout }) {
     pointed = null;
     readout.hidden = true;
     ends = stacked();
-    const drawnValues = (axis) => seen().flatMap((trace) => (ends.get(trace) || {})[axis] || trace[axis]);
+    const drawnValues = (axis) => seen().flatMap((trace) => (ends.get(trace) || {})[axis] || (trace.type === "bar" && barWidth(trace, axis) ? edges(trace, axis) : trace[axis]));
     const values = (axis) => drawnValues(axis).filter((value) => value !== null && value !== undefined && !(floor && axis === "y" && value === 0));
     // bars stand on zero
     const sides = Object.fromEntries(["x", "y"].map((axis) => {
@@ -56,7 +56,7 @@ function plot(box, { data, layout }) {
       return [axis, bars ? { rangemode: "tozero", ...layout[`${axis}axis`] } : layout[`${axis}axis`]];
     }));
     const rows = Math.max(2, Math.floor((height - 60) / (isCategory(sides.y, values("y")) ? 16 : 42)));
-    const labels = scaled(sides.y, values("y"), 1, 0, rows, view && view.y).ticks.map(([, text]) => text);
+    const labels = scaled(sides.y, values("y"), height, 0, rows, view && view.y).ticks.map(([, text]) => text);
     const left = 32 + Math.min(0.5 * width, longest(labels)), slanted = isCategory(sides.x, values("x"));
     const bottom = slanted ? 14 + Math.min(90, 0.55 * longest([...new Set(values("x"))])) : 42;
     frame = { left, right: width - 14, top: 12, bottom: height - bottom, width, height };
@@ -134,12 +134,12 @@ function plot(box, { data, layout }) {
   function drawn(trace) {
     if (trace.type === "bar") return bars(trace);
     if (trace.type !== "scatter") throw new Error(`figures have no traces of type ${trace.type}`);
-    const made = [], places = trace.x.map((_, k) => place(trace, k)), known = { "data-series": trace.meta };
+    const made = [], points = layout.hovermode === "closest", places = trace.x.map((_, k) => place(trace, k, points)), known = { "data-series": trace.meta };
     const lines = (trace.mode || "lines").includes("lines");
     const path = places.map((at, k) => (at ? `${k && places[k - 1] ? "L" : "M"}${at[0].toFixed(1)} ${at[1].toFixed(1)}` : "")).join("");
     if (trace.fill) made.push(element("path", { class: "band", d: path && `${path}Z`, style: `fill: ${trace.fillcolor}` }));
     else if (lines) made.push(element("path", { ...known, class: "curve", d: path, ...stroke(trace.line) }));
-    if (floor) made.push(element("path", { ...known, class: "zeros", d: trace.y.flatMap((y, k) => (y === 0 ? [place(trace, k, true)] : [])).map(([x, y]) => `M${x.toFixed(1)} ${y - 4}v8`).join(""), ...stroke({ color: trace.line && trace.line.color, width: 1.2 }) }));
+    if (floor && !points) made.push(element("path", { ...known, class: "zeros", d: trace.y.flatMap((y, k) => (y === 0 ? [place(trace, k, true)] : [])).map(([x, y]) => `M${x.toFixed(1)} ${y - 4}v8`).join(""), ...stroke({ color: trace.line && trace.line.color, width: 1.2 }) }));
     const marker = trace.marker || {}, stride = Math.ceil(places.length / (marker.maxdisplayed || Infinity)) || 1;
     if ((trace.mode || "").includes("markers") || (lines && !trace.fill && places.some((at, k) => at && !places[k - 1] && !places[k + 1]))) {
       const mark = symbol(marker.symbol || "circle-open", (marker.size || 6) / 2), alone = !(trace.mode || "").includes("markers");
@@ -151,13 +151,21 @@ function plot(box, { data, layout }) {
     return made;
   }
 
+  // The width of bars at numbers [unit of the axis]: the least distance of two; 0 for one bar, of categories, and across the bars.
+  function barWidth(trace, axis) {
+    const at = trace[axis];
+    if (axis !== (trace.orientation === "h" ? "y" : "x") || at.length < 2 || typeof at[0] === "string") return 0;
+    return Math.min(...at.slice(1).map((value, k) => Math.abs(value - at[k])));
+  }
+
+  const edges = (trace, axis) => trace[axis].flatMap((at) => [at - 0.5 * barWidth(trace, axis), at + 0.5 * barWidth(trace, axis)]);
+
   function bars(trace) {
     const flat = trace.orientation === "h", [along, up] = flat ? ["y", "x"] : ["x", "y"];
-    const steps = frame[along].width ? 0 : Math.min(...trace[along].slice(1).map((value, k) => Math.abs(value - trace[along][k])), Infinity);
     return trace[along].flatMap((at, k) => {
       if (trace[up][k] === null) return [];
-      const middle = frame[along].place(at), width = (trace.width && (trace.width[k] || trace.width)) || steps;
-      const half = frame[along].width ? 0.36 * frame[along].width : width < Infinity ? 0.47 * Math.abs(frame[along].place(at + width) - middle) : 8;
+      const middle = frame[along].place(at), width = barWidth(trace, along);
+      const half = frame[along].width ? 0.36 * frame[along].width : width ? 0.47 * Math.abs(frame[along].place(at + width) - middle) : 8;
       const end = ends.has(trace) ? ends.get(trace)[up][k] : trace[up][k], base = ends.has(trace) ? end - trace[up][k] : 0;
       const [from, to] = [base, end].map(frame[up].place).sort((a, b) => a - b);
       const size = flat ? { x: from, y: middle - half, width: to - from, height: 2 * half } : { x: middle - half, y: from, width: 2 * half, height: to - from };

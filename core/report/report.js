@@ -68,10 +68,11 @@
   // Paper is light and narrower than the screen, and sends no resize event. What the filters hide stays away.
   window.addEventListener("beforeprint", () => {
     document.documentElement.dataset.paper = "";
+    for (const rest of document.querySelectorAll(".problems details")) rest.open = true;
     canvases.forEach((redraw) => redraw());
     for (const box of plots.filter((each) => !each.closest("[hidden], details:not([open])"))) {
       draw(box);
-      if (drawn.has(box)) drawn.get(box).fit(330, 250);
+      if (drawn.has(box)) drawn.get(box).fit(330, 270);
     }
   });
   window.addEventListener("afterprint", () => {

@@ -5,10 +5,12 @@ const VIEWS = { "y z": [0, 0], "x z": [-Math.PI / 2, 0], "x y": [-Math.PI / 2, M
 const FRAME_MS = 66; // sixty-one samples in four seconds
 
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+const cross = (u, v) => [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+const sum = (a, b, factor = 1) => a.map((value, k) => value + factor * b[k]);
+const direction = (a) => a.map((value) => value / Math.hypot(...a));
 
 // A vector of a body with the Euler parameters p, in global axes: a + 2 e0 (e x a) + 2 e x (e x a).
 function turned([e0, ...e], a) {
-  const cross = (u, v) => [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
   const once = cross(e, a), twice = cross(e, once);
   return a.map((value, k) => value + 2 * (e0 * once[k] + twice[k]));
 }
@@ -24,8 +26,18 @@ function outline(points) {
   return [...half(sorted).slice(0, -1), ...half(sorted.reverse()).slice(0, -1)];
 }
 
+// A tyre as a circle about its axis of rotation, and the road below it: a rectangle through the contact centre.
+function wheelShape(center, spin, up, radius) {
+  const rise = direction(sum(up, spin, -dot(up, spin))), heading = direction(cross(spin, rise)), aside = cross(up, heading);
+  const turn = (k, part = 1) => sum(sum(center, heading, part * radius * Math.cos(k)), rise, part * radius * Math.sin(k));
+  const circle = (part) => Array.from({ length: 49 }, (_, k) => turn((k * Math.PI) / 24, part)), contact = turn(-Math.PI / 2);
+  const corner = (along, across) => sum(sum(contact, heading, along * radius), aside, across * radius);
+  const axis = [sum(center, spin, -0.4 * radius), sum(center, spin, 0.4 * radius)];
+  return { tyre: circle(1), rim: circle(0.62), axis, road: [corner(-1.4, -0.8), corner(1.4, -0.8), corner(1.4, 0.8), corner(-1.4, 0.8), corner(-1.4, -0.8)] };
+}
+
 function mechanism(box, drawing) {
-  const { bodies, nodes, links, rods, marks, labels, paths, steps } = drawing;
+  const { bodies, nodes, links, rods, marks, labels, paths, steps, arrows } = drawing;
   const canvas = box.querySelector("canvas"), pen = canvas.getContext("2d");
   const play = box.querySelector("[data-act=play]"), slider = box.querySelector("input[type=range]"), said = box.querySelector("output");
   const frames = Math.max(1, steps.length), moving = bodies.flatMap((body, k) => (body.fixed ? [] : [k]));
@@ -36,7 +48,16 @@ function mechanism(box, drawing) {
     return r.map((value, k) => value + arm[k]);
   };
   const places = Array.from({ length: frames }, (_, f) => nodes.map(([b, ...place]) => placed(b, place, f)));
-  const all = places.flat();
+  const wheels = Array.from({ length: frames }, (_, f) => drawing.wheels.map(([b, center, spin, up, radius]) => wheelShape(placed(b, center, f), turned(pose(bodies[b], f)[1], spin), up, radius)));
+  const span = (points) => Math.hypot(...[0, 1, 2].map((k) => Math.max(...points.map((at) => at[k])) - Math.min(...points.map((at) => at[k])))) || 1;
+  // the largest force is about a quarter of the mechanism long
+  const largest = Math.max(0, ...arrows.flatMap(([, , , forces]) => forces.map((force) => (force ? Math.hypot(...force) : 0))));
+  const perMetre = largest && niceStep(largest / (0.25 * span(places.flat())));
+  const ends = Array.from({ length: frames }, (_, f) => arrows.map(([b, place, name, forces]) => {
+    const from = placed(b, place, f);
+    return forces[f] && largest ? { name, from, to: sum(from, forces[f], 1 / perMetre), size: Math.hypot(...forces[f]) } : null;
+  }));
+  const all = [...places.flat(), ...wheels.flat().flatMap(({ tyre, road }) => [...tyre, ...road]), ...ends.flat().flatMap((arrow) => (arrow ? [arrow.to] : []))];
   const extent = [0, 1, 2].map((k) => all.reduce(([low, high], at) => [Math.min(low, at[k]), Math.max(high, at[k])], [Infinity, -Infinity]));
   const sizes = extent.map(([low, high]) => high - low), size = Math.hypot(...sizes) || 1;
   const middle = extent.map(([low, high]) => (low + high) / 2);
@@ -62,7 +83,7 @@ function mechanism(box, drawing) {
     pen.clearRect(0, 0, width, height);
     const style = getComputedStyle(box), colour = (name) => style.getPropertyValue(`--${name}`).trim();
     const own = (b) => (bodies[b].fixed ? colour("soft") : colour(`s${moving.indexOf(b) % 6}`));
-    const layer = (name) => box.querySelector(`[data-layer=${name}]`).checked;
+    const layer = (name) => (box.querySelector(`[data-layer=${name}]`) || {}).checked;
 
     const [ca, sa, ce, se] = [Math.cos(azimuth), Math.sin(azimuth), Math.cos(elevation), Math.sin(elevation)];
     const right = [-sa, ca, 0], up = [-se * ca, -se * sa, ce], near = [ce * ca, ce * sa, se];
@@ -71,7 +92,7 @@ function mechanism(box, drawing) {
     const reach = (axis) => Math.max(...all.map((at) => Math.abs(dot(axis, about(at)))), 0.05 * size);
     const scale = zoom * Math.min((width / 2 - 60) / reach(right), (height / 2 - 34) / reach(up));
     const seen = (at) => [width / 2 + scale * dot(right, about(at)), height / 2 - scale * dot(up, about(at)), dot(near, about(at)) / size];
-    const shown = places[frame].map(seen);
+    const spots = places[frame].map(seen);
 
     const line = (points, stroke, thick, dash = [], alpha = 1) => {
       pen.beginPath();
@@ -90,9 +111,26 @@ function mechanism(box, drawing) {
       pen.stroke();
     };
 
+    if (layer("wheels")) {
+      for (const { tyre, rim, axis, road } of wheels[frame]) {
+        const fill = (points, shade, alpha) => {
+          pen.beginPath();
+          points.map(seen).forEach(([x, y]) => pen.lineTo(x, y));
+          Object.assign(pen, { fillStyle: shade, globalAlpha: alpha });
+          pen.fill();
+          pen.globalAlpha = 1;
+        };
+        fill(road, colour("axis"), 0.25);
+        line(road.map(seen), colour("axis"), 1);
+        fill(tyre, colour("soft"), 0.12);
+        line(tyre.map(seen), colour("soft"), 3.5, [], 0.7);
+        line(rim.map(seen), colour("soft"), 1, [], 0.7);
+        line(axis.map(seen), colour("soft"), 1.4, [9, 3, 2, 3]);
+      }
+    }
     if (layer("paths")) for (const k of paths) line(places.map((at) => seen(at[k])), colour("ink"), 2, [1, 5], 0.8);
     for (const b of moving) {
-      const skin = outline(shown.filter((_, k) => nodes[k][0] === b));
+      const skin = outline(spots.filter((_, k) => nodes[k][0] === b));
       if (skin.length < 3) continue;
       pen.beginPath();
       skin.forEach(([x, y]) => pen.lineTo(x, y));
@@ -104,12 +142,12 @@ function mechanism(box, drawing) {
       ...links.map(([a, b]) => [a, b, own(nodes[a][0]), 3, []]),
       ...rods.map(([a, b]) => [a, b, colour("ink"), 3, [9, 4]]),
     ];
-    const depth = ([a, b]) => shown[a][2] + shown[b][2];
+    const depth = ([a, b]) => spots[a][2] + spots[b][2];
     for (const [a, b, ...look] of lines.sort((one, other) => depth(one) - depth(other))) {
-      line([shown[a], shown[b]], ...look, Math.min(1, 0.8 + 0.4 * (shown[a][2] + shown[b][2])));
+      line([spots[a], spots[b]], ...look, Math.min(1, 0.8 + 0.4 * (spots[a][2] + spots[b][2])));
     }
     for (const [node, kind, axis, onFixed] of marks) {
-      const [x, y] = shown[node], edge = colour("ink"), fill = colour("raised");
+      const [x, y] = spots[node], edge = colour("ink"), fill = colour("raised");
       if (onFixed) {
         Object.assign(pen, { strokeStyle: colour("soft"), lineWidth: 1.2 });
         pen.strokeRect(x - 9, y - 9, 18, 18);
@@ -124,8 +162,16 @@ function mechanism(box, drawing) {
       else if (kind === "end") dotted(x, y, 3, edge, fill);
       else line([[x - 5, y], [x, y - 5], [x + 5, y], [x, y + 5], [x - 5, y]], edge, 1.6);
     }
-    for (const k of paths) dotted(shown[k][0], shown[k][1], 4, colour("paper"), colour("ink"));
+    for (const k of paths) dotted(spots[k][0], spots[k][1], 4, colour("paper"), colour("ink"));
 
+    const forces = layer("forces") ? ends[frame].filter(Boolean) : [];
+    for (const { from, to } of forces) {
+      const [[x0, y0], [x, y]] = [from, to].map(seen), length = Math.hypot(x - x0, y - y0);
+      if (length < 3) continue;
+      const [ux, uy] = [(x - x0) / length, (y - y0) / length], head = (side) => [x - 10 * ux + side * 4 * uy, y - 10 * uy - side * 4 * ux];
+      line([[x0, y0], [x, y]], colour("force"), 2.5);
+      line([head(1), [x, y], head(-1)], colour("force"), 2.5);
+    }
     const written = [];
     const write = (x, y, text, fill, font, offsets) => {
       pen.font = `${font} 12px ${style.fontFamily}`;
@@ -159,11 +205,15 @@ function mechanism(box, drawing) {
       line([corner, tip], colour("soft"), 1.4);
       if (Math.hypot(right[k], up[k]) > 0.3) write(tip[0], tip[1], name, colour("soft"), "", [[right[k] < -0.3 ? -1 : 1, 4]]);
     });
+    for (const { name, to, size: newtons } of forces) {
+      const [x, y] = seen(to);
+      write(x, y, `${name} ${shown(newtons, ".3g")} N`, colour("force"), "", [[1, 4], [-1, 4], [0, -8], [0, 18]]);
+    }
     if (layer("names")) {
       const around = [[1, -8], [1, 16], [-1, -8], [-1, 16], [0, -16], [0, 26]];
-      for (const [a, b, text] of labels) write((shown[a][0] + shown[b][0]) / 2, (shown[a][1] + shown[b][1]) / 2, text, colour("ink"), "", around);
+      for (const [a, b, text] of labels) write((spots[a][0] + spots[b][0]) / 2, (spots[a][1] + spots[b][1]) / 2, text, colour("ink"), "", around);
       for (const b of moving) {
-        const mine = shown.filter((_, k) => nodes[k][0] === b);
+        const mine = spots.filter((_, k) => nodes[k][0] === b);
         if (mine.length) write(...[0, 1].map((k) => mine.reduce((sum, at) => sum + at[k], 0) / mine.length), bodies[b].name, own(b), "italic", around);
       }
     }
@@ -230,6 +280,10 @@ function mechanism(box, drawing) {
   for (const check of box.querySelectorAll("[data-layer]")) check.addEventListener("change", draw);
   new ResizeObserver(draw).observe(canvas);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
+  if (largest) {
+    const length = niceStep(span(places.flat()) / 20);
+    box.querySelector("[data-scale]").textContent = `${shown(1000 * length)} mm of arrow are ${shown(perMetre * length)} N.`;
+  }
   show(frame);
   return draw;
 }

@@ -21,6 +21,7 @@ from kincheck.core.harness.record import Deviation, Deviations, Outcome, Results
 from kincheck.core.report.axis import SAMPLES
 from kincheck.core.report.figure_data import Past
 from kincheck.core.report.figures import SYMBOLS
+from kincheck.core.report.page_parts import parted
 from kincheck.core.report.report import headline, write_report
 from kincheck.core.studies.bench.ring import ring
 
@@ -408,3 +409,38 @@ def test_an_empty_run_says_so(tmp_path: Path) -> None:
     empty = Results(run={}, records=[])
     assert headline(empty) == "Nothing was compared"
     assert "Nothing was compared" in report(empty, tmp_path).text
+
+
+@pytest.mark.parametrize(
+    ("message", "head"),
+    [
+        ("short", "short"),
+        (f"{'a ' * 140}first. {'b ' * 100}", f"{'a ' * 140}first. "),
+        (f"one line\n\n{'b' * 400}", "one line\n\n"),
+        ("x" * 500, "x" * 500),  # no place to part it
+    ],
+)
+def test_long_messages_unfold_and_lose_nothing(message: str, head: str, tmp_path: Path) -> None:
+    shown, rest = parted(message)
+    assert (shown, shown + rest) == (head, message)
+    run = results()
+    failed = msgspec.structs.replace(run.records[1], message=message)
+    text = report(Results(run=run.run, records=[failed]), tmp_path).text
+    assert head.strip() in text
+    assert rest.strip() in text
+    assert "…" not in text[: text.index("Overview")].replace("0…20", "")
+
+
+def test_differences_of_round_off_are_drawn_within_the_tolerance(tmp_path: Path) -> None:
+    """Else the round-off of an output that stays where it is looks like a motion."""
+    still = msgspec.structs.replace(series(GRID), position=[1e-17 * (k % 3) for k in range(21)])
+    errors = {
+        "x": judged(still, msgspec.structs.replace(still, position=[0.0] * 21), 1e-9, "native")
+    }
+    run = results("consensus_only")
+    one = msgspec.structs.replace(run.records[1], outputs={"x": still}, errors=errors)
+    native = msgspec.structs.replace(run.records[0], outputs={"x": still}, errors={})
+    figures = report(Results(run=run.run, records=[native, one]), tmp_path).data["figures"]
+    assert figures["case-0-0"]["layout"]["xaxis"]["range"] == pytest.approx([-2e-6, 2e-6])
+    moving = report(results(), tmp_path).data["figures"]["case-0-0"]["layout"]
+    assert "range" not in moving["xaxis"]

@@ -269,3 +269,59 @@ def test_large_mechanisms_have_fewer_frames_and_the_largest_no_scene():
     assert len(scene(case(30)).frames) == POSES // 61
     # one crank more than loops
     assert with_scenes(Results(run={}, records=[]), [case(LARGEST // 2)]).scenes == {}
+
+
+def test_a_suspension_has_its_wheel_about_the_axis_of_rotation():
+    shown = scene(cases.load("mcpherson_suspension"), poses=False)
+    [wheel] = shown.wheels
+    # a right wheel in axes x rearward, y outboard and z up, without static angles
+    assert wheel.spin == pytest.approx((0.0, 1.0, 0.0), abs=1e-12)
+    aslant = msgspec.structs.replace(wheel, spin=[0.6, 0.8, 0.0])
+    drawn = drawing(msgspec.structs.replace(shown, wheels=[aslant]), AXIS)
+    [(body, center, spin, up, radius)] = drawn.wheels
+    assert drawn.bodies[body]["name"] == "knuckle"
+    turn = A(np.array(drawn.bodies[body]["p"][0]))
+    assert np.array(drawn.bodies[body]["r"][0]) + turn @ center == pytest.approx(
+        (0.975, 0.715, 0.101)
+    )
+    assert turn @ spin == pytest.approx((0.6, 0.8, 0.0), abs=1e-12)
+    assert (up, radius) == ([0.0, 0.0, 1.0], 0.3)
+    assert drawn.layers == ["names", "frames", "paths", "wheels"]
+    assert drawing(scene(STRUT, poses=False), AXIS).wheels == []
+
+
+def test_arrows_are_the_forces_of_outputs_at_the_samples_of_the_frames():
+    shown = msgspec.structs.replace(
+        scene(cases.load("mcpherson_strut_loaded"), poses=False), frames=[0, 2]
+    )
+    components = [(force.name, force.output, force.direction) for force in shown.forces]
+    assert components == [
+        ("stroke", "wheel_load", [0.0, 0.0, 1.0]),
+        ("tie_rod", "tie_rod_force_y", [0.0, 1.0, 0.0]),
+        ("ball", "ball_force_y", [0.0, 1.0, 0.0]),
+        ("strut_top", "strut_top_force_z", [0.0, 0.0, 1.0]),
+    ]
+    further = [
+        msgspec.structs.replace(shown.forces[2], output="ball_force_x", direction=[1.0, 0.0, 0.0]),
+        msgspec.structs.replace(shown.forces[2], output="aslant", direction=[0.6, 0.8, 0.0]),
+    ]
+    shown = msgspec.structs.replace(shown, forces=[*shown.forces[:3], *further])
+    values = {
+        "wheel_load": [5.0, 6.0, None],
+        "ball_force_x": [1.0, 2.0, 3.0],
+        "ball_force_y": [-4.0, 0.0, -6.0],
+        "aslant": [10.0, 0.0, 5.0],
+    }
+    drawn = drawing(shown, AXIS, values)
+    # components along axes are one vector; what is unknown has no arrow
+    assert {name: forces for _, _, name, forces in drawn.arrows} == {
+        "stroke": [[0.0, 0.0, 5.0], None],
+        "ball": [[1.0, -4.0, 0.0], [3.0, -6.0, 0.0]],
+        "aslant": [[6.0, 8.0, 0.0], [3.0, 4.0, 0.0]],
+    }
+    body, place, *_ = next(each for each in drawn.arrows if each[2] == "ball")
+    assert drawn.bodies[body]["name"] == "knuckle"
+    turn = A(np.array(drawn.bodies[body]["p"][0]))
+    assert np.array(drawn.bodies[body]["r"][0]) + turn @ place == pytest.approx(
+        (0.9676, 0.66, -0.01)
+    )

@@ -1,0 +1,72 @@
+"""Pages in a browser under axe (https://github.com/dequelabs/axe-core, MPL-2.0), where it is there:
+`npm install axe-core`, or the path of axe.min.js in the environment variable KINCHECK_AXE.
+"""
+
+from __future__ import annotations
+
+import html
+import json
+import os
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+from kincheck.core.harness.labels import output_label
+from kincheck.core.report.figure_data import Effort, Past, precision_figure
+from kincheck.core.report.figures import Style
+from kincheck.core.report.page_model import Plot
+from kincheck.core.report.report import write_report
+from kincheck.core.report.sections import Diagram, Report, Section, page
+
+from .test_report_browser import ACT, CHROMIUM, FLAGS, several, strut
+
+AXE = Path(os.environ.get("KINCHECK_AXE", "node_modules/axe-core/axe.min.js"))
+
+pytestmark = [
+    pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed"),
+    pytest.mark.skipif(not AXE.is_file(), reason="axe is not installed: npm install axe-core"),
+]
+
+
+def run_page(file: Path) -> None:
+    past = [Past(run, "one", 1e-12, 10.0) for run in ("2026-11-01", "2026-11-02")]
+    efforts = [Effort("one", "tol 1e-6", 1e-7, 20.0), Effort("one", "tol 1e-3", 1e-4, 9.0)]
+    write_report(strut(), file, history={"strut": past}, precision={"strut": efforts})
+
+
+def many_cases_page(file: Path) -> None:
+    write_report(several(), file)
+
+
+def bench_page(file: Path) -> None:
+    figure = precision_figure([Effort("one", "default", 1e-7, 20.0)], {})
+    diagram = Diagram(Plot("speed", "error against time", "."), figure, [Style.number(0, "one")])
+    columns, rows = ("", output_label("toe")), [["one", "2"]]
+    section = Section("Speed", ["It is fast."], ["Measured."], columns, 1, rows, [diagram])
+    file.write_text(page(Report("bench", "A benchmark", ["facts"], [section])), "utf-8")
+
+
+@pytest.mark.parametrize("written", [run_page, many_cases_page, bench_page])
+def test_axe_finds_nothing(written, tmp_path):
+    written(file := tmp_path / "page.html")
+    act = """
+      all("details").forEach((each) => { each.open = true; });
+      await pause(500);
+      const { violations } = await axe.run();
+      return violations.map(({ id, nodes }) => [id, nodes.map((node) => node.html)]);
+    """
+    axe = AXE.read_text("utf-8").replace("</script", "<\\/script")
+    scripts = f"<script>{axe}</script>{ACT % act}"
+    file.write_text(file.read_text("utf-8").replace("</body>", scripts), "utf-8")
+    options = ["--virtual-time-budget=60000", f"--user-data-dir={tmp_path / 'profile'}"]
+    done = subprocess.run(
+        [str(CHROMIUM), *FLAGS, *options, "--dump-dom", file.as_uri()],
+        capture_output=True,
+        text=True,
+        timeout=180,
+        check=True,
+    )
+    found = re.search(r'data-told="([^"]*)"', done.stdout)
+    assert found, "the page did not become ready"
+    assert json.loads(html.unescape(found[1])) == []
