@@ -102,12 +102,11 @@ class DesignForces:
         model = self._route.model
         if model.forces is None:
             return np.zeros(found.solved.shape[1], dtype=np.bool_)
-        # NaN where a sample is missing
-        sigma: Array = found.kept[model.rows[SIGMA]].min(axis=(0, 1))
+        estimates = [found.kept[model.rows[SIGMA].start]]
         if FORCE_SIGMA in model.rows:
-            sigma = np.minimum(sigma, found.kept[model.rows[FORCE_SIGMA]].min(axis=(0, 1)))
-        reached: NDArray[np.bool_] = found.solved.all(axis=0)
-        return reached & (sigma > model.forces.least)
+            estimates.append(found.kept[model.rows[FORCE_SIGMA].start])
+        # NaN where a sample is missing
+        return np.logical_and.reduce(np.array(estimates) > model.forces.least, axis=(0, 1))
 
     def _together(self, found: Variants, decided: NDArray[np.bool_]) -> Forces | None:
         forces = self._route.model.forces

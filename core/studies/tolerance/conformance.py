@@ -20,6 +20,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -128,9 +129,10 @@ def _of_counts(study: Study, index: int | None, counts: NDArray[np.int64]) -> Ca
 
 
 def _interval(inside: int, known: int) -> tuple[float, float]:
-    from scipy.stats import binomtest  # pyright: ignore[reportMissingTypeStubs]
+    import scipy.stats  # pyright: ignore[reportMissingTypeStubs]
 
-    found = binomtest(inside, known).proportion_ci(CONFIDENCE, method="exact")
+    binomial: Any = scipy.stats
+    found = binomial.binomtest(inside, known).proportion_ci(CONFIDENCE, method="exact")
     return float(found.low), float(found.high)
 
 

@@ -19,7 +19,7 @@ def limit_notes(results: SweepResults) -> list[str]:
             f"The interval supposes independent variants; with {results.sampling} sampling it is"
             " mostly wider than it need be."
         )
-    if unknown := max(each.unknown for each in results.limits):
+    if unknown := max((each.unknown for each in results.limits), default=0):
         lines.append(
             f"{unknown} variants with missing samples are neither inside nor outside; the yield"
             " leaves them out."
