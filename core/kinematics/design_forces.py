@@ -101,12 +101,13 @@ class DesignForces:
         """Return which designs the program decides: all samples are far from singular poses."""
         model = self._route.model
         if model.forces is None:
-            return np.zeros(found.solved.shape[1], dtype=np.bool_)
+            return np.zeros(found.kept.shape[2], dtype=np.bool_)
         estimates = [found.kept[model.rows[SIGMA].start]]
         if FORCE_SIGMA in model.rows:
             estimates.append(found.kept[model.rows[FORCE_SIGMA].start])
         # NaN where a sample is missing
-        return np.logical_and.reduce(np.array(estimates) > model.forces.least, axis=(0, 1))
+        regular: NDArray[np.bool_] = np.array(estimates) > model.forces.least
+        return regular.all(axis=(0, 1))
 
     def _together(self, found: Variants, decided: NDArray[np.bool_]) -> Forces | None:
         forces = self._route.model.forces
