@@ -99,15 +99,14 @@ class DesignForces:
 
     def _decided(self, found: Variants) -> NDArray[np.bool_]:
         """Return which designs the program decides: all samples are far from singular poses."""
-        model = self._route.model
-        if model.forces is None:
-            return np.zeros(found.kept.shape[2], dtype=np.bool_)
-        estimates = [found.kept[model.rows[SIGMA].start]]
-        if FORCE_SIGMA in model.rows:
-            estimates.append(found.kept[model.rows[FORCE_SIGMA].start])
-        # NaN where a sample is missing
-        regular: NDArray[np.bool_] = np.array(estimates) > model.forces.least
-        return regular.all(axis=(0, 1))
+        model, count = self._route.model, int(found.solved.shape[1])
+        forces = model.forces
+        decided = np.full(count, fill_value=forces is not None, dtype=np.bool_)
+        for name in (SIGMA, FORCE_SIGMA):
+            if forces is not None and name in model.rows:
+                # NaN where a sample is missing
+                decided &= (found.kept[model.rows[name].start] > forces.least).all(axis=0)
+        return decided
 
     def _together(self, found: Variants, decided: NDArray[np.bool_]) -> Forces | None:
         forces = self._route.model.forces
