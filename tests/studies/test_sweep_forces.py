@@ -107,6 +107,7 @@ def test_a_sweep_of_forces_is_reduced_checked_and_differentiated(tmp_path):
     (slope,) = [each for each in found.gradients if each.output == "crank_torque"]
     assert slope.unit == "(N m)/kg"
     assert slope.accurate
+    assert abs(slope.largest) > 1e-3  # the torque carries the mass
     offsets = vary(tmp_path, case, **mass).offsets(1, 0, 20)[0]
     ends = np.array(torque.nominal) + np.outer([offsets.min(), offsets.max()], slope.along)
     size = np.abs(torque.nominal).max()
