@@ -6,22 +6,20 @@ import argparse
 import math
 import sys
 from contextlib import ExitStack
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import KincheckError, unknown
+from ..errors import KincheckError
 from ..harness.interrupts import hold, status_of, words_of
 from ..report.progress import complain
 from ..version import VERSION
 from . import execution_options, import_options
 from .registry import House, Status
+from .sweep_inputs import limited, only, replay_problems
 from .sweep_options import FILES, LIMITS, PART, add_options
-from .sweep_replay import checking_solver, replay, replay_problems
+from .sweep_replay import checking_solver, replay
 
 if TYPE_CHECKING:
-    from ..case.case import Case
-    from ..case.variation.variation import Variation
     from ..harness.engine import Engine
     from ..studies.tolerance.part_file import Part
     from ..studies.tolerance.results import SweepResults
@@ -70,13 +68,13 @@ def _sweep(options: argparse.Namespace, house: House) -> int:
         )
     engine, share = _check(options, house, problems)
     whole = house.find_case(options.case, import_options.supplied(options))
-    case = _only(whole, options.output, problems)
+    case = only(whole, options.output, problems)
     import_options.tell_left_out([case])
     problems = problems or execution_options.unreachable(options)
     if problems:
         raise KincheckError("\n".join(problems))
     variation = read_variation(options.vary, whole)
-    variation = _limited(options, variation, whole, case)
+    variation = limited(options, variation, whole, case)
     if options.replay and options.samples is None:
         samples = variation.count or 0
     else:
@@ -129,35 +127,6 @@ def _check(
         )
     engines = house.find_engines([name], problems)
     return (engines[0] if engines else None), share
-
-
-def _only(case: Case, names: list[str], problems: list[str]) -> Case:
-    """Return the case with the named outputs only, or with all if none is named."""
-    there = [output.name for output in case.outputs]
-    problems += [unknown("output", name, there) for name in names if name not in there]
-    wanted = tuple(output for output in case.outputs if output.name in names or not names)
-    return replace(case, outputs=wanted)
-
-
-def _limited(
-    options: argparse.Namespace, variation: Variation, whole: Case, case: Case
-) -> Variation:
-    """Return the variation with the limits of the options too, which replace those of the file; of
-    the outputs of the case alone.
-    """
-    from ..case.variation.limits import limits_of_texts
-
-    given = limits_of_texts(options.limit, whole, variation.units)
-    limits = {each.output: each for each in (*variation.limits, *given)}
-    there = {output.name for output in case.outputs}
-    kept = {
-        name: each
-        for name, each in limits.items()
-        if name in there or name.rpartition(".")[0] in there
-    }
-    if left_out := [name for name in limits if name not in kept]:
-        complain([f"limits of {', '.join(left_out)}: left out, as --output leaves out these"])
-    return replace(variation, limits=tuple(kept.values()))
 
 
 def _part(options: argparse.Namespace) -> Part:

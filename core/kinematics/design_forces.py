@@ -99,15 +99,14 @@ class DesignForces:
 
     def _decided(self, found: Variants) -> NDArray[np.bool_]:
         """Return which designs the program decides: all samples are far from singular poses."""
-        model = self._route.model
-        if model.forces is None:
-            return np.zeros(found.solved.shape[1], dtype=np.bool_)
-        # NaN where a sample is missing
-        sigma: Array = found.kept[model.rows[SIGMA]].min(axis=(0, 1))
-        if FORCE_SIGMA in model.rows:
-            sigma = np.minimum(sigma, found.kept[model.rows[FORCE_SIGMA]].min(axis=(0, 1)))
-        reached: NDArray[np.bool_] = found.solved.all(axis=0)
-        return reached & (sigma > model.forces.least)
+        model, count = self._route.model, int(found.solved.shape[1])
+        forces = model.forces
+        decided = np.full(count, fill_value=forces is not None, dtype=np.bool_)
+        for name in (SIGMA, FORCE_SIGMA):
+            if forces is not None and name in model.rows:
+                # NaN where a sample is missing
+                decided &= (found.kept[model.rows[name].start] > forces.least).all(axis=0)
+        return decided
 
     def _together(self, found: Variants, decided: NDArray[np.bool_]) -> Forces | None:
         forces = self._route.model.forces

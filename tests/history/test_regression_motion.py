@@ -54,6 +54,27 @@ def test_other_values_at_the_same_samples(path, values):
     )
 
 
+@pytest.mark.parametrize(("off", "kinds"), [(1e-6, [Kind.MOVED]), (0.0, [])])
+def test_large_forces_do_not_hide_a_small_motion(path, off, kinds):
+    """Of an output without a standard, the scale is that of the outputs of its unit."""
+    for moved in (0.0, off):
+        force = OutputSeries(position=[9e5, 1e6, 0.0], velocity=None, acceleration=None, unit="N")
+        y = msgspec.structs.replace(SERIES, position=[0.0, 0.5 + moved, None])
+        outputs = {"y": y, "load": force}
+        keep(path, changed(records(), driver=DRIVER, outputs=outputs, errors={}))
+    assert [each.kind for each in reported(path, against="1").findings] == kinds
+
+
+def test_a_force_that_changes_is_told_with_its_unit(path):
+    for load in (1000.0, 1010.0):
+        force = OutputSeries(position=[load], velocity=None, acceleration=None, unit="N m")
+        outputs, driver = {"load": force}, {"turn": [0.0]}
+        keep(path, changed(records(), driver=driver, outputs=outputs, errors={}))
+    (found,) = reported(path, against="1").findings
+    assert (found.kind, found.output) == (Kind.MOVED, "load")
+    assert "differs by up to 10 N m from what it was" in found.message
+
+
 def test_round_off_and_missing_samples_are_no_other_motion(path):
     kinds, messages, _ = found_after(
         path, position=[0.0, 0.5 + 1e-10, None], velocity=[1.0, None, 2.0]

@@ -101,10 +101,16 @@ def test_a_sweep_writes_what_it_has_found(file, tmp_path, capsys):
 
     envelope = found["outputs"]["half_track_change"]
     rows = [each for each in read(out / "envelope.csv") if each["output"] == "half_track_change"]
-    assert [float(each["stroke"]) for each in rows] == found["driver"]["stroke"]
-    for column in ("min", "max", "mean", "standard_deviation", "nominal"):
-        assert [float(each[column]) for each in rows] == envelope[column]
-    assert [float(each["quantile_0.95"]) for each in rows] == envelope["quantiles"]["0.95"]
+    # the table is in the units of the file, the results are in SI
+    assert {(each["unit"], each["driver_unit"]) for each in rows} == {("mm", "mm")}
+    for column, expected in (
+        ("stroke", found["driver"]["stroke"]),
+        *((name, envelope[name]) for name in ("min", "max", "mean", "standard_deviation")),
+        ("nominal", envelope["nominal"]),
+        ("quantile_0.95", envelope["quantiles"]["0.95"]),
+    ):
+        values = [float(each[column]) for each in rows]
+        np.testing.assert_allclose(values, 1e3 * np.array(expected), rtol=1e-15)
     slopes = read(out / "gradients.csv")
     assert [each["coordinate"] for each in slopes[:5]] == [
         each["name"] for each in found["coordinates"]
@@ -139,7 +145,7 @@ def test_the_page_holds_all_and_escapes_it(file, tmp_path):
     text = page(found)
     assert "<h1>20 variants of mcpherson_strut, all solved</h1>" in text
     assert "<script>alert" not in text
-    assert text.count('class="plot"') == 6
+    assert text.count('class="plot"') == 8  # envelope, spread, histogram, effects
     assert all(
         name in text for name in ("half-track change", "wheel-base change", "ball.z", "rod.x")
     )

@@ -149,7 +149,7 @@ def _moved(now: Record, before: Record) -> Iterator[Finding]:
             limit = (
                 2.0 * judged.tolerance
                 if judged
-                else DEFAULT_ATOL + UNJUDGED * _largest(before, motion)
+                else DEFAULT_ATOL + UNJUDGED * _largest(before, motion, old.unit)
             )
             if off > limit:
                 size = value_text(number(off), motion_unit(old.unit, motion))
@@ -188,9 +188,10 @@ def _apart(a: Sequence[float | None], b: Sequence[float | None]) -> float:
     )
 
 
-def _largest(record: Record, motion: str) -> float:
-    """Return the largest value of any output."""
-    values = (x for output in record.outputs.values() for x in values_of(output, motion))
+def _largest(record: Record, motion: str, unit: str) -> float:
+    """Return the largest value of any output of a unit: forces say nothing of displacements."""
+    outputs = (output for output in record.outputs.values() if output.unit == unit)
+    values = (x for output in outputs for x in values_of(output, motion))
     return max((abs(x) for x in values if x is not None), default=0.0)
 
 

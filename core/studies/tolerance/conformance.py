@@ -17,7 +17,6 @@ Of each index the least over the samples counts.
 
 from __future__ import annotations
 
-import importlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -130,8 +129,10 @@ def _of_counts(study: Study, index: int | None, counts: NDArray[np.int64]) -> Ca
 
 
 def _interval(inside: int, known: int) -> tuple[float, float]:
-    stats: Any = importlib.import_module("scipy.stats")  # loaded on use: it takes a second
-    found = stats.binomtest(inside, known).proportion_ci(CONFIDENCE, method="exact")
+    import scipy.stats  # pyright: ignore[reportMissingTypeStubs]
+
+    binomial: Any = scipy.stats
+    found = binomial.binomtest(inside, known).proportion_ci(CONFIDENCE, method="exact")
     return float(found.low), float(found.high)
 
 

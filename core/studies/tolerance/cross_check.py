@@ -141,7 +141,7 @@ def judged(
     for row, values in zip(study.rows, ours, strict=True):
         series: Series = result.outputs[row.output.name]
         theirs: Array | None = getattr(series, QUANTITIES[row.derivative])
-        if theirs is None:
+        if theirs is None or not (row.derivative or series.possible):
             absent.append(row.name)
             continue
         # without a value of the sweep nothing is lost: the variant already counts as unsolved

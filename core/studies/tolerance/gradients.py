@@ -21,7 +21,7 @@ import numpy as np
 from ...case.case import size
 from ...mechanism.motions import Path
 from ...trajectory import Array
-from .study import Ready
+from .study import Ready, Study
 
 STEP = 2e-4
 # Required accuracy: error relative to the output's largest gradient by a coordinate of the
@@ -64,12 +64,7 @@ def gradients(ready: Ready) -> Gradients:
     from_design = start.stands
     if from_design:  # one sample more, at the design itself
         ready = ready.along(Path(path.motions, np.append(path.times, start.time), path.design))
-    steps = np.array(
-        [
-            STEP * (size(study.case) if each.unit == "m" else 1.0)
-            for each in study.variation.coordinates
-        ]
-    )
+    steps = np.array([STEP * _size(study, k) for k in range(count)])
     found = np.empty((count, len(study.rows), n + from_design))
     apart = np.empty_like(found)
     messages = dict[int, str]()
@@ -92,6 +87,16 @@ def gradients(ready: Ready) -> Gradients:
     accurate = error <= np.maximum(ACCURATE * _largest(ready, found), _noise(ready, steps))
     design = found[:, :, n] if from_design else None
     return Gradients(found[:, :, :n], design, error, accurate, messages)
+
+
+def _size(study: Study, coordinate: int) -> float:
+    """Return the size of what a coordinate changes: of the mechanism, a radian, or of a load."""
+    variation = study.variation
+    each = variation.coordinates[coordinate]
+    if each.unit in ("m", "rad"):
+        return size(study.case) if each.unit == "m" else 1.0
+    (number,) = np.flatnonzero(variation.moves[:, coordinate])
+    return float(abs(variation.nominal[number])) or each.scale
 
 
 def _largest(ready: Ready, found: Array) -> Array:

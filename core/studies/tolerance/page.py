@@ -4,73 +4,26 @@ script.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from ...harness.labels import notes, number, output_label, signs
+from ...harness.labels import notes, output_label, signs
 from ...harness.record import Outcome, Record
 from ...report.axis import Axis, driver_axis
 from ...report.figures import Figure
 from ...report.page_parts import environment, figure_parts
 from ...unit_text import with_unit
-from .conformance import Capability
 from .histogram_figure import LIMIT, histogram_figure
 from .limit_words import interval, limit_notes, percent
-from .results import Envelope, Gradient, Numbers, SweepResults
+from .output_view import DIGITS, OutputView, scaled_number
+from .results import Gradient, Numbers, SweepResults
 
 _HERE = Path(__file__).parent
 
 # Bars of a tornado diagram: what is left out is smaller than all of these.
 MOST_BARS = 15
-# Digits of a drawn number: one more than is told where a curve is pointed at.
-DIGITS = 7
-
-
-@dataclass(frozen=True)
-class OutputView:
-    """An output as the page has it, in display units: its figures by name, and its gradients, the
-    largest effect first.
-    """
-
-    name: str
-    unit: str
-    scale: float
-    envelope: Envelope
-    figure: str
-    spread: str
-    tornado: str
-    histogram: str
-    gradients: Sequence[Gradient]
-    limit: Capability | None
-
-    def shown(self, value: float | None) -> str:
-        """A value in display units."""
-        return scaled_number(self.scale, value)
-
-    @property
-    def limits(self) -> dict[str, float]:
-        """The limits in display units, by their names."""
-        ends = (None, None) if self.limit is None else (self.limit.low, self.limit.high)
-        return {
-            name: float(f"{self.scale * value:.{DIGITS}g}")
-            for name, value in zip(("low limit", "high limit"), ends, strict=True)
-            if value is not None
-        }
-
-    def ends(self) -> tuple[str, str, str]:
-        """The least, the most, and the largest standard deviation, over all samples."""
-        least, most, spread = (
-            [value for value in values if value is not None]
-            for values in (self.envelope.min, self.envelope.max, self.envelope.standard_deviation)
-        )
-        return (
-            self.shown(min(least, default=None)),
-            self.shown(max(most, default=None)),
-            self.shown(max(spread, default=None)),
-        )
 
 
 def page(results: SweepResults) -> str:
@@ -105,12 +58,6 @@ def page(results: SweepResults) -> str:
             )
         outputs.append(view)
 
-    def shown(unit: str, value: float | None) -> str:
-        return scaled_number(results.shown_unit(unit)[1], value)
-
-    def shown_unit(unit: str) -> str:
-        return results.shown_unit(unit)[0]
-
     return (
         environment(_HERE)
         .get_template("sweep.html")
@@ -126,8 +73,8 @@ def page(results: SweepResults) -> str:
             },
             effect=effect,
             slopes=partial(slopes, results),
-            shown=shown,
-            shown_unit=shown_unit,
+            shown=partial(in_file_unit, results),
+            shown_unit=results.shown_unit,
             limit_notes=limit_notes(results),
             percent=percent,
             interval=interval,
@@ -161,9 +108,9 @@ def slopes(results: SweepResults, view: OutputView, each: Gradient) -> dict[str,
     return {**found, "unit": f"({view.unit})/({its})"}
 
 
-def scaled_number(scale: float, value: float | None) -> str:
-    """Return a number times a factor, to three digits; a dash if there is none."""
-    return number(None if value is None else scale * value)
+def in_file_unit(results: SweepResults, unit: str, value: float | None) -> str:
+    """Return a number of an SI unit in the unit of the file."""
+    return scaled_number(results.shown_unit(unit)[1], value)
 
 
 def effect(gradient: Gradient) -> float:

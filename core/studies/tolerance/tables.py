@@ -153,6 +153,11 @@ def remarks(results: SweepResults) -> list[str]:
             f"quantiles are of a random subset of {results.quantiles_of} variants, with their"
             " standard errors in the results"
         )
+    if results.sampling == "sobol" and results.asked & (results.asked - 1):
+        lines.append(
+            f"a Sobol sequence is balanced at powers of two; {results.asked} is none, so the means"
+            f" converge more slowly: {1 << results.asked.bit_length()} would be"
+        )
     if results.retried:
         lines.append(f"{results.retried} variants needed divided steps")
     speed = ", ".join(

@@ -1,0 +1,56 @@
+"""What kincheck sweep makes of its options: outputs, limits, and variants to solve again."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from ..case.variation.sampling import Sampling
+from ..errors import unknown
+from ..report.progress import complain
+
+if TYPE_CHECKING:
+    from ..case.case import Case
+    from ..case.variation.variation import Variation
+
+
+def replay_problems(options: argparse.Namespace) -> list[str]:
+    """Return what keeps variants from being solved again: a Latin hypercube takes their number."""
+    if not options.replay:
+        return []
+    if options.sampling is Sampling.LATIN:
+        if options.samples is None:
+            return ["--replay: a Latin hypercube depends on the number of variants; give --samples"]
+    elif options.samples is not None:
+        return ["--replay: a variant is known by seed and index; leave out --samples"]
+    return []
+
+
+def only(case: Case, names: list[str], problems: list[str]) -> Case:
+    """Return the case with the named outputs only, or with all if none is named."""
+    there = [output.name for output in case.outputs]
+    problems += [unknown("output", name, there) for name in names if name not in there]
+    wanted = tuple(output for output in case.outputs if output.name in names or not names)
+    return replace(case, outputs=wanted)
+
+
+def limited(
+    options: argparse.Namespace, variation: Variation, whole: Case, case: Case
+) -> Variation:
+    """Return the variation with the limits of the options too, which replace those of the file; of
+    the outputs of the case alone.
+    """
+    from ..case.variation.limits import limits_of_texts
+
+    given = limits_of_texts(options.limit, whole, variation.units)
+    limits = {each.output: each for each in (*variation.limits, *given)}
+    there = {output.name for output in case.outputs}
+    kept = {
+        name: each
+        for name, each in limits.items()
+        if name in there or name.rpartition(".")[0] in there
+    }
+    if left_out := [name for name in limits if name not in kept]:
+        complain([f"limits of {', '.join(left_out)}: left out, as --output leaves out these"])
+    return replace(variation, limits=tuple(kept.values()))

@@ -1,0 +1,180 @@
+"""Specification limits of a study: yield, capability and histograms, against closed forms."""
+
+import csv
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from kincheck.core.case.variation.limits import Limit
+from kincheck.core.case.variation.sampling import Sampling
+from kincheck.core.cli.main import main
+from kincheck.core.errors import KincheckError
+from kincheck.core.studies.tolerance.histograms import sparkline
+from kincheck.core.studies.tolerance.limit_counts import RowLimit, limit_counts
+from kincheck.core.studies.tolerance.page import page
+from kincheck.core.studies.tolerance.sweep import sweep_designs
+from scipy import stats
+
+from ..case.test_vary import HEAD, vary
+from ..support.fakes import crank
+
+TIP = {"at": "tip", "sigma": [0.0, 1.0, 0.0]}
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory):
+    """The crank at its design: y of the tip is normal, of one millimetre, about zero."""
+    case = crank()
+    still = replace(case, sweep=replace(case.sweep, values=case.sweep.values[4:5]))
+    assert still.sweep.change == pytest.approx(0.0)
+    variation = vary(tmp_path_factory.mktemp("limits"), still, tip=TIP)
+    limits = (Limit("y", -2e-3, 3e-3), Limit("x", high=1.0))
+    return sweep_designs(
+        still, replace(variation, limits=limits), samples=4096, seed=2, sampling=Sampling.SOBOL
+    )
+
+
+def test_yield_and_capability_of_a_normal_output(found):
+    y, x, whole = found.limits
+    expected = stats.norm.cdf(3.0) - stats.norm.cdf(-2.0)
+    assert y.share == pytest.approx(expected, abs=2.0 / 4096)
+    assert y.below / 4096 == pytest.approx(stats.norm.cdf(-2.0), abs=1.0 / 4096)
+    assert y.above / 4096 == pytest.approx(stats.norm.sf(3.0), abs=1.0 / 4096)
+    assert (y.cp, y.cpk, y.sample) == (
+        pytest.approx(5.0 / 6.0, rel=2e-3),
+        pytest.approx(2.0 / 3.0, rel=2e-3),
+        0,
+    )
+    assert y.by_quantiles == pytest.approx(2.0 / 3.0, rel=2e-2)
+    assert (x.share, x.cp, x.cpk) == (1.0, None, None)  # x from the design does not change
+    assert (whole.output, whole.outside, whole.share) == ("", y.outside, y.share)
+
+
+def test_the_interval_is_that_of_clopper_and_pearson(found):
+    y = found.limits[0]
+    inside = y.known - y.outside
+    low = stats.beta.ppf(0.025, inside, y.outside + 1)
+    high = stats.beta.ppf(0.975, inside + 1, y.outside)
+    assert y.interval == pytest.approx((low, high), rel=1e-9)
+    assert found.limits[1].interval == pytest.approx((0.025 ** (1.0 / 4096), 1.0), rel=1e-9)
+
+
+def test_the_histogram_counts_every_variant(found):
+    each = found.outputs["y"].histogram
+    assert sum(each.counts) == 4096
+    assert len(each.edges) == len(each.counts) + 1 == 31
+    assert each.edges[0] == found.outputs["y"].min[0]
+    assert each.edges[-1] == found.outputs["y"].max[0]
+    expected = 4096 * np.diff(stats.norm.cdf(np.array(each.edges) / 1e-3))
+    np.testing.assert_allclose(each.counts, expected, atol=3.0)
+    text = sparkline(each)
+    assert len(text) == 30
+    assert text[np.argmax(each.counts)] == "█"
+    assert found.outputs["x"].histogram is None
+
+
+def test_the_page_has_limits_histograms_and_legends(found):
+    text = page(found)
+    assert "Specification limits" in text
+    assert text.count("Histogram of y") == 1
+    for words in ("nominal", "median", "5 to 95 %", "least and most", "limits", "variants at"):
+        assert f"</svg> {words}" in text
+    assert "Sobol" not in text
+    assert "--sampling sobol --replay" in text
+
+
+def test_variants_are_counted_by_side_and_missing_ones_are_unknown():
+    nan = np.nan
+    values = np.array(
+        [
+            [[0.0, 0.0, 9.0, nan, nan, -9.0], [0.0, -9.0, 0.0, 0.0, 9.0, 9.0]],
+            [[0.0] * 6, [0.0, 0.0, 0.0, 0.0, 0.0, nan]],
+        ]
+    )
+    limits = [RowLimit(0, -1.0, 1.0), RowLimit(1, -1.0, np.inf)]
+    # variants, below, above, outside, unknown
+    assert limit_counts(values, limits).tolist() == [
+        [6, 2, 3, 4, 1],
+        [6, 0, 0, 0, 1],
+        [6, 2, 3, 4, 1],
+    ]
+
+
+def test_counts_do_not_depend_on_chunks_and_jobs(tmp_path):
+    case = crank()
+    limits = (Limit("y", high=0.4995),)
+    variation = replace(vary(tmp_path, case, tip=TIP), limits=limits)
+    one, three = (
+        sweep_designs(case, variation, samples=300, seed=1, jobs=jobs).limits for jobs in (1, 3)
+    )
+    assert one == three
+    values = np.array([variation.of_variant(1, k)[0] for k in range(300)])
+    angle = case.sweep.change[:, None]
+    y = 0.5 * np.sin(angle) + np.cos(angle) * values
+    assert one[0].above == int((y > 0.4995).any(axis=0).sum())
+
+
+def test_limits_of_a_rate_take_its_order(tmp_path):
+    case = crank()
+    limits = (Limit("y.velocity", high=0.4),)
+    variation = replace(vary(tmp_path, case, tip=TIP), limits=limits)
+    with pytest.raises(KincheckError, match=r"limits of y.velocity: .+ give --order 1"):
+        sweep_designs(case, variation, samples=4)
+    found = sweep_designs(case, variation, samples=4, order=1)
+    assert found.limits[0].unit == "m/s"
+
+
+@pytest.fixture
+def file(tmp_path):
+    tables = {
+        **HEAD,
+        "mode": "monte_carlo",
+        "hardpoints": {"ball": {"at": "ball", "sigma": 1.0}},
+        "limits": {"half_track_change": {"low": -12.0, "high": 1.0}},
+    }
+    path = tmp_path / "vary.json"
+    path.write_text(json.dumps(tables))
+    return path
+
+
+def test_limits_of_file_and_option_are_in_the_units_of_the_file(file, tmp_path, capsys):
+    out = tmp_path / "out"
+    command = ["sweep", "mcpherson_strut", "--vary", str(file), "--samples", "50"]
+    limits = ["--limit", "wheelbase_change::3.5", "--limit", "half_track_change:-11:1"]
+    assert main([*command, *limits, "--sampling", "latin", "--out", str(out)]) == 0
+    found = json.loads((out / "sweep.json").read_text())
+    assert found["sampling"] == "latin"
+    assert [(each["output"], each["low"], each["high"]) for each in found["limits"]] == [
+        ("half_track_change", -0.011, 0.001),
+        ("wheelbase_change", None, 0.0035),
+        ("", None, None),
+    ]
+    with (out / "limits.csv").open() as lines:
+        rows = list(csv.DictReader(lines))
+    assert [(each["output"], each["unit"], each["low"], each["high"]) for each in rows] == [
+        ("half_track_change", "mm", "-11.0", "1.0"),
+        ("wheelbase_change", "mm", "", "3.5"),
+        ("all", "", "", ""),
+    ]
+    told = capsys.readouterr().out
+    assert "Specification limits" in told
+    assert "95 % interval" in told
+
+
+WRONG = [
+    (["--limit", "half_track_change:1"], "--limit: found 'half_track_change:1', expected OUTPUT:"),
+    (["--limit", "toe:0:1"], "--limit toe:0:1: there is no output 'toe'"),
+    (["--limit", "half_track_change:a:b"], "expected OUTPUT:LOW:HIGH"),
+    (
+        ["--sampling", "latin", "--replay", "1"],
+        "a Latin hypercube depends on the number of variants; give --samples",
+    ),
+]
+
+
+@pytest.mark.parametrize(("options", "message"), WRONG)
+def test_wrong_options_are_status_2_and_a_message(file, capsys, options, message):
+    samples = [] if "--replay" in options else ["--samples", "5"]
+    assert main(["sweep", "mcpherson_strut", "--vary", str(file), *samples, *options]) == 2
+    assert message in capsys.readouterr().err
