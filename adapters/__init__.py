@@ -25,6 +25,8 @@ SIMULATIONS = {
     "exudyn-alpha": ("exudyn.solvers", "generalized_alpha"),
     "exudyn-static": ("exudyn.solvers", "static"),
     "exudyn-static-modified": ("exudyn.solvers", "static_modified"),
+    "drake": ("drake.steps", "Steps"),
+    "dart": ("dart.steps", "Steps"),
     "simbody": ("simbody.assembly", "Assembly"),
 }
 """Name on the command line -> module and what makes the engine: simulate mode. A simulator's bare

@@ -45,11 +45,13 @@ class DrakeModel(TreeModel):
     """The tree in Drake: a body and its joint for each link, a fixed offset frame for each frame.
 
     Attributes:
-        turning: places of the unknown velocities: all but the displacements of balls.
+        held: whether the displacements of balls are no unknowns.
+        turning: places of the unknown velocities.
         balls: where in Drake's positions a ball has its quaternion.
         inertias: of bodies, by their numbers.
     """
 
+    held: ClassVar[bool] = True
     recursion = False
     computed_by: ClassVar[Mapping[str, str]] = {
         "inverse dynamics": "CalcInverseDynamics",
@@ -60,11 +62,11 @@ class DrakeModel(TreeModel):
         "force elements": "of the adapter, by frames of Drake",
     }
 
-    def __init__(self, case: Case) -> None:
+    def __init__(self, case: Case, time_step: float = 0.0) -> None:
         load = importlib.import_module
         self.tree, plant = load("pydrake.multibody.tree"), load("pydrake.multibody.plant")
         self.shift = load("pydrake.math").RigidTransform
-        self.plant = plant.MultibodyPlant(0.0)
+        self.plant = plant.MultibodyPlant(time_step)
         self.world, self.kind = self.plant.world_frame(), self.tree.JacobianWrtVariable.kV
         self.bodies: list[Any] = [self.plant.world_body()]
         self.joints: list[Any] = [None]  # the world has none
@@ -105,7 +107,7 @@ class DrakeModel(TreeModel):
             self.bodies[number].SetSpatialInertiaInBodyFrame(self.context, inertia)
         balls = [joint for joint in self.joints if joint and joint.num_velocities() == 6]
         self.balls = [slice(at, at + 4) for at in (each.position_start() for each in balls)]
-        idle = [each.velocity_start() + k for each in balls for k in (3, 4, 5)]
+        idle = [each.velocity_start() + k for each in balls for k in (3, 4, 5) if self.held]
         self.turning: NDArray[np.intp] = np.setdiff1d(
             np.arange(int(self.plant.num_velocities())), idle
         )

@@ -10,11 +10,10 @@ from ...core import joints
 from ...core.case.case import Case
 from ...core.joints.base import unit
 from ...core.kinematics import start_of
+from ..shared.simulation import uneven
 
 # Exudyn's objects keep products at zero only; a smaller value is round-off, below any residual.
 NOTHING = 1e-12
-# Largest difference in the spacing of equidistant samples, relative to the spacing: round-off.
-EQUIDISTANT = 1e-6
 
 
 def limitation_of(case: Case) -> str | None:
@@ -34,12 +33,8 @@ def limitation_of(case: Case) -> str | None:
     for coupler in case.mechanism.couplers:
         if coupler.curve:
             return f"{coupler}: Exudyn's own solvers have no object that keeps a polynomial"
-    times = case.sweep.path.times
-    if len(times) > 1 and np.ptp(np.diff(times)) > EQUIDISTANT * np.abs(np.diff(times)).max():
-        return (
-            "samples are not equidistant in time, and Exudyn's steps are; give the sweep by"
-            " start, stop and steps"
-        )
+    if (reason := uneven(case, "Exudyn")) is not None:
+        return reason
     if case.mechanism.couplers and not start_of(case.mechanism, case.sweep.path).stands:
         return (
             "turns of coupled joints are counted from the design, where this motion does not begin"

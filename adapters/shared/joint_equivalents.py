@@ -26,14 +26,17 @@ SAME_LENGTH = 1e-12
 ALONG = 0.3
 
 
-def jointed(mechanism: Mechanism) -> Mechanism:
+def jointed(mechanism: Mechanism, *, rods: bool = False) -> Mechanism:
     """Return the mechanism with joint drivers only and without rods.
 
     Rods whose length differs from the design stay. Added bodies have no mass.
+
+    Args:
+        rods: whether all rods stay.
     """
     bodies, joints, drivers = list(mechanism.bodies), list[Joint](), list[Driver]()
     for joint in mechanism.joints:
-        if isinstance(joint, Distance) and fits(joint):
+        if isinstance(joint, Distance) and fits(joint) and not rods:
             rod = Body(f"{joint.name}: rod", joint.points[0])
             bodies.append(rod)
             joints += _rod(mechanism, joint, rod.name)

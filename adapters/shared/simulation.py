@@ -29,6 +29,8 @@ from .projection_model import ProjectionModel
 # one of the mechanism. The softest simulator, MuJoCo as it comes, stays below on most built-in
 # cases.
 TORN = 1e-2
+# Largest difference in the spacing of equidistant samples, relative to the spacing: round-off.
+EQUIDISTANT = 1e-6
 # Residual of the pose to set off from: what projection reaches.
 START = 1e-12
 
@@ -155,6 +157,17 @@ def start_of(model: ProjectionModel, case: Case) -> Start:
         " nearer to it",
         walk.lost.kind,
     )
+
+
+def uneven(case: Case, title: str) -> str | None:
+    """Return the reason why steps of one length do not meet the samples, or None."""
+    gaps = np.abs(np.diff(case.sweep.path.times))
+    if len(gaps) and np.ptp(gaps) > EQUIDISTANT * gaps.max():
+        return (
+            f"samples are not equidistant in time, and {title}'s steps are; give the sweep by"
+            " start, stop and steps"
+        )
+    return None
 
 
 def simulated(

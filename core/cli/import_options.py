@@ -1,6 +1,4 @@
-"""Options of commands that read files: a user's joint types, and facts missing in files
-of other tools.
-"""
+"""Options for files: a user's joint types, and facts missing in files of other tools."""
 
 from __future__ import annotations
 
@@ -152,7 +150,7 @@ def return_cases(options: argparse.Namespace) -> None:
 
 
 def supplied(options: argparse.Namespace) -> Supplied:
-    """Return the facts that the options supply."""
+    """Return the facts supplied by options."""
     return Supplied(
         options.template,
         options.units,

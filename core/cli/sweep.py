@@ -10,16 +10,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..case.variation.sampling import Sampling
 from ..errors import KincheckError, unknown
 from ..harness.interrupts import hold, status_of, words_of
 from ..report.progress import complain, lacking, uncompared
 from ..version import VERSION
 from . import execution_options, import_options
 from .registry import House, Status
-from .sweep_options import FILES, PART, add_options
+from .sweep_options import FILES, LIMITS, PART, add_options
 
 if TYPE_CHECKING:
     from ..case.case import Case
+    from ..case.variation.variation import Variation
     from ..harness.engine import Engine
     from ..harness.execution import Solver
     from ..studies.tolerance.part_file import Part
@@ -58,8 +60,7 @@ def _sweep(options: argparse.Namespace, house: House) -> int:
     problems += Destinations.of(options).problems(names)
     if options.scheduler is not None and options.jobs is not None:
         problems.append("--scheduler: how many threads is the cluster's matter; leave out --jobs")
-    if options.replay and options.samples is not None:
-        problems.append("--replay: a variant is known by seed and index; leave out --samples")
+    problems += _replay_problems(options)
     if options.replay and (options.store or options.scheduler):
         problems.append(
             "--replay solves here, and stores nothing; leave out --store and --scheduler"
@@ -69,15 +70,19 @@ def _sweep(options: argparse.Namespace, house: House) -> int:
             "--resume goes on from a folder of results: give --out DIR, and leave out --replay"
         )
     engine, share = _check(options, house, problems)
-    case = _only(
-        house.find_case(options.case, import_options.supplied(options)), options.output, problems
-    )
+    whole = house.find_case(options.case, import_options.supplied(options))
+    case = _only(whole, options.output, problems)
     import_options.tell_left_out([case])
     problems = problems or execution_options.unreachable(options)
     if problems:
         raise KincheckError("\n".join(problems))
-    variation = read_variation(options.vary, case)
-    samples = variation.count or 0 if options.replay else how_many(variation, options.samples)
+    variation = read_variation(options.vary, whole)
+    variation = _limited(options, variation, whole, case)
+    if options.replay and options.samples is None:
+        samples = variation.count or 0
+    else:
+        samples = how_many(variation, options.samples)
+    variation = variation.sampled(options.sampling, samples)
     study = Study(case, variation, samples, options.seed, options.order, options.tol)
     if options.replay:
         return _replay(options, house, study, engine)
@@ -127,20 +132,45 @@ def _check(
     return (engines[0] if engines else None), share
 
 
-def _only(case: Case, names: list[str], problems: list[str]) -> Case:
-    """Return the case with the named outputs only, or with all motions if none is named."""
-    from ..case.case import without_forces
+def _replay_problems(options: argparse.Namespace) -> list[str]:
+    """Return what keeps variants from being solved again: a Latin hypercube takes their number."""
+    if not options.replay:
+        return []
+    if options.sampling is Sampling.LATIN:
+        if options.samples is None:
+            return ["--replay: a Latin hypercube depends on the number of variants; give --samples"]
+    elif options.samples is not None:
+        return ["--replay: a variant is known by seed and index; leave out --samples"]
+    return []
 
+
+def _only(case: Case, names: list[str], problems: list[str]) -> Case:
+    """Return the case with the named outputs only, or with all if none is named."""
     there = [output.name for output in case.outputs]
     problems += [unknown("output", name, there) for name in names if name not in there]
-    wanted = [output for output in case.outputs if output.name in names or not names]
-    if loads := [output.name for output in wanted if output.forces]:
-        text = f"forces are not reduced over variants: {', '.join(loads)}"
-        if names:
-            problems.append(f"--output: {text}; leave them out")
-        else:
-            complain([f"{text} {'is' if len(loads) == 1 else 'are'} left out"])
-    return without_forces(replace(case, outputs=tuple(wanted)))
+    wanted = tuple(output for output in case.outputs if output.name in names or not names)
+    return replace(case, outputs=wanted)
+
+
+def _limited(
+    options: argparse.Namespace, variation: Variation, whole: Case, case: Case
+) -> Variation:
+    """Return the variation with the limits of the options too, which replace those of the file; of
+    the outputs of the case alone.
+    """
+    from ..case.variation.limits import limits_of_texts
+
+    given = limits_of_texts(options.limit, whole, variation.units)
+    limits = {each.output: each for each in (*variation.limits, *given)}
+    there = {output.name for output in case.outputs}
+    kept = {
+        name: each
+        for name, each in limits.items()
+        if name in there or name.rpartition(".")[0] in there
+    }
+    if left_out := [name for name in limits if name not in kept]:
+        complain([f"limits of {', '.join(left_out)}: left out, as --output leaves out these"])
+    return replace(variation, limits=tuple(kept.values()))
 
 
 def _solver(options: argparse.Namespace, engine: Engine) -> Solver:
@@ -161,8 +191,8 @@ def _solver(options: argparse.Namespace, engine: Engine) -> Solver:
 
 
 def _part(options: argparse.Namespace) -> Part:
-    """Return the file of the finished part, with the facts besides the study that its
-    numbers depend on.
+    """Return the file of the finished part, with all facts besides the study behind its
+    numbers.
     """
     import numpy as np
 
@@ -193,8 +223,8 @@ def _solve(
     from ..harness.resource_limits import default_jobs
     from ..report.meter import Meter
     from ..studies.tolerance.chunk_execution import on_cluster
+    from ..studies.tolerance.parquet_store import ParquetStore
     from ..studies.tolerance.sweep import Check, sweep_designs
-    from ..studies.tolerance.tables import ParquetStore
 
     def solved(progress: Progress) -> None:
         rate = f"{progress.solved / progress.seconds:.3g} variants/s"
@@ -222,6 +252,7 @@ def _solve(
             study.variation,
             samples=options.samples,
             seed=options.seed,
+            sampling=options.sampling,
             order=options.order,
             tol=options.tol,
             jobs=options.jobs or default_jobs(),
@@ -273,8 +304,9 @@ def _deliver(options: argparse.Namespace, results: SweepResults) -> list[str]:
     """Print the table and write the requested files; return the problems of writing."""
     from ..case.io.atomic_files import to_standard_output, write_all
     from ..harness.record import to_json
+    from ..studies.tolerance.csv_tables import envelope_csv, gradient_csv, limits_csv
     from ..studies.tolerance.page import page
-    from ..studies.tolerance.tables import envelope_csv, gradient_csv, print_sweep
+    from ..studies.tolerance.tables import print_sweep
 
     encoded = to_json(results)
     contents = [(Path(options.json), encoded)] if options.json not in (None, "-") else []
@@ -286,6 +318,8 @@ def _deliver(options: argparse.Namespace, results: SweepResults) -> list[str]:
             gradient_csv(results).encode(),
         )
         contents += [(options.out / name, text) for name, text in zip(FILES, texts, strict=True)]
+    if options.out is not None and results.limits:
+        contents.append((options.out / LIMITS, limits_csv(results).encode()))
     problems = write_all(contents)  # first: the reader of standard output may have closed it
     print_sweep(results, sys.stderr if options.json == "-" else sys.stdout)
     if options.json == "-":

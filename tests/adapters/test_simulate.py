@@ -20,6 +20,7 @@ from kincheck.core import (
     Mechanism,
     Point,
     PointCoordinate,
+    Polynomial,
     Revolute,
     Translational,
     solve,
@@ -43,6 +44,8 @@ STRUT = {
     "exudyn-alpha": (1e-15, 2e-7, 6e-4),
     "exudyn-static": (5e-13, None, None),
     "exudyn-static-modified": (2e-12, None, None),
+    "drake": (1e-7, 2e-4, 1e-1),
+    "dart": (5e-8, 2e-4, 5e-3),
     "simbody": (2e-15, None, None),
 }
 
@@ -99,7 +102,8 @@ def test_a_stroke_out_of_reach_ends_and_says_so(name):
     found = record(case, simulation(name))
     assert found.outcome is Outcome.FAIL
     # the lock-up is at +0.29337 m; what has rates is torn or ends a little before
-    assert 20 < found.solved <= 30
+    # Drake's softness passes 0.30 m with a gap of millimetres
+    assert 20 < found.solved <= 30 + (name == "drake")
     assert (
         "cannot be followed to stroke = 0.2" in found.message
         or "cannot be followed to stroke = 0.3" in found.message
@@ -109,7 +113,8 @@ def test_a_stroke_out_of_reach_ends_and_says_so(name):
 
 
 @pytest.mark.parametrize(
-    "name", ["mujoco", "mujoco-projecting", "pinocchio", "exudyn", "exudyn-static"]
+    "name",
+    ["mujoco", "mujoco-projecting", "pinocchio", "exudyn", "exudyn-static", "drake", "dart"],
 )
 def test_drivers_with_motions_of_their_own_and_redundant_loops(name):
     """Two drivers, neither steady, and a planar loop of revolutes, whose rows are redundant."""
@@ -136,7 +141,10 @@ def test_drivers_with_motions_of_their_own_and_redundant_loops(name):
     found = record(
         Case("arm", "made up", Truth.CONSENSUS_ONLY, mechanism, sweep, outputs), simulation(name)
     )
-    limits = {"exudyn-static": (1e-11,), "mujoco-projecting": (1e-11,)}.get(name, (1e-5, 1e-3, 0.2))
+    # Drake and DART move along the velocities at the end of a step: these are of its middle
+    special = dict.fromkeys(("exudyn-static", "mujoco-projecting"), (1e-11,))
+    special |= dict.fromkeys(("drake", "dart"), (2e-6, 4e-2, 1.2))
+    limits = special.get(name, (1e-5, 1e-3, 0.2))
     errors = [error for error in worst(found) if error is not None]
     assert found.solved == 81
     assert len(errors) == len(limits)
@@ -144,7 +152,11 @@ def test_drivers_with_motions_of_their_own_and_redundant_loops(name):
 
 
 @pytest.mark.parametrize(
-    "name", ["mujoco", "mujoco-projecting", "pinocchio", "exudyn", "exudyn-alpha", "exudyn-static"]
+    "name",
+    [
+        *("mujoco", "mujoco-projecting", "pinocchio", "exudyn", "exudyn-alpha", "exudyn-static"),
+        *("drake", "dart"),
+    ],
 )
 def test_more_effort_is_more_precise(name):
     efforts = simulation(name).efforts()
@@ -217,7 +229,7 @@ def test_a_rod_of_another_length_stays_a_distance():
     assert "tie_rod" in adapters.engine("pinocchio", "simulate").unsupported(case)
 
 
-def test_what_a_solver_cannot_express_is_named():
+def gears():
     z = (0.0, 0.0, 1.0)
     mechanism = Mechanism(
         "gears",
@@ -231,19 +243,48 @@ def test_what_a_solver_cannot_express_is_named():
         [Gear("mesh", ("a", "b"), ratio=-2.0)],
     )
     output = Output("x", "tip", (1.0, 0.0, 0.0), False, 1e-9, 0.0, "made up")
-    case = Case(
-        "gears",
-        "made up",
-        Truth.CONSENSUS_ONLY,
-        mechanism,
-        Sweep("turn", np.linspace(0.0, 7.0, 71)),
-        (output,),
-    )
+    sweep = Sweep("turn", np.linspace(0.0, 7.0, 71))
+    return Case("gears", "made up", Truth.CONSENSUS_ONLY, mechanism, sweep, (output,))
+
+
+def bent(case):
+    """Return the case with a polynomial in place of its gear."""
+    coupler = Polynomial("cam", ("b", "a"), coefficients=(0.0, 1.0, 0.2))
+    return replace(case, mechanism=replace(case.mechanism, couplers=[coupler]))
+
+
+def test_what_a_solver_cannot_express_is_named():
+    case = gears()
     assert "mesh" in adapters.engine("pinocchio", "simulate").unsupported(case)
     uneven = replace(case, sweep=Sweep("turn", np.array([0.0, 0.1, 0.3])))
     assert "equidistant" in adapters.engine("exudyn", "simulate").unsupported(uneven)
     # two turns and more of the second gear
     assert record(case, simulation("exudyn-static")).outcome is Outcome.PASS
+
+
+@pytest.mark.parametrize("name", ["pinocchio", "exudyn", "drake", "dart", "simbody"])
+def test_polynomial_couplers_are_refused_by_name(name):
+    assert "cam" in adapters.engine(name, "simulate").unsupported(bent(gears()))
+
+
+def test_steps_refuse_what_their_simulator_has_no_constraint_of():
+    case, drake, dart = gears(), *(adapters.engine(n, "simulate") for n in ("drake", "dart"))
+    assert "'mesh' (gear): the steps of DART have no constraint" in dart.unsupported(case)
+    uneven = replace(case, sweep=Sweep("turn", np.array([0.0, 0.1, 0.3])))
+    assert "equidistant" in drake.unsupported(uneven)
+    joints = [
+        replace(joint, length=joint.rod_length + 1e-3) if isinstance(joint, Distance) else joint
+        for joint in mcpherson().joints
+    ]
+    rod = replace(strut(), mechanism=replace(mcpherson(), joints=joints))
+    assert "tie_rod" in dart.unsupported(rod)
+    assert drake.unsupported(rod) is None
+
+
+def test_gears_of_drake_turn_with_a_motion_that_is_not_steady():
+    motion = {"turn": Sine(0.5, 1.0)}
+    case = replace(gears(), sweep=Sweep("time", np.linspace(0.0, 0.4, 41), motions=motion))
+    assert worst(record(case, simulation("drake")))[0] <= 1e-8  # nearly rigid
 
 
 def simulated(tmp_path, *options):
@@ -319,7 +360,9 @@ def test_a_motion_may_begin_with_an_acceleration(name):
     assert worst(found)[2] <= 0.02 * 0.5 * (2.0 * np.pi) ** 2
 
 
-@pytest.mark.parametrize("name", ["mujoco-projecting", "pinocchio", "exudyn", "exudyn-static"])
+@pytest.mark.parametrize(
+    "name", ["mujoco-projecting", "pinocchio", "exudyn", "exudyn-static", "drake", "dart"]
+)
 def test_where_the_nearest_sample_cannot_be_reached_the_other_side_is(name):
     """An arm whose tip is at 0.6 m and gets to 1 m."""
     hinge = Revolute("hinge", "ground", "arm", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))

@@ -1,0 +1,117 @@
+"""Drake in simulate mode: the steps of a discrete MultibodyPlant, whose SAP solver takes its own
+constraints to close loops.
+
+Drake has constraints in discrete plants only: a continuous one refuses to be simulated with them.
+They are nearly rigid, a softness that has no setting. A ball is a floating joint with a constraint
+of its point, because Drake's ball joint locks at a right angle. A driven coordinate has an armature
+far above all masses, and is set to its value and its velocity at every step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ...core.case.case import Case
+from ...core.trajectory import Array
+from ..shared.joint_chains import Link, dependence
+from ..shared.simulation import SimulationEndedError
+from ..shared.stepped_tree import SteppedTree, Stepping, Tie
+from ..shared.tree_rows import Terms
+from .drake import Drake, DrakeModel
+
+# Inertia of what is driven [kg or kg m2], the bodies having one: what they ask of it bends its
+# motion by a billionth.
+ARMATURE = 1e9
+
+
+class DrakePlant(SteppedTree, DrakeModel):
+    """The tree in a discrete plant, with a constraint for each tie and each relation.
+
+    Attributes:
+        couplings: one coordinate is another one times a factor; by the numbers of their bodies.
+    """
+
+    held = False
+
+    def __init__(self, case: Case, steps: int) -> None:
+        self.ties = []
+        self.couplings: list[tuple[int, int, float]] = []
+        times = case.sweep.path.times
+        gap = float(np.ptp(times)) / max(len(times) - 1, 1)
+        DrakeModel.__init__(self, case, (gap or 1.0) / steps)
+        self.set_off(case, steps)
+        self.rates = [self.coordinate(body)[1] for body, _ in self.driven]
+        self.efforts = self.plant.get_applied_generalized_force_input_port()
+
+    def add_links(self, at: int, links: Sequence[Link], joint: str = "", sign: int = 1) -> int:
+        for link in links[::sign]:
+            carrier, at = at, super().add_links(at, [link], joint, sign)
+            if link.move == "ball":
+                self.tie(f"ball {at}", Tie("point", (carrier, at), (link.point, link.point)))
+        return at
+
+    def relate(self, terms: Terms, curve: Sequence[float] = ()) -> None:
+        super().relate(terms, curve)
+        if len(terms) > 1:
+            moved = [(self.coordinates[joint, freedom], weight) for joint, freedom, weight in terms]
+            self.couplings.append(dependence((b, sign * weight) for (b, sign), weight in moved))
+
+    def finish(self) -> None:
+        plant, tree = self.plant, self.tree
+        # Drake ends the process at a constraint of the world itself
+        whole = tree.SpatialInertia(1.0, np.zeros(3), tree.UnitInertia(1.0, 1.0, 1.0))
+        anchor = plant.AddRigidBody("anchor", whole)
+        plant.WeldFrames(self.world, anchor.body_frame())
+        for tie in self.ties:
+            self.constrain([self.bodies[body] if body else anchor for body in tie.bodies], tie)
+        for one, other, factor in self.couplings:
+            plant.AddCouplerConstraint(self.joints[one], self.joints[other], factor)
+        for body, _ in self.driven:
+            motor = plant.AddJointActuator(f"motor {body}", self.joints[body])
+            motor.set_default_rotor_inertia(ARMATURE)
+        # with them Drake evaluates no update outside a simulator
+        plant.SetUseSampledOutputPorts(False)
+        super().finish()
+
+    def constrain(self, bodies: Sequence[Any], tie: Tie) -> None:
+        """Add Drake's constraint of a tie."""
+        plant, (one, other) = self.plant, bodies
+        P, Q = (
+            np.array(point) - self.origin[body]
+            for body, point in zip(tie.bodies, tie.points, strict=True)
+        )
+        match tie.kind:
+            case "point":
+                plant.AddBallConstraint(one, P, other, Q)
+            case "frame":
+                plant.AddWeldConstraint(one, self.shift(P), other, self.shift(Q))
+            case "rod":
+                plant.AddDistanceConstraint(one, P, other, Q, tie.length)
+
+    def step(self, q: Array, v: Array, driven: Array, h: float) -> tuple[Array, Array]:
+        plant, context = self.plant, self.context
+        forces = np.zeros_like(v)
+        forces[self.rates] = ARMATURE * (driven - v[self.rates]) / h
+        plant.SetPositions(context, q)
+        plant.SetVelocities(context, v)
+        self.efforts.FixValue(context, forces)
+        try:
+            context.SetDiscreteState(plant.EvalUniquePeriodicDiscreteUpdate(context))
+        except RuntimeError as error:
+            first = str(error).strip().splitlines()[0]
+            raise SimulationEndedError(f"Drake: {first}") from error
+        return np.array(plant.GetPositions(context)), np.array(plant.GetVelocities(context))
+
+
+class Steps(Stepping):
+    """The engine `drake` in simulate mode."""
+
+    projection, model, rods, couples, equal = Drake, DrakePlant, True, True, True
+    described: ClassVar[Mapping[str, Any]] = {
+        "solver": "discrete MultibodyPlant, SAP",
+        "balls": "QuaternionFloatingJoint and a ball constraint",
+        "driven coordinates": f"set at every step, armature {ARMATURE:g}",
+    }

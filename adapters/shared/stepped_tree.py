@@ -1,0 +1,220 @@
+"""Simulate mode of simulators that step a tree of links whose loops their own constraints close.
+
+A loop has the chain of its joint on its first body (see `joint_chains`), and one tie of a point or
+of a whole frame to its second. Both simulators solve for velocities at the end of a step and move
+the configuration along them: a driven coordinate that is given its mean velocity over the step is
+at its value after it, a gap of the constraints is closed a step later, and velocities are those of
+the middle of the step. Accelerations are the change of velocities over the last step.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any, ClassVar, Literal, Self
+
+import numpy as np
+
+from ...core.case.case import Case
+from ...core.errors import SolveError
+from ...core.joints import Coupler, Distance, Fixed, Joint, Spherical
+from ...core.mechanism.drivers import JointDriver
+from ...core.mechanism.mechanism import Vector
+from ...core.trajectory import Array, Trajectory
+from .joint_chains import CHAINS, end_of_loop, relations
+from .joint_equivalents import fits, jointed
+from .loop_closures import CLOSURES
+from .simulation import Leg, SimulatedPose, SimulationEndedError, simulated, start_of, uneven
+from .tree_engine import TreeEngine
+from .tree_model import TreeModel
+
+TIED: Mapping[str, type[Joint]] = {"point": Spherical, "frame": Fixed, "rod": Distance}
+
+
+@dataclass(frozen=True)
+class Tie:
+    """A constraint between two bodies, by their numbers: one point or the whole frame stays
+    together, or two points stay apart by a length.
+
+    Attributes:
+        points: on the first and the second body, global at design [m].
+        length: of a rod [m].
+    """
+
+    kind: Literal["point", "frame", "rod"]
+    bodies: tuple[int, int]
+    points: tuple[Vector, Vector]
+    length: float = 0.0
+
+
+@dataclass(frozen=True)
+class Stepping:
+    """Time stepping of a simulator, steps of equal length between the samples.
+
+    Attributes:
+        steps: between samples.
+        projection: the engine of the same simulator in projection mode.
+        model: of the simulator.
+        described: solver, constraints and drivers of the simulator.
+        rods: whether it has a constraint of a distance; without, rods are bodies.
+        couples: whether it has a constraint that couples two coordinates.
+        equal: whether the steps of a whole simulation are of one length.
+    """
+
+    steps: int = 4
+    projection: ClassVar[type[TreeEngine]]
+    model: ClassVar[type[SteppedTree]]
+    described: ClassVar[Mapping[str, Any]]
+    rods: ClassVar[bool] = False
+    couples: ClassVar[bool] = False
+    equal: ClassVar[bool] = False
+    mode = "simulate"
+    loop = "python"
+
+    @property
+    def name(self) -> str:
+        """The name of the simulator."""
+        return self.projection.name
+
+    @property
+    def settings(self) -> Mapping[str, Any]:
+        """Solver, steps, drivers and rods."""
+        rods = "distance constraints" if self.rods else "bodies between a cross and a ball"
+        return {**self.described, "steps per sample": self.steps, "rods": rods}
+
+    def version(self) -> str | None:
+        """Return the version of the simulator, or None if the import fails."""
+        return self.projection().version()
+
+    def unsupported(self, case: Case) -> str | None:
+        """Return the joint, coupler or driver without a constraint here, or None."""
+        engine = self.projection()
+        case = engine.known(case)
+        if (reason := engine.unsupported(case)) is not None:
+            return reason
+        for joint in case.mechanism.joints:
+            if relations(joint) and not self.couples:
+                return self._without(joint, "that couples coordinates")
+            if isinstance(joint, Distance) and not self.rods and not fits(joint):
+                return self._without(joint, "of another distance than at design")
+        for coupler in case.mechanism.couplers:
+            if not self.couples:
+                return self._without(coupler, "that couples coordinates")
+            if coupler.curve:
+                return self._without(coupler, "that keeps a polynomial")
+        return uneven(case, engine.title) if self.equal else None
+
+    def _without(self, joint: Joint | Coupler, what: str) -> str:
+        title = self.projection.title
+        return f"{joint}: the steps of {title} have no constraint {what}; use projection"
+
+    def efforts(self) -> Mapping[str, Self]:
+        """Return the efforts by the number of steps."""
+        return {f"{n} steps a sample": replace(self, steps=n) for n in (1, 2, 4, 8, 16)}
+
+    def floor(self, case: Case) -> None:
+        """Return None: a bound on its steps would be that of projection."""
+
+    def build(self, case: Case) -> SteppedTree:
+        """Return tree, constraints and start."""
+        mechanism = jointed(self.projection().known(case).mechanism, rods=self.rods)
+        return self.model(replace(case, mechanism=mechanism), self.steps)
+
+    def solve(self, model: SteppedTree, case: Case, tol: float) -> Trajectory:
+        """All samples in reach, however far the constraints drift; see `Engine.solve`."""
+        return simulated(case, model.start, model.run, model.details)
+
+
+class SteppedTree(TreeModel):
+    """A tree with ties, whose driven coordinates have given velocities.
+
+    The constructor of a simulator's class sets `ties`, makes the model and calls `set_off`.
+
+    Attributes:
+        ties: constraints that close loops.
+        driven_at: places of the driven coordinates in q.
+        signs: of the driven coordinates in the tree.
+    """
+
+    gives_forces = False
+    ties: list[Tie]
+
+    @abstractmethod
+    def __init__(self, case: Case, steps: int) -> None:
+        """Make the model of a case with joint drivers only, and so many steps between samples."""
+
+    def set_off(self, case: Case, steps: int) -> None:
+        """Find the start.
+
+        Args:
+            steps: between samples.
+        """
+        self.steps, self.start = steps, start_of(self, case)
+        self.driven_at = [self.coordinate(body)[0] for body, _ in self.driven]
+        self.signs = np.array([float(sign) for _, sign in self.driven])
+
+    @property
+    def driven(self) -> list[tuple[int, int]]:
+        """The driven bodies, by their numbers, and the signs of their coordinates."""
+        drivers = [each for each in self.case.mechanism.drivers if isinstance(each, JointDriver)]
+        return [self.coordinates[each.joint, each.freedom] for each in drivers]
+
+    @abstractmethod
+    def step(self, q: Array, v: Array, driven: Array, h: float) -> tuple[Array, Array]:
+        """Return the configuration and the velocities after a step.
+
+        Args:
+            driven: velocities of the driven coordinates over the step [1/s of their units].
+            h: length of the step [s].
+
+        Raises:
+            SimulationEndedError: the simulator cannot go on.
+        """
+
+    def close(self, joint: Joint, ends: tuple[Vector, Vector], named: bool) -> None:
+        i, j = self.bodies_of(joint)
+        if isinstance(joint, Distance):
+            self.tie(joint.name, Tie("rod", (i, j), ends, joint.rod_length), joint)
+            return
+        links, point, turns = end_of_loop(CHAINS[type(joint)](joint, ends[0]), ends[0])
+        i = self.add_links(i, links, joint.name)
+        for relation in relations(joint):
+            self.relate(relation)
+        if i == j:
+            raise SolveError(
+                f"case {self.case.name!r}: {joint} closes a loop of one body with itself, which no"
+                " constraint of the simulator does; use the projection mode"
+            )
+        self.tie(joint.name, Tie("point" if turns else "frame", (i, j), (point, point)), joint)
+
+    def tie(self, name: str, tie: Tie, joint: Any = None) -> None:
+        """Add a tie under the name of its joint."""
+        self.ties.append(tie)
+        closure = CLOSURES[TIED[tie.kind]]
+        self.closures[name] = f"constraint, {closure.text}"
+        frames = map(self.add_frame, tie.bodies, tie.points)
+        self.conditions += closure.conditions(joint, *frames)
+
+    def run(self, leg: Leg) -> Iterator[SimulatedPose]:
+        """Yield the poses of a leg."""
+        q, v, a = self.start.configuration, leg.sign * self.start.v, self.start.a
+        yield self.pose(q, v, a, leg.drive(leg.times[:1])[0, :, 0], 0)
+        parts = np.arange(self.steps + 1) / self.steps
+        for t, until in pairwise(leg.times.tolist()):
+            h = abs(until - t) / self.steps
+            values = leg.drive(t + (until - t) * parts)[0]
+            for aim in values[:, 1:].T if h else ():  # samples may be repeated
+                before = v
+                q, v = self.step(q, v, (self.signs * aim - q[self.driven_at]) / h, h)
+                if not np.isfinite(v).all():
+                    raise SimulationEndedError("its velocities are not finite")
+                a = (v - before) / h
+            yield self.pose(q, v, a, values[:, -1], self.steps)
+
+    def pose(self, q: Array, v: Array, a: Array, driven: Array, steps: int) -> SimulatedPose:
+        """Return the pose at this state, steps counted from the sample before."""
+        self.q = q
+        residual = float(np.abs(self.residual(driven)).max())
+        return SimulatedPose(np.array(self.points(v, a)).swapaxes(0, 1), residual, steps)
