@@ -10,20 +10,19 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..case.variation.sampling import Sampling
 from ..errors import KincheckError, unknown
 from ..harness.interrupts import hold, status_of, words_of
-from ..report.progress import complain, lacking, uncompared
+from ..report.progress import complain
 from ..version import VERSION
 from . import execution_options, import_options
 from .registry import House, Status
 from .sweep_options import FILES, LIMITS, PART, add_options
+from .sweep_replay import checking_solver, replay, replay_problems
 
 if TYPE_CHECKING:
     from ..case.case import Case
     from ..case.variation.variation import Variation
     from ..harness.engine import Engine
-    from ..harness.execution import Solver
     from ..studies.tolerance.part_file import Part
     from ..studies.tolerance.results import SweepResults
     from ..studies.tolerance.study import Study
@@ -60,7 +59,7 @@ def _sweep(options: argparse.Namespace, house: House) -> int:
     problems += Destinations.of(options).problems(names)
     if options.scheduler is not None and options.jobs is not None:
         problems.append("--scheduler: how many threads is the cluster's matter; leave out --jobs")
-    problems += _replay_problems(options)
+    problems += replay_problems(options)
     if options.replay and (options.store or options.scheduler):
         problems.append(
             "--replay solves here, and stores nothing; leave out --store and --scheduler"
@@ -85,7 +84,7 @@ def _sweep(options: argparse.Namespace, house: House) -> int:
     variation = variation.sampled(options.sampling, samples)
     study = Study(case, variation, samples, options.seed, options.order, options.tol)
     if options.replay:
-        return _replay(options, house, study, engine)
+        return replay(options, house, study, engine)
     with ExitStack() as stack:
         part = None if options.out is None else stack.enter_context(_part(options))
         stops: list[KeyboardInterrupt | KincheckError] = []
@@ -132,18 +131,6 @@ def _check(
     return (engines[0] if engines else None), share
 
 
-def _replay_problems(options: argparse.Namespace) -> list[str]:
-    """Return what keeps variants from being solved again: a Latin hypercube takes their number."""
-    if not options.replay:
-        return []
-    if options.sampling is Sampling.LATIN:
-        if options.samples is None:
-            return ["--replay: a Latin hypercube depends on the number of variants; give --samples"]
-    elif options.samples is not None:
-        return ["--replay: a variant is known by seed and index; leave out --samples"]
-    return []
-
-
 def _only(case: Case, names: list[str], problems: list[str]) -> Case:
     """Return the case with the named outputs only, or with all if none is named."""
     there = [output.name for output in case.outputs]
@@ -171,23 +158,6 @@ def _limited(
     if left_out := [name for name in limits if name not in kept]:
         complain([f"limits of {', '.join(left_out)}: left out, as --output leaves out these"])
     return replace(variation, limits=tuple(kept.values()))
-
-
-def _solver(options: argparse.Namespace, engine: Engine) -> Solver:
-    """Return the solver of checked variants: this process for an engine without foreign code, else
-    worker processes.
-    """
-    from ..harness.engine import may_run_here
-    from ..harness.execution import here
-    from ..harness.resource_limits import Limits, default_jobs
-    from ..harness.workers.distributed import on_cluster
-    from ..harness.workers.pool import in_workers
-
-    if options.scheduler is not None:
-        return on_cluster(options.scheduler, Limits())
-    if may_run_here(engine):
-        return here
-    return in_workers(options.jobs or default_jobs(), Limits())
 
 
 def _part(options: argparse.Namespace) -> Part:
@@ -239,7 +209,7 @@ def _solve(
     meter = Meter("sweep", quiet=options.quiet, every=EVERY)
     check = None
     if engine is not None:
-        check = Check(engine, share, _solver(options, engine), options.tol, checked)
+        check = Check(engine, share, checking_solver(options, engine), options.tol, checked)
     with ExitStack() as stack:
         stack.enter_context(meter)
         store = (
@@ -264,40 +234,6 @@ def _solve(
             part=part,
             stopped=stops.append,
         )
-
-
-def _replay(options: argparse.Namespace, house: House, study: Study, engine: Engine | None) -> int:
-    """Solve single variants as a run does: its table, its report, its status."""
-    from ..harness import run as running
-    from ..harness.standard import STANDARD
-    from . import destinations as delivery
-
-    for index in options.replay:
-        if study.samples and index >= study.samples:
-            raise KincheckError(
-                f"--replay {index}: there are {study.samples} variants, 0 to {study.samples - 1};"
-                " give one of them"
-            )
-    native = house.engine(STANDARD)
-    engines = [native] if engine is None or engine.name == STANDARD else [native, engine]
-    cases = [study.of_variant(index) for index in dict.fromkeys(options.replay)]
-    results = running.run(
-        cases,
-        engines,
-        tol=options.tol,
-        command=options.command,
-        solver=_solver(options, engines[-1]),
-    )
-    problems: list[str] = []
-    delivery.deliver(results, problems, delivery.Destinations.of(options))
-    if engine is not None:
-        problems += lacking(results, [], [engine.name]) + uncompared(results)
-    complain(problems)
-    if problems:
-        return Status.FAILED
-    return (
-        Status.DEVIATES if any(record.outcome.bad for record in results.records) else Status.WITHIN
-    )
 
 
 def _deliver(options: argparse.Namespace, results: SweepResults) -> list[str]:
