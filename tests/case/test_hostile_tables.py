@@ -201,6 +201,7 @@ OTHERS = {
     "car.jpg": (b"\xff\xd8\xff\xe0", "found a JPEG image"),
     "car.ods": (zipped("content.xml"), "found an OpenDocument file (.ods, .odt)"),
     "car.docx": (zipped("word/document.xml"), "found a Word document"),
+    "car.xlsb": (zipped("xl/workbook.bin"), "found a binary Excel workbook (.xlsb)"),
     "table.xlsx": (zipped("word/document.xml"), "found a Word document, expected a workbook"),
     "car.zip": (zipped("car.csv"), "found a zip archive, expected text; unpack it"),
     "page.csv": (b"<!DOCTYPE html><html>", "found a web page (HTML)"),
