@@ -8,6 +8,7 @@ import zipfile
 import pytest
 from kincheck.core.case.io.reader_options import LEFT_OUT, Supplied
 from kincheck.core.case.models.files import load
+from kincheck.core.case.models.hardpoints.templates import TEMPLATES
 from kincheck.core.cli.main import main
 from kincheck.core.errors import CaseError
 
@@ -96,6 +97,17 @@ READ = {
 @pytest.mark.parametrize("kind", READ)
 def test_read(tmp_path, plain, kind):
     assert read(tmp_path, READ[kind]).mechanism == plain
+
+
+def test_a_strut_by_the_names_of_optimumk(tmp_path):
+    names = {"lca_front": "CHAS_LowFor", "lca_rear": "CHAS_LowAft", "lca_outer": "UPRI_LowPnt"}
+    rows = {names.get(name, name): at for name, at in TEMPLATES["mcpherson"].sample.items()}
+    file = tmp_path / "car.csv"
+    file.write_text(table("name;x [m];y [m];z [m]", points=rows))
+    by_role = Supplied("mcpherson", axes="iso")
+    theirs = load(file, by_role).mechanism
+    file.write_text(table("name;x [m];y [m];z [m]", points=TEMPLATES["mcpherson"].sample))
+    assert theirs == load(file, by_role).mechanism
 
 
 def test_what_is_no_point_is_listed(tmp_path):
