@@ -65,7 +65,7 @@ def add_options(command: argparse.ArgumentParser) -> None:
             " and trail"
         ),
     )
-    points.add_argument("--wheelbase", metavar="M", help="[m], for Ackermann of a whole axle")
+    points.add_argument("--wheelbase", metavar="M", help="[m], for Ackermann and anti-values")
     points.add_argument(
         "--axle",
         metavar="MOTION",
@@ -89,6 +89,18 @@ def add_options(command: argparse.ArgumentParser) -> None:
             "travel of the rack while the wheel goes up [m], positive to the left: -M to M, or"
             " START:STOP"
         ),
+    )
+    points.add_argument(
+        "--position",
+        metavar="AXLE",
+        help="front or rear, for anti-values; with --wheelbase, --cg-height and a share",
+    )
+    points.add_argument("--cg-height", metavar="M", help="of the vehicle above the road [m]")
+    points.add_argument(
+        "--brake-share", metavar="X", help="part of the braking force at this axle, 0 to 1"
+    )
+    points.add_argument(
+        "--drive-share", metavar="X", help="part of the driving force at this axle, 0 to 1"
     )
     points.add_argument("--sheet", metavar="NAME", help="of a workbook with several tables")
     model = command.add_argument_group(
@@ -155,6 +167,10 @@ def supplied(options: argparse.Namespace) -> Supplied:
         (*options.start,),
         options.rack,
         options.sheet,
+        options.position,
+        options.cg_height,
+        options.brake_share,
+        options.drive_share,
     )
 
 

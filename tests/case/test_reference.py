@@ -17,6 +17,30 @@ def test_reference_in_a_file(tmp_path: Path):
     assert case.truth is Truth.CLOSED_FORM
 
 
+GERMAN = "push;tip_x;tip_x.velocity\n-0,1;1,4;2,0\n0,0;1,5;2,0\n0,1;1,6;2,0\n"
+DIALECTS = {
+    "semicolons": GERMAN.replace(",", "."),
+    "decimal commas": GERMAN,
+    "tabs": GERMAN.replace(";", "\t"),
+    "trailing separators": GERMAN.replace("\n", ";;\n"),
+    "a line sep=": "sep=;\r\n" + GERMAN.replace("\n", "\r\n"),
+    "a title": "Rig 3, left;;\n\n" + GERMAN,
+    "Windows-1252": ("# geprüft\n" + GERMAN).encode("cp1252"),
+    "UTF-16": ("Prüfstand\n" + GERMAN).encode("utf-16"),
+    "quotes": GERMAN.replace("tip_x;", '"tip_x";').replace("1,4", '"1,4"'),
+}
+
+
+@pytest.mark.parametrize("kind", DIALECTS)
+def test_dialects_of_spreadsheets(tmp_path: Path, kind: str):
+    text = DIALECTS[kind]
+    write(tmp_path, text, "tip.csv")
+    series = load_case(write(tmp_path, BASE + BY_FILE)).reference["tip_x"]
+    assert series.position.tolist() == [1.4, 1.5, 1.6]
+    assert series.velocity is not None
+    assert series.velocity.tolist() == [2.0, 2.0, 2.0]
+
+
 def test_outputs_may_lack_a_reference(tmp_path: Path):
     more = '\n[outputs.tip_y]\npoint = "tip"\ncomponent = "y"\n'
     case = load_case(write(tmp_path, BASE + more + INLINE))
@@ -25,6 +49,9 @@ def test_outputs_may_lack_a_reference(tmp_path: Path):
 
 
 REFERENCES = [
+    (GERMAN.replace("1,5", "1.5"), ["tip.csv", "line 3", "'1.5'", "'-0,1' above", "one decimal"]),
+    (GERMAN.replace("1,5", "=B2"), ["tip.csv", "line 3, column tip_x", "'=B2'", "correct it"]),
+    ("%PDF-1.7", ["tip.csv", "found a PDF document, expected text"]),
     (
         CSV.replace("\n 0.0", "\n0.01"),
         ["tip.csv", "line 5", "0.01 m", "the nearest is 0 m", "expected 4 rows", "found 3"],

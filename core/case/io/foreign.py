@@ -44,6 +44,11 @@ _SIGNATURES: Sequence[tuple[bytes, str, str]] = (
 _HTML = re.compile(rb"\s*(?:<!doctype\s+html|<html|<table|<meta)\b", re.IGNORECASE)
 _MEMBERS: Sequence[tuple[Callable[[str], bool], str, str]] = (
     (
+        lambda name: name == "xl/workbook.bin",
+        "a binary Excel workbook (.xlsb)",
+        "save it as .xlsx or as CSV",
+    ),
+    (
         lambda name: name.startswith("xl/"),
         EXCEL,
         "name it .xlsx, or save the sheet as CSV",

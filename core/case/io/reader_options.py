@@ -22,6 +22,9 @@ class Supplied:
         wheel_radius: loaded radius of the wheel of hardpoints [m].
         wheelbase: of the vehicle of hardpoints [m].
         axle: motion of both wheels of hardpoints: "heave", "roll" or "steer".
+        position: axle of hardpoints, "front" or "rear", for anti-values.
+        cg_height: of the vehicle of hardpoints above the road [m].
+        brake_share, drive_share: parts of the forces at the axle of hardpoints [-].
         drive: driven joints of a model: "JOINT:START:STOP" or "JOINT:START:STOP:SAMPLES", in their
             coordinates [rad, m].
         hold: joints or free bodies of a model that are held in place.
@@ -45,6 +48,10 @@ class Supplied:
     start: tuple[str, ...] = ()
     rack: str | None = None
     sheet: str | None = None
+    position: str | None = None
+    cg_height: str | None = None
+    brake_share: str | None = None
+    drive_share: str | None = None
 
     @property
     def given(self) -> tuple[str, ...]:

@@ -54,6 +54,10 @@ _OF_HARDPOINTS = (
     "wheel-radius",
     "wheelbase",
     "axle",
+    "position",
+    "cg-height",
+    "brake-share",
+    "drive-share",
 )
 _OPTIONS = {
     CASE: ("closure",),

@@ -5,19 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 from ....mechanism.mechanism import Vector
 from ...case import Case, Quantity, size
 from ...io.coordinates import with_all_coordinates
-from ...io.document import decimal, fault, shown
+from ...io.document import fault
 from ...io.suspension import with_slopes
 from ...io.tolerance import default
 from ...markers import with_markers
 from ...suspension import Convention, Side, SuspensionOutput, Vehicle
 from ...suspension.wheel import Place
 from .axle import STROKE, AxleMotion, name_of
+from .car import Car, read_length
 from .table import HardpointTable
 from .templates.base import (
     WHEEL_AXIS,
@@ -45,13 +45,11 @@ class Wheel:
     Attributes:
         radius: from the centre to the road in the wheel plane [m]; None if unknown.
         toe, camber: at design [rad].
-        wheelbase: [m]; None if unknown.
     """
 
     radius: float | None
     toe: float
     camber: float
-    wheelbase: float | None = None
 
 
 def wheel_of(
@@ -59,14 +57,13 @@ def wheel_of(
     named: Mapping[str, str],
     at: Mapping[str, Vector],
     radius: str | None,
-    wheelbase: str | None,
 ) -> Wheel:
     """Return the wheel: radius and attitude follow from points if the table has them.
 
     Args:
         named: names of the points in the file, by role.
         at: positions by role [m].
-        radius, wheelbase: lengths from the user [m].
+        radius: the length from the user [m].
 
     Raises:
         CaseError: a length is unusable or contradicts the points, or the axis points inboard.
@@ -92,7 +89,7 @@ def wheel_of(
             f"found {radius}, and the point {named[WHEEL_CONTACT.name]}, expected one of them;"
             " leave out --wheel-radius",
         )
-    given = _length(table.file, "wheel-radius", radius) if measured is None else measured
+    given = read_length(table.file, "wheel-radius", radius) if measured is None else measured
     if given is not None and not RADII[0] <= given <= RADII[1]:
         where = "--wheel-radius" if measured is None else named[WHEEL_CONTACT.name]
         raise fault(
@@ -101,29 +98,14 @@ def wheel_of(
             f"found a wheel's radius of {given:.6g} m, expected {RADII[0]:g} to {RADII[1]:g} m;"
             " correct it",
         )
-    base = _length(table.file, "wheelbase", wheelbase)
-    if base is not None and not base > 0.0:
-        raise fault(table.file, "--wheelbase", f"found {base:.6g} m, expected a length; correct it")
-    return Wheel(given, toe, camber, base)
-
-
-def _length(file: Path, option: str, text: str | None) -> float | None:
-    if text is None:
-        return None
-    try:
-        return decimal(text)
-    except ValueError:
-        raise fault(
-            file,
-            f"--{option}",
-            f"found {shown(text)}, expected metres; say --{option} 0.3",
-        ) from None
+    return Wheel(given, toe, camber)
 
 
 def with_suspension_outputs(
     case: Case,
     template: Template,
     wheel: Wheel,
+    car: Car,
     at: Mapping[str, Vector],
     motion: str | None,
     *,
@@ -142,19 +124,19 @@ def with_suspension_outputs(
     watched: list[str] = []
     travel = tuple(name_of(each, STROKE) for each in Side) if axle else (STROKE,) * steered
     vehicles = [
-        replace(_vehicle(side, template, wheel, axle), travel=travel)
+        replace(_vehicle(side, template, wheel, car, axle), travel=travel)
         for side in (Side if axle else [Side.LEFT])
     ]
     for vehicle in vehicles:
         prefix = f"{vehicle.side}_" if axle else ""
-        for name, cls, own in _types(template, wheel, at):
+        for name, cls, own in _types(template, wheel, car, at):
             ends = {key: tuple(prefix + each for each in own[key]) for key in own if key != "at"}
             given = default(extent, cls.measure)
             outputs.append(cls(prefix + name, vehicle, *given, **{**own, **ends}))
         watched += [prefix + role for role in template.watched]
     if axle and wheel.radius is not None:
         turning = steered or motion == AxleMotion.STEER
-        names = [*AXLE, *(ACKERMANN if wheel.wheelbase and turning else ())]
+        names = [*AXLE, *(ACKERMANN if car.wheelbase and turning else ())]
         for name in names:
             cls = SuspensionOutput.registry[name]
             given = default(extent, cls.measure)
@@ -168,7 +150,7 @@ def with_suspension_outputs(
     )
 
 
-def _vehicle(side: Side, template: Template, wheel: Wheel, axle: bool) -> Vehicle:
+def _vehicle(side: Side, template: Template, wheel: Wheel, car: Car, axle: bool) -> Vehicle:
     """Return the vehicle with the wheel of a side."""
     prefix = f"{side}_" if axle else ""
     return Vehicle(
@@ -180,13 +162,17 @@ def _vehicle(side: Side, template: Template, wheel: Wheel, axle: bool) -> Vehicl
         static_toe=wheel.toe,
         static_camber=wheel.camber,
         wheel_radius=wheel.radius,
-        wheelbase=wheel.wheelbase,
+        axle=car.position,
+        wheelbase=car.wheelbase,
+        cg_height=car.cg_height,
+        brake_share=car.brake_share,
+        drive_share=car.drive_share,
         kingpin=prefixed(prefix, template.kingpin),
     )
 
 
 def _types(
-    template: Template, wheel: Wheel, at: Mapping[str, Vector]
+    template: Template, wheel: Wheel, car: Car, at: Mapping[str, Vector]
 ) -> Iterator[tuple[str, type[SuspensionOutput], Mapping[str, Any]]]:
     """Yield name, class and own fields of each output that is defined."""
     types = [*WHEEL]
@@ -194,6 +180,7 @@ def _types(
         types += STEERING_AXIS
     if wheel.radius is not None:
         types += [*ON_THE_ROAD, *(AXIS_ON_THE_ROAD if template.kingpin else ())]
+        types += car.anti_outputs
     for name in types:
         yield name, SuspensionOutput.registry[name], {}
     place = Place.WHEEL_CENTER if wheel.radius is None else Place.CONTACT

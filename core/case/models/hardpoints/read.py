@@ -15,6 +15,7 @@ from ...io.document import explained, fault, shown
 from ...io.escape import visible
 from ...io.reader_options import LEFT_OUT, Supplied
 from .axle import one_wheel, whole_axle
+from .car import read_car
 from .default_outputs import wheel_of, with_suspension_outputs
 from .own_names import read_own_names
 from .table import HardpointTable, coordinate, placed, require_size, unit_of
@@ -51,7 +52,8 @@ def case_of_hardpoints(table: HardpointTable, supplied: Supplied) -> Case:
     named = _filled(table, template, supplied.names)
     at = {role: points[name] for role, name in named.items()}
     require_size(table, at, supplied.units)
-    wheel = wheel_of(table, named, at, supplied.wheel_radius, supplied.wheelbase)
+    wheel = wheel_of(table, named, at, supplied.wheel_radius)
+    car = read_car(file, supplied)
     travels = read_travels(file, supplied.travel, supplied.rack)
     _require_left_and_upright(table, template, named, at, supplied)
     with explained(file, "", unit_of(table, supplied.units)):
@@ -70,7 +72,7 @@ def case_of_hardpoints(table: HardpointTable, supplied: Supplied) -> Case:
     case = Case(file.stem, source, Truth.CONSENSUS_ONLY, mechanism, sweep, ())
     case = replace(case, length_unit=unit_of(table, supplied.units).name)
     return with_suspension_outputs(
-        case, template, wheel, at, supplied.axle, steered=supplied.rack is not None
+        case, template, wheel, car, at, supplied.axle, steered=supplied.rack is not None
     )
 
 

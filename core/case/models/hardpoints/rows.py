@@ -68,7 +68,7 @@ def read_rows(
         if fact := remark(cells):
             facts.setdefault(*fact)
         else:
-            left_out.append(f"{where} ({brief(written(cells))})")
+            left_out.append(f"{where} ({brief(written(cells).strip(','))})")
     body = list(rows[place + 1 :])
     unit = head.unit
     if unit is None and body and (below := _units(body[0][1])):
@@ -94,7 +94,7 @@ def read_rows(
         raise fault(
             file, "", "found a head and no row, expected hardpoints; the file was cut: save it anew"
         )
-    left_out += [f"{where} ({brief(written(cells))})" for where, cells in notes]
+    left_out += [f"{where} ({brief(written(cells).strip(','))})" for where, cells in notes]
     left_out += [f"column {brief(name)}" for name in head.others]
     return HardpointTable(
         file,

@@ -143,7 +143,8 @@ def placed(table: HardpointTable, units: str | None, axes: str | None) -> dict[s
     for name, point in table.points.items():
         position = [0.0, 0.0, 0.0]
         for value, (k, sign) in zip(point.position, places, strict=True):
-            position[k] = sign * convert(value)
+            place = sign * convert(value)
+            position[k] = place if usable(place) else 0.0  # too small to be squared
         points[name] = (position[0], position[1], position[2])
     return points
 

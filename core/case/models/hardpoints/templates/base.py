@@ -194,6 +194,28 @@ def spring_roles(lower: str, section: str) -> tuple[Role, ...]:
     )
 
 
+def arm_names(level: str, end: str) -> tuple[str, ...]:
+    """Return names of a point of a wishbone in tables of Adams/Car, Lotus Suspension Analysis,
+    suspension-explorer and OptimumK.
+
+    Args:
+        level: upper or lower.
+        end: front, rear or outer.
+    """
+    wishbone, optimum = f"{level}_wishbone", level[:3].capitalize()
+    own = {
+        "front": (f"{wishbone}_front_pivot", f"{wishbone}_inboard_front", f"CHAS_{optimum}For"),
+        "rear": (f"{wishbone}_rear_pivot", f"{wishbone}_inboard_rear", f"CHAS_{optimum}Aft"),
+        "outer": (
+            f"{level}_ball_joint",
+            f"{wishbone}_outer_ball_joint",
+            f"{wishbone}_outboard",
+            f"UPRI_{optimum}Pnt",
+        ),
+    }
+    return (f"{level}_arm_{end}", *own[end])
+
+
 SPRINGS: Mapping[str, tuple[str, str]] = {
     "spring_ratio": ("spring_lower", "spring_upper"),
     "damper_ratio": ("damper_lower", "damper_upper"),

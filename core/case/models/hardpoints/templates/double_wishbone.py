@@ -16,6 +16,7 @@ from .base import (
     WHEEL_CENTER,
     Role,
     Template,
+    arm_names,
     between,
     spring_bodies,
     spring_roles,
@@ -48,45 +49,22 @@ def _rods(at: Mapping[str, Vector]) -> Sequence[Joint]:
 
 
 def _arm(arm: str, level: str) -> tuple[Role, Role, Role]:
-    """Return the roles of an arm, with its names in Project Chrono, OptimumK (CHAS_LowFor) and
-    Lotus Suspension Analysis (Lower wishbone front pivot).
-    """
-    chrono, plain = f"{level.capitalize()} Control Arm", f"{level}_arm"
-    wishbone, optimum = f"{level}_wishbone", level[:3].capitalize()
+    chrono = f"{level.capitalize()} Control Arm"
     return (
         Role(
             f"{arm}_front",
             f"the {level} arm's front pivot on the chassis",
-            (
-                f"{chrono}/Location Chassis Front",
-                f"{plain}_front",
-                f"{wishbone}_front_pivot",
-                f"{wishbone}_inboard_front",
-                f"CHAS_{optimum}For",
-            ),
+            (f"{chrono}/Location Chassis Front", *arm_names(level, "front")),
         ),
         Role(
             f"{arm}_rear",
             f"the {level} arm's rear pivot on the chassis",
-            (
-                f"{chrono}/Location Chassis Back",
-                f"{plain}_rear",
-                f"{wishbone}_rear_pivot",
-                f"{wishbone}_inboard_rear",
-                f"CHAS_{optimum}Aft",
-            ),
+            (f"{chrono}/Location Chassis Back", *arm_names(level, "rear")),
         ),
         Role(
             f"{arm}_outer",
             f"the {level} arm's ball joint on the knuckle",
-            (
-                f"{chrono}/Location Upright",
-                f"{plain}_outer",
-                f"{level}_ball_joint",
-                f"{wishbone}_outer_ball_joint",
-                f"{wishbone}_outboard",
-                f"UPRI_{optimum}Pnt",
-            ),
+            (f"{chrono}/Location Upright", *arm_names(level, "outer")),
         ),
     )
 

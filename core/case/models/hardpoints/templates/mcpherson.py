@@ -16,6 +16,7 @@ from .base import (
     WHEEL_CENTER,
     Role,
     Template,
+    arm_names,
     between,
 )
 
@@ -48,17 +49,17 @@ MCPHERSON = Template(
         Role(
             "lca_front",
             "the arm's front pivot on the chassis",
-            ("Control Arm/Location Chassis Front", "lower_arm_front"),
+            ("Control Arm/Location Chassis Front", *arm_names("lower", "front")),
         ),
         Role(
             "lca_rear",
             "the arm's rear pivot on the chassis",
-            ("Control Arm/Location Chassis Back", "lower_arm_rear"),
+            ("Control Arm/Location Chassis Back", *arm_names("lower", "rear")),
         ),
         Role(
             "lca_outer",
             "the arm's ball joint on the knuckle",
-            ("Control Arm/Location Upright", "lower_arm_outer"),
+            ("Control Arm/Location Upright", *arm_names("lower", "outer")),
         ),
         Role(
             "strut_lower",
