@@ -30,6 +30,23 @@ def test_import_loads_names_only():
     assert found == ["", "kincheck kincheck.core kincheck.core.version", "True False"]
 
 
+HELP = """
+import contextlib, io, sys
+from kincheck.core.cli.main import main
+with contextlib.redirect_stdout(io.StringIO()):
+    status = main(["--help"])
+print(status, *sorted({name.split(".")[0] for name in sys.modules} & {"numpy", "scipy", "rich"}))
+"""
+
+
+def test_help_loads_no_library():
+    """In a fresh interpreter: with numpy, help and completion would take four times as long."""
+    found = subprocess.run(
+        [sys.executable, "-c", HELP], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert found.stdout.split() == ["0"]
+
+
 @pytest.mark.parametrize("name", kincheck.__all__)
 def test_every_name_is_there(name):
     assert getattr(kincheck, name) is not None

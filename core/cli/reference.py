@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 from ..case.io.escape import file_name
 from ..errors import KincheckError
-from ..trajectory import QUANTITIES
 from .option_types import whole
 from .registry import House, Status, add_joint_types
 from .run_options import TOL
@@ -151,6 +150,8 @@ def _lines(found: Reference, errors: list[NativeError], named: int) -> list[str]
     ]
     if errors:
         wide = max(len(error.output) for error in errors)
+        from ..trajectory import QUANTITIES
+
         heads = ("native error", *QUANTITIES)
         lines.append(f"  {heads[0]:{wide}}" + "".join(f"  {head:>20}" for head in heads[1:]))
         for error in errors:

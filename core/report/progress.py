@@ -5,10 +5,13 @@ from __future__ import annotations
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING
 
 from ..case.io.escape import visible
 from ..extras import how_to_install
-from ..harness.record import Outcome, Record, Results
+
+if TYPE_CHECKING:
+    from ..harness.record import Record, Results
 
 
 def complain(lines: Iterable[str]) -> None:
@@ -37,6 +40,8 @@ def progress(records: list[Record], *, quiet: bool = False) -> Callable[[Record,
 
 def lacking(results: Results, required: Sequence[str], named: Sequence[str] = ()) -> list[str]:
     """Return the failures of required engines and the named engines that are missing."""
+    from ..harness.record import Outcome
+
     lines = [
         (
             f"required engine {record.engine!r}: {record.message}"
@@ -64,6 +69,8 @@ def lacking(results: Results, required: Sequence[str], named: Sequence[str] = ()
 
 def uncompared(results: Results) -> list[str]:
     """Return why a run has compared nothing: then no result deviates, and none is right."""
+    from ..harness.record import Outcome
+
     counts = Counter(record.outcome for record in results.records)
     if any(outcome.judged for outcome in counts):
         return []
