@@ -103,8 +103,8 @@ IMPORTS = {
     "history": ". case case/io harness",
     "history/regression": ". case case/io harness history",
     "report": ". joints mechanism case case/io harness history history/regression",
-    "studies/stress/truth": ". program joints mechanism kinematics case",
-    "studies/stress/families": ". joints mechanism case case/io studies/stress/truth",
+    "studies/stress/truth": ". program joints mechanism kinematics case case/measures",
+    "studies/stress/families": ". joints mechanism case case/measures case/io studies/stress/truth",
     "studies": ". program joints mechanism kinematics case case/io harness report",
     "studies/joint_check": ". primitives program joints mechanism kinematics case harness studies",
     "studies/engine_check": (

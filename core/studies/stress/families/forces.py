@@ -33,7 +33,7 @@ LARGEST = 8
 # Shorter springs have directions that a small error turns far [m].
 SHORTEST = 0.1
 # Of the reach of loops: most specimens come to no singular pose, where forces grow without limit.
-NEAR = 0.3
+NEAR = 0.1
 # Forces have bounds of their own here; an output cannot be without a tolerance.
 TOLERANCE = (1e-6, 1e-9, "the stress truth has bounds of its own")
 
