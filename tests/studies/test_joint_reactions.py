@@ -5,9 +5,10 @@ from dataclasses import replace
 import pytest
 from kincheck.core import Revolute, Spherical, check_joint
 from kincheck.core import primitives as p
-from kincheck.core.case.joint_probe import probe
+from kincheck.core.case.joint_probe import AXIS, probe
 from kincheck.core.harness.native_engine import NativeEngine
 from kincheck.core.joints import Joint
+from kincheck.core.joints.base import unit
 from kincheck.core.kinematics.forces import equations
 from kincheck.core.studies.findings import Verdict
 from kincheck.core.studies.joint_check import reactions as checks
@@ -15,7 +16,7 @@ from kincheck.core.studies.joint_check.loaded_probe import loaded, solved
 from kincheck.core.studies.joint_check.loop import loops
 from kincheck.core.studies.stress.solving import interpreted
 
-from .test_check_joint_mistakes import mistaken, negative_gamma, steady
+from .test_check_joint_mistakes import mistaken, negative_gamma
 
 pytestmark = pytest.mark.usefixtures("own_joint_types")
 CHECKS = ["power", "no work", "acts and reacts", "order", "units", "place"]
@@ -37,18 +38,28 @@ def test_sound_joints_pass(name):
     assert found(Joint.registry[name]) == dict.fromkeys(CHECKS, Verdict.PASS)
 
 
-def test_a_joint_that_works_is_found():
-    """Its right-hand side of velocities is not zero: the joint drives."""
-    assert {"power", "no work"} <= {*failing(mistaken(Revolute, p.Dot11, nu=steady))}
+def planted(monkeypatch, change):
+    """Change force and moment of the joint under test."""
+    right = equations.ForceEquations.reaction
+
+    def wrong(self, joint, multipliers):
+        found = right(self, joint, multipliers)
+        return change(*found) if joint.name == "tested" else found
+
+    monkeypatch.setattr(equations.ForceEquations, "reaction", wrong)
 
 
-def stronger(self, i, j):
-    return tuple(row._replace(pi=1.25 * row.pi) for row in super(type(self), self).rows(i, j))
+def test_a_moment_about_a_free_axis_is_found(monkeypatch):
+    """That of a hinge: the reaction works as it turns."""
+    axis = unit(AXIS)
+    planted(monkeypatch, lambda force, moment: (force, moment + (force @ axis) * axis))
+    assert {"no work", "acts and reacts"} <= {*failing(Revolute)}
 
 
-def test_a_reaction_that_is_not_the_opposite_is_found():
-    """Newton's iteration still converges with these rows, to the right pose."""
-    assert "acts and reacts" in failing(mistaken(Revolute, p.Dot11, rows=stronger))
+def test_a_reaction_that_balances_no_body_is_found(monkeypatch):
+    """It does no work on a ball's freedoms, but is too small."""
+    planted(monkeypatch, lambda force, moment: (0.99 * force, moment))
+    assert failing(Spherical) == ["acts and reacts"]
 
 
 def by_metres(self, factor):
@@ -76,7 +87,7 @@ def test_forces_that_depend_on_the_order_are_found(monkeypatch):
         return tuple(part * each for each in right(self, joint, multipliers))
 
     monkeypatch.setattr(equations.ForceEquations, "reaction", by_number)
-    assert "order" in failing(Revolute)
+    assert "order" in failing(Spherical)
 
 
 def test_a_wrong_sign_of_gravity_is_found(monkeypatch):
