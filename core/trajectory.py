@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Generic, TypeAlias, TypeVar
@@ -23,6 +23,10 @@ QUANTITIES = ("position", "velocity", "acceleration")
 """Quantities of a motion: each is the rate of the one before."""
 PER_TIME = ("", "/s", "/s^2")
 """Suffixes of their units."""
+MARKER = "~"
+"""Prefix of the points that the case reader adds, to measure a body's rotation or for forces; no
+hardpoints, and not shown.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +171,7 @@ class Trajectory(Tabular):
         """Return the driver's range, the samples and points, and why samples are missing."""
         count, reached = len(self.solved), int(self.solved.sum())
         samples = f"{count} samples" if reached == count else f"{reached} of {count} samples"
-        points = f"points {', '.join(self.points) or 'none'}"
+        points = f"points {', '.join(shown(self.points)) or 'none'}"
         found = [in_words(self.drive), samples, points, f"residual {self.residual:.1e}"]
         return ", ".join(filter(None, [*found, self.message]))
 
@@ -186,6 +190,11 @@ def largest_found(values: Array) -> float:
     return float(values.max()) if values.size else math.nan
 
 
+def shown(points: Iterable[str]) -> list[str]:
+    """Return the names of points without those that outputs add to a mechanism."""
+    return [name for name in points if not name.startswith(MARKER)]
+
+
 def as_variables(
     points: Mapping[str, PointMotion], dims: tuple[str, ...], drive: Driving | None
 ) -> tuple[dict[str, Variable], dict[str, Variable], str]:
@@ -196,6 +205,8 @@ def as_variables(
         dims: of the samples, the last one "sample".
     """
     along = {} if drive is None else drive.coords()
+    count = _samples(points)
+    points = {name: points[name] for name in shown(points)}
     axes = {"point": Variable("point", [*points]), "axis": Variable("axis", ["x", "y", "z"])}
     variables = dict[str, Variable]()
     for quantity, per_time in zip(QUANTITIES, PER_TIME, strict=True):
@@ -203,7 +214,7 @@ def as_variables(
         if series and all(each is not None for each in series):
             stacked = np.stack(series, axis=-2)
             variables[quantity] = Variable((*dims, "point", "axis"), stacked, f"m{per_time}")
-    numbered = {} if along else {"sample": Variable("sample", np.arange(_samples(points)))}
+    numbered = {} if along else {"sample": Variable("sample", np.arange(count))}
     return {**along, **numbered, **axes}, variables, next(iter(along), "sample")
 
 

@@ -108,7 +108,10 @@ IMPORTS = {
     "studies/stress/truth": ". program joints mechanism kinematics case case/measures",
     "studies/stress/families": ". joints mechanism case case/measures case/io studies/stress/truth",
     "studies": ". program joints mechanism kinematics case case/io harness report",
-    "studies/joint_check": ". primitives program joints mechanism kinematics case harness studies",
+    "studies/joint_check": (
+        ". primitives program joints mechanism kinematics case case/measures case/io "
+        "harness studies"
+    ),
     "studies/engine_check": (
         ". primitives joints case harness harness/workers studies studies/joint_check"
     ),

@@ -11,9 +11,7 @@ from typing import Any, Protocol
 from ..algebra import Vec3
 from ..jet import Jet
 from ..mechanism.mechanism import Mechanism, Point, Vector
-
-MARKER = "~"
-"""Prefix of the points that the case reader adds to measure a body's rotation; no hardpoints."""
+from ..trajectory import MARKER as MARKER
 
 ORDERS = 3
 """Orders of an output of the pose alone: value, velocity and acceleration."""

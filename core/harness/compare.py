@@ -89,10 +89,14 @@ def output_series(
 
 def _force_series(output: ForceMeasure, trajectory: Trajectory) -> Series:
     """Return a force over the samples, NaN where it is missing or undetermined."""
-    if trajectory.forces is None:
+    given = trajectory.forces
+    # a simulator that solves a joint by its equivalent has no reaction of it
+    if given is None or not {*given.joints, *given.drivers, *given.elements}.issuperset(
+        output.forces
+    ):
         return Series(np.full(len(trajectory.solved), np.nan), possible=False)
-    values = np.where(trajectory.solved, output.values(trajectory.forces), np.nan)
-    return Series(values, reason=output.undetermined(trajectory.forces))
+    values = np.where(trajectory.solved, output.values(given), np.nan)
+    return Series(values, reason=output.undetermined(given))
 
 
 def _moving(motion: PointMotion) -> Vec3:

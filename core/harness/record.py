@@ -157,7 +157,8 @@ class Record(RecordTable, msgspec.Struct, frozen=True, kw_only=True):
         dof: degrees of freedom without drivers; the same in all engines.
         iterations: Newton iterations, sum over the solved samples.
         solved, samples: number of samples reached, and number of samples.
-        us_per_step: time of the warm solve per sample [us]; null unless all samples were reached.
+        us_per_step: time of the warm solve per sample [us], with the forces that outputs read; null
+            unless all samples were reached.
         evidence: of the reference used for the verdict; null without a reference, and in records of
             older versions.
         reasons: why a number is null, by its key: residual_max, rank, dof, iterations, us_per_step.

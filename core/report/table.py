@@ -53,8 +53,8 @@ def print_table(results: Results, file: TextIO) -> None:
 
 
 def print_outputs(results: Results, file: TextIO) -> None:
-    """Print a line for each output of each record, its largest errors and their tolerances, then
-    what `print_table` prints.
+    """Print a line for each output of each record, its largest errors and their tolerances, the
+    reasons of those that are missing, then what `print_table` prints.
     """
     console = terminal.console(file)
     table = terminal.columns(
@@ -67,7 +67,20 @@ def print_outputs(results: Results, file: TextIO) -> None:
             names = (record.case, record.engine, name)
             table.add_row(*(Text(visible(each)) for each in names), *cells, unit)
     console.print(table)
+    for record in results.records:
+        for reason, outputs in _uncompared(record).items():
+            line = f"–: {record.case} · {record.engine}: {', '.join(outputs)}: {reason}"
+            console.print(Text(visible(line)), soft_wrap=True)
     print_table(results, file)
+
+
+def _uncompared(record: Record) -> dict[str, list[str]]:
+    """Return the reasons why quantities are not compared, each with its outputs."""
+    found: dict[str, list[str]] = {}
+    for name, errors in record.errors.items():
+        if errors.reason:
+            found.setdefault(errors.reason, []).append(name)
+    return found
 
 
 def print_summary(results: Results, file: TextIO) -> None:

@@ -25,6 +25,7 @@ from ...kinematics import (
     freeing,
     places,
 )
+from .determinacy import Determinacy, determinacy
 from .outputs import Budget, Sensitivity, binding, budgets, read_points, sensitivities
 
 SCHEMA = "kincheck-explain/1"
@@ -73,6 +74,7 @@ class Diagnosis(msgspec.Struct, frozen=True):
         signs: sign conventions of the outputs; empty without.
         not_derived: outputs of more than the pose, without budget and sensitivities.
         programs: lines on the native engine's programs and the parts left out.
+        determinacy: of reactions and efforts, if forces are asked for; null if it cannot be solved.
     """
 
     schema: str
@@ -98,6 +100,7 @@ class Diagnosis(msgspec.Struct, frozen=True):
     signs: str
     not_derived: list[str]
     programs: list[str]
+    determinacy: Determinacy | None
 
     @property
     def worst(self) -> Sample | None:
@@ -153,10 +156,13 @@ def diagnose(case: Case, *, samples: int, tol: float) -> Diagnosis:
     )
     design = {name: np.array(mechanism.point(name).position) for name in read_points(case)}
     derived = swept is not None and bool(swept.poses)
+    forces = (
+        determinacy(case, swept.trajectory) if swept and swept.trajectory.solved.any() else None
+    )
     return Diagnosis(
         schema=SCHEMA,
         case=case.name,
-        verdict=_verdict(ranks, findings, swept),
+        verdict=_verdict(ranks, findings, swept, forces),
         findings=findings,
         notes=notes(case),
         freedom=freedom,
@@ -177,6 +183,7 @@ def diagnose(case: Case, *, samples: int, tol: float) -> Diagnosis:
         signs=case.signs,
         not_derived=[output.name for output in case.outputs if output.orders != ORDERS],
         programs=programs,
+        determinacy=forces,
     )
 
 
@@ -194,7 +201,9 @@ def _samples(swept: Conditioning) -> list[Sample]:
     ]
 
 
-def _verdict(ranks: Ranks, findings: list[str], swept: Conditioning | None) -> str:
+def _verdict(
+    ranks: Ranks, findings: list[str], swept: Conditioning | None, forces: Determinacy | None
+) -> str:
     """Return in one plain sentence whether the case can be solved, and if not, the kind of the
     reason.
     """
@@ -217,7 +226,8 @@ def _verdict(ranks: Ranks, findings: list[str], swept: Conditioning | None) -> s
     worst = max((p.condition for p in swept.poses), default=1.0)
     lost = f"{np.log10(worst):.0f} of 16 digits at most are lost to conditioning"
     redundant = _counted(len(ranks.dependencies), "redundant row")
-    return f"it can be solved: {count}, {redundant}; all samples reached; {lost}"
+    told = f"; {forces}" if ranks.dependencies and forces is not None else ""
+    return f"it can be solved: {count}, {redundant}; all samples reached; {lost}{told}"
 
 
 def _counted(number: int, one: str, several: str = "") -> str:

@@ -11,10 +11,13 @@ from rich.text import Text
 
 from ...kinematics import NamedRow, describe_screws
 from ...report.terminal import columns, listed
+from .determinacy import Determinacy
 from .diagnose import Diagnosis, Sample
 
 # Rows of tables, which only show where to look; the JSON has all.
 SAMPLES, PLACES, TERMS = 9, 5, 6
+# Components of unit vectors below it are zero.
+ROUND_OFF = 1e-12
 
 
 def print_diagnosis(
@@ -49,6 +52,8 @@ def _parts(found: Diagnosis, verbose: bool) -> Iterator[Text | Table]:
         yield from _budgets(found)
     if found.sensitivities:
         yield from _sensitivities(found, len(found.sensitivities) if verbose else PLACES)
+    if found.determinacy is not None:
+        yield from _forces(found.determinacy)
     if found.not_derived and found.samples:
         yield Text(
             "not functions of the pose alone, so without tolerance and sensitivities here:"
@@ -130,6 +135,45 @@ def _changes(samples: Sequence[Sample], swept: str) -> Iterator[Text]:
             yield Text(
                 f"the determinant changes its sign {where}: there is a singular pose", "yellow"
             )
+
+
+def _forces(found: Determinacy) -> Iterator[Text | Table]:
+    yield _head(f"forces, if asked for: {found}")
+    if found.partly:
+        table = columns(
+            *("joint", ">force", ">moment", ">wrench", "force determined along"),
+            "moment determined along",
+        )
+        for each in found.partly:
+            table.add_row(
+                each.joint,
+                *(
+                    f"{n} of {of}"
+                    for n, of in ((each.force, 3), (each.moment, 3), (each.wrench, 6))
+                ),
+                _directions(each.force_along),
+                _directions(each.moment_along),
+            )
+        yield table
+        yield Text("directions are global axes at the first sample; other components are null")
+    if found.efforts:
+        yield Text(f"undetermined efforts: {listed(found.efforts)}", "yellow")
+
+
+def _directions(found: Sequence[Sequence[float]]) -> str:
+    """Return directions in words; two of them by the one that is left out."""
+    if len(found) == 3:
+        return "all"
+    if len(found) == 2:
+        (x, y, z), (u, v, w) = found
+        return f"all across {_direction((y * w - z * v, z * u - x * w, x * v - y * u))}"
+    return _direction(found[0]) if found else "none"
+
+
+def _direction(axis: Sequence[float]) -> str:
+    first = next((x for x in axis if abs(x) > ROUND_OFF), 1.0)
+    turned = [x if first > 0.0 else -x for x in axis]
+    return f"[{', '.join(f'{0.0 if abs(x) < ROUND_OFF else x:.4g}' for x in turned)}]"
 
 
 def _budgets(found: Diagnosis) -> Iterator[Text | Table]:

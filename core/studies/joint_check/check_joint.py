@@ -114,7 +114,8 @@ def check_joint(
         sorted(found, key=lambda each: order[each.check]), key=lambda each: each.check
     )
     worst = [max(group, key=lambda each: each.badness) for _, group in by_name]
-    loop = loops(offered[0] if own else joint_class, engines)
+    failing = [each.check for each in worst if each.verdict is Verdict.FAIL]
+    loop = loops(offered[0] if own else joint_class, engines, failing)
     return Report(joint_class.__name__, tuple(map(repr, offered)), seed, (*worst, *loop))
 
 

@@ -23,6 +23,8 @@ from ...mechanism.equivalents import declared_equivalent, with_equivalents
 from ...trajectory import Array, Trajectory
 from ..findings import Finding, Verdict, judged
 from .checks import ROUND_OFF
+from .loaded_probe import loaded, solved
+from .reactions import reactions
 
 # Largest accepted constraint residual of an engine [m or -]: round-off of metre-sized coordinates,
 # x1000.
@@ -38,9 +40,14 @@ RATES_WHY = "what the differences change by as their step is doubled: 63 times t
 AGREE_WHY = "error over the tolerance of the probe's outputs"
 
 
-def loops(tested: Joint | type[Joint], engines: Sequence[Engine]) -> Iterator[Finding]:
+def loops(
+    tested: Joint | type[Joint], engines: Sequence[Engine], failing: Sequence[str] = ()
+) -> Iterator[Finding]:
     """Solve the probe of a joint, or of a joint type, natively and in the other engines, and
     yield the findings.
+
+    Args:
+        failing: checks of the equations that fail: then there is no sense in forces.
     """
     try:
         case, native = _unlocked(tested)
@@ -80,6 +87,31 @@ def loops(tested: Joint | type[Joint], engines: Sequence[Engine]) -> Iterator[Fi
     for engine in engines:
         if engine.name != STANDARD:
             yield _simulated(engine, case, other or without, reference)
+    if failing:
+        why = f"first repair {', '.join(failing)}"
+        yield Finding("reaction", Verdict.SKIP, message=why)
+        return
+    try:
+        yield from _forces(case, other or without, engines)
+    except Exception as error:  # any error of the joint's own code
+        yield Finding("reaction", Verdict.FAIL, message=f"{type(error).__name__}: {error}")
+
+
+def _forces(case: Case, other: Case | str, engines: Sequence[Engine]) -> Iterator[Finding]:
+    """Check the reaction in the loaded probe, and compare it with that of the engines."""
+    heavy = loaded(case)
+    probe = solved(heavy, heavy.mechanism)
+    yield from reactions(probe, heavy)
+    reference = {each.name: output_series(heavy, each, probe.motion) for each in heavy.outputs}
+    if not isinstance(other, str):
+        equivalent = _equivalent(heavy)
+        assert equivalent is not None
+        there = {joint.name for joint in equivalent.mechanism.joints} | {heavy.sweep.driver}
+        outputs = tuple(each for each in heavy.outputs if there.issuperset(each.forces))
+        other = replace(equivalent, outputs=outputs)
+    for engine in engines:
+        if engine.name != STANDARD:
+            yield _simulated(engine, heavy, other, reference, "reaction")
 
 
 def _unlocked(tested: Joint | type[Joint]) -> tuple[Case, Trajectory]:
@@ -152,12 +184,16 @@ def _equivalent(case: Case) -> Case | None:
 
 
 def _simulated(
-    engine: Engine, case: Case, other: Case | str, reference: dict[str, Series]
+    engine: Engine,
+    case: Case,
+    other: Case | str,
+    reference: dict[str, Series],
+    what: str = "loop",
 ) -> Finding:
     """Compare an engine's answer with the native one; `other` is the equivalent case, or the reason
     for its absence.
     """
-    name = f"loop: {engine.name}"
+    name = f"{what}: {engine.name}"
     if engine.version() is None:
         return Finding(name, Verdict.SKIP, message="not installed")
     try:
@@ -175,12 +211,14 @@ def _simulated(
             return Finding(name, Verdict.SKIP, message=f"{reason}; nor its equivalent: {unknown}")
         chosen = other
     try:
-        solved = engine.solve(engine.build(chosen), chosen, TOL)
-        check(chosen, engine.name, solved)
+        answer = engine.solve(engine.build(chosen), chosen, TOL)
+        check(chosen, engine.name, answer)
     except Exception as error:  # any error of a simulator
         return Finding(name, Verdict.FAIL, message=f"{type(error).__name__}: {error}")
-    found = _compared(name, chosen, solved, reference)
-    itself = chosen is case and "equivalents" not in solved.details
+    if chosen.forces and answer.forces is None:
+        return Finding(name, Verdict.SKIP, message="the engine gives no forces")
+    found = _compared(name, chosen, answer, reference)
+    itself = chosen is case and "equivalents" not in answer.details
     how = "on the joint itself" if itself else "on the equivalent"
     return replace(found, message="; ".join(part for part in (how, found.message) if part))
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ....case.case import Case, Quantity
 from ....case.markers import with_markers
-from ....case.measures import DriverEffort, ElementForce, JointForce, JointMoment
+from ....case.measures import DriverEffort, ElementForce, ForceMeasure, JointForce, JointMoment
 from ....joints import Joint, Revolute
 from ....mechanism.body import Body, Inertia
 from ....mechanism.drivers import JointAngle
@@ -33,7 +33,7 @@ LARGEST = 8
 # Shorter springs have directions that a small error turns far [m].
 SHORTEST = 0.1
 # Of the reach of loops: most specimens come to no singular pose, where forces grow without limit.
-NEAR = 0.3
+NEAR = 0.1
 # Forces have bounds of their own here; an output cannot be without a tolerance.
 TOLERANCE = (1e-6, 1e-9, "the stress truth has bounds of its own")
 
@@ -65,7 +65,7 @@ class Forces(Family):
         mechanism = _loaded(rng, mechanism)
         motions: dict[str, Motion] = {d.name: Sine(0.1 * reach, 0.7) for d in mechanism.drivers[1:]}
         values = np.linspace(-reach, reach, samples)
-        rate = power(rng, -1.0, 1.0) * reach
+        rate = power(rng, -1.0, 1.0)
         outputs = _outputs(rng, mechanism, along)
         return Specimen(
             what,
@@ -173,7 +173,7 @@ def _outputs(rng: Rng, mechanism: Mechanism, along: Sequence[np.ndarray]) -> tup
     others = [joint for joint in mechanism.joints if joint not in twins]
     chosen: list[Joint] = [others[k] for k in rng.choice(len(others), 2, replace=False)]
     axes = [*np.eye(3), *along]
-    found: list[Quantity] = [
+    found: list[ForceMeasure] = [
         cls(f"{joint.name}.{what}{k}", *TOLERANCE, joint=joint.name, direction=triple(axis))
         for joint in (*chosen, *twins)
         for cls, what in ((JointForce, "force"), (JointMoment, "moment"))

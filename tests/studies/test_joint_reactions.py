@@ -1,0 +1,140 @@
+"""Reactions in check-joint: sound joints pass, and each check finds its mistake."""
+
+from dataclasses import replace
+
+import pytest
+from kincheck.core import Revolute, Spherical, check_joint
+from kincheck.core import primitives as p
+from kincheck.core.case.joint_probe import AXIS, probe
+from kincheck.core.harness.native_engine import NativeEngine
+from kincheck.core.joints import Joint
+from kincheck.core.joints.base import unit
+from kincheck.core.kinematics.forces import equations
+from kincheck.core.studies.findings import Verdict
+from kincheck.core.studies.joint_check import reactions as checks
+from kincheck.core.studies.joint_check.loaded_probe import loaded, solved
+from kincheck.core.studies.joint_check.loop import loops
+from kincheck.core.studies.stress.solving import interpreted
+
+from .test_check_joint_mistakes import mistaken, negative_gamma
+
+pytestmark = pytest.mark.usefixtures("own_joint_types")
+CHECKS = ["power", "no work", "acts and reacts", "order", "units", "place"]
+
+
+def found(joint_type):
+    """The verdicts of a joint type by check."""
+    case = loaded(probe(joint_type))
+    every = checks.reactions(solved(case, case.mechanism), case)
+    return {each.check.removeprefix("reaction: "): each.verdict for each in every}
+
+
+def failing(joint_type):
+    return [name for name, verdict in found(joint_type).items() if verdict is Verdict.FAIL]
+
+
+@pytest.mark.parametrize("name", ["universal", "screw", "in_plane", "fixed"])
+def test_sound_joints_pass(name):
+    assert found(Joint.registry[name]) == dict.fromkeys(CHECKS, Verdict.PASS)
+
+
+def planted(monkeypatch, change):
+    """Change force and moment of the joint under test."""
+    right = equations.ForceEquations.reaction
+
+    def wrong(self, joint, multipliers):
+        found = right(self, joint, multipliers)
+        return change(*found) if joint.name == "tested" else found
+
+    monkeypatch.setattr(equations.ForceEquations, "reaction", wrong)
+
+
+def test_a_moment_about_a_free_axis_is_found(monkeypatch):
+    """That of a hinge: the reaction works as it turns."""
+    axis = unit(AXIS)
+    planted(monkeypatch, lambda force, moment: (force, moment + (force @ axis) * axis))
+    assert {"no work", "acts and reacts"} <= {*failing(Revolute)}
+
+
+def test_a_reaction_that_balances_no_body_is_found(monkeypatch):
+    """It does no work on a ball's freedoms, but is too small."""
+    planted(monkeypatch, lambda force, moment: (0.99 * force, moment))
+    assert failing(Spherical) == ["acts and reacts"]
+
+
+def by_metres(self, factor):
+    """A point a centimetre off, whatever the unit."""
+    x, y, z = self.point
+    return replace(self, point=(factor * x + 0.01, factor * y, factor * z))
+
+
+def by_place(self, factor):
+    """A point that is off by more, the farther it is from the global origin."""
+    x, y, z = self.point
+    return replace(self, point=(factor * (x + 1e-3 * x * x), factor * y, factor * z))
+
+
+@pytest.mark.parametrize(("scaled", "check"), [(by_metres, "units"), (by_place, "place")])
+def test_what_is_arbitrary_must_not_matter(scaled, check):
+    assert check in failing(mistaken(Spherical, scaled=scaled))
+
+
+def test_forces_that_depend_on_the_order_are_found(monkeypatch):
+    right = equations.ForceEquations.reaction
+
+    def by_number(self, joint, multipliers):
+        part = 1.0 + 1e-6 * self.mechanism.joints.index(joint)
+        return tuple(part * each for each in right(self, joint, multipliers))
+
+    monkeypatch.setattr(equations.ForceEquations, "reaction", by_number)
+    assert "order" in failing(Spherical)
+
+
+def test_a_wrong_sign_of_gravity_is_found(monkeypatch):
+    right = equations.inertial
+    monkeypatch.setattr(equations, "inertial", lambda body, at, g: right(body, at, -g))
+    assert "power" in failing(Spherical)
+
+
+class Wrong:
+    """An engine whose forces are off by a thousandth."""
+
+    name = "wrong"
+
+    def __getattr__(self, name):
+        return getattr(NATIVE, name)
+
+    def solve(self, model, case, tol):
+        found = NATIVE.solve(model, case, tol)
+        forces = found.forces
+        joints = {k: replace(each, force=1.001 * each.force) for k, each in forces.joints.items()}
+        other = object.__new__(type(found))
+        other.__dict__.update(found.__dict__, forces=replace(forces, joints=joints))
+        return other
+
+
+class Right(Wrong):
+    """The same with right forces."""
+
+    def solve(self, model, case, tol):
+        return NATIVE.solve(model, case, tol)
+
+
+NATIVE = interpreted(NativeEngine())
+
+
+def test_an_engine_with_other_forces_is_found():
+    right, wrong = (
+        [each for each in loops(Spherical, [engine]) if each.check.startswith("reaction: wrong")]
+        for engine in (Right(), Wrong())
+    )
+    assert [each.verdict for each in right] == [Verdict.PASS]
+    assert [each.verdict for each in wrong] == [Verdict.FAIL]
+    assert "force_" in wrong[0].message
+
+
+def test_forces_wait_for_sound_equations():
+    report = check_joint(mistaken(Revolute, p.Dot11, gamma=negative_gamma), samples=4)
+    (waiting,) = (each for each in report.findings if each.check == "reaction")
+    assert waiting.verdict is Verdict.SKIP
+    assert "first repair" in waiting.message
