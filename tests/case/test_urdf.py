@@ -161,6 +161,21 @@ def test_a_file_of_pairs_closes_the_loop_beside_it(tmp_path: Path):
     assert solution(case).solved.all()
 
 
+def test_paired_frames_need_not_meet_in_the_zero_pose(tmp_path: Path):
+    """The file has no other start; another model so far open is refused."""
+    pytest.importorskip("yaml")
+    text = seeds.PAIRED.decode().replace("yaml=", "said=")
+    pairs = text.split('said="')[1].split('"')[0]
+    far = text.replace('<origin xyz="0 0 3"/>', '<origin xyz="0 0 1.5"/>')
+    assert far != text
+    case = load(robot(tmp_path, far, yaml=pairs), DRIVE)
+    assert (
+        "the start (its zero pose) is assembled: closed_loop: X = y was open by 1.5 m"
+        in (case.assembly[0])
+    )
+    assert solution(case).solved.all()
+
+
 BUILT_IN = (
     *("four_bar", "double_cardan", "hooke_joint", "planar_slider_crank", "rssr"),
     *("mcpherson_steered", "chrono_multi_link_bodies", "delta_robot"),

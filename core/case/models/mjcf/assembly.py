@@ -85,14 +85,15 @@ def assemble(
     pose, notes = start.pose, list[str]()
     if opened > CLOSED * closing.size:
         # who gives some joints' values leaves the others to the assembly
-        if not start.given and (apart := closing.apart(pose)) > FAR * closing.size:
+        if start.closed and (apart := closing.apart(pose)) > FAR * closing.size:
             raise _open(
                 closing.widest(pose).element.file,
                 closing,
                 pose,
                 f"is open in the start ({start.text}) by {apart:.4g} m, expected"
                 f" {FAR * closing.size:.3g} m at most, a tenth of the model's size; give a start"
-                " that is nearer: --start keyframe:NAME or --start JOINT=VALUE ...",
+                " that is nearer by --start keyframe:NAME, or values of some joints by --start"
+                " JOINT=VALUE ..., from which the nearest closed pose is taken however far it is",
             )
         pose = _closed(closing, pose, ((*start.given, *driven), start.given, ()))
         left = closing.gap(pose)

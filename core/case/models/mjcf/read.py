@@ -32,7 +32,7 @@ from .frames import coordinates, read_compiler
 from .freedom import taken
 from .parts import Parts, parts_of, require_coupled
 from .rods import Spin, spins
-from .start import read_start
+from .start import QPOS0, read_start
 from .tree import Tree, read_tree
 
 # What these hold is for looks, forces and measurements. Tendons are read where an equality holds
@@ -75,12 +75,16 @@ class Document:
         original: root of the file, whose numbers have its digits.
         left_out: number of omitted items of the file, by name; None to count those of the
             document.
+        zero: its own start, in words.
+        closed: whether that is meant to close.
     """
 
     described: str
     root: Element
     original: Element
     left_out: Mapping[str, int] | None = None
+    zero: str = QPOS0
+    closed: bool = True
 
 
 def case_of(file: Path, document: Document, supplied: Supplied) -> Case:
@@ -95,7 +99,7 @@ def case_of(file: Path, document: Document, supplied: Supplied) -> Case:
     driving = read_driving(file, tree, supplied)
     equalities = [*read_equalities(root, tree)]
     require_coupled(equalities)
-    start = read_start(file, root, tree, supplied.start)
+    start = read_start(file, root, tree, supplied.start, zero=document.zero, closed=document.closed)
     digits = _digits(document.original, size_of(start.pose, equalities), supplied.closure)
     model = assemble(file, equalities, start, digits, driving.joints)
     free = spins(model.tree, model.equalities, driving.fixed)
