@@ -182,6 +182,22 @@ BUILT_IN = (
 )
 
 
+@pytest.mark.parametrize("name", ["four_bar", "delta_robot"])
+def test_an_export_as_sdf_is_read_back_and_moves_alike(name: str, tmp_path: Path):
+    """Loops are Drake's ball constraints there, which are read too."""
+    case = by_joints(cases.load(name))
+    file = tmp_path / "robot.sdf"
+    file.write_text(written(case, adapters.writer("sdf"))[".sdf"])
+    swept, *held = (driver.name for driver in case.mechanism.drivers)
+    again = load(file, Supplied(drive=(f"{swept}:0:0.02:2",), hold=tuple(held)))
+    assert same_motion(case, again) < EXACT
+    for body in case.mechanism.moving:
+        there = again.mechanism.body(body.name)
+        assert there.mass == body.mass
+        if body.inertia is not None:
+            assert np.allclose(there.inertia, body.inertia, rtol=0, atol=EXACT)
+
+
 @pytest.mark.parametrize("name", BUILT_IN)
 def test_an_export_is_read_back_and_moves_alike(name: str, tmp_path: Path):
     """By joints, which models can be driven by, at their two ends."""
@@ -328,11 +344,29 @@ def test_a_fault_of_a_file_of_pairs_names_it(text: str, said: str, tmp_path: Pat
     assert str(caught.value).startswith(str(file.with_suffix(".yaml")))
 
 
-@pytest.mark.parametrize("name", ["robot.yaml", "robot.xacro", "robot.usd", "part.STL"])
+@pytest.mark.parametrize(
+    "name", ["robot.yaml", "robot.xacro", "robot.usd", "part.STL", "r.constraints.json", "a.zip"]
+)
 def test_a_file_that_is_beside_models_is_told(name: str, tmp_path: Path):
     (tmp_path / name).write_bytes(b"\x00\xff")
-    with pytest.raises(CaseError, match=r"found a \.\w+ file, which .*; "):
+    with pytest.raises(CaseError, match=r"found a \.[\w.]+ file, which .*; "):
         load(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("text", "advice"),
+    [
+        ("<mujocoinclude/>", "give the file that includes it"),
+        ("<OpenSimDocument/>", "give MJCF or a case file"),
+        ("<launch/>", "give the URDF"),
+        (TREE.replace('xyz="0 0 2"', 'xyz="${l} 0 2"'), "xacro FILE"),
+    ],
+)
+def test_other_documents_are_told(text: str, advice: str, tmp_path: Path):
+    file = tmp_path / "model.xml"
+    file.write_text(text)
+    with pytest.raises(CaseError, match=advice):
+        load(file)
 
 
 def test_entities_are_refused(tmp_path: Path):

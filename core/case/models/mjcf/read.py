@@ -48,6 +48,16 @@ _LEFT_OUT = (
     "deformable",
     "asset",
 )
+OTHERS = {
+    "mujocoinclude": "is a part of a model; give the file that includes it",
+    "OpenSimDocument": (
+        "is a model of OpenSim, which kincheck writes and does not read; give MJCF or a case file"
+    ),
+    "COLLADA": "holds shapes, which say nothing of joints; give the model that names it",
+    "launch": "starts programs of ROS; give the URDF that it names",
+    "model": "describes a package of Gazebo; give the SDF beside it",
+}
+"""Other documents in XML, and what to do, by their root."""
 NO_GRAVITY = (0.0, 0.0, 0.0)
 
 
@@ -175,6 +185,8 @@ def _sweep(tree: Tree, driving: Driving) -> Sweep:
 
 def _require_model(root: Element) -> None:
     """Refuse other documents, and elements in place of parts elsewhere."""
+    if root.tag in OTHERS:
+        raise root.fault(OTHERS[root.tag])
     if root.tag != "mujoco":
         raise root.fault(
             "found another document, expected a model <mujoco>, <robot> or <sdf>; give a file of"
