@@ -262,10 +262,21 @@ def test_includes_and_replicates_are_as_in_mujoco(tmp_path):
         assert np.allclose([*joint.axis], data.joint(name).xaxis, rtol=0, atol=EXACT)
 
 
+def test_an_include_may_be_in_a_folder_beside_the_model(tmp_path):
+    (tmp_path / "leg").mkdir()
+    (tmp_path / "scene").mkdir()
+    part = f'<mujocoinclude><body name="b"><joint name="j"/>{BODY}</body></mujocoinclude>'
+    (tmp_path / "scene" / "part.xml").write_text(part)
+    text = '<mujoco><worldbody><include file="../scene/part.xml"/></worldbody></mujoco>'
+    _, tree = tree_of(written(tmp_path / "leg", text))
+    assert [*tree.joints] == ["j"]
+
+
 @pytest.mark.parametrize(
     ("include", "fragments"),
     [
-        ("../outside.xml", ["'../outside.xml'", "in the folder of the model or below"]),
+        ("../../outside.xml", ["'../../outside.xml'", "in the folder of the model, in one beside"]),
+        ("../notes.txt", ["in the folder of the model"]),
         ("/etc/hostname", ["in the folder of the model"]),
         ("", ["in the folder of the model"]),
         ("gone.xml", ["no such file"]),
@@ -274,9 +285,10 @@ def test_includes_and_replicates_are_as_in_mujoco(tmp_path):
     ],
 )
 def test_includes_stay_beside_the_model(tmp_path, include, fragments):
-    folder = tmp_path / "inside"
-    folder.mkdir()
+    folder = tmp_path / "robots" / "inside"
+    folder.mkdir(parents=True)
     (tmp_path / "outside.xml").write_text("<mujoco/>")
+    (folder.parent / "notes.txt").write_text("<mujoco/>")
     (folder / "link.xml").symlink_to(tmp_path / "outside.xml")
     file = written(folder, f'<mujoco><include file="{include}"/><worldbody/></mujoco>')
     with pytest.raises(CaseError) as caught:

@@ -161,10 +161,41 @@ def test_a_file_of_pairs_closes_the_loop_beside_it(tmp_path: Path):
     assert solution(case).solved.all()
 
 
+def test_paired_frames_need_not_meet_in_the_zero_pose(tmp_path: Path):
+    """The file has no other start; another model so far open is refused."""
+    pytest.importorskip("yaml")
+    text = seeds.PAIRED.decode().replace("yaml=", "said=")
+    pairs = text.split('said="')[1].split('"')[0]
+    far = text.replace('<origin xyz="0 0 3"/>', '<origin xyz="0 0 1.5"/>')
+    assert far != text
+    case = load(robot(tmp_path, far, yaml=pairs), DRIVE)
+    assert (
+        "the start (its zero pose) is assembled: closed_loop: X = y was open by 1.5 m"
+        in (case.assembly[0])
+    )
+    assert solution(case).solved.all()
+
+
 BUILT_IN = (
     *("four_bar", "double_cardan", "hooke_joint", "planar_slider_crank", "rssr"),
     *("mcpherson_steered", "chrono_multi_link_bodies", "delta_robot"),
 )
+
+
+@pytest.mark.parametrize("name", ["four_bar", "delta_robot"])
+def test_an_export_as_sdf_is_read_back_and_moves_alike(name: str, tmp_path: Path):
+    """Loops are Drake's ball constraints there, which are read too."""
+    case = by_joints(cases.load(name))
+    file = tmp_path / "robot.sdf"
+    file.write_text(written(case, adapters.writer("sdf"))[".sdf"])
+    swept, *held = (driver.name for driver in case.mechanism.drivers)
+    again = load(file, Supplied(drive=(f"{swept}:0:0.02:2",), hold=tuple(held)))
+    assert same_motion(case, again) < EXACT
+    for body in case.mechanism.moving:
+        there = again.mechanism.body(body.name)
+        assert there.mass == body.mass
+        if body.inertia is not None:
+            assert np.allclose(there.inertia, body.inertia, rtol=0, atol=EXACT)
 
 
 @pytest.mark.parametrize("name", BUILT_IN)
@@ -313,11 +344,29 @@ def test_a_fault_of_a_file_of_pairs_names_it(text: str, said: str, tmp_path: Pat
     assert str(caught.value).startswith(str(file.with_suffix(".yaml")))
 
 
-@pytest.mark.parametrize("name", ["robot.yaml", "robot.xacro", "robot.usd", "part.STL"])
+@pytest.mark.parametrize(
+    "name", ["robot.yaml", "robot.xacro", "robot.usd", "part.STL", "r.constraints.json", "a.zip"]
+)
 def test_a_file_that_is_beside_models_is_told(name: str, tmp_path: Path):
     (tmp_path / name).write_bytes(b"\x00\xff")
-    with pytest.raises(CaseError, match=r"found a \.\w+ file, which .*; "):
+    with pytest.raises(CaseError, match=r"found a \.[\w.]+ file, which .*; "):
         load(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("text", "advice"),
+    [
+        ("<mujocoinclude/>", "give the file that includes it"),
+        ("<OpenSimDocument/>", "give MJCF or a case file"),
+        ("<launch/>", "give the URDF"),
+        (TREE.replace('xyz="0 0 2"', 'xyz="${l} 0 2"'), "xacro FILE"),
+    ],
+)
+def test_other_documents_are_told(text: str, advice: str, tmp_path: Path):
+    file = tmp_path / "model.xml"
+    file.write_text(text)
+    with pytest.raises(CaseError, match=advice):
+        load(file)
 
 
 def test_entities_are_refused(tmp_path: Path):

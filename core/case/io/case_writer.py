@@ -21,7 +21,7 @@ from ..measures import Measure, key_of, own_keys
 from ..suspension import PerTravel, SuspensionOutput
 from .class_keys import own_fields
 from .coordinates import AXES
-from .document import LONGEST_TEXT
+from .document import LONGEST_TEXT, SMALLEST
 from .reference_writer import reason_against, reference_table
 from .schema import SCHEMA
 from .suspension_writer import suspension_output, suspension_tables
@@ -206,4 +206,7 @@ def _value(value: Any) -> str:
         return json.dumps(value, ensure_ascii=False)  # a JSON string is a basic string of TOML
     if isinstance(value, tuple | list):
         return f"[{', '.join(map(_value, cast('Sequence[Any]', value)))}]"
-    return repr(float(value)) if not isinstance(value, int) else repr(value)
+    if isinstance(value, int):
+        return repr(value)
+    # a file holds no smaller numbers, which are the rounding of zeros
+    return repr(float(value) if abs(value) >= SMALLEST else 0.0)

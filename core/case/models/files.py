@@ -33,15 +33,32 @@ HARDPOINTS = (CHRONO, ADAMS, TABLE)
 UNREAD = {
     ".yaml": "is beside a URDF of the same name; give that file, NAME.urdf",
     ".yml": "is beside a URDF of the same name; give that file, NAME.urdf",
+    ".constraints.json": "holds the loops of a URDF beside it; give that file, NAME.urdf",
     ".xacro": "holds macros; expand them: xacro FILE > robot.urdf",
+    ".mjb": "is compiled; give the MJCF that it is made of",
+    ".osim": "is a model of OpenSim, which kincheck writes and does not read; give MJCF or a case",
+    ".adm": "is a model of Adams/View; give its hardpoints (.sub, .csv), or MJCF, URDF or SDF",
     **dict.fromkeys(
-        (".usd", ".usda", ".usdc", ".usdz"),
+        (
+            ".usd",
+            ".usda",
+            ".usdc",
+            ".usdz",
+            ".mo",
+            ".slx",
+            ".mat",
+            ".sldasm",
+            ".iam",
+            ".catproduct",
+        ),
         "cannot be read; write the model out as MJCF, URDF or SDF from the program that made it",
     ),
     **dict.fromkeys(
-        (".step", ".stp", ".stl", ".obj", ".dae", ".iges"),
+        (".step", ".stp", ".stl", ".obj", ".dae", ".iges", ".igs", ".fbx", ".glb", ".gltf", ".wrl"),
         "holds shapes, which say nothing of joints; give the model that names it",
     ),
+    **dict.fromkeys((".xls", ".xlsx", ".ods"), "is a workbook; save its table as CSV"),
+    **dict.fromkeys((".zip", ".gz", ".tar", ".7z"), "is an archive; unpack it and give the model"),
 }
 """Files that people have beside their models, and what to do, by suffix."""
 _OF_HARDPOINTS = (
@@ -74,8 +91,9 @@ def load(file: Path, supplied: Supplied = NOTHING) -> Case:
         CaseError: the file is unreadable, inconsistent or incomplete, or an option is not for such
             files.
     """
-    if advice := UNREAD.get(file.suffix.lower()):
-        raise fault(file, "", f"found a {file.suffix} file, which {advice}")
+    for ending in ("".join(file.suffixes[-2:]), file.suffix):
+        if advice := UNREAD.get(ending.lower()):
+            raise fault(file, "", f"found a {ending} file, which {advice}")
     kind = kind_of(file, supplied)
     for option in supplied.given:
         if option not in _OPTIONS[kind]:

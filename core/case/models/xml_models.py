@@ -33,5 +33,6 @@ def read_model(file: Path, text: str, supplied: Supplied) -> Case:
     name = root.attributes.get("name", file.stem)
     beside = f" with {', '.join(robot.beside)}" if robot.beside else ""
     described = f"{robot.format} {name!r} of {file.name}{beside}"
-    document = Document(described, as_mjcf(robot), root, robot.left_out)
+    zero, closed = "its zero pose", not robot.paired
+    document = Document(described, as_mjcf(robot), root, robot.left_out, zero, closed)
     return case_of(file, document, supplied)

@@ -85,14 +85,15 @@ def assemble(
     pose, notes = start.pose, list[str]()
     if opened > CLOSED * closing.size:
         # who gives some joints' values leaves the others to the assembly
-        if not start.given and (apart := closing.apart(pose)) > FAR * closing.size:
+        if start.closed and (apart := closing.apart(pose)) > FAR * closing.size:
             raise _open(
                 closing.widest(pose).element.file,
                 closing,
                 pose,
                 f"is open in the start ({start.text}) by {apart:.4g} m, expected"
                 f" {FAR * closing.size:.3g} m at most, a tenth of the model's size; give a start"
-                " that is nearer: --start keyframe:NAME or --start JOINT=VALUE ...",
+                " that is nearer by --start keyframe:NAME, or values of some joints by --start"
+                " JOINT=VALUE ..., from which the nearest closed pose is taken however far it is",
             )
         pose = _closed(closing, pose, ((*start.given, *driven), start.given, ()))
         left = closing.gap(pose)
@@ -103,8 +104,8 @@ def assemble(
                 pose,
                 f"is open: the start ({start.text}) by {opened:.4g} m or rad, and the nearest pose"
                 f" that was found by {left:.4g}, expected {digits.tolerance:.3g} m at most"
-                f" ({digits.why}); give a start that can be closed by --start, or another"
-                " tolerance by --closure",
+                f" ({digits.why}); still open are {_open_ones(closing, pose)}; give a start that"
+                " can be closed by --start, another tolerance by --closure, or correct the model",
             )
         notes.append(_note(start, closing, pose, opened, left))
     tree = pose.settled()
@@ -215,6 +216,14 @@ def _moves(before: Pose, after: Pose) -> Iterator[tuple[float, str]]:
             if turn or shift:
                 far = f" and {shift:.3g} m" if UNKNOWNS[joint.type] == 6 else ""
                 yield max(turn, shift), f"{joint.name} by {turn:.3g} rad{far}"
+
+
+def _open_ones(closing: Closing, pose: Pose) -> str:
+    """Return the equalities open beyond the digits, the widest ones first."""
+    gaps = [(closing.gap_of(each, pose), each.name) for each in closing.equalities]
+    told = [f"{name} by {gap:.2g}" for gap, name in sorted(gaps, reverse=True)]
+    limit = max(ADDED_UP * closing.digits.tolerance, CLOSED * closing.size)
+    return shortened(told[: sum(gap > limit for gap, _ in gaps)], MOST_TOLD)
 
 
 def _open(file: Path, closing: Closing, pose: Pose, problem: str) -> CaseError:

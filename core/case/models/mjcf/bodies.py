@@ -11,6 +11,7 @@ from ....algebra import Quat
 from ....errors import shortened
 from ....mechanism.body import Body
 from ....mechanism.mechanism import Vector
+from ...io.document import SMALLEST
 from .elements import Element
 from .frames import coordinates
 from .masses import Mass, together, weighed
@@ -110,5 +111,5 @@ def _lump(rod: Mass, spin: Spin, masses: dict[str, list[Mass]]) -> bool:
 
 
 def _euler_parameters(turn: Quat) -> tuple[float, float, float, float]:
-    e0, e1, e2, e3 = turn
-    return float(e0), float(e1), float(e2), float(e3)
+    e0, e1, e2, e3 = (float(x) if abs(x) >= SMALLEST else 0.0 for x in turn)
+    return e0, e1, e2, e3

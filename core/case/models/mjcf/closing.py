@@ -37,6 +37,10 @@ class Closing:
         """Return the largest residual [m or rad]."""
         return float(np.abs(self._gaps(pose)).max(initial=0.0))
 
+    def gap_of(self, each: Equality, pose: Pose) -> float:
+        """Return the largest residual of an equality [m or rad]."""
+        return float(np.abs(self._residual(each, pose)).max(initial=0.0))
+
     def apart(self, pose: Pose) -> float:
         """Return the largest gap of connects, welds and rods [m], angles at arms of the size;
         offsets of coupled coordinates are meant, and do not count.
@@ -50,7 +54,7 @@ class Closing:
 
     def widest(self, pose: Pose) -> Equality:
         """Return the equality with the largest residual."""
-        return max(self.equalities, key=lambda each: np.abs(self._residual(each, pose)).max())
+        return max(self.equalities, key=lambda each: self.gap_of(each, pose))
 
     def _gaps(self, pose: Pose) -> Array:
         found = [self._residual(each, pose) for each in self.equalities]

@@ -83,9 +83,8 @@ class Element:
         except ValueError:
             found = (math.nan,)
         if len(found) not in counts or not all(map(usable, found)):
-            raise self.fault(
-                f"{name}: found {shown(text)}, expected {expected}; correct the attribute"
-            )
+            advice = "expand its macros: xacro FILE" if "${" in text else "correct the attribute"
+            raise self.fault(f"{name}: found {shown(text)}, expected {expected}; {advice}")
         return found
 
     def choice(self, name: str, known: Sequence[str], default: str) -> str:

@@ -13,6 +13,7 @@ from .attributes import KNOWN, WRITE_OUT
 from .elements import DEEPEST, Element, parse_xml
 from .frames import Compiler, Place, euler_turn, read_compiler
 
+MODELS = (".xml", ".mjcf")
 MOST_INCLUDES, MOST_COPIES, MOST_ELEMENTS = 100, 1_000, 200_000
 
 
@@ -21,7 +22,7 @@ class Expansion:
     """The elements of a model of several files.
 
     Attributes:
-        root: file of the model; includes are beside it or below.
+        root: file of the model; includes are in the folder around its own one, or below.
         compiler: how the model writes angles; without it, copies are not made yet.
         taken: included files; each may be included once.
         bytes: how many were read.
@@ -70,13 +71,13 @@ class Expansion:
         folder = self.root.parent.resolve()
         try:
             file = (folder / name).resolve()
-            inside = bool(name) and not Path(name).is_absolute() and file.is_relative_to(folder)
+            inside = bool(name) and not Path(name).is_absolute() and _near(file, folder)
         except (OSError, ValueError, RuntimeError):  # a null byte, a loop of links
             file, inside = folder, False
         if not inside:
             raise element.fault(
-                f"file: found {shown(name)}, expected a file in the folder of the model or below,"
-                f" and no other is opened; put it there, or {WRITE_OUT}"
+                f"file: found {shown(name)}, expected a file in the folder of the model, in one"
+                f" beside it or below, and no other is opened; put it there, or {WRITE_OUT}"
             )
         if file in self.taken or len(self.taken) == MOST_INCLUDES:
             raise element.fault(
@@ -121,6 +122,13 @@ class Expansion:
                 attributes["childclass"] = element.attributes["childclass"]
             yield replace(element, tag="frame", attributes=attributes, children=named)
             at = place.point(vec(offset))
+
+
+def _near(file: Path, folder: Path) -> bool:
+    """Return whether a file is in a folder or below, or a model in a folder beside that one."""
+    around = folder.parent
+    beside = file.suffix.lower() in MODELS and around != around.parent
+    return file.is_relative_to(folder) or (beside and file.is_relative_to(around))
 
 
 def _numbers(values: Iterable[float]) -> str:

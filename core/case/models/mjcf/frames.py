@@ -22,7 +22,7 @@ from ....algebra import (
     vec,
 )
 from ....mechanism.mechanism import Vector
-from ...io.document import shown
+from ...io.document import SMALLEST, shown
 from .attributes import KNOWN, ORIENTATION
 from .elements import Element
 
@@ -117,8 +117,9 @@ def unit_quaternion(q: Quat) -> Quat:
 
 
 def coordinates(a: Vec3) -> Vector:
-    """A vector as the description of a mechanism has it."""
-    return float(a.x), float(a.y), float(a.z)
+    """A vector as the description of a mechanism has it; less than numbers may be is zero."""
+    x, y, z = (float(x) if abs(x) >= SMALLEST else 0.0 for x in a)
+    return x, y, z
 
 
 def read_place(element: Element, compiler: Compiler) -> Place:

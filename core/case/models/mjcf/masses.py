@@ -8,10 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ....algebra import ZERO, Vec3, X, Y, Z
+from ....algebra import ZERO, Vec3, X, Y, Z, vec
 from ....errors import MechanismError
 from ....mechanism.body import Body, Inertia, checked_inertia
 from ....trajectory import Array
+from ...io.document import SMALLEST, usable
 from .classes import Classes
 from .elements import Element
 from .frames import HERE, Compiler, Place, coordinates, read_place
@@ -66,9 +67,14 @@ def weighed(body: Body, mass: Mass | None) -> Body | None:
     """Return a body with a mass given in global axes; None if no rigid body has it."""
     if mass is None or mass.mass == 0.0:
         return body
+    mass = Mass(mass.mass, vec(coordinates(mass.center)), mass.inertia)
     matrix = 0.5 * (mass.inertia + mass.inertia.T)
     xx, yy, zz = np.diag(matrix).tolist()
-    six: Inertia = (xx, yy, zz, float(matrix[0, 1]), float(matrix[1, 2]), float(matrix[0, 2]))
+    products = (float(matrix[pair]) for pair in ((0, 1), (1, 2), (0, 2)))
+    xy, yz, xz = (x if abs(x) >= SMALLEST else 0.0 for x in products)
+    six: Inertia = (xx, yy, zz, xy, yz, xz)
+    if not all(map(usable, (mass.mass, *mass.center, *six))):
+        return None
     try:
         inertia = checked_inertia(body.name, six) if matrix.any() else None
     except MechanismError:
@@ -149,8 +155,8 @@ class Scales:
             raise element.fault("shellinertia: is a shell, expected a solid; give <inertial>")
         volume, moments = _solid(kind, _sizes(element, kind))
         mass = density * volume if math.isnan(mass) else mass
-        if not (mass > 0.0 and volume > 0.0):
-            raise element.fault("has a negative mass or size, expected positive ones; correct it")
+        if not (mass > 0.0 and volume > 0.0 and usable(mass)):
+            raise element.fault("has a mass or size that is not positive or huge; correct it")
         return Mass(mass, ZERO, mass * np.diag(moments))
 
     def _bounded(self, found: Mass) -> Mass:

@@ -32,7 +32,7 @@ from .frames import coordinates, read_compiler
 from .freedom import taken
 from .parts import Parts, parts_of, require_coupled
 from .rods import Spin, spins
-from .start import read_start
+from .start import QPOS0, read_start
 from .tree import Tree, read_tree
 
 # What these hold is for looks, forces and measurements. Tendons are read where an equality holds
@@ -48,6 +48,16 @@ _LEFT_OUT = (
     "deformable",
     "asset",
 )
+OTHERS = {
+    "mujocoinclude": "is a part of a model; give the file that includes it",
+    "OpenSimDocument": (
+        "is a model of OpenSim, which kincheck writes and does not read; give MJCF or a case file"
+    ),
+    "COLLADA": "holds shapes, which say nothing of joints; give the model that names it",
+    "launch": "starts programs of ROS; give the URDF that it names",
+    "model": "describes a package of Gazebo; give the SDF beside it",
+}
+"""Other documents in XML, and what to do, by their root."""
 NO_GRAVITY = (0.0, 0.0, 0.0)
 
 
@@ -75,12 +85,16 @@ class Document:
         original: root of the file, whose numbers have its digits.
         left_out: number of omitted items of the file, by name; None to count those of the
             document.
+        zero: its own start, in words.
+        closed: whether that is meant to close.
     """
 
     described: str
     root: Element
     original: Element
     left_out: Mapping[str, int] | None = None
+    zero: str = QPOS0
+    closed: bool = True
 
 
 def case_of(file: Path, document: Document, supplied: Supplied) -> Case:
@@ -95,7 +109,7 @@ def case_of(file: Path, document: Document, supplied: Supplied) -> Case:
     driving = read_driving(file, tree, supplied)
     equalities = [*read_equalities(root, tree)]
     require_coupled(equalities)
-    start = read_start(file, root, tree, supplied.start)
+    start = read_start(file, root, tree, supplied.start, zero=document.zero, closed=document.closed)
     digits = _digits(document.original, size_of(start.pose, equalities), supplied.closure)
     model = assemble(file, equalities, start, digits, driving.joints)
     free = spins(model.tree, model.equalities, driving.fixed)
@@ -171,6 +185,8 @@ def _sweep(tree: Tree, driving: Driving) -> Sweep:
 
 def _require_model(root: Element) -> None:
     """Refuse other documents, and elements in place of parts elsewhere."""
+    if root.tag in OTHERS:
+        raise root.fault(OTHERS[root.tag])
     if root.tag != "mujoco":
         raise root.fault(
             "found another document, expected a model <mujoco>, <robot> or <sdf>; give a file of"

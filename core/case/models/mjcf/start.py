@@ -18,6 +18,7 @@ from .tree import ModelJoint, Tree
 
 COORDINATES = {"hinge": 1, "slide": 1, "ball": 4, "free": 7}
 KEYFRAME = "keyframe:"
+QPOS0 = "its pose qpos0"
 _FORM = f"{KEYFRAME}NAME or JOINT=VALUE [rad or m, as qpos]"
 
 
@@ -28,15 +29,29 @@ class Start:
     Attributes:
         given: joints whose values the user gave; they stay if the closures let them.
         text: of its source, for notes and messages.
+        closed: whether it is meant to close, so that it is refused far from that.
     """
 
     pose: Pose
     given: tuple[str, ...] = ()
-    text: str = "its pose qpos0"
+    text: str = QPOS0
+    closed: bool = True
 
 
-def read_start(file: Path, root: Element, tree: Tree, said: Sequence[str]) -> Start:
+def read_start(
+    file: Path,
+    root: Element,
+    tree: Tree,
+    said: Sequence[str],
+    *,
+    zero: str = QPOS0,
+    closed: bool = True,
+) -> Start:
     """Read the start of a model.
+
+    Args:
+        zero: the model's own start, in words.
+        closed: whether that is meant to close.
 
     Raises:
         CaseError: there is no such keyframe or joint, one is given twice, or its numbers are not
@@ -65,8 +80,8 @@ def read_start(file: Path, root: Element, tree: Tree, said: Sequence[str]) -> St
         joint = tree.chain[names.index(name)]
         values[names.index(name)] = _value(file, tree, joint, text.split(","))
         given.append(name)
-    text = ", ".join(said) if said else "its pose qpos0"
-    return Start(Pose(tree, values), tuple(given), text)
+    text = ", ".join(said) if said else zero
+    return Start(Pose(tree, values), tuple(given), text, closed and not given)
 
 
 def _keyframe(file: Path, root: Element, tree: Tree, name: str) -> list[Value]:

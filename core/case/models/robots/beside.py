@@ -50,6 +50,7 @@ class Beside:
             file, pairs = self.pairs
             add_pairs(file, pairs, robot)
             robot.beside.append(file.name)
+            robot.paired = True
 
 
 def read_beside(file: Path, root: Element) -> Beside:
@@ -74,7 +75,8 @@ def read_beside(file: Path, root: Element) -> Beside:
             raise fault(
                 pairs[0],
                 "joint_name",
-                f"found {name!r}, expected a joint of {file.name}; correct it",
+                f"found {name!r}, expected a joint of {file.name}; correct it, or remove it with"
+                " its joint_type",
             )
     return Beside(constraints, pairs, types)
 

@@ -144,6 +144,7 @@ class Robot:
         actuated: coordinates with a motor.
         left_out: number of omitted items, by name.
         beside: names of the files read beside this one.
+        paired: whether one of them pairs frames that the zero pose need not bring together.
     """
 
     format: str
@@ -162,6 +163,7 @@ class Robot:
     actuated: list[str] = field(default_factory=list[str])
     left_out: dict[str, int] = field(default_factory=dict[str, int])
     beside: list[str] = field(default_factory=list[str])
+    paired: bool = False
 
     def count(self, what: str) -> None:
         """Count one more omitted item."""
