@@ -45,7 +45,7 @@ def thinned(case: Case, samples: int) -> Case:
     return replace(case, sweep=replace(case.sweep, values=values), reference={})
 
 
-@pytest.mark.parametrize("name", TREES)
+@pytest.mark.parametrize("name", ["mujoco", "exudyn", *TREES])
 def test_the_strut_is_the_truth_to_round_off(name: str) -> None:
     (record,) = run([cases.load("mcpherson_strut")], [installed(name)], tol=1e-12).records
     assert record.outcome is Outcome.PASS, record.message
