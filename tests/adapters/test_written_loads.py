@@ -130,6 +130,7 @@ def test_exudyn_begins_to_turn(tmp_path):
     model = runpy.run_path(str(script))
     mbs = model["mbs"]
     settings = exu.SimulationSettings()
+    settings.solution.file.write = False  # in the working directory
     static, solver = exu.MainSolverStatic(), exu.MainSolverImplicitSecondOrder()
     assert static.InitializeSolver(mbs, settings)
     static.ComputeNewtonJacobian(mbs, settings)
