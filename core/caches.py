@@ -1,8 +1,8 @@
-"""Caches of what repeated calls use again; `clear_caches` empties them.
+"""Caches of results for repeated calls; `clear_caches` empties them.
 
 `keep_last` keeps the last results of a function, for the process or for each thread. `ThreadCache`
-keeps what one object needs in each thread, as lanes that a thread solves in place, and ends with
-the object. Both are bounded: a new result replaces the one that was used least recently.
+keeps the data of one object in each thread, such as lanes solved in place, and ends with the
+object. Both are bounded: a new result replaces the least recently used one.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ _lock = Lock()
 def keep_last(
     count: int, *, per_thread: bool = False
 ) -> Callable[[Callable[Arguments, Result]], Callable[Arguments, Result]]:
-    """Return a decorator that keeps the last results of a function by its hashable arguments.
+    """Return a decorator to keep the last results of a function by its hashable arguments.
 
-    Threads that ask for a missing result at the same time may each compute it.
+    Threads in need of a missing result at the same time may each compute it.
 
     Args:
         count: number of results.
@@ -42,7 +42,7 @@ def keep_last(
 
 
 def clear_caches() -> None:
-    """Drop the results that `keep_last` keeps, in all threads; the next calls compute them again.
+    """Drop the results kept by `keep_last`, in all threads; the next calls compute them again.
 
     Long-running processes free memory by this. Results in use stay valid.
     """
@@ -76,7 +76,7 @@ class ThreadCache(local):
         self._found: dict[Hashable, Any] = {}
 
     def __call__(self, key: Hashable, make: Callable[[], Result]) -> Result:
-        """Return what this thread made under the key, or make it now."""
+        """Return this thread's result under the key, or compute it now."""
         found = self._found
         value = found.pop(key) if key in found else make()
         found[key] = value  # the last one in order is the one used most recently

@@ -37,7 +37,7 @@ def _arrays(variables: Mapping[str, Variable]) -> dict[str, Any]:
 
 
 def _plain(values: Any) -> Any:
-    """Return nested lists with null for numbers that are not finite."""
+    """Return nested lists with null for infinite and missing numbers."""
     if isinstance(values, list):
         return [_plain(each) for each in cast("list[Any]", values)]
     return None if isinstance(values, float) and not math.isfinite(values) else values

@@ -33,11 +33,11 @@ class Dataset:
     """Variables over common dimensions.
 
     Attributes:
-        rows: the dimensions that count the rows of a table; the labels of all others go into the
-            names of its columns.
+        rows: the dimensions along the rows of a table; the labels of all others go into the names
+            of its columns.
         coords: labels of dimensions, by their names, and values along them.
         variables: results by name.
-        x: the coordinate that curves are drawn over; empty if there are no curves.
+        x: the coordinate along the axis of curves; empty if there are no curves.
     """
 
     rows: tuple[str, ...]

@@ -13,7 +13,7 @@ from .dataset import Variable
 
 @dataclass(frozen=True, eq=False)
 class Driving:
-    """What drives a motion, over n samples.
+    """The drivers of a motion, over n samples.
 
     Attributes:
         times: zero at the design value of the swept driver [s], shape (n,).

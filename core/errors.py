@@ -16,7 +16,7 @@ MOST_NAMED, MOST_SEARCHED = 50, 10_000
 
 
 class KincheckError(Exception):
-    """Base of all errors that kincheck raises on purpose.
+    """Base of all errors raised by kincheck on purpose.
 
     Attributes:
         kind: of a failure with a kind of its own; None for any other.

@@ -1,4 +1,4 @@
-"""Optional libraries: their import on use, and the command that installs a missing one."""
+"""Optional libraries: their import on use, and the command to install a missing one."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .errors import KincheckError
 
 
 def how_to_install(extra: str) -> str:
-    """Return the command that installs an extra, from kincheck's own metadata. An engine's extra
+    """Return the command to install an extra, from kincheck's own metadata. An engine's extra
     has the engine's name up to a hyphen.
     """
     wanted = _requirements(extra)
@@ -32,7 +32,7 @@ def installed_version(extra: str) -> str | None:
 
 
 def is_extra(name: str) -> bool:
-    """Return whether kincheck has an extra for the engine of that name."""
+    """Return whether kincheck has an extra for the engine of a name."""
     return bool(_requirements(name))
 
 

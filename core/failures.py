@@ -1,4 +1,4 @@
-"""Kinds of failures of a solution, with the messages of poses that are not reached."""
+"""Kinds of failures of a solution, with messages for unreached poses."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ TEXTS = {
 
 @dataclass(frozen=True)
 class PoseFailure:
-    """A pose that is not reached: the kind, and the numbers of the message.
+    """An unreached pose: the kind, and the numbers of the message.
 
     Attributes:
         residual: largest residual of the solved rows [units of the mechanism's size].
@@ -98,7 +98,7 @@ class PoseFailure:
         leftover: largest residual of the redundant rows.
         branch: smallest branch test, the cosine of an angle.
         redundant: names of the redundant rows.
-        where: the part of the mechanism that fails; empty for all of it.
+        where: the failing part of the mechanism; empty for all of it.
         sigma: smallest singular value at the last pose, an estimate; None if not known.
         pivot: smallest pivot there; None if not known.
     """

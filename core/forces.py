@@ -18,13 +18,13 @@ DETERMINED = 1e-8
 
 @dataclass(frozen=True, eq=False)
 class Reaction:
-    """The wrench of a joint over n samples: what its first body exerts on its second, global axes.
+    """The wrench of a joint over n samples: of its first body on its second, global axes.
 
     Attributes:
         force: [N], shape (n, 3).
         moment: about the joint's point as carried by the second body [N m], shape (n, 3).
-        free: directions of wrenches (force, then moment per unit of length) that redundant rows
-            leave undetermined, shape (n, 6, redundant rows).
+        free: directions of wrenches (force, then moment per unit of length) left undetermined by
+            redundant rows, shape (n, 6, redundant rows).
     """
 
     force: Array
@@ -34,7 +34,7 @@ class Reaction:
     def along(self, direction: Sequence[float] | Array, *, moment: bool = False) -> Array:
         """Return the component of force or moment along a unit direction, shape (n,).
 
-        It is NaN at samples where redundant rows leave it undetermined.
+        It is NaN at samples with this component undetermined by redundant rows.
         """
         part = slice(3, 6) if moment else slice(0, 3)
         d = np.asarray(direction, dtype=np.float64)
@@ -60,17 +60,17 @@ class Reaction:
 
 @dataclass(frozen=True, eq=False)
 class Forces:
-    """Forces over n samples; NaN at samples that were not reached or have none.
+    """Forces over n samples; NaN at samples unreached or without forces.
 
     Attributes:
         joints: reaction by joint.
         drivers: effort by driver, [N] or, if it turns, [N m], shape (n,): effort times rate is the
-            power that the driver puts in.
+            power put in by the driver.
         elements: force by force element, shape (n,): tension of a spring-damper [N]; torque of a
             torsional one on the joint's second body [N m]; amount of a force [N] or torque [N m].
         power: of the drivers less the change of energy and the dissipation [W], shape (n,): zero
             but for round-off.
-        largest_power: the largest of the powers that are summed [W], shape (n,).
+        largest_power: the largest of the summed powers [W], shape (n,).
         message: empty, or why forces are missing.
     """
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .dataset import Dataset
+from .unit_text import with_unit
 
 MOST_ROWS, MOST_COLUMNS, MOST_LINES, MOST_DIAGRAMS = 10, 10, 24, 9
 """Rows and columns of a table, lines of a diagram, and diagrams; the rest is left out, and said."""
@@ -32,7 +33,7 @@ def _table(data: Dataset) -> str:
     half = MOST_ROWS // 2
     rows = [*range(count)] if count <= MOST_ROWS else [*range(half), *range(count - half, count)]
     shown = [*columns][:MOST_COLUMNS]
-    heads = (f"{name} [{unit}]" if (unit := units.get(name)) else name for name in shown)
+    heads = (with_unit(name, units.get(name, "")) for name in shown)
     lines = [f"<tr>{''.join(f'<th style={CELL!r}>{escape(head)}</th>' for head in heads)}</tr>"]
     for k, row in enumerate(rows):
         if k == half and count > MOST_ROWS:
@@ -55,9 +56,8 @@ def _diagrams(data: Dataset) -> Iterator[str]:
     across = data.coords[data.x]
     curves = data.curves()
     for name, columns in islice(curves.items(), MOST_DIAGRAMS):
-        unit = data.variables[name].unit
-        label = f"{name} [{unit}]" if unit else name
-        below = f"{data.x} [{across.unit}]" if across.unit else data.x
+        label = with_unit(name, data.variables[name].unit)
+        below = with_unit(data.x, across.unit)
         short = {column.removeprefix(f"{name}."): lines for column, lines in columns.items()}
         yield _diagram(label, below, across.values, short)
     if len(curves) > MOST_DIAGRAMS:
@@ -65,7 +65,7 @@ def _diagrams(data: Dataset) -> Iterator[str]:
 
 
 def _diagram(label: str, below: str, x: NDArray[Any], columns: Mapping[str, NDArray[Any]]) -> str:
-    """Return one diagram as SVG; gaps where there is no number."""
+    """Return one diagram as SVG, with gaps for missing numbers."""
     lines = [
         (name, line)
         for name, values in columns.items()

@@ -1,4 +1,4 @@
-"""Results that can be shown, drawn and handed to other libraries."""
+"""Results as pictures, curves, tables and data of other libraries."""
 
 from __future__ import annotations
 

@@ -30,9 +30,9 @@ class PointMotion:
     """Motion of one point over n samples, global axes.
 
     Attributes:
-        position: [m], shape (n, 3); NaN at samples that were not reached.
-        velocity: [m/s], shape (n, 3), or None where the engine has none.
-        acceleration: [m/s^2], shape (n, 3), or None where the engine has none.
+        position: [m], shape (n, 3); NaN at unreached samples.
+        velocity: [m/s], shape (n, 3), or None if the engine has none.
+        acceleration: [m/s^2], shape (n, 3), or None if the engine has none.
     """
 
     position: Array
@@ -101,11 +101,11 @@ class Trajectory(Tabular):
         solved: whether each sample was reached, shape (n,).
         iterations: Newton iterations of each sample, shape (n,).
         residual: the engine's own largest constraint residual over the solved samples [m or -]; NaN
-            where there are none.
-        message: empty, or why samples are missing: what was found, where, and what to do.
+            if there are none.
+        message: empty, or why samples are missing: the finding, the place and the remedy.
         details: further facts worth a place in the record (rank, rows, degrees of freedom, ...).
-        bodies: motion by body name, for engines and requests that give it.
-        forces: reactions and efforts, for engines and requests that give them.
+        bodies: motion by body name, if requested and given by the engine.
+        forces: reactions and efforts, if requested and given by the engine.
         driven_by: gives `drive`; None if the engine does not tell it.
         failures: kinds of the failures in the message, each once.
     """
@@ -189,8 +189,8 @@ def largest_found(values: Array) -> float:
 def as_variables(
     points: Mapping[str, PointMotion], dims: tuple[str, ...], drive: Driving | None
 ) -> tuple[dict[str, Variable], dict[str, Variable], str]:
-    """Return coordinates and variables of the motion of points, and the name of the coordinate that
-    curves are drawn over.
+    """Return coordinates and variables of the motion of points, and the coordinate of the axis of
+    curves, by its name.
 
     Args:
         dims: of the samples, the last one "sample".

@@ -64,8 +64,8 @@ IMPORTS = {
         ". program mechanism kinematics/formulation kinematics/structure kinematics/compiled"
     ),
     "kinematics/verified": (
-        ". primitives program mechanism kinematics/formulation kinematics/structure "
-        "kinematics/compiled kinematics/continuation"
+        ". primitives program joints mechanism kinematics/formulation kinematics/forces "
+        "kinematics/structure kinematics/compiled kinematics/continuation"
     ),
     "kinematics/by_components": (
         ". program mechanism kinematics/formulation kinematics/structure "
@@ -103,16 +103,16 @@ IMPORTS = {
     "history": ". case case/io harness",
     "history/regression": ". case case/io harness history",
     "report": ". joints mechanism case case/io harness history history/regression",
-    "studies/stress/truth": ". program joints mechanism kinematics case",
-    "studies/stress/families": ". joints mechanism case case/io studies/stress/truth",
+    "studies/stress/truth": ". program joints mechanism kinematics case case/measures",
+    "studies/stress/families": ". joints mechanism case case/measures case/io studies/stress/truth",
     "studies": ". program joints mechanism kinematics case case/io harness report",
     "studies/joint_check": ". primitives program joints mechanism kinematics case harness studies",
     "studies/engine_check": (
         ". primitives joints case harness harness/workers studies studies/joint_check"
     ),
     "studies/tolerance": (
-        ". program program/llvm mechanism kinematics case case/io case/variation "
-        "harness harness/workers history report"
+        ". program program/llvm mechanism kinematics case case/measures case/io "
+        "case/variation harness harness/workers history report"
     ),
     "studies/stress": (
         ". joints mechanism kinematics case case/io harness harness/workers report "

@@ -14,6 +14,7 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Mapping, Sequence
 
 from ...core.algebra import vec
+from ...core.case.models.mjcf.masses import STAND_INS
 from ...core.errors import KincheckError
 from ...core.joints import Coupler, Distance, Joint
 from ...core.mechanism.loads import ForceElement, SpringDamper, TorsionSpringDamper
@@ -83,6 +84,8 @@ class _Model:
         armature = numbers([loads.STAND_IN]) if self.loaded else "1"
         ET.SubElement(ET.SubElement(self.root, "default"), "joint", armature=armature)
         self.custom = ET.SubElement(self.root, "custom")
+        if not self.loaded:  # for the reader: the masses below are none
+            ET.SubElement(self.custom, "text", name=STAND_INS, data="masses")
         self.elements = {GROUND: ET.SubElement(self.root, "worldbody")}
         self.tendons, self.equalities = (
             ET.SubElement(self.root, "tendon"),

@@ -125,7 +125,7 @@ class _Model:
         _text(inertial, "pose", f"{numbers(local(body, loads.center_of(body)))} 0 0 0")
         _text(inertial, "mass", numbers([loads.mass_of(body)]))
         inertia = ET.SubElement(inertial, "inertia")
-        entries = ("ixx", "iyy", "izz", "ixy", "iyz", "ixz")
+        entries = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
         # what stands in is the same in all axes, and remains so without rounding
         matrix = loads.inertia_of(body) if body.inertia is None else loads.own_inertia(body)
         for entry, value in zip(entries, loads.six(matrix), strict=True):

@@ -65,3 +65,18 @@ LENGTHS: Mapping[str, Unit] = {
     "foot": Unit("foot", 0.3048, lambda x: x * 0.3048),
 }
 ANGLES: Mapping[str, Unit] = {"rad": RADIAN, "deg": Unit("deg", math.pi / 180.0, math.radians)}
+
+
+def in_units(unit: str, length: Unit, angle: Unit) -> tuple[str, float]:
+    """Return the name of an SI unit, N and s as they are, with other units of length and angle, and
+    the size of one of it [SI]: N m with mm is N mm, a thousandth.
+    """
+    size, powers = 1.0, (1, *[-1] * unit.count("/"))
+    parts: list[str] = []
+    for part, power in zip(unit.split("/"), powers, strict=True):
+        names = [{"m": length, "rad": angle}.get(name, name) for name in part.split(" ")]
+        for name in names:
+            if isinstance(name, Unit):
+                size = name.power(size, power)
+        parts.append(" ".join(name.name if isinstance(name, Unit) else name for name in names))
+    return "/".join(parts), size

@@ -72,7 +72,7 @@ def add(commands: Any) -> None:
 
 
 def _assemblies(options: argparse.Namespace, house: House) -> int:
-    """List the assemblies that random starts find at a driver value, the intended one first.
+    """List the assemblies found from random starts at a driver value, the intended one first.
 
     Exit status: 0 some are found, 1 none is, 2 the tool could not do its work.
     """

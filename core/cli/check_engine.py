@@ -44,7 +44,7 @@ def add(commands: Any) -> None:
 
 def _check_engine(options: argparse.Namespace, house: House) -> int:
     """Check an engine: every joint type, several topologies, its rates against differences, its
-    refusals, and that it keeps no state. Each pair is solved in a worker process.
+    refusals, and repeated answers. Each pair is solved in a worker process.
     """
     report = examined(options.engine, house)
     report.print(sys.stdout, quiet=options.quiet)

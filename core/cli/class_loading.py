@@ -43,8 +43,8 @@ def _raised(error: Exception) -> str:
 
 
 def _members(module: ModuleType, offered: Callable[[object], bool]) -> list[str]:
-    """Return the names of the wanted objects that a module or package defines itself, including
-    those that it loads on first use.
+    """Return the names of the wanted objects of a module or package, without those it imports from
+    elsewhere, and with those it loads on first use.
     """
     found = {
         name: getattr(module, name, None)

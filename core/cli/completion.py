@@ -36,8 +36,8 @@ def add(commands: Any) -> None:
 
 
 def _complete(options: argparse.Namespace, house: House) -> int:
-    """Print the script that completes commands, options, built-in cases, engines and files. Make it
-    anew after an update.
+    """Print a shell script for the completion of commands, options, built-in cases, engines and
+    files. Print it anew after an update.
     """
     import shtab
 

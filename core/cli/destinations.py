@@ -28,7 +28,7 @@ REPORT = ("results.json", "report.html")
 
 @dataclass(frozen=True)
 class Destinations:
-    """Destinations of results; None where not wanted.
+    """Destinations of results; None if not wanted.
 
     Attributes:
         out: folder for the results and the report.
@@ -58,7 +58,7 @@ class Destinations:
         return any(getattr(self, each.name) is not None for each in fields(self))
 
     def problems(self, names: Sequence[str] = REPORT, history: Path | None = None) -> list[str]:
-        """Return the destinations that cannot be written, before the work starts.
+        """Return messages on unwritable destinations, before the work starts.
         Creates the folder.
 
         Args:
@@ -117,8 +117,7 @@ def deliver(
     precision: Mapping[str, Sequence[Effort]] | None = None,
     history: Callable[[], Trends] | None = None,
 ) -> None:
-    """Print the results and write the requested files; a file that cannot be written does not
-    stop the others.
+    """Print the results and write the requested files, as many of them as possible.
 
     Args:
         show: prints the results; default: `print_table`.
@@ -161,7 +160,7 @@ def _write_page(
     precision: Mapping[str, Sequence[Effort]] | None,
     history: Callable[[], Trends] | None,
 ) -> None:
-    """Write the report; without trends, and with a note about it, where the history is damaged."""
+    """Write the report; if the history is damaged, without trends and with a note."""
     from ..report.report import WITHOUT_TRENDS, write_report
 
     past = None if history is None else history()

@@ -1,7 +1,4 @@
-"""kincheck doctor: list installed and missing parts with remedies, and check that the tool works.
-
-The self-check solves one case.
-"""
+"""kincheck doctor: list installed and missing parts with remedies, and solve one case."""
 
 from __future__ import annotations
 
@@ -66,15 +63,14 @@ def _print(found: Examination, console: Console) -> None:
     console.print(f"{machine.processor}, {machine.processors} processors", soft_wrap=True)
     table = columns("part", "version", "for", "state")
     for part in found.parts:
-        state = (
-            Text(f"{part.problem}: {part.remedy}", "bold red" if part.essential else "yellow")
-            if part.problem
-            else Text("ok", "green")
-        )
-        table.add_row(
-            part.name, part.version or "–", part.purpose + " (essential)" * part.essential, state
-        )
+        state = "ok" if not part.problem else "broken" if part.version else "not installed"
+        style = "green" if not part.problem else "bold red" if part.essential else "yellow"
+        purpose = part.purpose + " (essential)" * part.essential
+        table.add_row(part.name, part.version or "–", purpose, Text(state, style))
     console.print(table)
+    for part in found.parts:
+        if part.problem and not part.essential:
+            console.print(f"{part.name}: {part.problem}: {part.remedy}", soft_wrap=True)
     width = f", {machine.vector_width} doubles at a time" if machine.vector_width else ""
     console.print(f"programs run by {machine.executor}{width}", soft_wrap=True)
     state = machine.cache_problem or f"writable, {1e-6 * machine.cache_bytes:.3g} MB now"

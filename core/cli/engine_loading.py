@@ -63,7 +63,7 @@ def _is_engine(each: object) -> bool:
 
 @cache
 def entry_points() -> Mapping[str, EntryPoint]:
-    """Return the engines that other installed packages offer, by name."""
+    """Return the engines of other installed packages, by name."""
     from importlib import metadata  # slow
 
     return {each.name: each for each in metadata.entry_points(group=GROUP)}

@@ -1,4 +1,4 @@
-"""Options of isolation: where pairs are solved, how many at a time, and with which limits."""
+"""Options of isolation: worker processes, their number and their limits."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def add_options(parser: argparse.ArgumentParser, positive: Callable[[str], float]) -> None:
-    """Add the options to a command that solves pairs of case and engine."""
+    """Add the options to a command for pairs of case and engine."""
 
     def limit(text: str) -> float:
         number = positive(text)

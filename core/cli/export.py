@@ -59,8 +59,8 @@ def add(commands: Any) -> None:
 def _export(options: argparse.Namespace, house: House) -> int:
     """Write a case's mechanism in a simulator's format, with a consistent start.
 
-    A second file beside the first holds parts that do not fit the format, such as the constraints
-    of a URDF.
+    A second file beside the first holds parts foreign to the format, such as the constraints of a
+    URDF.
     """
     from ..case.io.model_writer import written
 

@@ -78,7 +78,7 @@ def add(commands: Any) -> None:
 
 
 def add_history(parser: argparse.ArgumentParser, what: str) -> None:
-    """Add the option that names the history file."""
+    """Add the option for the history file."""
     parser.add_argument(
         "--history",
         type=Path,

@@ -31,8 +31,8 @@ def add(commands: Any) -> None:
 
 
 def _import(options: argparse.Namespace, house: House) -> int:
-    """Write a case file with all that `kincheck run FILE` makes of a file: `kincheck import
-    model.xml --drive hinge:0:1 > case.toml`, then `kincheck run case.toml`.
+    """Write a model or hardpoint table as a case file: `kincheck import model.xml
+    --drive hinge:0:1 > case.toml`, then `kincheck run case.toml`.
 
     Numbers are in SI units and keep all their digits.
     """

@@ -1,6 +1,4 @@
-"""Options of commands that read files: a user's joint types, and facts missing in files
-of other tools.
-"""
+"""Options for files: a user's joint types, and facts missing in files of other tools."""
 
 from __future__ import annotations
 
@@ -32,7 +30,8 @@ def add_options(command: argparse.ArgumentParser) -> None:
         ),
     )
     points = command.add_argument_group(
-        "hardpoints", "Suspensions of Project Chrono (.json), Adams/Car (.sub), tables (.csv)."
+        "hardpoints",
+        "Suspensions of Project Chrono (.json), Adams/Car (.sub), tables (.csv, .xlsx).",
     )
     points.add_argument(
         "--template",
@@ -76,8 +75,22 @@ def add_options(command: argparse.ArgumentParser) -> None:
         ),
     )
     points.add_argument(
-        "--travel", metavar="M[:SAMPLES]", help="of the wheel, up and down [m]; default 0.05:41"
+        "--travel",
+        metavar="M[:SAMPLES]",
+        help=(
+            "of the wheel, up and down [m], default 0.05:41; or START:STOP:SAMPLES, positive up:"
+            " --travel=-0.04:0.12:33"
+        ),
     )
+    points.add_argument(
+        "--rack",
+        metavar="M",
+        help=(
+            "travel of the rack while the wheel goes up [m], positive to the left: -M to M, or"
+            " START:STOP"
+        ),
+    )
+    points.add_argument("--sheet", metavar="NAME", help="of a workbook with several tables")
     model = command.add_argument_group(
         "models", "Models (MJCF, URDF, SDF); nothing in them says how they are driven."
     )
@@ -125,7 +138,7 @@ def return_cases(options: argparse.Namespace) -> None:
 
 
 def supplied(options: argparse.Namespace) -> Supplied:
-    """Return the facts that the options supply."""
+    """Return the facts supplied by options."""
     return Supplied(
         options.template,
         options.units,
@@ -140,6 +153,8 @@ def supplied(options: argparse.Namespace) -> Supplied:
         options.closure,
         options.hold_rest,
         (*options.start,),
+        options.rack,
+        options.sheet,
     )
 
 

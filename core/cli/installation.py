@@ -31,12 +31,18 @@ PURPOSES = {
     "fast": "machine code",
     "proofs": "proved references",
     "parquet": "history as Parquet",
+    "xlsx": "tables of spreadsheets",
     "distributed": "runs on many machines",
+    "yaml": "loops of URDF files",
+    "pandas": "results as tables",
+    "xarray": "results as datasets",
+    "matplotlib": "results as figures",
 }
 # Modules of distributions whose import name differs; of other simulators it is the engine's name.
 MODULES = {
     "python-flint": "flint",
     "llvmlite": "llvmlite.binding",
+    "pyyaml": "yaml",
     "drake": "pydrake.multibody.plant",
     "dartpy": "dartpy",
     "opensim": "opensim",
@@ -48,11 +54,11 @@ class Part(msgspec.Struct, frozen=True):
     """A part of the installation, present or missing.
 
     Attributes:
-        version: null where it is not installed.
+        version: null if it is not installed.
         purpose: use of the part.
         essential: the tool cannot work without it.
-        problem: why it cannot be used; empty where it can.
-        remedy: how to get it; empty where nothing is to be done.
+        problem: why it cannot be used; empty if it can.
+        remedy: how to get it; empty if nothing is to be done.
     """
 
     name: str
@@ -133,7 +139,7 @@ def examine(case: Case, native: Engine, tol: float, engines: Collection[str]) ->
 
 
 def parts(engines: Collection[str]) -> list[Part]:
-    """Return the parts that kincheck requires or can use, from its own metadata, and a browser.
+    """Return required and optional parts from kincheck's own metadata, and a browser.
 
     Args:
         engines: names of engines; the extra of an engine's simulator has the same name.
@@ -218,7 +224,7 @@ def _ended(importing: subprocess.Popen[str]) -> str:
 
 
 def _cache_problem() -> str:
-    """Return why compiled code cannot be cached; empty where it can."""
+    """Return why compiled code cannot be cached; empty if it can."""
     folder, remedy = (
         disk_cache.folder(),
         "every process compiles anew: make it writable, or set XDG_CACHE_HOME to a folder that is",

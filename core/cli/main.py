@@ -93,8 +93,8 @@ def _done(argv: list[str]) -> int:
 
 
 def _be_able_to_print() -> None:
-    """Print characters that the encoding lacks as question marks, so that no finished run ends at a
-    dash. A closed stream is replaced by the null device.
+    """Print characters missing in the encoding as question marks: no finished run ends at a
+    dash. Replace a closed stream by the null device.
     """
     for name in ("stdout", "stderr"):
         stream: TextIO | None = getattr(sys, name)
@@ -147,7 +147,7 @@ def house() -> House:
 
 
 def parser(argv: Sequence[str]) -> Parser:
-    """Return the parser of the command that the arguments begin with, or of all commands. Each
+    """Return the parser of the command at the start of the arguments, or of all commands. Each
     takes a millisecond to build.
     """
     found = Parser(

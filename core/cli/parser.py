@@ -1,4 +1,4 @@
-"""The parser of the command line: argparse, with errors that name the command and the remedy."""
+"""The parser of the command line: argparse, whose errors name the command and the remedy."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from ..errors import brief, similar, unknown
 class Parser(argparse.ArgumentParser):
     """A parser whose errors show the short usage of its own command.
 
-    argparse reports unknown options and superfluous arguments after all others, and with the usage
-    of the outermost parser. Here the command that they were given to reports them, first.
+    argparse reports unknown options and superfluous arguments after all other errors, with the
+    usage of the outermost parser. Here their own command reports them first.
     """
 
     def parse_known_args(  # pyright: ignore[reportIncompatibleMethodOverride]
         self, args: Any = None, namespace: Any = None
     ) -> Any:
-        """Parse the arguments; exit with a message at any that is not known."""
+        """Parse the arguments; exit with a message at an unknown one."""
         known = self._option_string_actions
         for word in self._own_options(args or ()):
             name = word.partition("=")[0] if word.startswith("--") else word[:2]
@@ -55,7 +55,7 @@ class Parser(argparse.ArgumentParser):
         return tuple(self._actions)
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
-        """Refuse a value that is none of an option's choices, or a command that does not exist."""
+        """Refuse an unknown choice of an option, or an unknown command."""
         if action.choices is None or value in action.choices:
             return
         names = [str(each) for each in action.choices]

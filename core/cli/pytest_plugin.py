@@ -1,10 +1,10 @@
 """The pytest plugin: `pytest --kincheck` collects case files as tests, one for each engine.
 
-    pytest --kincheck                                   # every engine that is installed
+    pytest --kincheck                                   # every installed engine
     pytest --kincheck --kincheck-engine mujoco          # this one only, and it must be there
 
-Files are TOML or JSON with the schema kincheck-case/1, anywhere pytest looks. A test fails where an
-output is out of tolerance or an engine breaks. A test is skipped where an engine is missing or
+Files are TOML or JSON with the schema kincheck-case/1, anywhere pytest looks. A test fails if an
+output is out of tolerance or an engine breaks. A test is skipped if an engine is missing or
 cannot express the case, or nothing was compared (not judged). pytest loads this file every time, so
 slow imports wait for --kincheck.
 """

@@ -74,8 +74,8 @@ def add(commands: Any) -> None:
 
 
 def _prove(options: argparse.Namespace, house: House) -> int:
-    """Prove that exactly one solution is near each sample of the native engine, and
-    enclose its outputs.
+    """Prove one solution, and no second one, near each sample of the native engine, and enclose
+    its outputs.
 
     Exit status: 0 all samples are proved, 1 some are not (singular poses), 2 the tool could not
     do its work.

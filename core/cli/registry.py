@@ -105,7 +105,7 @@ class House:
         return case
 
     def matching(self, name: str) -> list[str]:
-        """Return the built-in cases and files that a shell-style pattern matches; any other name as
+        """Return the built-in cases and files matched by a shell-style pattern; any other name as
         it is.
 
         Raises:
@@ -157,7 +157,7 @@ class House:
     def find_engines(
         self, names: Sequence[str], problems: list[str], mode: str | None = None
     ) -> list[Engine]:
-        """Return the named engines, each once. A name is that of an engine, or MODULE:CLASS.
+        """Return the named engines, each once: by the name of an engine, or by MODULE:CLASS.
 
         Args:
             problems: receives the messages of unknown names and missing modes.
@@ -236,8 +236,9 @@ def add_joint_types(command: argparse.ArgumentParser) -> None:
 
 
 def given(options: argparse.Namespace, names: Iterable[str]) -> str:
-    """Return the names of the options that were set, for a message. Their defaults are None,
-    False or [].
+    """Return the names of the given options, for a message.
+
+    Their defaults are None, False or [].
     """
     found = (
         name

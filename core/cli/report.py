@@ -122,7 +122,7 @@ def _write(
     store: Store | None,
     problems: list[str],
 ) -> None:
-    """Write the requested files; a file that cannot be written does not stop the others."""
+    """Write the requested files, as many of them as possible."""
     from ..case.io.atomic_files import to_standard_output, written
     from ..harness.record import to_json
     from ..history.queries import NIGHTS, read

@@ -45,7 +45,7 @@ class _Plan:
 
     Attributes:
         baseline: native engine to compare with, if it is not among the engines.
-        required, named: names of the engines that must be there.
+        required, named: names of engines without which the run is incomplete.
         unread: messages of unreadable cases, by their names as given; the other cases are run.
     """
 
@@ -105,7 +105,7 @@ def _run(options: argparse.Namespace, house: House) -> int:
 
 
 def _shown(options: argparse.Namespace) -> Callable[[Results, TextIO], None]:
-    """Return the function that prints the results."""
+    """Return a function to print the results."""
     from ..report.matrix import print_matrix
     from ..report.table import print_outputs, print_summary, print_table
 
@@ -241,7 +241,7 @@ def _explained(cases: Sequence[Case]) -> Iterator[str]:
 
 
 def _return_cases(options: argparse.Namespace, house: House) -> None:
-    """Move cases back from options that take several names: `run --engine native my_case.toml`."""
+    """Move cases back from options of several names: `run --engine native my_case.toml`."""
     for names in (options.engine, options.require):
         swallowed = [
             name

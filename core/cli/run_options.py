@@ -1,4 +1,4 @@
-"""Options of kincheck run, and defaults that other commands share."""
+"""Options of kincheck run, and defaults shared with other commands."""
 
 from __future__ import annotations
 

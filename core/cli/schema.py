@@ -1,4 +1,4 @@
-"""kincheck schema: print the JSON Schema of a file that kincheck reads or writes."""
+"""kincheck schema: print the JSON Schema of a file format of kincheck."""
 
 from __future__ import annotations
 
@@ -60,8 +60,8 @@ def add(commands: Any) -> None:
 
 
 def _schema(options: argparse.Namespace, house: House) -> int:
-    """Print the JSON Schema of a file, for editors and validators, made from the types that read
-    and write it.
+    """Print the JSON Schema of a file, for editors and validators, made from the types of its
+    reader and writer.
     """
     found = msgspec.json.encode(SCHEMAS[options.name]())
     to_standard_output(msgspec.json.format(found, indent=2) + b"\n")

@@ -89,7 +89,7 @@ def add(commands: Any) -> None:
 
 
 def _stress(options: argparse.Namespace, house: House) -> int:
-    """Drive engines through random mechanisms that break kinematic solvers, and judge every sample.
+    """Drive engines through random mechanisms made to break solvers, and judge every sample.
 
     Exit status: 0 no sample is silently wrong or refused for a wrong reason, 1 some are, 2 the tool
     could not do its work, or an engine supports none of the samples.

@@ -12,16 +12,17 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import KincheckError, unknown
 from ..harness.interrupts import hold, status_of, words_of
-from ..report.progress import complain, lacking, uncompared
+from ..report.progress import complain
 from ..version import VERSION
 from . import execution_options, import_options
 from .registry import House, Status
-from .sweep_options import FILES, PART, add_options
+from .sweep_options import FILES, LIMITS, PART, add_options
+from .sweep_replay import checking_solver, replay, replay_problems
 
 if TYPE_CHECKING:
     from ..case.case import Case
+    from ..case.variation.variation import Variation
     from ..harness.engine import Engine
-    from ..harness.execution import Solver
     from ..studies.tolerance.part_file import Part
     from ..studies.tolerance.results import SweepResults
     from ..studies.tolerance.study import Study
@@ -58,8 +59,7 @@ def _sweep(options: argparse.Namespace, house: House) -> int:
     problems += Destinations.of(options).problems(names)
     if options.scheduler is not None and options.jobs is not None:
         problems.append("--scheduler: how many threads is the cluster's matter; leave out --jobs")
-    if options.replay and options.samples is not None:
-        problems.append("--replay: a variant is known by seed and index; leave out --samples")
+    problems += replay_problems(options)
     if options.replay and (options.store or options.scheduler):
         problems.append(
             "--replay solves here, and stores nothing; leave out --store and --scheduler"
@@ -69,18 +69,22 @@ def _sweep(options: argparse.Namespace, house: House) -> int:
             "--resume goes on from a folder of results: give --out DIR, and leave out --replay"
         )
     engine, share = _check(options, house, problems)
-    case = _only(
-        house.find_case(options.case, import_options.supplied(options)), options.output, problems
-    )
+    whole = house.find_case(options.case, import_options.supplied(options))
+    case = _only(whole, options.output, problems)
     import_options.tell_left_out([case])
     problems = problems or execution_options.unreachable(options)
     if problems:
         raise KincheckError("\n".join(problems))
-    variation = read_variation(options.vary, case)
-    samples = variation.count or 0 if options.replay else how_many(variation, options.samples)
+    variation = read_variation(options.vary, whole)
+    variation = _limited(options, variation, whole, case)
+    if options.replay and options.samples is None:
+        samples = variation.count or 0
+    else:
+        samples = how_many(variation, options.samples)
+    variation = variation.sampled(options.sampling, samples)
     study = Study(case, variation, samples, options.seed, options.order, options.tol)
     if options.replay:
-        return _replay(options, house, study, engine)
+        return replay(options, house, study, engine)
     with ExitStack() as stack:
         part = None if options.out is None else stack.enter_context(_part(options))
         stops: list[KeyboardInterrupt | KincheckError] = []
@@ -128,41 +132,37 @@ def _check(
 
 
 def _only(case: Case, names: list[str], problems: list[str]) -> Case:
-    """Return the case with the named outputs only, or with all motions if none is named."""
-    from ..case.case import without_forces
-
+    """Return the case with the named outputs only, or with all if none is named."""
     there = [output.name for output in case.outputs]
     problems += [unknown("output", name, there) for name in names if name not in there]
-    wanted = [output for output in case.outputs if output.name in names or not names]
-    if loads := [output.name for output in wanted if output.forces]:
-        text = f"forces are not reduced over variants: {', '.join(loads)}"
-        if names:
-            problems.append(f"--output: {text}; leave them out")
-        else:
-            complain([f"{text} {'is' if len(loads) == 1 else 'are'} left out"])
-    return without_forces(replace(case, outputs=tuple(wanted)))
+    wanted = tuple(output for output in case.outputs if output.name in names or not names)
+    return replace(case, outputs=wanted)
 
 
-def _solver(options: argparse.Namespace, engine: Engine) -> Solver:
-    """Return the solver of checked variants: this process for an engine without foreign code, else
-    worker processes.
+def _limited(
+    options: argparse.Namespace, variation: Variation, whole: Case, case: Case
+) -> Variation:
+    """Return the variation with the limits of the options too, which replace those of the file; of
+    the outputs of the case alone.
     """
-    from ..harness.engine import may_run_here
-    from ..harness.execution import here
-    from ..harness.resource_limits import Limits, default_jobs
-    from ..harness.workers.distributed import on_cluster
-    from ..harness.workers.pool import in_workers
+    from ..case.variation.limits import limits_of_texts
 
-    if options.scheduler is not None:
-        return on_cluster(options.scheduler, Limits())
-    if may_run_here(engine):
-        return here
-    return in_workers(options.jobs or default_jobs(), Limits())
+    given = limits_of_texts(options.limit, whole, variation.units)
+    limits = {each.output: each for each in (*variation.limits, *given)}
+    there = {output.name for output in case.outputs}
+    kept = {
+        name: each
+        for name, each in limits.items()
+        if name in there or name.rpartition(".")[0] in there
+    }
+    if left_out := [name for name in limits if name not in kept]:
+        complain([f"limits of {', '.join(left_out)}: left out, as --output leaves out these"])
+    return replace(variation, limits=tuple(kept.values()))
 
 
 def _part(options: argparse.Namespace) -> Part:
-    """Return the file of the finished part, with the facts besides the study that its
-    numbers depend on.
+    """Return the file of the finished part, with all facts besides the study behind its
+    numbers.
     """
     import numpy as np
 
@@ -193,8 +193,8 @@ def _solve(
     from ..harness.resource_limits import default_jobs
     from ..report.meter import Meter
     from ..studies.tolerance.chunk_execution import on_cluster
+    from ..studies.tolerance.parquet_store import ParquetStore
     from ..studies.tolerance.sweep import Check, sweep_designs
-    from ..studies.tolerance.tables import ParquetStore
 
     def solved(progress: Progress) -> None:
         rate = f"{progress.solved / progress.seconds:.3g} variants/s"
@@ -209,7 +209,7 @@ def _solve(
     meter = Meter("sweep", quiet=options.quiet, every=EVERY)
     check = None
     if engine is not None:
-        check = Check(engine, share, _solver(options, engine), options.tol, checked)
+        check = Check(engine, share, checking_solver(options, engine), options.tol, checked)
     with ExitStack() as stack:
         stack.enter_context(meter)
         store = (
@@ -222,6 +222,7 @@ def _solve(
             study.variation,
             samples=options.samples,
             seed=options.seed,
+            sampling=options.sampling,
             order=options.order,
             tol=options.tol,
             jobs=options.jobs or default_jobs(),
@@ -235,46 +236,13 @@ def _solve(
         )
 
 
-def _replay(options: argparse.Namespace, house: House, study: Study, engine: Engine | None) -> int:
-    """Solve single variants as a run does: its table, its report, its status."""
-    from ..harness import run as running
-    from ..harness.standard import STANDARD
-    from . import destinations as delivery
-
-    for index in options.replay:
-        if study.samples and index >= study.samples:
-            raise KincheckError(
-                f"--replay {index}: there are {study.samples} variants, 0 to {study.samples - 1};"
-                " give one of them"
-            )
-    native = house.engine(STANDARD)
-    engines = [native] if engine is None or engine.name == STANDARD else [native, engine]
-    cases = [study.of_variant(index) for index in dict.fromkeys(options.replay)]
-    results = running.run(
-        cases,
-        engines,
-        tol=options.tol,
-        command=options.command,
-        solver=_solver(options, engines[-1]),
-    )
-    problems: list[str] = []
-    delivery.deliver(results, problems, delivery.Destinations.of(options))
-    if engine is not None:
-        problems += lacking(results, [], [engine.name]) + uncompared(results)
-    complain(problems)
-    if problems:
-        return Status.FAILED
-    return (
-        Status.DEVIATES if any(record.outcome.bad for record in results.records) else Status.WITHIN
-    )
-
-
 def _deliver(options: argparse.Namespace, results: SweepResults) -> list[str]:
     """Print the table and write the requested files; return the problems of writing."""
     from ..case.io.atomic_files import to_standard_output, write_all
     from ..harness.record import to_json
+    from ..studies.tolerance.csv_tables import envelope_csv, gradient_csv, limits_csv
     from ..studies.tolerance.page import page
-    from ..studies.tolerance.tables import envelope_csv, gradient_csv, print_sweep
+    from ..studies.tolerance.tables import print_sweep
 
     encoded = to_json(results)
     contents = [(Path(options.json), encoded)] if options.json not in (None, "-") else []
@@ -286,6 +254,8 @@ def _deliver(options: argparse.Namespace, results: SweepResults) -> list[str]:
             gradient_csv(results).encode(),
         )
         contents += [(options.out / name, text) for name, text in zip(FILES, texts, strict=True)]
+    if options.out is not None and results.limits:
+        contents.append((options.out / LIMITS, limits_csv(results).encode()))
     problems = write_all(contents)  # first: the reader of standard output may have closed it
     print_sweep(results, sys.stderr if options.json == "-" else sys.stdout)
     if options.json == "-":

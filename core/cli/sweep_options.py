@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from ..case.variation.sampling import Sampling
 from . import import_options
 from .option_types import positive, whole
 from .run_options import TOL
@@ -12,6 +13,9 @@ from .verbosity import add_verbosity
 
 PART = "sweep.part"
 """File of a sweep's finished part, in the folder of its results until the sweep ends."""
+
+LIMITS = "limits.csv"
+"""File of the specification limits, for studies that have some."""
 
 FILES = ("sweep.json", "sweep.html", "envelope.csv", "gradients.csv")
 
@@ -35,6 +39,26 @@ def add_options(sweep: argparse.ArgumentParser) -> None:
         default=0,
         metavar="S",
         help="seed of the random variants; default %(default)s",
+    )
+    sweep.add_argument(
+        "--sampling",
+        type=Sampling,
+        choices=[*Sampling],
+        default=Sampling.RANDOM,
+        help=(
+            "how the variants are drawn: at random, as a Latin hypercube or as a Sobol sequence;"
+            " default %(default)s"
+        ),
+    )
+    sweep.add_argument(
+        "--limit",
+        action="append",
+        default=[],
+        metavar="OUTPUT:LOW:HIGH",
+        help=(
+            "specification limits of an output, in the units of the --vary file; one may be empty."
+            " The study counts the variants inside, with Cp and Cpk"
+        ),
     )
     sweep.add_argument(
         "--output",
@@ -87,7 +111,12 @@ def add_options(sweep: argparse.ArgumentParser) -> None:
     sweep.add_argument(
         "--store", type=Path, metavar="FILE", help="write the values of all variants as Parquet"
     )
-    sweep.add_argument("--out", type=Path, metavar="DIR", help=f"write {', '.join(FILES)} there")
+    sweep.add_argument(
+        "--out",
+        type=Path,
+        metavar="DIR",
+        help=f"write {', '.join(FILES)} there, and {LIMITS} of limits",
+    )
     sweep.add_argument(
         "--json", metavar="FILE", help="write the results as JSON; - for standard output"
     )

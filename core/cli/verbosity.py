@@ -1,4 +1,4 @@
-"""The options -q and -v, for the commands that have less or more to say."""
+"""The options -q and -v, to print less or more."""
 
 from __future__ import annotations
 

@@ -7,6 +7,7 @@ from typing import Any, cast
 
 from ..case.case import PER_TRAVEL, Truth
 from ..trajectory import PER_TIME, QUANTITIES
+from ..unit_text import unit_text
 from .record import Outcome, Record, Results
 
 TRUTHS = {
@@ -86,7 +87,7 @@ def unread_count(count: int) -> str:
 
 def motion_unit(unit: str, motion: str) -> str:
     """Return the unit of a motion's derivative, e.g. m/s for a velocity in m."""
-    return unit + PER_TIME[QUANTITIES.index(motion)].replace("^2", "²")
+    return unit_text(unit + PER_TIME[QUANTITIES.index(motion)])
 
 
 def number(value: float | None) -> str:

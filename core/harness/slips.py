@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..trajectory import Array
+from ..unit_text import value_text
 from .compare import deviation
 from .record import Deviation
 
@@ -158,8 +159,9 @@ def _moves(held: Held, reference: Uncertain, offsets: bool) -> Iterator[_Change]
     known = np.isfinite(off)
     if offsets and known.any():
         constant = 0.5 * float(off[known].max() + off[known].min())
+        size = value_text(f"{abs(constant):.9g}", held.unit)
         yield (
-            f"{'plus' if constant > 0 else 'minus'} {abs(constant):.9g} {held.unit}",
+            f"{'plus' if constant > 0 else 'minus'} {size}",
             lambda x: x + constant,
         )
     yield "with its samples in reversed order", lambda x: x[::-1]

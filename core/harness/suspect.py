@@ -11,6 +11,7 @@ from ..case.case import TIME, Case
 from ..case.units import ANGLES, LENGTHS, SECOND, Unit
 from ..errors import shortened
 from ..trajectory import PER_TIME, QUANTITIES, Array
+from ..unit_text import value_text
 from .compare import deviation, pace
 from .evidence import Explanation, Suspect
 from .record import Deviation, Deviations, OutputSeries, Record
@@ -86,7 +87,7 @@ def suspect(case: Case, records: Sequence[Record]) -> Suspect | None:
 def _engines(engines: Sequence[str], agreed: float, worst: _Off) -> str:
     if len(engines) == 1:
         return f"{engines[0]} is the only engine that solved it"
-    return f"all {len(engines)} engines agree within {_number(agreed)} {worst.held.unit}"
+    return f"all {len(engines)} engines agree within {value_text(_number(agreed), worst.held.unit)}"
 
 
 def _difference(case: Case, worst: _Off) -> str:
@@ -95,11 +96,9 @@ def _difference(case: Case, worst: _Off) -> str:
         f"sample {step} ({case.sweep.driver} ="
         f" {_unit(case).written(float(case.sweep.values[step]))})"
     )
-    off = f"{_number(worst.deviation.max_abs)} {worst.held.unit}"
-    held = (
-        f"{QUANTITIES[worst.order]}, tolerance {_number(worst.deviation.tolerance)}"
-        f" {worst.held.unit}"
-    )
+    off = value_text(_number(worst.deviation.max_abs), worst.held.unit)
+    tolerance = value_text(_number(worst.deviation.tolerance), worst.held.unit)
+    held = f"{QUANTITIES[worst.order]}, tolerance {tolerance}"
     return f"the reference differs by {off} at {at} of output {worst.output} ({held})"
 
 
@@ -114,8 +113,8 @@ def _unit(case: Case) -> Unit:
 def _reasons(explanations: Sequence[Explanation], left: Sequence[str]) -> str:
     said = [
         f"{', '.join(each.outputs)} ({', '.join(each.quantities)}): the reference {each.change}"
-        f" fits within {_number(each.difference)} {each.unit}, tolerance {_number(each.tolerance)}"
-        f" {each.unit}"
+        f" fits within {value_text(_number(each.difference), each.unit)}, tolerance"
+        f" {value_text(_number(each.tolerance), each.unit)}"
         for each in explanations
     ]
     if left:

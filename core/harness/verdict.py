@@ -12,6 +12,7 @@ import numpy as np
 
 from ..case.case import Case, Quantity, size
 from ..errors import shortened
+from ..unit_text import value_text
 from .compare import NO_VALUE, describe, deviations
 from .engine import Engine, bounds_error
 from .execution import Answer
@@ -126,7 +127,7 @@ def _contradiction(case: Case, answer: Answer, native: Standard) -> str:
         return ""
     first = int(np.argmax(at))
     values = [
-        f"{output.name} = {value:.6g} {output.unit}"
+        f"{output.name} = {value_text(f'{value:.6g}', output.unit)}"
         for output in case.outputs
         if np.isfinite(value := answer.outputs[output.name].position[first])
     ]

@@ -74,7 +74,7 @@ def export(
 def _rows(
     store: Store, cases: Sequence[str], engines: Sequence[str]
 ) -> Iterator[list[tuple[Any, ...]]]:
-    """The names of the columns, then the rows, so many at a time."""
+    """Yield the names of the columns, then the rows in batches."""
     chosen = [(column, names) for column, names in (("case", cases), ("engine", engines)) if names]
     where = (
         " AND ".join(f'"{column}" IN ({", ".join("?" * len(names))})' for column, names in chosen)

@@ -36,7 +36,7 @@ class DamagedRunError(HistoryError):
 
 @contextmanager
 def explained(path: Path, what: str, run: int | None = None) -> Generator[None]:
-    """Turn faults of the database into a HistoryError with the file, and with the run if one run is
+    """Raise faults of the database as a HistoryError with the file, and with the run if one run is
     damaged.
 
     Args:

@@ -1,4 +1,4 @@
-"""Which process writes a run, and whether it still does."""
+"""The process writing a run, and whether it is alive."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ..harness.provenance import readable
 
 
 def owner() -> str:
-    """This process: host, number, and when it began, as numbers are given again."""
+    """Return host, number and start of this process; systems use the numbers again."""
     return f"{readable(platform.node())}|{os.getpid()}|{_begun(os.getpid())}"
 
 

@@ -92,8 +92,8 @@ def read(
 
 
 def readable(store: Store) -> list[RunRow]:
-    """The runs whose facts and records' columns can all be read, the latest first; the others are
-    passed over.
+    """Return the runs whose facts and records' columns can all be read, the latest first; pass over
+    the others.
 
     Raises:
         HistoryError: the file cannot be read.

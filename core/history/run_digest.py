@@ -1,4 +1,4 @@
-"""What makes two runs the same: a digest of cases and settings by their content."""
+"""The identity of a run: a digest of cases and settings by their content."""
 
 from __future__ import annotations
 
@@ -11,11 +11,10 @@ import numpy as np
 
 
 def digest(*things: Any) -> str:
-    """SHA-256 of data: dataclasses by their class and fields, arrays by their bits, and what these
-    are made of.
+    """Return the SHA-256 digest of data: dataclasses by class and fields, arrays by their bits.
 
-    Not of their pickle: that one changes with which equal parts happen to be one object. What else
-    is in there counts by its text; where that has an address, no two digests are equal.
+    A pickle would not do: it depends on which equal parts are one object. Objects of other types
+    enter by their text; a text with a memory address makes each digest a different one.
     """
     whole = hashlib.sha256()
     for piece in _pieces(things):

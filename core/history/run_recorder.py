@@ -1,4 +1,4 @@
-"""A run being written down while it goes on, and taken up again where it ended by force."""
+"""Recording of a run while it goes on, and continuation of a killed run."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ class Keeping:
 
     Attributes:
         run: its number.
-        resumed: it began earlier, and was taken up again.
-        made: its records of then.
+        resumed: whether it continues an earlier run.
+        made: the records of the earlier run.
         facts: its circumstances, for `run`.
-        problems: what the history could not do; from then on the run goes on without it.
+        problems: faults of the history; after the first, the run goes on without a history.
     """
 
     store: Store
@@ -50,7 +50,7 @@ class Keeping:
             )
 
     def end(self, results: Results, *, interrupted: bool) -> None:
-        """The run has ended: with all its records, or by an interrupt."""
+        """End the run, complete or interrupted."""
         if not self.problems:
             try:
                 self.store.finish(self.run, results, "interrupted" if interrupted else "finished")
@@ -74,13 +74,13 @@ def keep(
     unread: Sequence[str] = (),
     joints: Mapping[str, str] | None = None,
 ) -> Keeping:
-    """Begin a run in a history, or take up the last one of the same cases, engines, tolerance,
+    """Begin a run in a history, or continue the last one of the same cases, engines, tolerance,
     limits, versions, machine and files.
 
     Args:
         settings: further circumstances.
-        resume: take up one that has no end; where there is none, a new one begins.
-        unread: names of cases that were asked for and make no sense.
+        resume: continue a run without an end; begin a new one if there is none.
+        unread: names of requested cases that cannot be read.
         joints: digests of the modules of joint types, by name: other code makes another run.
 
     Raises:

@@ -1,9 +1,9 @@
-"""The tables of a history, and how files of earlier versions come to have them.
+"""The tables of a history, and the migration of files of earlier versions.
 
-`runs`: a row a run. `records`: a row a (case, engine, mode) of a run; the columns are what trends
-and tables read, the whole record is in `record`. `documents`: what belongs to a run's case besides,
-references above all, each text once however many runs have it. `measured`: all of it in one flat
-table, a row a case, engine, mode, output and motion of a run, for other programs and for export.
+`runs`: a row a run. `records`: a row a (case, engine, mode) of a run; trends and tables read the
+columns, and `record` holds the whole record. `documents`: further texts of a run's case, such as
+references, each text once for all runs. `measured`: a flat view for other programs and for export,
+a row a case, engine, mode, output and motion of a run.
 """
 
 from __future__ import annotations
@@ -109,10 +109,10 @@ that was published stays.
 
 
 def migrate(connection: sqlite3.Connection) -> None:
-    """Bring the tables up to date, all or nothing. Others who do the same wait.
+    """Bring the tables up to date in one transaction. Other processes wait for it.
 
     Raises:
-        ValueError: another program's file, or one that a later version has made.
+        ValueError: the file is another program's, or of a later version.
     """
     connection.execute("BEGIN IMMEDIATE")
     try:
@@ -130,10 +130,10 @@ def migrate(connection: sqlite3.Connection) -> None:
 
 
 def check(connection: sqlite3.Connection) -> int:
-    """The version of a file's tables, 0 where it is empty.
+    """Return the version of a file's tables, 0 if it is empty.
 
     Raises:
-        ValueError: another program's file, or one that a later version has made.
+        ValueError: the file is another program's, or of a later version.
     """
     # in one statement: another process may be making the tables, and is not to be seen halfway
     tables, version, application = connection.execute(
@@ -151,10 +151,10 @@ def check(connection: sqlite3.Connection) -> int:
 
 
 def write_ahead(connection: sqlite3.Connection, patience: float) -> None:
-    """Have readers and a writer not wait for each other.
+    """Turn on write-ahead logging, with which readers and a writer do not wait for each other.
 
-    Of those who ask for that in a new file at once, SQLite has some fail instead of wait: they ask
-    again.
+    If several processes ask for it in a new file at once, SQLite fails some of them instead of
+    making them wait. These ask again.
     """
     end = monotonic() + patience
     while True:

@@ -41,7 +41,7 @@ QUICK = 1
 
 @dataclass(frozen=True)
 class RunRow:
-    """A run as the history has it; see the table `runs`."""
+    """A row of the table `runs`."""
 
     id: int
     started: str
@@ -53,7 +53,7 @@ class RunRow:
 
 
 class Store:
-    """A history file. From every method comes a HistoryError where it cannot be read or written."""
+    """A history file. Every method raises HistoryError if the file cannot be read or written."""
 
     def __init__(self, path: Path, *, writable: bool = True) -> None:
         self.path = path
@@ -68,7 +68,7 @@ class Store:
         self.close()
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Close the file."""
         # what was committed is on the disk; tidying up can fail on a full one
         with suppress(sqlite3.Error):
             self.connection.close()
@@ -80,14 +80,13 @@ class Store:
         circumstances: dict[str, Any],
         references: Mapping[str, Any] | None = None,
     ) -> int:
-        """A new run; its number.
+        """Begin a run and return its number.
 
         Args:
-            identity: by which it is found to be resumed: equal for runs that give the same records.
+            identity: digest by which a later process resumes it; equal for runs with equal records.
             plan: case, engine and mode of its pairs, in the order of the results.
-            circumstances: as `Results.run`; among them when it started, and the command.
-            references: as `Results.references`, for whoever reads the run before it has ended, or
-                if it never does.
+            circumstances: as `Results.run`; with the time of the start and the command.
+            references: as `Results.references`, for readers of a run without an end.
         """
         started, command = circumstances["started"], circumstances["command"]
         row = (started, "running", command, identity, owner(), _json(plan), _json(circumstances))
@@ -102,8 +101,9 @@ class Store:
         return done.lastrowid
 
     def resume_run(self, identity: str) -> RunRow | None:
-        """The last run of that identity, if it has no end and no other process is at it. It is this
-        process's from now on.
+        """Return the last run of an identity if it has no end and no other process writes it.
+
+        From now on this process owns it.
         """
         with self._transaction():
             query = (
@@ -121,7 +121,7 @@ class Store:
         return None
 
     def add_record(self, run: int, record: Record) -> None:
-        """Keep a record. A pair that has one keeps that: it is never there twice."""
+        """Keep a record. A second record of a pair is ignored."""
         seconds = record.seconds
         row: dict[str, Any] = {
             "run_id": run,
@@ -154,9 +154,7 @@ class Store:
             )
 
     def finish(self, run: int, results: Results | None = None, status: Status = "finished") -> None:
-        """The run has ended. What the results have besides records, references above all, is kept
-        with it.
-        """
+        """End the run, and keep the parts of the results beside the records, such as references."""
         with self._transaction():
             if results is not None:
                 for kind in (
@@ -170,7 +168,7 @@ class Store:
             )
 
     def remove(self, run: int) -> None:
-        """Remove a run and all that belongs to it alone."""
+        """Remove a run with its records, and texts used by no other run."""
         with self._transaction():
             for table, column in (("attachments", "run_id"), ("records", "run_id"), ("runs", "id")):
                 removed = self.connection.execute(
@@ -183,7 +181,7 @@ class Store:
             raise HistoryError(f"history {self.path}: there is no run {run}")
 
     def runs(self) -> list[RunRow]:
-        """All runs that can be read, the latest first."""
+        """Return all readable runs, the latest first."""
         rows: list[RunRow] = []
         with self.explained("read"):
             numbers = self.connection.execute("SELECT id FROM runs ORDER BY id DESC").fetchall()
@@ -194,7 +192,7 @@ class Store:
 
     @contextmanager
     def sparing(self) -> Generator[None]:
-        """Pass over a run that cannot be read."""
+        """Pass over an unreadable run."""
         try:
             yield
         except DamagedRunError as error:
@@ -202,11 +200,11 @@ class Store:
 
     @property
     def damage(self) -> list[str]:
-        """Runs that were passed over, a line each."""
+        """Return a line for each run passed over."""
         return told(self.path, self.passed_over)
 
     def run(self, run: int) -> RunRow:
-        """The run of that number.
+        """Return the run of a number.
 
         Raises:
             HistoryError: there is none.
@@ -230,7 +228,7 @@ class Store:
         raise HistoryError(f"history {self.path}: there is no run {run}")
 
     def records(self, run: int) -> list[Record]:
-        """The records of a run, in the order of its plan."""
+        """Return the records of a run, in the order of its plan."""
         place = {pair: k for k, pair in enumerate(self.run(run).plan)}
         with self.explained("read", run):
             rows = self.connection.execute(
@@ -244,8 +242,9 @@ class Store:
         )
 
     def results(self, run: int) -> Results:
-        """A run as the command wrote it; of one without an end, what there is, and in
-        `run["missing"]` what is not.
+        """Return the results of a run as the command wrote them.
+
+        Of a run without an end, `run["missing"]` lists the missing pairs.
         """
         row, records = self.run(run), self.records(run)
         attached: dict[str, dict[str, Any]] = {}
@@ -284,7 +283,7 @@ class Store:
                 raise
 
     def explained(self, what: str, run: int | None = None) -> AbstractContextManager[None]:
-        """What goes wrong meanwhile is a HistoryError: see `faults`."""
+        """Raise faults of the database as a HistoryError; see `faults`."""
         return explained(self.path, what, run)
 
 
@@ -293,5 +292,5 @@ def _json(value: Any) -> str:
 
 
 def now() -> str:
-    """The time as the history has it."""
+    """Return the present time in the format of the history."""
     return datetime.now(UTC).isoformat(timespec="milliseconds")

@@ -15,6 +15,7 @@ class Kind(Enum):
     POSITIONS = "two points [[x, y, z] on the first body, [x, y, z] on the second]"
     DIRECTIONS = "two directions [[x, y, z] on the first body, [x, y, z] on the second]"
     LENGTH = "a length"
+    NUMBER = "a number"
 
     @property
     def pair(self) -> bool:

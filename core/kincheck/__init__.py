@@ -1,12 +1,12 @@
-"""Cross-validation of the kinematics of constrained multibody systems.
+"""Cross-validation of the kinematics and forces of constrained multibody systems.
 
     import kincheck
 
     case = kincheck.load("rssr")
     results = kincheck.run(case, engines=["native", "mujoco"])
 
-All names of `kincheck.core` are here too. Each is imported on first use, so that the command line
-and pytest start without numpy.
+All names of `kincheck.core` are here too. Each is imported on first use: the command line and
+pytest start without numpy.
 
 This folder is the package kincheck itself; its parts lie in folders of their own. They are named
 in full here: in the sources, a relative import would look for them in this folder.
@@ -36,5 +36,5 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """Return the public names, also those that are not loaded yet."""
+    """Return the public names, loaded or not."""
     return sorted({*globals(), *__all__})

@@ -2,8 +2,7 @@
 
 This folder is the package kincheck itself; its parts lie in folders of their own.
 
-It imports next to nothing before it takes signals, so that an interrupt is one line while the rest
-is imported too.
+It takes signals before it imports the rest: an interrupt during imports is one line too.
 """
 
 import os
@@ -17,7 +16,7 @@ SIGNALS = 128
 
 
 def leave(number: int, frame: FrameType | None) -> None:
-    """End the process at a signal that comes before the command begins or after it has ended."""
+    """End the process at a signal before the command begins or after it has ended."""
     os.write(
         2, b"kincheck: terminated\n" if number == signal.SIGTERM else b"kincheck: interrupted\n"
     )

@@ -25,7 +25,7 @@ def load(name: str | Path, supplied: Supplied = NOTHING) -> Case:
 
     Args:
         name: name, or path of a case file, hardpoint table or model.
-        supplied: facts that a file of another tool lacks.
+        supplied: facts missing in a file of another tool.
 
     Raises:
         KincheckError: there is no such case, or its file is invalid.

@@ -19,6 +19,7 @@ Describe:
     degrees_of_freedom, require_driven              drivers against degrees of freedom
     reduce_rows, largest_residual                   rows that are redundant but for digits
     kinds, places, placed                           the geometry by name
+    LoadPlace, load_places                          masses and loads by name
     Ranks, freeing, conditioning, describe_screws   rank, conditioning and screws at a pose
     prove, prove_pose                               samples and poses enclosed in balls
     constraints, Cartesian, Frames, Relation        the equations of joints and drivers
@@ -56,6 +57,7 @@ if TYPE_CHECKING:
     from .continuation.curve import Event as Event
     from .continuation.trace import trace as trace
     from .design_batch import Variants as Variants
+    from .design_forces import ForcesOfDesigns as ForcesOfDesigns
     from .design_sweep import Designs as Designs
     from .design_sweep import solve_designs as solve_designs
     from .diagnosis.conditioning import Conditioning as Conditioning
@@ -85,6 +87,8 @@ if TYPE_CHECKING:
     from .formulation.constraints import Style as Style
     from .formulation.constraints import constraints as constraints
     from .formulation.constraints import unit_near as unit_near
+    from .formulation.load_parameters import LoadPlace as LoadPlace
+    from .formulation.load_parameters import load_places as load_places
     from .formulation.parameters import kinds as kinds
     from .formulation.parameters import placed as placed
     from .formulation.parameters import places as places
@@ -102,8 +106,9 @@ if TYPE_CHECKING:
     from .verified.exact import Reading as Reading
     from .verified.exact import as_decimal as as_decimal
     from .verified.exact import as_double as as_double
+    from .verified.force_enclosure import EnclosedForces as EnclosedForces
+    from .verified.force_enclosure import UnprovedError as UnprovedError
     from .verified.krawczyk import Enclosure as Enclosure
-    from .verified.krawczyk import UnprovedError as UnprovedError
     from .verified.pose_proof import PoseState as PoseState
     from .verified.pose_proof import prove_pose as prove_pose
     from .verified.verified_sweep import Drives as Drives
@@ -118,6 +123,7 @@ _NAMES = {
     "continuation.curve": "Curve Event",
     "continuation.trace": "trace",
     "design_batch": "Variants",
+    "design_forces": "ForcesOfDesigns",
     "design_sweep": "Designs solve_designs",
     "diagnosis.conditioning": "Conditioning PoseConditioning conditioning",
     "diagnosis.freeing": "freeing",
@@ -128,6 +134,7 @@ _NAMES = {
     "formulation.acceptance_criteria": "LONGEST_TURN ROUNDING continued continuous regular_between",
     "formulation.cartesian": "COLUMNS Cartesian",
     "formulation.constraints": "Frames Relation Style constraints unit_near",
+    "formulation.load_parameters": "LoadPlace load_places",
     "formulation.parameters": "kinds placed places",
     "native_solver": "Method NativeSolver",
     "one_design": "solve",
@@ -137,7 +144,8 @@ _NAMES = {
     "structure.driver_count": "degrees_of_freedom require_driven",
     "structure.reduction": "largest_residual reduce_rows",
     "verified.exact": "Exact Reading as_decimal as_double",
-    "verified.krawczyk": "Enclosure UnprovedError",
+    "verified.force_enclosure": "EnclosedForces UnprovedError",
+    "verified.krawczyk": "Enclosure",
     "verified.pose_proof": "PoseState prove_pose",
     "verified.verified_sweep": "Drives Proofs prove",
 }

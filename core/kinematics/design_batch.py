@@ -29,7 +29,7 @@ from .compiled.samples import Route
 from .continuation.side_follower import FINER, ROOM
 from .continuation.walk import march
 from .formulation.acceptance_criteria import doubtful
-from .formulation.parameters import placed, places
+from .formulation.parameters import every_place, placed
 from .solver_selection import IRREDUCIBLE, prepare
 from .structure.driver_count import require_driven
 
@@ -157,7 +157,7 @@ def _by_itself(route: Route, numbers: Array, tol: float) -> tuple[Array, NDArray
     model, n = route.model, len(route.path.times)
     kept = np.full((model.kept, n), np.nan)
     try:
-        found = prepare(_variant(model, numbers), replace(model.request, varied=()), route.path)(
+        found = prepare(variant_of(model, numbers), replace(model.request, varied=()), route.path)(
             tol
         )
     except SolveError as error:
@@ -193,15 +193,15 @@ def _held(route: Route, geometry: Array, solved: NDArray[np.bool_]) -> dict[int,
     away = np.abs(times - route.start) > SAME_TIME * np.abs(times).max(initial=0.0)
     for k in np.flatnonzero(solved.any(axis=0) & ~solved[away].any(axis=0)).tolist():
         try:
-            require_driven(_variant(model, geometry[:, k]))
+            require_driven(variant_of(model, geometry[:, k]))
         except SolveError as error:
             found[k] = str(error)
     return found
 
 
-def _variant(model: Model, numbers: Array) -> Mechanism:
-    """The mechanism with the numbers of a variant at the varied places."""
-    known, given = places(model.mechanism), iter(numbers.tolist())
+def variant_of(model: Model, numbers: Array) -> Mechanism:
+    """Return the mechanism with the numbers of a variant at the varied places."""
+    known, given = every_place(model.mechanism), iter(numbers.tolist())
     return placed(
         model.mechanism, {name: [next(given) for _ in known[name]] for name in model.request.varied}
     )

@@ -101,21 +101,37 @@ class NativeSolver:
         return partial(solve_sparse, model, path, request.points, request.bodies, request.order)
 
     def prepare_designs(
-        self, mechanism: Mechanism, path: Path, varied: Sequence[str], points: Sequence[str] = ()
+        self,
+        mechanism: Mechanism,
+        path: Path,
+        varied: Sequence[str],
+        points: Sequence[str] = (),
+        forces: Collection[str] = (),
     ) -> PreparedDesigns:
         """Return the mechanism made ready for many designs, as one program.
 
         Args:
             mechanism: the nominal design.
             path: as for `prepare`.
-            varied: places of the geometry that vary, see `places`; all others are constants in the
-                programs.
+            varied: places that vary, see `places` and `load_places`; all others are constants in
+                the programs.
             points: names of those whose motion is wanted.
+            forces: names of joints, drivers and force elements whose forces are wanted; they take
+                order 2.
 
         Raises:
             SolveError: as `prepare`.
         """
-        return PreparedDesigns(Route(self._model(mechanism, path, points, varied=varied), path))
+        request = self._request(path, points, (), varied)
+        if not forces:
+            return PreparedDesigns(Route(compile_model(mechanism, request), path))
+        from .design_forces import DesignForces, compile_with_forces  # most studies are without
+        from .forces.wanted import wanted_forces
+
+        wanted = wanted_forces(mechanism, forces)
+        model = compile_with_forces(mechanism, replace(request, order=2, forces=wanted))
+        route = Route(model, path)
+        return PreparedDesigns(route, DesignForces(route, wanted))
 
     def program_size(
         self,
@@ -167,9 +183,8 @@ class NativeSolver:
         path: Path,
         points: Sequence[str],
         bodies: Sequence[str] = (),
-        varied: Sequence[str] = (),
     ) -> Model:
-        return compile_model(mechanism, self._request(path, points, bodies, varied))
+        return compile_model(mechanism, self._request(path, points, bodies))
 
     def _request(
         self,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from ..mechanism.motions import Path
 from ..program import ITERATIONS
@@ -13,6 +14,9 @@ from .compiled.samples import Route
 from .design_batch import RECYCLED, Variants, solve_variants
 from .program_size import ProgramSize
 from .solver_selection import start_notes
+
+if TYPE_CHECKING:
+    from .design_forces import DesignForces, ForcesOfDesigns
 
 # Designs solved at once at least: with fewer, the calls around them would be felt.
 LEAST = 8
@@ -24,13 +28,16 @@ class PreparedDesigns:
 
     Attributes:
         route: the path made ready for the compiled model.
+        loads: computes the forces that are wanted; None without any.
     """
 
     route: Route
+    loads: DesignForces | None = None
 
     def along(self, path: Path) -> PreparedDesigns:
         """Return the same programs on another path of the same drivers."""
-        return PreparedDesigns(Route(self.route.model, path))
+        route = Route(self.route.model, path)
+        return PreparedDesigns(route, self.loads and self.loads.along(route))
 
     @property
     def start(self) -> Start:
@@ -64,6 +71,14 @@ class PreparedDesigns:
         """
         rows, orders = self.route.model.rows, self.route.model.orders
         return [found.kept[rows[f"{label} {point}"]] for label in QUANTITIES[:orders]]
+
+    def forces(self, found: Variants, geometry: Array, tol: float) -> ForcesOfDesigns | None:
+        """Return the forces of solved designs; None where none are wanted.
+
+        Args:
+            found: what `solve` returns for the geometry.
+        """
+        return self.loads and self.loads.of(found, geometry, tol)
 
     def iterations(self, found: Variants) -> Array:
         """Return Newton's iterations of each sample, shape (n, V)."""

@@ -31,6 +31,7 @@ class Dimension:
         return number / unit ** (self.force + self.length)
 
 
+MASS = Dimension("kg")
 LENGTH = Dimension("{length}", length=1)
 ANGLE = Dimension("{angle}", angle=1)
 ACCELERATION = Dimension("{length}/s^2", length=1)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..harness.record import Record
+from ..unit_text import value_text, with_unit
 
 # a figure is that many pixels wide; longer series are thinned, the worst samples always kept
 SAMPLES = 500
@@ -53,11 +54,7 @@ class Moved:
         if step >= len(self.values):
             return ""
         value = f"{self.scale * self.values[step]:+.4g}".replace("-", "\N{MINUS SIGN}")
-        return (
-            f"{self.name} {value}{self.unit}"
-            if self.unit == "°"
-            else f"{self.name} {value} {self.unit}".rstrip()
-        )
+        return f"{self.name} {value_text(value, self.unit)}"
 
 
 @dataclass(frozen=True)
@@ -96,7 +93,7 @@ class Axis(Moved):
     @property
     def label(self) -> str:
         """Name and unit."""
-        return f"{self.name} [{self.unit}]" if self.unit else self.name
+        return with_unit(self.name, self.unit)
 
     @property
     def shown(self) -> list[float]:
@@ -131,12 +128,10 @@ def driver_axis(facts: Mapping[str, Any], records: Sequence[Record], worst: Iter
     # driven along the global z axis; every other driver, angles, rack travel and time, lies to the
     # right. Driven along -z, the axis runs backwards: up on paper is up on the vehicle.
     up = _upwards(driver)
-    title = f"{name} [{unit}]" if unit else name
+    title = with_unit(name, unit)
     if up and "wheel" in driver.get("point", "") and driver.get("relative", True):
-        name, title = (
-            "wheel travel",
-            f"rebound \N{LEFTWARDS ARROW}  wheel travel [{unit}]  \N{RIGHTWARDS ARROW} jounce",
-        )
+        name = "wheel travel"
+        title = f"rebound \N{LEFTWARDS ARROW}  {with_unit(name, unit)}  \N{RIGHTWARDS ARROW} jounce"
     return Axis(name, unit, swept.scale, values, title, _kept(len(values), worst), up, further)
 
 

@@ -9,7 +9,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from .figures import Figure, Style, log_axis, plain
+from .error_figure import log_axis
+from .figures import Figure, Style
 
 TIMES = "time per sample [µs]"
 
@@ -64,9 +65,8 @@ def trend_figures(history: Sequence[Past], styles: Mapping[str, Style]) -> dict[
     def figure(values: Mapping[tuple[str, str], float | None]) -> Figure:
         # a category each: a date would otherwise become a place on a calendar, and runs of one
         # night one point
-        names = [plain(run) for run in runs]
         curves = [
-            _curve(style, names, [values.get((style.name, run)) for run in runs]) for style in drawn
+            _curve(style, runs, [values.get((style.name, run)) for run in runs]) for style in drawn
         ]
         return {
             "data": curves,
@@ -127,7 +127,7 @@ def precision_figure(efforts: Sequence[Effort], styles: Mapping[str, Style]) -> 
             [_finite(each.error) for each in mine],
         )
         told = {
-            "text": [plain(each.setting) for each in mine],
+            "text": [each.setting for each in mine],
             "hovertemplate": "%{text}: %{x:.3~g} µs, %{customdata:.3~g} m",
         }
         traces.append(curve | told)
@@ -141,7 +141,7 @@ def _curve(style: Style, x: Sequence[Any], y: Sequence[float | None]) -> Figure:
     line = {"width": 1.8, "color": style.colour, "dash": style.dash}
     marker = {"size": 8, "symbol": style.symbol, "color": style.colour}
     look = {
-        "name": plain(style.name),
+        "name": style.name,
         "uid": style.key,
         "meta": style.name,
         "line": line,

@@ -2,23 +2,15 @@
 
 from __future__ import annotations
 
-import importlib
-import json
 from pathlib import Path
-from typing import Any, cast
-
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from ..case.io.atomic_files import write
-from ..harness.labels import known, number
 from ..history.queries import History
 from .figure_data import trend_figures
 from .figures import Figure, Style
 from .page_model import Plot
-from .report import packed
+from .page_parts import environment, figure_parts
 from .trends import trends
-
-_HERE = Path(__file__).parent
 
 
 def write_plot(history: History, path: Path, *, title: str) -> None:
@@ -32,7 +24,6 @@ def write_plot(history: History, path: Path, *, title: str) -> None:
 
 def page(history: History, *, title: str) -> str:
     """The page as HTML text."""
-    plotly: Any = importlib.import_module("plotly.offline")  # no types; and not for a list
     by_case = trends(history)
     names = dict.fromkeys(past.engine for each in by_case.values() for past in each)
     styles = {name: Style.number(index, name) for index, name in enumerate(names)}
@@ -48,21 +39,8 @@ def page(history: History, *, title: str) -> str:
         cases.append(
             (case, [styles[name] for name in dict.fromkeys(past.engine for past in each)], plots)
         )
-    environment = Environment(
-        loader=FileSystemLoader(_HERE),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    # which the macros use
-    cast("dict[str, Any]", environment.filters).update(number=number, known=known)
-    return environment.get_template("history.html").render(
-        title=title,
-        runs=len(history.runs),
-        cases=cases,
-        css=(_HERE / "report.css").read_text("utf-8"),
-        script=(_HERE / "report.js").read_text("utf-8"),
-        data=packed(json.dumps({"drivers": {}, "figures": figures, "scenes": {}}, allow_nan=False)),
-        plotlyjs=packed(plotly.get_plotlyjs()),
+    return (
+        environment()
+        .get_template("history.html")
+        .render(title=title, runs=len(history.runs), cases=cases, **figure_parts(figures))
     )

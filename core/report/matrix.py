@@ -14,6 +14,7 @@ from ..case.io.escape import visible
 from ..harness.labels import against, motion_unit, notes, signs, suspects, unread
 from ..harness.record import Outcome, Record, Results
 from ..trajectory import QUANTITIES
+from ..unit_text import with_unit
 from . import terminal
 from .fitting_table import FittingTable
 from .markdown import code, escaped, row
@@ -127,7 +128,9 @@ def _reading(results: Results) -> str:
     )
     if not standards:
         return "No errors: nothing was compared with anything"
-    units = " · ".join(f"{quantity} [{motion_unit(LENGTH, quantity)}]" for quantity in QUANTITIES)
+    units = " · ".join(
+        with_unit(quantity, motion_unit(LENGTH, quantity)) for quantity in QUANTITIES
+    )
     return f"Largest errors against {', '.join(map(against, standards))}: {units}"
 
 

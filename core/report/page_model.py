@@ -11,10 +11,12 @@ from ..harness.evidence import Evidence
 from ..harness.labels import against, engine_name, motion_unit, number, output_label
 from ..harness.record import Deviation, OutputSeries, Record, Results
 from ..trajectory import QUANTITIES
+from ..unit_text import value_text
 from .axis import Axis, driver_axis
 from .drawing import Drawing, drawing
+from .error_figure import error_figure
 from .figure_data import Effort, Past, precision_figure, trend_figures
-from .figures import Figure, Style, Values, band_is_thin, error_figure, output_figure
+from .figures import Figure, Style, Values, band_is_thin, output_figure
 
 
 @dataclass(frozen=True)
@@ -67,12 +69,18 @@ class Plot:
 
 @dataclass(frozen=True)
 class OutputView:
-    """One output of a case, against the driver, and its errors by motion."""
+    """One output of a case: its curves against the driver, and their differences to the standard.
+
+    Attributes:
+        errors: a figure for each quantity that was compared.
+        rates: the quantities of those figures but the first.
+    """
 
     name: str
     label: str
     plot: Plot
     errors: list[Plot]
+    rates: list[str]
 
 
 @dataclass(frozen=True)
@@ -168,7 +176,7 @@ def _output(
 ) -> OutputView:
     curves = [(styles[engine_name(r)], r.outputs[output]) for r in records if output in r.outputs]
     label, truth = output_label(output), references.get(output)
-    errors: list[Plot] = []
+    errors, compared = list[Plot](), list[str]()
     for motion in QUANTITIES:
         here = [each for each in deviations if each.motion == motion]
         values: Values | None = getattr(_standard(here, records, references), motion, None)
@@ -178,7 +186,8 @@ def _output(
             (styles[engine_name(j.record)], getattr(j.record.outputs[output], motion), j.deviation)
             for j in here
         ]
-        title = f"{motion} error of {label} against {axis.name}, log axis"
+        title = f"{motion} difference of {label} against {axis.name}, log axis"
+        compared.append(motion)
         errors.append(Plot(f"{key}-{motion}", title, _worst_caption(here, axis)))
         figures[f"{key}-{motion}"] = error_figure(motion, here[0].unit, axis, found, values)
     positions = [each for each in deviations if each.motion == "position"]
@@ -193,7 +202,7 @@ def _output(
     plot = Plot(
         key, f"{label} against {axis.name}, all engines", " ".join([*said, axis.besides]).strip()
     )
-    return OutputView(output, label, plot, errors)
+    return OutputView(output, label, plot, errors, compared[1:])
 
 
 def _trends(
@@ -243,15 +252,13 @@ def _standard(
 
 def _band_caption(standard: OutputSeries, tolerance: float, whose: str) -> str:
     band = "narrower than the line" if band_is_thin(standard, tolerance) else "the grey band"
-    unit = "" if standard.unit == "1" else f" {standard.unit}"
-    return f"Tolerance ±{number(tolerance)}{unit} around the {whose}: {band}."
+    held = value_text(number(tolerance), standard.unit)
+    return f"Tolerance ±{held} around the {whose}: {band}."
 
 
 def _worst_caption(deviations: Sequence[Judged], axis: Axis) -> str:
     largest = max(deviations, key=lambda each: each.deviation.max_abs)
     d = largest.deviation
     who = f"{engine_name(largest.record)}, sample {d.worst_step} ({axis.at(d.worst_step)})"
-    return (
-        f"Worst {number(d.max_abs)}: {who}. Tolerance {number(d.tolerance)}, against"
-        f" {against(d.against)}."
-    )
+    found, tolerance = (value_text(number(size), largest.unit) for size in (d.max_abs, d.tolerance))
+    return f"Worst {found}: {who}. Tolerance {tolerance}, against {against(d.against)}."

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from ..errors import shortened
 from ..harness.labels import motion_unit, number, product, unread_count
 from ..history.regression.findings import Finding, Kind, Loose, Regressions, Step
+from ..unit_text import value_text
 
 LONGEST = 12
 """Rows of a group that are shown; a broken engine has one for every case. The JSON has all."""
@@ -150,7 +151,7 @@ def step_says(step: Step) -> str:
         what = f"{number(1e3 * step.before)} → {number(1e3 * step.now)} ms a sweep"
     else:
         unit = motion_unit(step.unit, step.quantity)
-        what = f"{number(step.before)} → {number(step.now)} {unit}".rstrip()
+        what = f"{number(step.before)} → {value_text(number(step.now), unit)}"
     changed = ", ".join(map(str, step.changes)) or "no version, machine or commit changed there"
     repaired = f", repaired in run {step.repaired}" if step.repaired is not None else ""
     since = f"since run {step.first} ({step.started[:16].replace('T', ' ')}){repaired}"

@@ -2,27 +2,18 @@
 
 from __future__ import annotations
 
-import base64
-import importlib
 import json
-import zlib
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, cast
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
-from ..case.io.escape import file_name
 from ..harness.labels import (
     TRUTHS,
-    against,
     engine_name,
-    known,
-    number,
-    output_label,
     product,
     suspects,
     unread_count,
@@ -35,6 +26,7 @@ from .curves import downloads
 from .figure_data import Effort, Past
 from .figures import Figure, Style
 from .page_model import CaseView, Judged, Material, case_view, judged, worst
+from .page_parts import environment, figure_parts, packed
 
 NOT_JUDGED = (Outcome.UNJUDGED, Outcome.UNSUPPORTED, Outcome.UNAVAILABLE)
 BROKEN = (Outcome.ERROR, Outcome.TIMEOUT, Outcome.CRASHED)
@@ -52,8 +44,6 @@ FAULTS = (
     ("lacks", "lack", "samples"),
 )
 """What is wrong with records that fail, as the headline says it of one and of several."""
-
-_HERE = Path(__file__).parent
 
 
 def write_report(
@@ -87,8 +77,6 @@ def write_report(
 
 def render(given: Material, changes: Markup | None = None) -> str:
     """The report as HTML text."""
-    # Loaded here, for runs that write no report; the package has no types.
-    plotly: Any = importlib.import_module("plotly.offline")
     records = given.results.records
     never = {(case, product(engine, mode)) for case, engine, mode in given.results.missing}
     names = dict.fromkeys(
@@ -101,94 +89,56 @@ def render(given: Material, changes: Markup | None = None) -> str:
         case_view(given, name, f"case-{index}", styles, figures)
         for index, name in enumerate(case_names)
     ]
-    data = {
-        "drivers": {case.anchor: case.axis.shown for case in cases},
-        "figures": figures,
-        "scenes": {case.anchor: asdict(case.scene) for case in cases if case.scene},
-    }
     curves = downloads(given.results, {each.anchor: each.name for each in cases if each.outputs})
-    return (
-        _environment()
-        .get_template("report.html")
-        .render(
-            headline=headline(given.results),
-            changes=changes,
-            worst=max(
-                (
-                    (case, case.worst)
-                    for case in cases
-                    if case.worst and case.name not in given.results.suspects
-                ),
-                key=lambda each: each[1].ratio,
-                default=None,
+    templates = environment()
+    cast("dict[str, Any]", templates.filters).update(model=_model, worst=_worst_of)
+    return templates.get_template("report.html").render(
+        headline=headline(given.results),
+        changes=changes,
+        worst=max(
+            (
+                (case, case.worst)
+                for case in cases
+                if case.worst and case.name not in given.results.suspects
             ),
-            counts=[(outcome, count) for outcome in Outcome if (count := _count(records, outcome))],
-            not_judged=_grouped(record for record in records if record.outcome in NOT_JUDGED),
-            suspects=suspects(given.results),
-            problems=_grouped(
-                record
-                for record in records
-                if record.outcome in (Outcome.FAIL, *BROKEN)
-                and not given.results.blames_reference(record)
-            ),
-            circumstances={
-                key: value
-                for key, value in given.results.run.items()
-                if key not in ("cases", "missing", "unread")
-            },
-            unread=given.results.unread,
-            settings=_settings(records),
-            styles=styles,
-            cases=cases,
-            references=given.results.references,
-            caveats=[*given.limits, *caveats(given.results)],
-            never=never,
-            truths=TRUTHS,
-            motions=QUANTITIES,
-            answered=ANSWERED,
-            validation=validation,
-            severity=severity,
-            searched=searched,
-            css=_source("report.css"),
-            scripts=[_source("scene.js"), _source("report.js")],
-            data=packed(json.dumps(data, allow_nan=False, separators=(",", ":"))),
-            plotlyjs=packed(plotly.get_plotlyjs()),
-            curves=curves,
-            packed_curves=packed(json.dumps(curves)),
-        )
+            key=lambda each: each[1].ratio,
+            default=None,
+        ),
+        counts=[(outcome, count) for outcome in Outcome if (count := _count(records, outcome))],
+        not_judged=_grouped(record for record in records if record.outcome in NOT_JUDGED),
+        suspects=suspects(given.results),
+        problems=_grouped(
+            record
+            for record in records
+            if record.outcome in (Outcome.FAIL, *BROKEN)
+            and not given.results.blames_reference(record)
+        ),
+        circumstances={
+            key: value
+            for key, value in given.results.run.items()
+            if key not in ("cases", "missing", "unread")
+        },
+        unread=given.results.unread,
+        settings=_settings(records),
+        styles=styles,
+        cases=cases,
+        references=given.results.references,
+        caveats=[*given.limits, *caveats(given.results)],
+        never=never,
+        truths=TRUTHS,
+        motions=QUANTITIES,
+        answered=ANSWERED,
+        validation=validation,
+        severity=severity,
+        searched=searched,
+        curves=curves,
+        packed_curves=packed(json.dumps(curves)),
+        **figure_parts(
+            figures,
+            drivers={case.anchor: case.axis.shown for case in cases},
+            scenes={case.anchor: asdict(case.scene) for case in cases if case.scene},
+        ),
     )
-
-
-def _environment() -> Environment:
-    environment = Environment(
-        loader=FileSystemLoader(_HERE),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    cast("dict[str, Any]", environment.filters).update(
-        number=number,
-        label=output_label,
-        engine=engine_name,
-        against=against,
-        model=_model,
-        file_name=file_name,
-        known=known,
-        worst=_worst_of,
-    )
-    return environment
-
-
-def _source(name: str) -> str:
-    return (_HERE / name).read_text("utf-8")
-
-
-def packed(text: str) -> str:
-    """Return text as base64 of its zlib stream: a third of the size, and nothing in it can end its
-    script element.
-    """
-    return base64.b64encode(zlib.compress(text.encode())).decode("ascii")
 
 
 def headline(results: Results) -> str:

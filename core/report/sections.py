@@ -4,27 +4,23 @@ page.
 
 from __future__ import annotations
 
-import importlib
-import json
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TextIO, cast
+from typing import TextIO
 
 import msgspec
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from rich.text import Text
 
 from ..case.io.atomic_files import to_standard_output, write_all
 from ..errors import KincheckError
-from ..harness.labels import known, number
 from ..harness.record import to_json
 from . import terminal
 from .figures import Figure, Style
 from .fitting_table import FittingTable
 from .page_model import Plot
-from .report import packed
+from .page_parts import environment, figure_parts, style_sheet
 
 
 @dataclass(frozen=True)
@@ -112,33 +108,14 @@ def print_report(report: Report, file: TextIO) -> None:
 
 def page(report: Report) -> str:
     """The report as one HTML file, in the look of a run's."""
-    here = Path(__file__).parent
-    environment = Environment(
-        loader=FileSystemLoader(here),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    # which the macros use
-    cast("dict[str, Any]", environment.filters).update(number=number, known=known)
     figures = {
         diagram.plot.figure: diagram.figure
         for section in report.sections
         for diagram in section.diagrams
     }
-    shown: dict[str, str] = {}
-    if figures:
-        plotly: Any = importlib.import_module("plotly.offline")
-        data = json.dumps(
-            {"drivers": {}, "figures": figures, "scenes": {}},
-            allow_nan=False,
-            separators=(",", ":"),
-        )
-        shown = {
-            "data": packed(data),
-            "plotlyjs": packed(plotly.get_plotlyjs()),
-            "script": (here / "report.js").read_text("utf-8"),
-        }
-    css = (here / "report.css").read_text("utf-8")
-    return environment.get_template("bench.html").render(report=report, css=css, shown=shown)
+    parts = figure_parts(figures) if figures else {"css": style_sheet()}
+    return (
+        environment()
+        .get_template("bench.html")
+        .render(report=report, scripted=bool(figures), **parts)
+    )

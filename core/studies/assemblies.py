@@ -59,7 +59,7 @@ class Survey:
 
     Attributes:
         drivers: their values at the assemblies, as in the sweep [m or rad].
-        way: motion of the bodies from the design to the intended assembly; None where
+        way: motion of the bodies from the design to the intended assembly; None if
             there is none.
         reason: why the drive does not lead from the design to these values.
     """

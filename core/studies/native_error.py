@@ -22,7 +22,7 @@ class NativeError:
     """Largest native errors over the samples, of an output's position, velocity and acceleration.
 
     Attributes:
-        largest: [SI]; None where there is no such derivative.
+        largest: [SI]; None if there is no such derivative.
         ulps: in units in the last place of the largest value of any output of the same unit: an
             output may be zero throughout, by symmetry.
     """

@@ -36,6 +36,7 @@ from ..program.ball_executor import Ball, flint, precision
 from ..trajectory import Array
 from ..version import VERSION
 from .native_error import Column, NativeError, native_errors, upper
+from .proved_forces import FORCES_NOTE, force_values
 
 NUMBERS: Mapping[str, Reading] = {"double": as_double, "decimal": as_decimal}
 """Readings of a case's numbers: as the engines' doubles, or as the decimals of
@@ -81,6 +82,7 @@ def prove_case(
         NUMBERS[numbers],
         bits,
         tol,
+        {name for output in case.outputs for name in output.forces},
     )
     with precision(bits):
         values: dict[str, Sequence[Column]] = {}
@@ -92,7 +94,9 @@ def prove_case(
                 )
                 continue
             if output.forces:
-                reasons[output.name] = "is a force; motion alone is enclosed"
+                values[output.name], reason = force_values(output, found)
+                if reason is not None:
+                    reasons[output.name] = reason
                 continue
             try:
                 values[output.name] = _values(case, output, found, numbers)
@@ -113,7 +117,7 @@ def prove_case(
         case=case.name,
         kincheck=VERSION,
         numbers=numbers,
-        note=NOTE,
+        note=NOTE + FORCES_NOTE * any(output.forces for output in case.outputs),
         digits=digits,
         bits=bits,
         rows=list(found.rows),
@@ -147,7 +151,7 @@ def _drives(case: Case, numbers: str) -> Drives:
 
 
 def _grid(values: Array, numbers: str) -> list[Fraction]:
-    """Return the sweep's samples; decimals of a grid that is even up to rounding are made even."""
+    """Return the sweep's samples; a grid even up to its decimals is made even."""
     each, last = list(map(NUMBERS[numbers], values.tolist())), len(values) - 1
     if numbers == "double" or last < 1:
         return each

@@ -190,7 +190,7 @@ TEXTS: dict[str, tuple[str, str | bytes, str]] = {
     "empty table": ("a.csv", "", "is empty"),
     "a mark alone": ("a.toml", b"\xef\xbb\xbf", "found none, expected"),
     **{
-        f"an archive as {end}": (f"a{end}", ZIP.getvalue(), "is not UTF-8")
+        f"an archive as {end}": (f"a{end}", ZIP.getvalue(), "a zip archive, expected text")
         for end in (".toml", ".json", ".csv", ".sub", ".xml", "")
     },
     # XML

@@ -58,6 +58,11 @@ FAULTS = [
     ("outputs", "rocker_tip_y", "component", "w"),
     ("schema", "kincheck-case/2"),
     ("colour", "red"),
+    ("outputs", "crank_torque", "driver", 3),
+    ("outputs", "rod_force_y", "joints", "rod"),
+    ("outputs", "rod_force_y", "type", "joint_fource"),
+    ("forces", {"spring": {"type": "spring_damper", "bodies": ["crank"], "stiffness": 1.0}}),
+    ("closure", "tolerance", "small"),
     ("drivers", "crank", "motion", {"type": "sine", "amplitude": 1.0}),
 ]
 
@@ -139,4 +144,4 @@ def test_command(name, capfdbinary):
 
 def test_an_unknown_schema_is_named(capsys):
     assert main.main(["schema", "cases"]) == 2
-    assert "'case', 'variation', 'results', 'regression'" in capsys.readouterr().err
+    assert "none of case, variation, results, regression" in capsys.readouterr().err

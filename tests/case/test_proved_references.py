@@ -70,7 +70,8 @@ def test_rows_are_chosen_for_the_sample_where_those_of_the_design_are_singular()
         len(sample.left_out) == len(found.redundant) for sample in found.samples if sample.left_out
     )
     assert found.samples[1].left_out != found.redundant
-    assert max(error.largest[0] for error in errors) < 1e-14
+    assert max(error.largest[0] for error in errors if error.unit == "m") < 1e-14
+    assert max(error.ulps[0] for error in errors) < 100.0
 
 
 def test_native_errors_are_round_off(made):
@@ -281,8 +282,11 @@ def test_a_case_file_can_name_a_proved_reference(tmp_path):
     (tmp_path / "proved.json").write_bytes(msgspec.json.encode(found))
     loaded = load_case(file)
     forces = {each.name for each in load_case(bare).outputs if each.forces}
-    assert loaded.reference.keys() == found.outputs.keys() - forces
-    assert all("is a force" in found.outputs[name].reason for name in forces)
+    assert len(forces) == 3
+    assert loaded.reference.keys() == found.outputs.keys()
     for name, each in loaded.reference.items():
         assert each.position.tolist() == [float(x) for x in found.outputs[name].position]
+        if name in forces:
+            assert each.acceleration is None
+            continue
         assert each.acceleration.tolist() == [float(x) for x in found.outputs[name].acceleration]

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from kincheck.cases import load
 from kincheck.core import CaseError
-from kincheck.core.case.variation.variation import DRAWN, Law
+from kincheck.core.case.variation.distributions import Law
+from kincheck.core.case.variation.sampling import DRAWN
 from kincheck.core.case.variation.variation_file import read_variation
 
 from ..support.fakes import crank
@@ -190,7 +191,10 @@ FAULTS = [
     ({"tip": {"at": "tip", "sigma": 1.0, "law": "normal"}}, "hardpoints.tip.law: unknown key"),
     (
         {"tip": {"at": "tipp", "sigma": 1.0}},
-        "hardpoints.tip.at: found 'tipp', expected a position, direction or length of the case;",
+        (
+            "hardpoints.tip.at: found 'tipp', expected a position, direction, length, mass or load"
+            " of the case;"
+        ),
     ),
     (
         {"tip": {"at": "tip", "sigma": -1.0}},

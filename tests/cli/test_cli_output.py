@@ -209,7 +209,7 @@ def test_the_table_says_what_happened_and_never_too_much(kincheck_main, capsys):
     for engine in engines[1:]:
         assert "validated" not in rows[engine.name]
     assert "2.0e-06" in rows["wrong"]
-    assert "fail: crank · wrong: x: acceleration is off by 2e-06 m/s^2" in captured.out
+    assert "fail: crank · wrong: x: acceleration is off by 2e-06 m/s²" in captured.out
     assert "error: crank · broken: ValueError: no [axis] there" in captured.out
     assert "1 pass, 2 fail, 1 error, 1 unsupported, 1 unavailable" in captured.out
     assert captured.err.splitlines() == [

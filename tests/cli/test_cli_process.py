@@ -42,7 +42,7 @@ def test_a_command_loads_no_other():
 def test_the_start_loads_nothing_that_is_not_needed():
     code = (
         "import sys; from kincheck.core.cli import main as cli; status ="
-        " cli.main(['--version']);print(sorted({'rich', 'jinja2', 'plotly', 'mujoco', 'pinocchio',"
+        " cli.main(['--version']);print(sorted({'rich', 'jinja2', 'mujoco', 'pinocchio',"
         " 'exudyn', 'scipy', 'llvmlite', 'flint', 'pyarrow','sqlite3', 'asyncio',"
         " 'multiprocessing', 'distributed', 'kincheck.core.kinematics', 'kincheck.core.program'}&"
         " set(sys.modules)))"

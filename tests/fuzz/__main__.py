@@ -18,6 +18,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from kincheck import core
+
 from .keeping import keep, kept
 
 # Before numpy is there: small matrices gain nothing by threads, which on a busy machine wait for
@@ -71,7 +73,8 @@ def main(argv: Sequence[str]) -> int:
 def minimal(name: str, corpus: Path) -> list[bytes]:
     """Inputs that together take every step from line to line that all take, the short ones first.
     (libFuzzer's own merge starts its program anew, which Python is not.)"""
-    reader, here = importlib.import_module(f"tests.fuzz.{name}"), str(HERE.parent.parent / "core")
+    reader = importlib.import_module(f"tests.fuzz.{name}")
+    here = str(Path(str(core.__file__)).parent)  # as it is imported: not always this folder
     inputs = [*reader.seeds(), *(file.read_bytes() for file in corpus.iterdir())]
     steps: set[tuple[Any, int, int]] = set()
     last: dict[int, int] = {}
@@ -98,6 +101,7 @@ def minimal(name: str, corpus: Path) -> list[bytes]:
         if not steps <= found:
             found |= steps
             kept_inputs.append(each)
+    assert found, f"none of {len(inputs)} inputs takes a line below {here}"
     return kept_inputs
 
 

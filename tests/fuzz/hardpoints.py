@@ -1,17 +1,25 @@
-"""Hardpoint files: Project Chrono (JSON with comments), Adams/Car blocks, plain tables, onto a
-template.
+"""Hardpoint files: Project Chrono (JSON with comments), Adams/Car blocks, plain tables, workbooks
+and the cells of their sheets, onto a template.
 """
 
+import importlib.util
+import math
+from contextlib import suppress
+from io import BytesIO
 from pathlib import Path
 
+from kincheck.core.case.case import Case
 from kincheck.core.case.io.reader_options import Supplied
+from kincheck.core.case.io.workbook import Cell
 from kincheck.core.case.models.files import load
+from kincheck.core.case.models.hardpoints.read import case_of_hardpoints
+from kincheck.core.case.models.hardpoints.rows import read_rows
 from kincheck.core.case.models.hardpoints.templates import TEMPLATES
 
-from .fuzzing import changing, read_or_refused, written
+from .fuzzing import FOLDER, changing, read_or_refused, written
 from .trees import changed_json, changed_lines
 
-LONGEST = 3000
+LONGEST = 8000
 DATA = Path(__file__).parent.parent / "data" / "hardpoints"
 ROLES = [
     name
@@ -21,7 +29,7 @@ ROLES = [
 ]
 KEYS = """name x y z mm cm inch [HARDPOINT] [UNITS] {hardpoint_name symmetry x_value y_value z_value} left/right single right LENGTH
 = Type Template Suspension Spindle COM Location // /* */ $ # units: axes: rearward,right,up
-sep=; (VARIANTS) 1,5 -1.234,5 1,234 "2,5" point;"""  # noqa: E501
+units axes left_ _FL CHAS_LowFor =A1+1 sep=; (VARIANTS) 1,5 -1.234,5 1,234 "2,5" point;"""  # noqa: E501
 WORDS = (
     *KEYS.split(),
     *ROLES,
@@ -30,31 +38,57 @@ WORDS = (
 )
 
 
+SHEET = b"sheet\n"
+
+
 def one(data: bytes) -> None:
     """Read one input as the kind of file that it begins like."""
+    if data.startswith(SHEET):
+        return read_or_refused(lambda: of_cells(data.removeprefix(SHEET)))
+    if data.startswith(b"PK"):
+        said = Supplied("double_wishbone", "mm", "adams")
+        return read_or_refused(lambda: load(written("car.xlsx", data), said))
     start = data.lstrip()[:1]
     if start in (b"{", b"/"):
-        read_or_refused(
+        return read_or_refused(
             lambda: load(
                 written("car.json", data),
                 Supplied(template=None if b"Template" in data else "mcpherson"),
             )
         )
-        return
     template = (
         "mcpherson"
         if b"strut" in data
         else "five_link"
         if b"trailing" in data
+        else "pushrod_knuckle"
+        if b"rocker" in data
         else "double_wishbone"
     )
     if b"[" in data.split(b"\n", 1)[0] or b"[HARDPOINT]" in data:
-        read_or_refused(lambda: load(written("car.sub", data), Supplied(template)))
-        return
+        return read_or_refused(lambda: load(written("car.sub", data), Supplied(template)))
     said = Supplied(
         template, None if b"unit" in data else "mm", None if b"axes" in data else "adams"
     )
-    read_or_refused(lambda: load(written("car.csv", data), said))
+    return read_or_refused(lambda: load(written("car.csv", data), said))
+
+
+def of_cells(data: bytes) -> Case:
+    """The case of a sheet's cells, without the program that makes a workbook of them."""
+    lines = (line for line in data.decode("latin-1").split("\n") if line.strip())
+    rows = [(f"row {k}", [*map(cell_of, line.split("\t"))]) for k, line in enumerate(lines, 1)] or [
+        ("row 1", [""])
+    ]
+    table = read_rows(FOLDER / "car.xlsx", "Excel", rows, {})
+    return case_of_hardpoints(table, Supplied("double_wishbone", None, None))
+
+
+def cell_of(text: str) -> Cell:
+    """A number where the text is one that a sheet can hold."""
+    with suppress(ValueError):
+        if math.isfinite(number := float(text)):
+            return number
+    return text.strip()
 
 
 def seeds() -> list[bytes]:
@@ -78,7 +112,21 @@ def seeds() -> list[bytes]:
         *(text.encode() for text in (adams, table, other, variants)),
         german.removeprefix("Car\n").encode("utf-16"),
         german.replace("sep=;\n", "").encode(),
+        SHEET + ("units\tmm\naxes: adams\n" + table.replace(",", "\t")).encode(),
+        *workbook([line.split(",") for line in table.splitlines()]),
     ]
+
+
+def workbook(rows: list[list[str]]) -> list[bytes]:
+    """A workbook with these rows; none where openpyxl is missing."""
+    if importlib.util.find_spec("openpyxl") is None:
+        return []
+    openpyxl = importlib.import_module("openpyxl")
+    book, stream = openpyxl.Workbook(), BytesIO()
+    for row in rows:
+        book.active.append([*map(cell_of, row)])
+    book.save(stream)
+    return [stream.getvalue()]
 
 
 mutate = changing(changed_json, changed_lines, words=WORDS)

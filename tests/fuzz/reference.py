@@ -10,9 +10,10 @@ from kincheck.core.case.io.case_file import load_case
 
 from ..support.case_texts import BASE, CSV
 from .fuzzing import changing, read_or_refused, written
+from .hardpoints import workbook
 from .trees import changed_json, changed_lines
 
-LONGEST = 3000
+LONGEST = 8000
 PROVED = {
     "schema": "kincheck-reference/1",
     "case": "slider",
@@ -66,6 +67,7 @@ def one(data: bytes) -> None:
     one.
     """
     name = "table.json" if data.lstrip().startswith(b"{") else "table.csv"
+    name = "table.xlsx" if data.startswith(b"PK") else name
     written(name, data)
     read_or_refused(lambda: load_case(case(name, b"camber" in data)))
 
@@ -88,7 +90,14 @@ def seeds() -> list[bytes]:
     few = "\n".join(
         [*(each for each in comments if "signs" in each), head, *rows[:: (len(rows) - 1) // 4]]
     )
-    return [CSV.encode(), json.dumps(PROVED).encode(), few.encode()]
+    head, *rows = CSV.removeprefix("# made up\n\n").replace(",", ";").splitlines()
+    german = "\n".join(["sep=;", "Rig 3", head, *(row.replace(".", ",") for row in rows)])
+    sheet = workbook([line.split(",") for line in CSV.splitlines()])
+    return [
+        *(text.encode() for text in (CSV, json.dumps(PROVED), few)),
+        german.encode("utf-16"),
+        *sheet,
+    ]
 
 
 mutate = changing(changed_json, changed_lines, words=WORDS)

@@ -64,10 +64,7 @@ def one(data: bytes) -> None:
         for show in (print_table, print_matrix):
             show(found, text := io.StringIO())
             assert "\x1b" not in text.getvalue()
-        with (
-            mock.patch("plotly.offline.get_plotlyjs", return_value=""),
-            mock.patch.object(Path, "read_text", return_value=""),
-        ):
+        with mock.patch.object(Path, "read_text", return_value=""):
             render(Material(found, {}, {})).encode()
 
     read_or_refused(read)

@@ -75,7 +75,7 @@ def test_the_sign_of_an_output_matters():
 
 @pytest.mark.parametrize(
     ("quantity", "unit", "tolerance"),
-    [("velocity", "m/s", "2e-09"), ("acceleration", "m/s^2", "4e-09")],
+    [("velocity", "m/s", "2e-09"), ("acceleration", "m/s²", "4e-09")],
 )
 def test_a_relative_error_of_a_millionth_is_caught_and_named(quantity, unit, tolerance):
     record = record_of(Fake(answer=off(quantity, lambda values: values * (1.0 + 1e-6))))

@@ -32,9 +32,9 @@ from kincheck.core.kinematics.verified.exact import (
     Exact,
     as_decimal,
     as_double,
-    equations,
     exact_mechanism,
 )
+from kincheck.core.kinematics.verified.exact_equations import equations
 from kincheck.core.kinematics.verified.krawczyk import Enclosure, UnprovedError
 from kincheck.core.kinematics.verified.verified_sweep import _states, prove
 from kincheck.core.mechanism.motions import Path as Way

@@ -12,8 +12,10 @@ import subprocess
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import msgspec
+import numpy as np
 import pytest
 from kincheck import cases
 from kincheck.core.harness.record import Outcome, Results
@@ -21,7 +23,7 @@ from kincheck.core.harness.scene import FRAMES, scene
 from kincheck.core.report.figure_data import Effort, Past
 from kincheck.core.report.report import write_report
 
-from ..support.made_up import GRID, record, results
+from ..support.made_up import GRID, distances, record, results, series
 
 CHROMIUM = (
     shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
@@ -154,52 +156,98 @@ def test_the_overview_is_filtered_by_outcome_engine_and_words_and_worked_by_keyb
     assert sorted_["rows"] == ["fine", "bad", "good"]  # what broke, then by error in tolerances
 
 
-def test_plots_hold_the_numbers_of_the_results(visit: Any) -> None:
+# The points of a curve, in pixels, and what a figure shows at each sample by the arrow keys.
+READ = """
+  const points = (plot, series) => [...one(`[data-figure=${plot}] .curve[data-series="${series}"]`).getAttribute("d").matchAll(/[ML](\\S+) ([^ML]+)/g)].map(([, x, y]) => [+x, +y]);
+  const readout = (plot) => one(`[data-figure=${plot}] .readout`);
+  const told = (plot, count) => Array.from({ length: count }, () => { press("ArrowRight", one(`[data-figure=${plot}]`)); return [...readout(plot).children].map((row) => row.textContent); });
+"""  # noqa: E501
+
+
+def lies_on_a_line(pixels: Any, values: Any) -> bool:
+    """Whether pixels are an affine function of values, to a tenth of a pixel and its rounding."""
+    slope, start = np.polyfit(values, pixels, 1)
+    return np.abs(slope * np.asarray(values) + start - pixels).max() < 0.1
+
+
+def test_figures_draw_and_show_the_numbers_of_the_results(visit: Any) -> None:
     run = results()
     told = visit(
         run,
-        """
-        return all(".plot[data-drawn]").map((plot) => [plot.dataset.figure, plot.data.map(({ meta, mode, x, y, uid }) =>
-          ({ meta, mode, uid, x: [...x], y: [...y] }))]);
+        READ
+        + """
+        const drawn = all(".plot[data-drawn]").map((plot) => plot.dataset.figure);
+        return { drawn, native: points("case-0-0", "native"), errors: points("case-0-0-position", "one"),
+          zeros: one("[data-figure=case-0-0-position] .zeros[data-series=one]").getAttribute("d").split("M").length - 1,
+          curves: told("case-0-0", 21), differences: told("case-0-0-position", 21) };
         """,  # noqa: E501
     )
-    drawn = dict(told)
-    # others wait; no history, no efforts
-    assert list(drawn) == ["case-0-0", "case-0-1", "case-0-0-position", "case-0-0-velocity"]
-    for each in run.records[:2]:
-        [curve] = [
-            trace
-            for trace in drawn["case-0-0"]
-            if (trace["meta"], trace["mode"]) == (each.engine, "lines")
-        ]
-        assert curve["y"] == pytest.approx([1000 * d for d in GRID], abs=1e-12)
-        position = each.outputs["half_track_change"].position
-        assert curve["x"] == pytest.approx([1000 * v for v in position if v is not None], rel=1e-9)
-    [errors] = [trace for trace in drawn["case-0-0-position"] if trace["uid"] == "s1"]
-    deviation = run.records[1].errors["half_track_change"].position
+    # the rates' figures are folded, and wait
+    assert told["drawn"] == ["case-0-0", "case-0-0-position", "case-0-1", "case-0-1-position"]
+    native, other = run.records[:2]
+    x, y = np.array(told["native"]).T
+    position = np.array(native.outputs["half_track_change"].position, dtype=float)
+    assert lies_on_a_line(x, position)
+    assert lies_on_a_line(y, GRID)
+    deviation = other.errors["half_track_change"].position
     assert deviation is not None
-    assert errors["y"][deviation.worst_step] == pytest.approx(deviation.max_abs, rel=5e-3)
-    assert max(e for e in errors["y"] if e) == errors["y"][deviation.worst_step]
+    errors = distances(other.outputs["half_track_change"].position, series(GRID).position)
+    above = [(d, e) for d, e in zip(GRID, errors, strict=True) if e]
+    assert told["zeros"] == errors.count(0.0) == 21 - len(above)
+    x, y = np.array(told["errors"]).T
+    assert lies_on_a_line(x, [d for d, _ in above])
+    assert lies_on_a_line(y, np.log10([e for _, e in above]))
+    for k, (curves, differences) in enumerate(
+        zip(told["curves"], told["differences"], strict=True)
+    ):
+        travel = f"{float(f'{1000 * GRID[k]:.6g}'):g} mm".replace("-", "−")
+        assert curves[0] == differences[0] == travel
+        assert [row.split()[0] for row in curves[1:]] == ["reference", "native", "one"]
+        shown = [float(row.split()[1].replace("−", "-")) for row in curves[1:]]
+        assert shown[1] == pytest.approx(1000 * position[k], rel=1e-8)
+        [error] = [row.split()[1] for row in differences if row.startswith("one ")]
+        assert float(error.replace("−", "-")) == pytest.approx(errors[k], rel=5e-3)
 
 
-def test_curves_are_switched_and_the_other_errors_chosen(visit: Any) -> None:
+def test_curves_are_switched_and_figures_zoomed_saved_and_unfolded(visit: Any) -> None:
     told = visit(
         results(),
-        """
-        const visible = () => all(".plot").filter((each) => each.offsetHeight).map((each) => each.dataset.figure);
+        READ
+        + """
+        const plot = one("[data-figure=case-0-0]"), box = plot.getBoundingClientRect(), seen = [];
+        const note = () => seen.push([...new Set([...plot.querySelectorAll("[data-series]")].map((each) => each.dataset.series))]);
+        note();
         one("button[data-series=one]").click();
-        one("select").value = "case-0-1";
-        one("select").dispatchEvent(new Event("change"));
-        await pause();
-        const off = one("[data-figure=case-0-0]").data.filter((trace) => trace.visible === false).map((trace) => trace.meta);
-        return { off, pressed: one("button[data-series=one]").ariaPressed, visible: visible(),
-          later: one("[data-figure=case-0-1-position]").data.filter((trace) => trace.visible === false).length };
+        note();
+        const at = (type, x, y) => plot.dispatchEvent(new PointerEvent(type, { clientX: box.left + x, clientY: box.top + y, pointerType: "mouse", pointerId: 1, bubbles: true }));
+        plot.setPointerCapture = () => {};
+        const reset = plot.parentElement.querySelector("[data-reset]"), whole = points("case-0-0", "native");
+        at("pointerdown", 200, 100); at("pointermove", 300, 180); at("pointerup", 300, 180);
+        const zoomed = points("case-0-0", "native"), offered = reset.offsetWidth > 0;
+        reset.click();
+        const again = points("case-0-0", "native");
+        let file, name; const made = URL.createObjectURL;
+        URL.createObjectURL = (blob) => { file = blob.text(); return made(blob); };
+        HTMLAnchorElement.prototype.click = function () { name = this.download; };
+        plot.parentElement.querySelector("[data-save]").click();
+        one("section.case details:has(.plot)").open = true;
+        await pause(300);
+        const rates = all("[data-figure=case-0-0-velocity] .curve").map((each) => each.dataset.series);
+        return { seen, pressed: one("button[data-series=one]").ariaPressed, whole, zoomed, again, offered, rates, name, file: await file };
         """,  # noqa: E501
     )
-    assert told["off"] == ["one", "one"]  # the line and its markers
+    assert told["seen"] == [["reference", "native", "one"], ["reference", "native"]]
     assert told["pressed"] == "false"
-    assert told["visible"] == ["case-0-0", "case-0-1", "case-0-1-position", "case-0-1-velocity"]
-    assert told["later"] > 0
+    assert told["again"] == told["whole"] != told["zoomed"]
+    assert told["offered"]
+    # a hundred pixels fill the width of some 460 now
+    (a, _), (b, _) = (np.ptp(told[each], axis=0) for each in ("whole", "zoomed"))
+    assert 3 < b / a < 6
+    assert told["rates"] == ["native"]
+    assert told["name"] == "case-0-0.svg"
+    root = ElementTree.fromstring(told["file"])
+    assert root.tag == "{http://www.w3.org/2000/svg}svg"
+    assert "var(--" not in told["file"]  # it stands by itself, in the colours of the screen
 
 
 def test_the_mechanism_is_drawn_turned_and_moved(visit: Any) -> None:
@@ -257,20 +305,26 @@ def test_earlier_runs_and_work_precision_are_drawn_where_there_are_any(visit: An
         Effort("gone", "default", 1e-9, 5.0),
         Effort("one", "tol 1e-3", 1e-4, 9.0),
     ]
-    read = """
-        const traces = (plot) => plot.data.map(({ meta, x, y }) => [meta, [...x], [...y]]);
-        return all(".plot[data-drawn]").map((plot) => [plot.dataset.figure, traces(plot)]);
+    read = (
+        READ
+        + """
+        const precision = "case-0-precision-projection";
+        const curves = all(`[data-figure=${precision}] .curve`);
+        return {
+          error: told("case-0-trend-error", 2),
+          time: told("case-0-trend-time", 3),
+          zeros: all("[data-figure=case-0-trend-error] .zeros").length,
+          precision: told(precision, 2),
+          drawn: curves.map((each) => each.dataset.series),
+        };
     """
-    drawn = dict(visit(results(), read, history={"strut": past}, precision={"strut": efforts}))
-    [curve, zeros, _] = drawn["case-0-trend-error"]
-    assert curve == ["one", ["2026-11-01", "2026-11-02", "2026-11-03"], [1e-12, None, None]]
-    assert zeros[1] == ["2026-11-02"]
-    assert drawn["case-0-trend-time"] == [
-        ["one", ["2026-11-01", "2026-11-02", "2026-11-03"], [10, 10, 10]]
-    ]
-    curves = {meta: (x, y) for meta, x, y in drawn["case-0-precision-projection"]}
-    assert curves["one"] == ([9, 20], [1e-4, 1e-7])
-    assert "gone" in curves
+    )
+    told = visit(results(), read, history={"strut": past}, precision={"strut": efforts})
+    assert told["error"] == [["2026-11-01", "one 1e−12 m"], ["2026-11-02", "one 0 m"]]
+    assert told["time"] == [[f"2026-11-0{k}", "one 10 µs"] for k in (1, 2, 3)]
+    assert told["zeros"] == 1
+    assert told["drawn"] == ["one", "gone"]
+    assert told["precision"] == [["one tol 1e-3: 9 µs, 0.0001 m"], ["one tol 1e-6: 20 µs, 1e−7 m"]]
 
 
 def test_hostile_text_is_text(visit: Any) -> None:
@@ -292,9 +346,8 @@ def test_hostile_text_is_text(visit: Any) -> None:
     told = visit(
         run,
         """
-        const traces = all(".plot[data-drawn]").flatMap((plot) => plot.data);
-        const raw = traces.filter(({ name, text, x }) => JSON.stringify([name, text, x]).includes("<")).length;
-        return { raw, images: all("img").length, scripts: all("script").length, title: one("section.case h2").textContent,
+        for (const plot of all(".plot")) press("ArrowRight", plot);
+        return { read: all(".readout").filter((each) => each.textContent.includes("alert(1)")).length, images: all("img").length, scripts: all("script").length, title: one("section.case h2").textContent,
           drawn: all(".plot[data-drawn]").length, links: all(".plot a").length,
           shown: all("section.case")[0].textContent.split("alert(1)").length };
         """,  # noqa: E501
@@ -302,8 +355,9 @@ def test_hostile_text_is_text(visit: Any) -> None:
         precision={HOSTILE: [effort]},
     )
     assert told["title"] == HOSTILE
-    assert told["raw"] == told["images"] == told["links"] == 0
-    assert told["scripts"] == 7  # three of data, two of ours, Plotly unpacked, and this test's
+    assert told["images"] == told["links"] == 0
+    assert told["read"] >= 5
+    assert told["scripts"] == 4  # two of data, ours, and this test's
     assert told["drawn"] == 7
     assert told["shown"] > 5
 

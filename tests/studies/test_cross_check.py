@@ -79,7 +79,7 @@ def test_a_check_contradicts_variants_that_the_sweep_cannot_solve(tmp_path, caps
         monkeypatch.setattr(
             adapters, "engine", lambda name, *mode: liar if name == "mujoco" else known(name, *mode)
         )
-        monkeypatch.setattr("kincheck.core.cli.sweep._solver", lambda options, engine: here)
+        monkeypatch.setattr("kincheck.core.cli.sweep.checking_solver", lambda options, engine: here)
         assert main(command) == 1
         return capsys.readouterr().out
 

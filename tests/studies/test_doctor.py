@@ -51,6 +51,10 @@ def test_a_sound_installation_is_found_able(without_imports, tmp_path, capsys):
         "python-flint",
         "distributed",
         "pyarrow",
+        "pyyaml",
+        "pandas",
+        "xarray",
+        "matplotlib",
         "chromium",
     } <= names
     assert found["check"]["error"] < 1e-3 * found["check"]["tolerance"]
@@ -62,7 +66,7 @@ def test_a_missing_engine_is_no_obstacle_and_its_remedy_is_named(
 ):
     missing(monkeypatch, "pin")
     assert main(["doctor"]) == 0
-    (line,) = (line for line in capsys.readouterr().out.splitlines() if line.startswith("pin "))
+    (line,) = (line for line in capsys.readouterr().out.splitlines() if line.startswith("pin:"))
     assert "not installed: pip install 'pin>=" in line
 
 

@@ -340,7 +340,7 @@ def test_what_cannot_be_proved_is_counted(monkeypatch):
         raise SolveError("singular at the design")
 
     monkeypatch.setattr("kincheck.core.studies.stress.run.distance_from_proof", refused)
-    found, _ = stress([FAMILIES["loops"]], [NATIVE], samples=12, seed=0)
+    found, _ = stress([FAMILIES["hardpoints"]], [NATIVE], samples=12, seed=0)
     (proofs,) = found.proofs
     assert proofs.tried > proofs.proved == 0
     assert "singular at the design" in proofs.reasons[0]

@@ -15,13 +15,14 @@ import reprlib
 import tomllib
 from collections import Counter
 from collections.abc import Generator, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, TypeAlias, cast
 
 from ...errors import LONGEST_NAME, CaseError, MechanismError
 from ..units import METRE, Unit
 from .escape import visible
+from .foreign import binary, foreign
 
 # Numbers are squared and multiplied later; within these bounds this neither overflows nor
 # underflows.
@@ -116,35 +117,52 @@ def decimal(text: str) -> float:
     return float(text)
 
 
-def read_text(file: Path, limit: int, why_limit: str, *, utf_16: bool = False) -> str:
-    """Return the text of a file of at most `limit` bytes.
-
-    Args:
-        utf_16: accept UTF-16 with its mark, which spreadsheets write.
+def read_bytes(file: Path, limit: int, why_limit: str) -> bytes:
+    """Return the content of a file of at most `limit` bytes.
 
     Raises:
-        CaseError: not there, not a regular file, not readable, too large, or not UTF-8.
+        CaseError: not there, not a regular file, not readable, or too large.
     """
     try:
         if not file.exists():
             raise fault(file, "", "no such file; check the path")
         if not file.is_file():
-            raise fault(file, "", "not a regular file; give the path of a file")
+            what = "a folder, not a regular file" if file.is_dir() else "not a regular file"
+            raise fault(file, "", f"{what}; give the path of a file")
         with file.open("rb") as stream:
             data = stream.read(limit + 1)
     except OSError as error:
         raise fault(file, "", f"cannot be read ({error.strerror}); check path and rights") from None
     if len(data) > limit:
         raise fault(file, "", f"larger than {limit} bytes, expected less; {why_limit}")
-    marked = utf_16 and data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    return data
+
+
+def read_text(file: Path, limit: int, why_limit: str, *, of_spreadsheet: bool = False) -> str:
+    """Return the text of a file of at most `limit` bytes.
+
+    Args:
+        of_spreadsheet: accept what spreadsheets write: UTF-16 with its mark, and Windows-1252,
+            whose digits and signs are those of UTF-8.
+
+    Raises:
+        CaseError: not there, not a regular file, not readable, too large, of another program, or
+            in another encoding.
+    """
+    data = read_bytes(file, limit, why_limit)
+    if problem := foreign(data):
+        raise fault(file, "", problem)
+    marked = of_spreadsheet and data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
     try:
         return data.decode("utf-16" if marked else "utf-8-sig")
     except UnicodeDecodeError as error:
-        if marked:
-            raise fault(
-                file, "", f"byte {error.start} is not UTF-16; save the file as UTF-8"
-            ) from None
-        raise fault(file, "", f"byte {error.start} is not UTF-8; save the file as UTF-8") from None
+        if of_spreadsheet and not marked and not binary(data):
+            with suppress(UnicodeDecodeError):
+                return data.decode("cp1252")
+        problem = f"byte {error.start} is not UTF-{16 if marked else 8}; save the file as UTF-8"
+        if not marked and binary(data):
+            problem = "found a binary file, expected text; give what the program exports as text"
+        raise fault(file, "", problem) from None
 
 
 def sha256(file: Path) -> str:

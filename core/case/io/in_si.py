@@ -22,7 +22,7 @@ def geometry_in_si(kind: Kind | None, value: Any, length: Unit) -> Any:
             return tuple(map(length, value))
         case Kind.POSITIONS:
             return tuple(tuple(map(length, each)) for each in value)
-        case Kind.DIRECTION | Kind.DIRECTIONS | None:
+        case Kind.DIRECTION | Kind.DIRECTIONS | Kind.NUMBER | None:
             return value
 
 

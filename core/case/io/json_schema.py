@@ -8,16 +8,21 @@ from typing import Any, TypeAlias, cast
 import msgspec
 
 from ...joints import Coupler, Joint
+from ...mechanism.loads import ELEMENTS
 from ...mechanism.motions import Motion
+from ..measures import Measure
 from ..suspension import SuspensionOutput
 from .class_keys import driver_keys, joint_keys, motion_keys
 from .driving import DRIVERS
+from .loads import force_keys
+from .measures import measure_keys
 from .reference_samples import ReferenceKeys
 from .schema import (
     COORDINATE,
     SCHEMA,
     BodyKeys,
     CaseKeys,
+    ClosureKeys,
     OutputKeys,
     PointKeys,
     SweepKeys,
@@ -37,6 +42,7 @@ TEMPLATE = "#/$defs/{name}"
 def case_schema() -> dict[str, Any]:
     """Return the schema of case files, with all joint types that are registered now."""
     joints: Mapping[str, type[Joint | Coupler]] = {**Joint.registry, **Coupler.registry}
+    measures = {name: measure_keys(cls) for name, cls in Measure.registry.items()}
     outputs = {name: output_keys(cls) for name, cls in SuspensionOutput.registry.items()}
     tables: Tables = {
         "bodies": BodyKeys,
@@ -44,10 +50,12 @@ def case_schema() -> dict[str, Any]:
         "couplers": {name: joint_keys(cls) for name, cls in Coupler.registry.items()},
         "points": PointKeys,
         "drivers": {name: driver_keys(cls) for name, cls in DRIVERS.items()},
-        "outputs": {COORDINATE: OutputKeys, **outputs},
+        "forces": {name: force_keys(cls) for name, cls in ELEMENTS.items()},
+        "outputs": {COORDINATE: OutputKeys, **measures, **outputs},
     }
     single = {
         "units": UnitsKeys,
+        "closure": ClosureKeys,
         "sweep": SweepKeys,
         "suspension": SuspensionKeys,
         "reference": ReferenceKeys,

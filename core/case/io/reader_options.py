@@ -14,7 +14,10 @@ class Supplied:
         template: suspension template of the hardpoints.
         units: unit of the coordinates in a file of hardpoints: "mm", "m", ...
         axes: directions of x, y and z in a file of hardpoints: "forward,left,up", ...
-        travel: wheel travel of a suspension, up and down: "METRES" or "METRES:SAMPLES".
+        travel: wheel travel of a suspension, up and down: "METRES", "METRES:SAMPLES" or
+            "START:STOP:SAMPLES".
+        rack: travel of the rack that goes with it, to the left: "METRES" or "START:STOP".
+        sheet: of a workbook with several tables.
         names: file of the user's own names of hardpoints, by role of the template.
         wheel_radius: loaded radius of the wheel of hardpoints [m].
         wheelbase: of the vehicle of hardpoints [m].
@@ -40,6 +43,8 @@ class Supplied:
     closure: float | None = None
     hold_rest: bool = False
     start: tuple[str, ...] = ()
+    rack: str | None = None
+    sheet: str | None = None
 
     @property
     def given(self) -> tuple[str, ...]:

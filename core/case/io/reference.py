@@ -1,5 +1,5 @@
-"""Reference of a case: samples of its outputs from a CSV file beside the case file, from rows
-inside it, or proved ones.
+"""Reference of a case: samples of its outputs from a table (CSV or .xlsx) beside the case file,
+from rows inside it, or proved ones.
 
 The first column holds driver values. Where they are not those of the sweep, the reference is
 interpolated, or compared at its own samples only: see `reference_grid`. Further columns are OUTPUT,
@@ -31,10 +31,10 @@ from .reference_samples import (
     ReferenceKeys,
     Samples,
     beside,
-    from_csv,
     inline,
     only_beside,
 )
+from .reference_table import from_table
 
 DERIVATIVES = (".velocity", ".acceleration")
 PROVED = ".json"
@@ -61,7 +61,7 @@ def read_grid(case_file: Path, keys: ReferenceKeys) -> Sequence[float]:
     if keys.file is None and keys.rows is not None and keys.columns is None:
         # their columns are those of the outputs, which checks them when they are read
         return [row[0] for row in keys.rows if row]
-    samples = inline(case_file, keys, ()) if keys.file is None else from_csv(case_file, keys)
+    samples = inline(case_file, keys, ()) if keys.file is None else from_table(case_file, keys)
     return [row[0] for _, row in samples.rows]
 
 
@@ -95,7 +95,7 @@ def read_reference(
         file = only_beside(case_file, keys)
         known = series(file, read(file), values, outputs)
         return known, replace(_origin(case_file, keys), signs=convention)
-    samples = inline(case_file, keys, outputs) if keys.file is None else from_csv(case_file, keys)
+    samples = inline(case_file, keys, outputs) if keys.file is None else from_table(case_file, keys)
     names = list(samples.columns[1:])
     _check_columns(samples, names, [*by_name])
     signed = any(by_name[name].signs for name in names if name in by_name)

@@ -1,11 +1,7 @@
-"""Samples of a reference table: from a CSV file beside the case file, or from rows inside it."""
+"""Samples of a reference table, and the keys that say where it is; from rows in the case file."""
 
 from __future__ import annotations
 
-import csv
-import math
-import re
-from array import array
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -17,12 +13,7 @@ from msgspec import Meta
 
 from ..case import PER_TRAVEL, Quantity
 from ..printed import Printed
-from .document import LARGEST, decimal, fault, read_text, shown
-
-LARGEST_FILE = 64_000_000
-# A line for each sample of the largest sweep, and as many lines between them.
-MOST_LINES = 2_000_000
-SIGNS = re.compile(r"\s*#\s*signs:\s*(\w+)")
+from .document import decimal, fault, shown
 
 CITATION = "a text that says where the true values come from: author, title, page or address"
 DIGEST = "sha256:"
@@ -35,12 +26,18 @@ class ReferenceKeys(msgspec.Struct, forbid_unknown_fields=True):
     Attributes:
         citation: source of the true values; without it, agreement with them validates nothing.
         digest: digest of the file; a file of other content is refused.
+        sheet: of a workbook with several tables.
     """
 
     file: (
         Annotated[
-            str, Meta(min_length=1, description="the name of a CSV file beside the case file")
+            str,
+            Meta(min_length=1, description="the name of a CSV or .xlsx file beside the case file"),
         ]
+        | None
+    ) = None
+    sheet: (
+        Annotated[str, Meta(min_length=1, description="the name of a sheet of an .xlsx file")]
         | None
     ) = None
     columns: (
@@ -68,7 +65,7 @@ class ReferenceKeys(msgspec.Struct, forbid_unknown_fields=True):
     ) = None
 
 
-_ROWS = "expected rows of numbers, one for each sample; add them"
+ROWS = "expected rows of numbers, one for each sample; add them"
 
 
 @dataclass(frozen=True)
@@ -118,69 +115,12 @@ def inline(file: Path, keys: ReferenceKeys, outputs: Sequence[Quantity]) -> Samp
     rows = [(f"{key}[{k}]", row) for k, row in enumerate(keys.rows)]
     printed = [Printed() for _ in columns]
     if not rows:
-        raise fault(file, key, f"found none, {_ROWS}")
+        raise fault(file, key, f"found none, {ROWS}")
     samples = Samples(file, "reference.columns", columns, rows, key, printed=printed)
     for where, row in rows:
-        _check_width(samples, where, len(row))
+        check_width(samples, where, len(row))
         for column, number in zip(printed, row, strict=True):
             column.add(repr(number))
-    return samples
-
-
-def from_csv(case_file: Path, keys: ReferenceKeys) -> Samples:
-    """Read the samples of the CSV file beside a case file."""
-    file = only_beside(case_file, keys)
-    text = read_text(file, LARGEST_FILE, "thin out the samples")
-    lines = text.splitlines()
-    if len(lines) > MOST_LINES:
-        raise fault(
-            file,
-            "",
-            f"found {len(lines)} lines, expected a row for each sample of the sweep; thin out the"
-            " samples",
-        )
-    signs = next((found[1] for line in lines if (found := SIGNS.match(line))), "")
-    # comment lines are blanked, not dropped, so that the reader's line numbers are those of the
-    # file
-    lines = ["" if line.lstrip().startswith("#") else line for line in lines]
-    reader = csv.reader(lines, skipinitialspace=True, strict=True)
-    samples: Samples | None = None
-    rows: list[tuple[str, Sequence[float]]] = []
-    try:
-        for cells in filter(None, reader):
-            where = f"line {reader.line_num}"
-            if samples is None:
-                samples = Samples(
-                    file,
-                    where,
-                    [cell.strip() for cell in cells],
-                    rows,
-                    signs=signs,
-                    lines=lines,
-                    printed=[Printed() for _ in cells],
-                )
-                continue
-            _check_width(samples, where, len(cells))
-            # numbers at once: the cells of a large file as texts would take many times its size
-            numbers = (
-                _number(file, where, name, cell)
-                for name, cell in zip(samples.columns, cells, strict=True)
-            )
-            rows.append((where, array("d", numbers)))
-            for column, cell in zip(samples.printed, cells, strict=True):
-                column.add(cell)
-    except csv.Error as error:
-        raise fault(
-            file, f"line {reader.line_num}", f"not valid CSV: {error}; correct the line"
-        ) from None
-    if samples is None:
-        raise fault(
-            file,
-            "",
-            "found no samples, expected a line of column names and rows of numbers; add them",
-        )
-    if not rows:
-        raise fault(file, "", f"found column names only, {_ROWS}")
     return samples
 
 
@@ -221,22 +161,8 @@ def beside(case_file: Path, name: str) -> Path:
     return file
 
 
-def _number(file: Path, line: str, column: str, cell: str) -> float:
-    try:
-        number = decimal(cell)
-    except ValueError:
-        number = math.nan
-    if not abs(number) <= LARGEST:
-        expected = f"expected a finite number, at most {LARGEST:g}"
-        raise fault(
-            file,
-            f"{line}, column {column}",
-            f"found {shown(cell)}, {expected}; correct it or leave the column out",
-        )
-    return number
-
-
-def _check_width(samples: Samples, where: str, found: int) -> None:
+def check_width(samples: Samples, where: str, found: int) -> None:
+    """Refuse a row that has not a number for each column."""
     if found != len(samples.columns):
         expected = f"{len(samples.columns)} ({', '.join(samples.columns)})"
         raise fault(

@@ -5,7 +5,7 @@ formula over the motion of points. The class declaration registers it: case file
 once, `case_writer` writes it, and `kincheck list --outputs` prints it. A field named in `NAMES`
 holds names of the mechanism, and is checked.
 
-Formulas read points only, so that every engine gives every measure: the angle of a joint is that
+Formulas read points only, and every engine gives every measure: the angle of a joint is the angle
 between markers on its bodies.
 """
 
@@ -106,7 +106,7 @@ class Measure(ABC):
         return {"type": self.type, "unit": self.unit, "sense": self.sense, **own}
 
     def check(self, mechanism: Mechanism) -> None:
-        """Raise MechanismError unless the mechanism has all that it names."""
+        """Raise MechanismError unless the mechanism has all its names."""
         known: Mapping[str, Iterable[str]] = {
             "point": [p.name for p in mechanism.points if not p.name.startswith(MARKER)],
             "joint": [joint.name for joint in (*mechanism.joints, *mechanism.grounded)],
@@ -125,7 +125,7 @@ class Measure(ABC):
                     )
 
     def bound(self, mechanism: Mechanism) -> Self:
-        """Return the measure with what it needs to know of the mechanism."""
+        """Return the measure with the facts it needs of the mechanism."""
         return self
 
     def markers(self, mechanism: Mechanism) -> Sequence[Point]:
@@ -169,7 +169,7 @@ def coordinates(place: Vec3) -> Vector:
 
 
 def place_on(mechanism: Mechanism, body: str) -> Vec3:
-    """Return a place on a body near what it carries [m]."""
+    """Return a place on a body near its joints and points [m]."""
     places = [
         place
         for joint in mechanism.joints

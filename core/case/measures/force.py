@@ -56,17 +56,17 @@ class ForceMeasure(Measure):
 
     @property
     def points(self) -> tuple[str, ...]:
-        """The point where it acts; engines follow a motion by the points of outputs."""
+        """The point of action; engines follow a motion by the points of outputs."""
         return (f"{MARKER}{self.read}: force",)
 
     def markers(self, mechanism: Mechanism) -> Sequence[Point]:
-        """Return the point where it acts."""
+        """Return the point of action."""
         body, place = self.place(mechanism)
         return [Point(self.points[0], body, place)]
 
     @abstractmethod
     def place(self, mechanism: Mechanism) -> tuple[str, Vector]:
-        """Return the body that it acts on, and the point of that body, global at design [m]."""
+        """Return the body it acts on, and the body's point, global at design [m]."""
 
     @property
     def forces(self) -> tuple[str, ...]:
@@ -84,7 +84,7 @@ class ForceMeasure(Measure):
         return 1
 
     def check(self, mechanism: Mechanism) -> None:
-        """Raise MechanismError unless the mechanism has loads, and all that it names."""
+        """Raise MechanismError unless the mechanism has loads, and all its names."""
         super().check(mechanism)
         if not mechanism.has_loads:
             raise MechanismError(
@@ -99,10 +99,10 @@ class ForceMeasure(Measure):
 
     @abstractmethod
     def values(self, forces: Forces) -> Array:
-        """Return the measure over the samples, NaN where it is missing or undetermined."""
+        """Return the measure over the samples, NaN if missing or undetermined."""
 
     def undetermined(self, forces: Forces) -> str:
-        """Return the message that redundant rows leave the measure undetermined, or nothing."""
+        """Return a message if redundant rows leave the measure undetermined, or nothing."""
         return ""
 
 
@@ -172,7 +172,7 @@ class _JointReaction(ForceMeasure):
         return forces.joints[self.joint].along(self.along, moment=self.turns)
 
     def undetermined(self, forces: Forces) -> str:
-        """Return the message that redundant rows leave the component undetermined, or nothing."""
+        """Return a message if redundant rows leave the component undetermined, or nothing."""
         reaction = forces.joints[self.joint]
         loose = np.isfinite(reaction.force).all(axis=1) & ~np.isfinite(self.values(forces))
         if not loose.any():
@@ -187,7 +187,7 @@ class _JointReaction(ForceMeasure):
 
 @dataclass(frozen=True)
 class JointForce(_JointReaction):
-    """Force that a joint's first body exerts on its second, along a global axis or direction."""
+    """Force of a joint's first body on its second, along a global axis or direction."""
 
     type = "joint_force"
     positive = "force"
@@ -195,9 +195,7 @@ class JointForce(_JointReaction):
 
 @dataclass(frozen=True)
 class JointMoment(_JointReaction):
-    """Moment that a joint's first body exerts on its second, about the joint's point as carried by
-    the second body.
-    """
+    """Moment of a joint's first body on its second, about the joint's point on the second body."""
 
     type = "joint_moment"
     measure = NEWTON_METRE
@@ -262,7 +260,7 @@ class ElementForce(ForceMeasure):
         return self.force
 
     def place(self, mechanism: Mechanism) -> tuple[str, Vector]:
-        """Return the last body that it acts on, and the point of it."""
+        """Return the last body it acts on, and the body's point."""
         element = mechanism.force(self.force)
         if isinstance(element, TorsionSpringDamper):
             return _joint_place(mechanism, element.joint)

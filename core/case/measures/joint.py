@@ -37,7 +37,7 @@ class _JointCoordinate(Measure):
         return f"{MARKER}joint {self.joint}: {what}"
 
     def markers(self, mechanism: Mechanism) -> Sequence[Point]:
-        """Return the points of both bodies on the joint's axis and beside it that it reads."""
+        """Return the points it reads: of both bodies, on the joint's axis and beside it."""
         joint: Any = mechanism.joint(self.joint)
         f, g, h = triad(joint.axis)
         place, reach = vec(joint.point), reach_of(mechanism)

@@ -41,7 +41,7 @@ class Distance(Measure):
 class Angle(Measure):
     """Angle between a direction of one body and a direction of another, 0 to pi.
 
-    Its rate is unknown where they are parallel.
+    Its rate is unknown while they are parallel.
 
     Attributes:
         directions: global at design, any length but zero [-].

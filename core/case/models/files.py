@@ -3,24 +3,30 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..case import Case
 from ..io.case_file import LARGEST_FILE, load_case
 from ..io.document import fault, parse, read_text
 from ..io.reader_options import NOTHING, Supplied
+from ..io.workbook import WORKBOOKS
+
+if TYPE_CHECKING:
+    from .hardpoints.table import HardpointTable
 
 CASE_FILES = (".toml", ".json")
 TABLES = (".csv", ".tsv")
 ADAMS_FILES = (".sub", ".tpl", ".asy", ".hpt")
 MODELS = (".xml", ".mjcf", ".urdf", ".sdf", ".world")
-SUFFIXES = (*CASE_FILES, *TABLES, *ADAMS_FILES, *MODELS)
+SUFFIXES = (*CASE_FILES, *TABLES, *WORKBOOKS, *ADAMS_FILES, *MODELS)
 """Suffixes of names that are files, whether they exist or not."""
 
-CASE, CHRONO, ADAMS, TABLE, MODEL = (
+CASE, CHRONO, ADAMS, TABLE, WORKBOOK, MODEL = (
     "case file",
     "Project Chrono suspension",
     "Adams/Car hardpoints",
     "hardpoint table",
+    "workbook of hardpoints",
     "model",
 )
 HARDPOINTS = (CHRONO, ADAMS, TABLE)
@@ -38,13 +44,22 @@ UNREAD = {
     ),
 }
 """Files that people have beside their models, and what to do, by suffix."""
+_OF_HARDPOINTS = (
+    "template",
+    "units",
+    "axes",
+    "travel",
+    "rack",
+    "names",
+    "wheel-radius",
+    "wheelbase",
+    "axle",
+)
 _OPTIONS = {
     CASE: ("closure",),
     MODEL: ("drive", "hold", "hold-rest", "start", "closure"),
-    **dict.fromkeys(
-        HARDPOINTS,
-        ("template", "units", "axes", "travel", "names", "wheel-radius", "wheelbase", "axle"),
-    ),
+    **dict.fromkeys(HARDPOINTS, _OF_HARDPOINTS),
+    WORKBOOK: (*_OF_HARDPOINTS, "sheet"),
 }
 
 
@@ -69,7 +84,6 @@ def load(file: Path, supplied: Supplied = NOTHING) -> Case:
             )
     if kind == CASE:
         return load_case(file, supplied.closure)
-    text = _text(file, utf_16=kind in (TABLE, ADAMS))
     if not file.stem.isprintable():  # it becomes the name of the case
         raise fault(
             file,
@@ -79,15 +93,23 @@ def load(file: Path, supplied: Supplied = NOTHING) -> Case:
     if kind == MODEL:
         from .xml_models import read_model
 
-        return read_model(file, text, supplied)
+        return read_model(file, _text(file), supplied)
+    from .hardpoints.read import case_of_hardpoints
+
+    return case_of_hardpoints(_hardpoints(file, kind, supplied), supplied)
+
+
+def _hardpoints(file: Path, kind: str, supplied: Supplied) -> HardpointTable:
+    """Return the table of hardpoints of a file."""
     from .hardpoints.adams import read_adams
     from .hardpoints.chrono import read_chrono
     from .hardpoints.plain import read_plain
-    from .hardpoints.read import read_hardpoints
+    from .hardpoints.spreadsheet import read_spreadsheet
 
-    return read_hardpoints(
-        file, text, {CHRONO: read_chrono, ADAMS: read_adams, TABLE: read_plain}[kind], supplied
-    )
+    if kind == WORKBOOK:
+        return read_spreadsheet(file, supplied.sheet)
+    text = _text(file, of_spreadsheet=kind in (TABLE, ADAMS))
+    return {CHRONO: read_chrono, ADAMS: read_adams, TABLE: read_plain}[kind](file, text)
 
 
 def kind_of(file: Path, supplied: Supplied = NOTHING) -> str:
@@ -108,10 +130,15 @@ def kind_of(file: Path, supplied: Supplied = NOTHING) -> str:
             if "schema" not in tables and ("Template" in tables or supplied.template)
             else CASE
         )
-    for kind, suffixes in ((TABLE, TABLES), (ADAMS, ADAMS_FILES), (MODEL, MODELS)):
+    for kind, suffixes in (
+        (TABLE, TABLES),
+        (WORKBOOK, WORKBOOKS),
+        (ADAMS, ADAMS_FILES),
+        (MODEL, MODELS),
+    ):
         if suffix in suffixes:
             return kind
-    text = _text(file, utf_16=True)
+    text = _text(file, of_spreadsheet=True)
     if "[HARDPOINT]" in text:
         return ADAMS
     if text.lstrip().startswith("<"):
@@ -119,10 +146,10 @@ def kind_of(file: Path, supplied: Supplied = NOTHING) -> str:
     return TABLE if supplied.template else CASE
 
 
-def _text(file: Path, *, utf_16: bool = False) -> str:
+def _text(file: Path, *, of_spreadsheet: bool = False) -> str:
     return read_text(
         file,
         LARGEST_FILE,
         "hardpoints and mechanisms need far less; take out what is not geometry",
-        utf_16=utf_16,
+        of_spreadsheet=of_spreadsheet,
     )

@@ -5,10 +5,23 @@ from __future__ import annotations
 from typing import Any
 
 from ..io.json_schema import document_schema
-from .variation_schema import SCHEMA, HardpointKeys, LineKeys, VaryKeys, VaryUnits
+from .variation_schema import (
+    SCHEMA,
+    CorrelationKeys,
+    HardpointKeys,
+    LimitKeys,
+    LineKeys,
+    VaryKeys,
+    VaryUnits,
+)
 
 
 def variation_schema() -> dict[str, Any]:
     """Return the schema of variation files."""
-    tables = {"hardpoints": HardpointKeys, "lines": LineKeys}
+    tables = {
+        "hardpoints": HardpointKeys,
+        "lines": LineKeys,
+        "limits": LimitKeys,
+        "correlations": CorrelationKeys,
+    }
     return document_schema(SCHEMA, VaryKeys, tables, {"units": VaryUnits})

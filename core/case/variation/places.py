@@ -1,4 +1,4 @@
-"""Places of a mechanism's geometry: search by name, and groups of coincident positions."""
+"""Places of a mechanism: search by name, and groups of coincident positions."""
 
 from __future__ import annotations
 
@@ -7,12 +7,14 @@ from collections.abc import Iterable
 
 from ...errors import remedy
 from ...joints import Kind
-from ...kinematics import kinds, places
+from ...kinematics import kinds, load_places, places
+from ...mechanism.dimension import Dimension
 from ...mechanism.mechanism import Mechanism
 from ..case import MARKER
 
 # Positions closer than this are one hardpoint [m]: tables are measured to a micrometre at best.
 SAME = 1e-6
+_BODIES, _LOADS = "bodies.", ("bodies.", "forces.")
 
 
 class PlaceError(ValueError):
@@ -23,13 +25,20 @@ class Geometry:
     """The places of a mechanism.
 
     Attributes:
-        values: value of each place [m or -], markers included.
-        kinds: kind of each place.
+        values: value of each place [SI], markers included.
+        kinds: kind of each place: a position, direction or length, or a number of a load.
+        dimensions: of the numbers of loads.
     """
 
     def __init__(self, mechanism: Mechanism) -> None:
-        self.values = places(mechanism)
-        self.kinds = kinds(mechanism)
+        loads = load_places(mechanism)
+        self.values = places(mechanism) | {name: each.value for name, each in loads.items()}
+        self.dimensions: dict[str, Dimension] = {
+            name: each.dimension for name, each in loads.items() if each.dimension is not None
+        }
+        self.kinds = kinds(mechanism) | {
+            name: Kind.NUMBER if name in self.dimensions else Kind.POSITION for name in loads
+        }
 
     @property
     def named(self) -> list[str]:
@@ -37,22 +46,25 @@ class Geometry:
         return [place for place in self.values if not place.startswith(f"points.{MARKER}")]
 
     def find(self, name: str) -> str:
-        """Return the place of a name, or the only position of the joint or point of that name.
+        """Return the place of a name, or the only position of the joint or point of that name, or
+        else of the body or force element.
 
         Raises:
             PlaceError: no place matches, or several do.
         """
         if name in self.named:
             return name
-        found = [
+        matching = [
             place
             for place in self.named
             if self.kinds[place] is Kind.POSITION
             and (place.startswith(f"{name}.") or place.partition(".")[2].startswith(f"{name}."))
         ]
+        found = [each for each in matching if not each.startswith(_LOADS)] or matching
         if not found:
             raise PlaceError(
-                f"expected a position, direction or length of the case; {remedy(name, self.named)}"
+                "expected a position, direction, length, mass or load of the case;"
+                f" {remedy(name, self.named)}"
             )
         if any(place not in self.together(found[0]) for place in found):
             raise PlaceError(
@@ -61,14 +73,19 @@ class Geometry:
         return found[0]
 
     def together(self, place: str) -> tuple[str, ...]:
-        """Return the place and, if a position, every other position at this point at design."""
-        if self.kinds[place] is not Kind.POSITION:
+        """Return the place and, if a position, every other position at this point at design.
+
+        A centre of mass moves alone.
+        """
+        if self.kinds[place] is not Kind.POSITION or place.startswith(_BODIES):
             return (place,)
         here = self.values[place]
         return tuple(
             each
             for each in self.named
-            if self.kinds[each] is Kind.POSITION and math.dist(here, self.values[each]) <= SAME
+            if self.kinds[each] is Kind.POSITION
+            and not each.startswith(_BODIES)
+            and math.dist(here, self.values[each]) <= SAME
         )
 
     def with_markers(self, moved: Iterable[str]) -> tuple[str, ...]:

@@ -9,42 +9,21 @@ and a single variant can be reproduced.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from enum import IntEnum, StrEnum
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...errors import KincheckError
 from ...trajectory import Array
-
-DRAWN = 256
-"""Number of variants drawn together. It is part of the meaning of a seed, and therefore no setting.
-"""
-
-
-class Mode(StrEnum):
-    """Choice of the variants."""
-
-    MONTE_CARLO = "monte_carlo"
-    GRID = "grid"
-    ONE_AT_A_TIME = "one_at_a_time"
-
-
-class Law(StrEnum):
-    """Distribution of a coordinate."""
-
-    NORMAL = "normal"
-    UNIFORM = "uniform"
-    VALUES = "values"
-
-
-class Stream(IntEnum):
-    """Purpose of random numbers; each purpose has its own generators."""
-
-    GEOMETRY = 0
-    SUBSET = 1
+from .correlations import Correlation
+from .distributions import Law, normal_quantile, normal_share, quantile
+from .file_units import SI, FileUnits
+from .limits import Limit
+from .modes import Mode
+from .sampling import DRAWN, Sampling, Stream, check_count, generator, points
 
 
 @dataclass(frozen=True)
@@ -59,6 +38,7 @@ class Coordinate:
         law: distribution of the offsets from the nominal value.
         scale: standard deviation, half width, or largest offset [unit].
         values: offsets in a grid or one at a time [unit]; empty if drawn.
+        bound: largest offset of a truncated normal distribution [unit]; zero of all others.
     """
 
     hardpoint: str
@@ -67,6 +47,7 @@ class Coordinate:
     law: Law
     scale: float
     values: tuple[float, ...] = ()
+    bound: float = 0.0
 
     @property
     def name(self) -> str:
@@ -83,6 +64,11 @@ class Variation:
             the count of numbers of each.
         nominal: numbers of the varied places at the nominal design [m or -], shape (numbers,).
         moves: changes of these numbers per unit offset, shape (numbers, coordinates).
+        correlations: of coordinates that are drawn, each in one of them at most.
+        sampling: choice of the points that are drawn.
+        drawn: number of variants that are drawn; a Latin hypercube depends on it.
+        limits: specification limits of outputs.
+        units: of the file, in which outputs are shown.
     """
 
     mode: Mode
@@ -90,6 +76,11 @@ class Variation:
     places: Mapping[str, int]
     nominal: Array
     moves: Array
+    correlations: tuple[Correlation, ...] = ()
+    sampling: Sampling = Sampling.RANDOM
+    drawn: int = 0
+    limits: tuple[Limit, ...] = ()
+    units: FileUnits = SI
 
     @property
     def count(self) -> int | None:
@@ -103,6 +94,25 @@ class Variation:
         for size in sizes:  # unbounded integers: a grid soon outgrows 64 bits
             count *= size
         return count
+
+    def sampled(self, sampling: Sampling, count: int) -> Variation:
+        """Return the variation with another choice of the points that are drawn.
+
+        Args:
+            count: number of variants.
+
+        Raises:
+            KincheckError: nothing is drawn, or the sampling cannot have as many points.
+        """
+        if sampling is not Sampling.RANDOM and self.mode is not Mode.MONTE_CARLO:
+            raise KincheckError(
+                f"--sampling {sampling}: {self.mode} draws nothing; leave it out, or set mode ="
+                ' "monte_carlo"'
+            )
+        check_count(sampling, len(self.coordinates), count)
+        # what does not depend on the number is the same for any number
+        drawn = count if sampling is Sampling.LATIN else 0
+        return replace(self, sampling=sampling, drawn=drawn)
 
     def geometry(self, offsets: Array) -> Array:
         """Return numbers of the varied places, shape (numbers, V), from offsets, shape
@@ -135,16 +145,34 @@ class Variation:
 
     def _drawn(self, seed: int, first: int, count: int) -> Array:
         places = range(first // DRAWN, -(-(first + count) // DRAWN))
-        found = np.concatenate(
-            [self._draw(generator(seed, place, Stream.GEOMETRY)) for place in places], axis=1
-        )
+        found = np.concatenate([self._draw(seed, place) for place in places], axis=1)
         skipped = first - places.start * DRAWN
         return found[:, skipped : skipped + count]
 
-    def _draw(self, random: np.random.Generator) -> Array:
+    def _draw(self, seed: int, block: int) -> Array:
         """Draw a whole block, even if only part of it is needed: a variant must not depend on the
         number of variants.
         """
+        laws = {each.law for each in self.coordinates}
+        plain = self.sampling is Sampling.RANDOM and laws <= {Law.NORMAL, Law.UNIFORM}
+        if plain and not self.correlations:
+            return self._independent(generator(seed, block, Stream.GEOMETRY))
+        at = points(self.sampling, seed, block, len(self.coordinates), self.drawn)
+        normal = dict[int, Array]()
+        for each in self.correlations:
+            rows = [*each.rows]
+            normal |= zip(rows, each.mixed(normal_quantile(at[rows])), strict=True)
+        found = np.empty_like(at)
+        for row, each in enumerate(self.coordinates):
+            if each.law is Law.NORMAL and row in normal:
+                found[row] = each.scale * normal[row]
+                continue
+            share = normal_share(normal[row]) if row in normal else at[row]
+            found[row] = quantile(each.law, share, each.scale, each.bound or each.scale)
+        return found
+
+    def _independent(self, random: np.random.Generator) -> Array:
+        """Draw normal and uniform coordinates directly."""
         rows = list[Array]()
         # one call for all coordinates of one law, without Python's lock
         for law, some in groupby(self.coordinates, lambda each: each.law):
@@ -180,10 +208,3 @@ class Variation:
         return np.array([row for row, _ in pairs], dtype=np.int64), np.array(
             [value for _, value in pairs]
         )
-
-
-def generator(seed: int, place: int, stream: Stream) -> np.random.Generator:
-    """Return the Philox generator of a draw of a stream, seeded by a child of the study's seed."""
-    return np.random.Generator(
-        np.random.Philox(np.random.SeedSequence(seed, spawn_key=(place, int(stream))))
-    )

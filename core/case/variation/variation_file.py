@@ -15,21 +15,17 @@ from ...trajectory import Array
 from ..case import Case
 from ..io.document import fault, join, parse, read_text, shown
 from ..io.typed_tables import typed
+from .coordinate_reader import CoordinateReader
+from .correlation_reader import read_correlations
+from .file_units import FileUnits, unit_of_offsets
+from .limits import read_limits
 from .places import Geometry, PlaceError
-from .variation import Coordinate, Law, Mode, Variation
+from .variation import Coordinate, Variation
 from .variation_schema import SCHEMA, HardpointKeys, LineKeys, VaryKeys, VaryUnits
 
 LARGEST_FILE = 1_000_000
 # Case files give directions to about five digits; a line with a larger error is another one.
 ALONG = 1e-4
-
-_TAKES: Mapping[Mode, tuple[frozenset[str], ...]] = {
-    Mode.MONTE_CARLO: (frozenset({"sigma"}), frozenset({"half_width"})),
-    Mode.GRID: (frozenset({"values"}), frozenset({"half_width", "steps"})),
-    Mode.ONE_AT_A_TIME: tuple(
-        map(frozenset, ({"values"}, {"half_width"}, {"half_width", "steps"}, {"sigma"}))
-    ),
-}
 
 
 def read_variation(path: str | Path, case: Case) -> Variation:
@@ -96,12 +92,16 @@ class _Reader:
             self._line(join("lines", name), table, moves)
         self._check_drivers(moves)
         values = self.geometry.values
+        units = FileUnits.of(self.units, self.case)
         return Variation(
             self.keys.mode,
             tuple(coordinates),
             {place: len(values[place]) for place in moves},
             np.array([number for place in moves for number in values[place]]),
             np.concatenate(list(moves.values())),
+            read_correlations(self.file, self.keys, [each.name for each in coordinates]),
+            limits=read_limits(self.file, self.keys.limits, self.case, units),
+            units=units,
         )
 
     def _block(self, name: str, table: object) -> _Block:
@@ -123,96 +123,21 @@ class _Reader:
         length = math.hypot(*self.geometry.values[place])
         factor = length if kind is Kind.DIRECTION else 1.0
         moved = self.geometry.with_markers(together) if kind is Kind.POSITION else together
-        return _Block(dict.fromkeys(moved, factor), self._coordinates(key, name, keys, kind))
+        dimension = self.geometry.dimensions.get(place)
+        unit, scale = unit_of_offsets(self.file, key, self.units, kind, dimension)
+        reader = CoordinateReader(self.file, key, name, self.keys.mode, unit, scale)
+        coordinates = reader.read(keys, 1 if kind in (Kind.LENGTH, Kind.NUMBER) else 3)
+        if dimension is not None:
+            value = self.geometry.values[place][0]
+            for _, each in coordinates:
+                reader.require_physical(value, each, dimension)
+        return _Block(dict.fromkeys(moved, factor), coordinates)
 
     def _found(self, key: str, name: str) -> str:
         try:
             return self.geometry.find(name)
         except PlaceError as error:
             raise fault(self.file, key, f"found {shown(name)}, {error}") from None
-
-    def _coordinates(
-        self, key: str, name: str, keys: HardpointKeys, kind: Kind
-    ) -> list[tuple[int, Coordinate]]:
-        given: frozenset[str] = frozenset(
-            each
-            for each in ("sigma", "half_width", "values", "steps")
-            if getattr(keys, each) is not None
-        )
-        if given not in _TAKES[self.keys.mode]:
-            there = " and ".join(sorted(given)) or "none of them"
-            choices = ", or ".join(" and ".join(sorted(each)) for each in _TAKES[self.keys.mode])
-            raise fault(
-                self.file,
-                key,
-                f"found {there}, expected for {self.keys.mode}: {choices}; correct the keys",
-            )
-        unit, scale = self._unit(key, kind)
-        axes = ("",) if kind is Kind.LENGTH else ("x", "y", "z")
-        law = Law.NORMAL if keys.sigma is not None else Law.UNIFORM
-        found: list[tuple[int, Coordinate]] = []
-        if keys.values is not None:
-            for row, offsets in enumerate(self._lists(join(key, "values"), keys.values, len(axes))):
-                found += self._listed(
-                    row, name, axes[row], unit, tuple(scale * offset for offset in offsets)
-                )
-            return found
-        sizes = keys.sigma if keys.sigma is not None else keys.half_width
-        if isinstance(sizes, list) and len(axes) == 1:
-            raise fault(
-                self.file,
-                key,
-                f"found {shown(sizes)}, expected one number, for it is a length; give one",
-            )
-        for row, size in enumerate(
-            sizes if isinstance(sizes, list) else [sizes or 0.0] * len(axes)
-        ):
-            if size == 0.0:
-                continue
-            if self.keys.mode is Mode.MONTE_CARLO:
-                found.append((row, Coordinate(name, axes[row], unit, law, scale * size)))
-            else:
-                values = tuple((scale * size * np.linspace(-1.0, 1.0, keys.steps or 2)).tolist())
-                found += self._listed(row, name, axes[row], unit, values)
-        return found
-
-    def _listed(
-        self, row: int, name: str, axis: str, unit: str, values: tuple[float, ...]
-    ) -> list[tuple[int, Coordinate]]:
-        """Return the coordinate with its values; one at a time without zero, the nominal design."""
-        if self.keys.mode is Mode.ONE_AT_A_TIME:
-            values = tuple(value for value in values if value)
-        if not any(values):
-            return []
-        return [(row, Coordinate(name, axis, unit, Law.VALUES, max(map(abs, values)), values))]
-
-    def _lists(self, key: str, given: list[float | list[float]], count: int) -> list[list[float]]:
-        """Return the offsets of each coordinate: the same for all, or a list each."""
-        flat: list[float] = [each for each in given if not isinstance(each, list)]
-        lists = [each for each in given if isinstance(each, list)]
-        found: list[list[float]] = [flat] * count if len(flat) == len(given) else lists
-        if len(found) != count or (flat and lists) or not all(found):
-            expected = "a list of offsets" + (
-                ", or three of them" if count == 3 else ", for it is a length"
-            )
-            raise fault(
-                self.file, key, f"found {shown(given)}, expected {expected}; correct the lists"
-            )
-        if any(len(set(each)) < len(each) for each in found):
-            raise fault(self.file, key, "found an offset twice, expected each once; remove one")
-        return found
-
-    def _unit(self, key: str, kind: Kind) -> tuple[str, float]:
-        """Return the SI unit of the offsets, and the size of the file's unit in it."""
-        if kind is Kind.DIRECTION:
-            return "rad", math.radians(1.0) if self.units.angle == "deg" else 1.0
-        if self.units.length is None:
-            raise fault(
-                self.file,
-                "units.length",
-                f'missing, expected "m" or "mm" for {key}; say which unit it is in',
-            )
-        return "m", 1e-3 if self.units.length == "mm" else 1.0
 
     def _line(self, key: str, table: object, moves: dict[str, Array]) -> None:
         """Let a direction follow the two positions on its line; unvaried ends are fixed."""

@@ -14,22 +14,36 @@ Reference. Keys in brackets may be left out.
                          "joints.tie_rod.points.0", "joints.hinge.axis", "joints.rod.length",
                          "points.wheel_center.position"; or the name of a joint or point with
                          one position only: "ball". Every place of the case at the same point at
-                         design moves along, so a ball and the rod that ends in it stay
+                         design moves along, so a ball and the rod or spring that ends in it stay
                          together; markers of a wheel's rotation move with its centre.
+                         Or a number of its masses and loads: "bodies.knuckle.mass",
+                         "forces.spring.stiffness", damping, free_length or free_angle; or
+                         "bodies.knuckle.center_of_mass", which moves alone
                          (only) = ["joints.ball.point", ...]: just these of them
                          sigma, or half_width, or values: a number for all three coordinates or
                          three numbers; 0 does not vary
-                         monte_carlo: sigma (normal) or half_width (uniform)
+                         monte_carlo: sigma (normal) or half_width (uniform); or distribution =
+                         "truncated_normal" with sigma and half_width, beyond which there is
+                         nothing, or "triangular" with half_width, most frequent at the nominal
+                         value
                          grid: values = [-1, 0, 1], offsets for each coordinate, or three such
                          lists; or half_width and steps, the number of values from -half_width
                          to half_width
                          one_at_a_time: values, or half_width (both ends; with steps, as in a
                          grid), or sigma (both sides)
                          offsets are along the case's axes; those of a direction, taken at
-                         length one, are angles
+                         length one, are angles. Masses are in kg; stiffness and damping in N and s
+                         with the units of length and angle, as in a case file
     [lines.NAME]         axis = "joints.strut_slide.axis", through = ["strut_foot", "strut_top"]:
                          a direction through two positions as they vary; named like `at`. Other
                          directions do not change.
+    [limits.OUTPUT]      low, high: the specification limits of an output, one or both, in the
+                         file's units of length and angle (those of the case where the file names
+                         none), N and s: the study counts the variants that keep them at every
+                         sample. OUTPUT may be a rate: [limits."camber.velocity"]
+    [correlations.NAME]  monte_carlo: coordinates = ["ball.x", "ball.y"], of [hardpoints.ball];
+                         matrix = [[1, 0.8], [0.8, 1]]: their correlations, by a Gaussian copula.
+                         A coordinate is in one table at most
 """
 
 from __future__ import annotations
@@ -39,7 +53,7 @@ from typing import Annotated, Any, Literal
 import msgspec
 from msgspec import Meta
 
-from .variation import Mode
+from .modes import Mode
 
 SCHEMA = "kincheck-vary/1"
 MOST_STEPS = 10_000
@@ -61,6 +75,9 @@ Steps = Annotated[
 ]
 
 
+Drawn = Literal["normal", "uniform", "truncated_normal", "triangular"]
+
+
 class VaryKeys(msgspec.Struct, forbid_unknown_fields=True):
     """The tables of the file."""
 
@@ -71,13 +88,15 @@ class VaryKeys(msgspec.Struct, forbid_unknown_fields=True):
     ]
     units: Annotated[dict[str, Any], Meta(description="a table")] = {}
     lines: Annotated[dict[str, Any], Meta(description="a table")] = {}
+    limits: Annotated[dict[str, Any], Meta(description="a table")] = {}
+    correlations: Annotated[dict[str, Any], Meta(description="a table")] = {}
 
 
 class VaryUnits(msgspec.Struct, forbid_unknown_fields=True):
-    """[units] of the offsets."""
+    """[units] of the offsets and limits."""
 
     length: Annotated[Literal["m", "mm"], Meta(description='"m" or "mm"')] | None = None
-    angle: Annotated[Literal["rad", "deg"], Meta(description='"rad" or "deg"')] = "rad"
+    angle: Annotated[Literal["rad", "deg"], Meta(description='"rad" or "deg"')] | None = None
 
 
 class HardpointKeys(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
@@ -90,6 +109,13 @@ class HardpointKeys(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
     ) = None
     sigma: Sizes | None = None
     half_width: Sizes | None = None
+    distribution: (
+        Annotated[
+            Drawn,
+            Meta(description='"normal", "uniform", "truncated_normal" or "triangular"'),
+        ]
+        | None
+    ) = None
     values: Offsets | None = None
     steps: Steps | None = None
 
@@ -100,4 +126,22 @@ class LineKeys(msgspec.Struct, forbid_unknown_fields=True):
     axis: Text
     through: Annotated[
         tuple[Text, Text], Meta(description='two names ["first position", "second position"]')
+    ]
+
+
+class LimitKeys(msgspec.Struct, forbid_unknown_fields=True):
+    """[limits.OUTPUT]."""
+
+    low: Annotated[float, Meta(description="a number")] | None = None
+    high: Annotated[float, Meta(description="a number")] | None = None
+
+
+class CorrelationKeys(msgspec.Struct, forbid_unknown_fields=True):
+    """[correlations.NAME]."""
+
+    coordinates: Annotated[
+        list[Text], Meta(min_length=2, description="a list of at least two coordinates")
+    ]
+    matrix: Annotated[
+        list[list[float]], Meta(description="a matrix of correlations [[1, r], [r, 1]]")
     ]

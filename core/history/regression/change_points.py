@@ -132,8 +132,8 @@ def errors_of(entries: Sequence[Entry], output: str, motion: str) -> list[tuple[
 
 
 def above_floor(errors: Sequence[tuple[Entry, Deviation]]) -> list[float]:
-    """Sizes of errors, none below one floor for all: there one is like another, whatever the
-    tolerance was then.
+    """Return sizes of errors, each at least the common floor, below which errors do not differ
+    whatever their tolerance was.
     """
     floor = DRIFT_FLOOR * min(
         (each.tolerance for _, each in errors if each.tolerance > 0.0), default=0.0

@@ -37,7 +37,8 @@ def _edits(facts: Mapping[str, Any]) -> str | None:
 
 
 def same_machine(now: Mapping[str, Any], before: Mapping[str, Any]) -> bool:
-    """Whether times can be compared by the clock too: on equal processors. Hosted runners have
-    another name every night.
+    """Return whether both runs had equal processors: only then are times compared by the clock.
+
+    Names of machines do not count: hosted runners have another one every night.
     """
     return now.get("processor") == before.get("processor")

@@ -11,6 +11,7 @@ from ...case.io.tolerance import DEFAULT_ATOL
 from ...harness.labels import UNMADE, motion_unit, number
 from ...harness.record import Outcome, OutputSeries, Record
 from ...trajectory import QUANTITIES
+from ...unit_text import value_text
 from ..queries import History, Pair
 from .circumstance_changes import same_machine
 from .findings import Finding, Kind, finding_of
@@ -73,7 +74,7 @@ def unmade(now: Subject) -> list[Finding]:
 
 
 def by_pair(records: Sequence[Record]) -> dict[Pair, Record]:
-    """The records by case, engine and mode."""
+    """Return the records by case, engine and mode."""
     return {(record.case, record.engine, record.mode): record for record in records}
 
 
@@ -89,7 +90,7 @@ def _outcomes(now: Record, before: Record) -> Iterator[Finding]:
 
 
 def _lost(now: Record, before: Record) -> Iterator[Finding]:
-    """Phases, samples, motions, standards."""
+    """Return findings on lost phases, samples, motions and standards."""
     phases = [phase for phase in PHASES if _reached(before, phase) and not _reached(now, phase)]
     if phases:
         why = f": {_said(now)}" if now.outcome is not Outcome.PASS else ""
@@ -151,8 +152,8 @@ def _moved(now: Record, before: Record) -> Iterator[Finding]:
                 else DEFAULT_ATOL + UNJUDGED * _largest(before, motion)
             )
             if off > limit:
-                unit = motion_unit(old.unit, motion)
-                told = f"{output} {motion} differs by up to {number(off)} {unit} from what it was"
+                size = value_text(number(off), motion_unit(old.unit, motion))
+                told = f"{output} {motion} differs by up to {size} from what it was"
                 yield finding_of(
                     Kind.MOVED, now, told, now=off, limit=limit, output=output, motion=motion
                 )
@@ -160,8 +161,8 @@ def _moved(now: Record, before: Record) -> Iterator[Finding]:
 
 
 def same_samples(now: Record, before: Record) -> bool:
-    """Whether all drivers have the values they had, but for the last digits of sines and splines on
-    another processor.
+    """Return whether all drivers have equal values, up to the last digits of sines and splines
+    on another processor.
     """
     here, there = now.driver, before.driver
     if {name: len(values) for name, values in here.items()} != {
@@ -188,7 +189,7 @@ def _apart(a: Sequence[float | None], b: Sequence[float | None]) -> float:
 
 
 def _largest(record: Record, motion: str) -> float:
-    """The largest value of any output."""
+    """Return the largest value of any output."""
     values = (x for output in record.outputs.values() for x in values_of(output, motion))
     return max((abs(x) for x in values if x is not None), default=0.0)
 
@@ -215,7 +216,7 @@ def _errors(now: Record, before: Record) -> Iterator[Finding]:
                     motion_unit(now.outputs[output].unit, motion) if output in now.outputs else ""
                 )
                 times = f"×{number(b.max_abs / a.max_abs)}, " if a.max_abs else ""
-                size = f"{number(a.max_abs)} → {number(b.max_abs)} {unit}"
+                size = f"{number(a.max_abs)} → {value_text(number(b.max_abs), unit)}"
                 told = f"{output} {motion} error {size} ({times}tolerance {number(b.tolerance)})"
                 ratio = b.max_abs / a.max_abs if a.max_abs else None
                 yield finding_of(

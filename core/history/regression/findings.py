@@ -34,7 +34,7 @@ class Kind(StrEnum):
 
     @property
     def regression(self) -> bool:
-        """Whether something is worse than it was."""
+        """Whether a pair is worse than before."""
         return self in REGRESSIONS
 
 
@@ -129,7 +129,7 @@ class Change(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def _short(value: Any) -> str:
-    """A value as a line of text has it: commits by their first digits."""
+    """Return a value for a line of text: commits by their first digits."""
     text = "none" if value is None else str(value)
     return text[:10] if len(text) == 40 and text.isalnum() else text
 
@@ -233,8 +233,8 @@ class Regressions(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def regressed(self) -> bool:
-        """Whether something is worse than it was, or was not made; without a run to compare with,
-        whether anything is bad.
+        """Whether a pair is worse than before or missing; without a run to compare with, whether
+        any pair is bad.
         """
         return bool(self.regressions) or (self.against is None and bool(self.failing))
 

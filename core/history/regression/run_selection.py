@@ -34,12 +34,12 @@ class Subject:
 
     @property
     def facts(self) -> dict[str, Any]:
-        """The circumstances."""
+        """The circumstances of the run."""
         return self.results.run
 
     @property
     def label(self) -> RunName:
-        """The run's name as a report has it."""
+        """The run's name in a report."""
         git: dict[str, Any] = self.facts.get("git") or {}
         known = {key: str(self.facts.get(key, "unknown")) for key in ("started", "host")}
         return RunName(name=self.name, number=self.number, commit=git.get("commit"), **known)
@@ -160,7 +160,7 @@ def _kept(store: Store, row: RunRow, rule: str = "") -> Subject:
 
 
 def _of_branch(store: Store, branch: str, subject: Subject) -> list[RunRow]:
-    """Finished runs of a branch, as it was committed: an edit under way is no baseline."""
+    """Return finished runs of a branch without uncommitted edits, which are no baseline."""
 
     def fits(row: RunRow) -> bool:
         git: dict[str, Any] = row.circumstances.get("git") or {}

@@ -1,5 +1,6 @@
-"""Errors that grow by less than a digit a night, and by more than one over many: no step, and
-nothing against last night.
+"""Slow drift: errors grow by less than a digit a night, and by more than one over many nights.
+
+Neither a step nor the comparison with last night shows it.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import numpy as np
 
 from ...harness.labels import motion_unit, number
 from ...trajectory import QUANTITIES
+from ...unit_text import value_text
 from ..queries import History
 from .change_points import above_floor, errors_of
 from .findings import Finding, Kind
@@ -61,7 +63,7 @@ def crept(subject: Subject, around: History, told: Sequence[Finding]) -> Iterato
                     if output in record.outputs
                     else ""
                 )
-                size = f"{number(least.max_abs)} → {number(now.max_abs)} {unit}".rstrip()
+                size = f"{number(least.max_abs)} → {value_text(number(now.max_abs), unit)}"
                 yield Finding(
                     kind=Kind.DRIFTED,
                     case=record.case,

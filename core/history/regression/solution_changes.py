@@ -1,5 +1,5 @@
-"""What two runs say of a pair's solution besides errors and times: freedom, rank, residual, units,
-and values that are gone.
+"""Changes of a pair's solution between two runs besides errors and times: degrees of freedom, rank,
+residual, units, and missing values.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from .thresholds import RESIDUAL, RESIDUAL_FLOOR
 
 
 def differing(now: Subject, before: Subject) -> Iterator[Finding]:
-    """Yield what differs, in the order of the records, for the pairs that both runs have solved."""
+    """Yield the changes of pairs solved in both runs, in the order of the records."""
     earlier = by_pair(before.results.records)
     for pair, record in by_pair(now.results.records).items():
         old = earlier.get(pair)
@@ -28,7 +28,7 @@ def differing(now: Subject, before: Subject) -> Iterator[Finding]:
 
 
 def _numbers(now: Record, before: Record) -> Iterator[Finding]:
-    """Yield changes of dof and rank, and numbers that are null now."""
+    """Yield changes of dof and rank, and numbers now null."""
     for name, kind in (("dof", Kind.FREEDOM), ("rank", Kind.RANK)):
         old, new = getattr(before, name), getattr(now, name)
         if None not in (old, new) and new != old:
@@ -54,9 +54,7 @@ def _residual(now: Record, before: Record) -> Iterator[Finding]:
 
 
 def _units(now: Record, before: Record) -> Iterator[Finding]:
-    """Yield units of outputs that have another name, and positive senses that have another
-    meaning.
-    """
+    """Yield outputs with another unit, or with another positive sense."""
     for output, old in before.outputs.items():
         new = now.outputs.get(output)
         for what in ("unit", "sense"):
@@ -68,8 +66,8 @@ def _units(now: Record, before: Record) -> Iterator[Finding]:
 
 
 def _gone(now: Record, before: Record) -> Iterator[Finding]:
-    """Yield motions of outputs with null where they had numbers, unless something lost says so
-    already.
+    """Yield motions of outputs with null in place of earlier numbers, unless another finding tells
+    it already.
     """
     if not same_samples(now, before):
         return

@@ -1,9 +1,9 @@
-"""From where on a difference between two runs is one: ratios, and floors below which a ratio says
-nothing.
+"""Thresholds of significant differences between two runs: ratios, and floors below which a ratio
+means nothing.
 
 Errors repeat exactly on one machine (25 runs of 5 cases in 4 engines, 20 pairs: not a bit
-differed); another processor or linear algebra library sums in another order, and moves what is
-nothing but round-off by a small factor. Times do not repeat: see `TIME`.
+differed). Another processor or linear algebra library sums in another order, and changes errors of
+pure round-off by a small factor. Times do not repeat: see `TIME`.
 """
 
 from __future__ import annotations
@@ -78,16 +78,16 @@ SEEN = 10
 
 
 def drifted(before: float, now: float, tolerance: float) -> bool:
-    """Whether an error has grown by more than its floor and round-off explain."""
+    """Return whether an error has grown by more than its floor and round-off explain."""
     return now > max(DRIFT_FLOOR * tolerance, DRIFT * before)
 
 
 def slowest(history: History) -> float:
-    """The ratio of times up to which a pair is not called slower: by the spread from run to run of
-    all pairs together.
+    """Return the largest ratio of times not called slower, by the spread of all pairs from run to
+    run.
 
-    Of ratios of successive runs, not of the spread about a median: a true change of pace counts
-    once, not in every run after it.
+    The spread is of ratios of successive runs, not about a median: a true change of pace counts
+    once, not in every later run.
     """
     ratios = [ratio for entries in history.pairs.values() for ratio in _ratios(entries)]
     if len(history.runs) < ENOUGH or len(ratios) < 2:

@@ -48,6 +48,10 @@ class ForceTable:
     Args:
         rows: columns of the table by the name of a vector.
         unit: of length, in which undetermined directions are given [m].
+
+    Attributes:
+        least: where the estimate of the smallest singular value is above it, the pose is far from
+            singular.
     """
 
     def __init__(
@@ -62,7 +66,7 @@ class ForceTable:
         products = rows[REDUNDANT] if REDUNDANT in rows else slice(0, 0)
         # with r redundant rows there are r + r (r + 1) / 2 products
         self.redundant = round((2.0 * (products.stop - products.start) + 2.25) ** 0.5 - 1.5)
-        self._least = WELL_CHOSEN if self.redundant else REGULAR
+        self.least = WELL_CHOSEN if self.redundant else REGULAR
 
     def read(self, table: Array, sigma: float) -> Forces | None:
         """Return the forces of a table, shape (n, columns); NaN where it is. None where rows are so
@@ -75,8 +79,12 @@ class ForceTable:
         if FORCE_SIGMA in self.rows:
             own = table[:, self.rows[FORCE_SIGMA]]
             sigma = min(sigma, float(np.fmin.reduce(own, axis=None, initial=np.inf)))
-        if not sigma > self._least:
+        if not sigma > self.least:
             return None
+        return self.of(table)
+
+    def of(self, table: Array) -> Forces:
+        """Return the forces of samples that are all far from singular poses; see `read`."""
         samples, wanted = _Samples(self, table), self.wanted
         power, largest = table[:, self._power], table[:, self._power + 1]
         if self.redundant:

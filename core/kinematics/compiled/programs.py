@@ -30,7 +30,7 @@ from ..formulation.cartesian import Cartesian, PrescribedBody
 from ..formulation.constraints import Style, constraints, frames
 from ..formulation.driver_inputs import turns
 from ..formulation.formulation import GROUND_ACCELERATION, Acceleration, Formulation, State
-from ..formulation.parameters import placed, places
+from ..formulation.parameters import every_place, placed
 from ..formulation.relative import Relative
 from ..structure.components import Section, select_section
 from ..structure.degrees_of_freedom import select_rows
@@ -72,7 +72,8 @@ class Tracer:
             self.selection = select_section(mechanism, self.frame, formulation)
         else:
             self.selection = select_rows(mechanism, self.frame, formulation, request.rows)
-        self.geometry = {place: places(mechanism)[place] for place in request.varied}
+        known = every_place(mechanism)
+        self.geometry = {place: known[place] for place in request.varied}
         given = {place: self.vector(place, len(value)) for place, value in self.geometry.items()}
         slots = {slot for place in given for slot in self.layout.vectors[place]}
         self.prepared = Prepared(self.tape, slots, self.layout.scalar)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
-from ...algebra import ZERO, Scalar, Vec3, cross, vec
+from ...algebra import ZERO, Scalar, Vec3, cross, is_literal_zero, vec
 from ...joints.base import Joint
 from ...mechanism.drivers import Driver
 from ...mechanism.mechanism import Mechanism
@@ -52,7 +52,9 @@ class ForceEquations:
         gravity = vec(self.mechanism.gravity)
         for name, first in self.formulation.columns.items():
             body = self.mechanism.body(name)
-            total = inertial(body, self.states, gravity) if body.mass > 0.0 else NO_WRENCH
+            total = (
+                NO_WRENCH if is_literal_zero(body.mass) else inertial(body, self.states, gravity)
+            )
             for each in self.applied.values():
                 if name in each.wrenches:
                     total += -each.wrenches[name]

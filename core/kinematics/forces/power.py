@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ...algebra import Scalar, vec
+from ...algebra import Scalar, is_literal_zero, vec
 from ...mechanism.mechanism import Mechanism
 from .demand import (
     Applied,
@@ -31,7 +31,7 @@ def powers(
     found: list[Scalar] = [efforts[name] * rates[name] for name in efforts]
     gravity = vec(mechanism.gravity)
     for body in mechanism.moving:
-        if body.mass == 0.0:
+        if is_literal_zero(body.mass):
             continue
         v = at.frame.unit * at.twists[body.name].of(arm_of_center(body, at))
         a = acceleration_of_center(body, at)

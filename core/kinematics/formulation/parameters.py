@@ -1,7 +1,8 @@
 """The geometry of a mechanism as named places: hardpoints, axes and lengths that can vary.
 
 Names are those of a case file: "joints.NAME.point", "joints.NAME.axis", "joints.NAME.points.0",
-"joints.NAME.lead", "points.NAME.position".
+"joints.NAME.lead", "points.NAME.position". `load_parameters` has the places of masses and loads,
+on which no motion depends.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from typing import Any
 from ...algebra import Scalar
 from ...joints import Joint, Kind
 from ...mechanism.mechanism import Mechanism, Point
+from .load_parameters import load_places, with_loads
 
 
 def places(mechanism: Mechanism) -> dict[str, tuple[float, ...]]:
@@ -22,6 +24,11 @@ def places(mechanism: Mechanism) -> dict[str, tuple[float, ...]]:
         for name, kind, value in joint.parts():
             found[f"joints.{joint.name}.{name}"] = (value,) if kind is Kind.LENGTH else tuple(value)
     return found | {f"points.{point.name}.position": point.position for point in mechanism.points}
+
+
+def every_place(mechanism: Mechanism) -> dict[str, tuple[float, ...]]:
+    """Return the value of every place [SI], of geometry, masses and loads."""
+    return places(mechanism) | {name: place.value for name, place in load_places(mechanism).items()}
 
 
 def kinds(mechanism: Mechanism) -> dict[str, Kind]:
@@ -40,7 +47,8 @@ def placed(mechanism: Mechanism, values: Mapping[str, Sequence[Scalar]]) -> Mech
     points = [
         _moved(point, values.get(f"points.{point.name}.position")) for point in mechanism.points
     ]
-    return replace(mechanism, joints=joints, points=points)
+    bodies, forces = with_loads(mechanism, values)
+    return replace(mechanism, joints=joints, points=points, bodies=bodies, forces=forces)
 
 
 def _changes(joint: Joint, values: Mapping[str, Sequence[Scalar]]) -> dict[str, Any]:

@@ -1,31 +1,23 @@
-"""A mechanism with exact numbers, and its equations as programs for ball arithmetic.
+"""A mechanism with exact numbers.
 
 Coordinates, axes and lengths are fractions: their doubles, or the decimals that print them.
 Quantities that joints derive from them (differences, directions, lengths) stay fractions up to the
 first root and are balls from there on, so no rounding is ignored. A joint type that calls `math`
 itself rounds to a double; the joint types of kincheck do not. Pi of a screw's lead is its double.
-
-The residuals are the only equations of the primitives in use: the Jacobian is the derivative of the
-traced residuals, and the unit length of the Euler parameters is an equation of its own. Proofs
-therefore check rows, nu and gamma and do not rely on them.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass, replace
+from collections.abc import Callable
+from dataclasses import fields, replace
 from fractions import Fraction
 from typing import Any
 
-from ...algebra import Scalar, Vec3, quat
+from ...algebra import Vec3
 from ...mechanism.mechanism import Mechanism
-from ...primitives.base import GROUND_POSE, Drive
-from ...program import Program, Tape, Traced, program
 from ...program.ball_executor import Ball, flint
-from ...program.derivative import jacobian
-from ..formulation.cartesian import Cartesian
-from ..formulation.constraints import Frames, constraints, frames
+from .exact_forces import converted
 
 Reading = Callable[[float], Fraction]
 """Interpretation of a float of a description as a fraction."""
@@ -140,10 +132,7 @@ def _value(b: Any) -> Any:
 
 
 def exact_mechanism(mechanism: Mechanism, reading: Reading) -> Mechanism:
-    """Return the mechanism with `Exact` numbers in joints, points, couplers and drivers.
-
-    The numbers of bodies and loads stay: joints do not read them.
-    """
+    """Return the mechanism with `Exact` numbers."""
 
     def read(value: Any) -> Any:
         if isinstance(value, float):
@@ -165,135 +154,7 @@ def exact_mechanism(mechanism: Mechanism, reading: Reading) -> Mechanism:
         points=[*map(each, mechanism.points)],
         drivers=[*map(each, mechanism.drivers)],
         couplers=[*map(each, mechanism.couplers)],
+        bodies=[converted(body, read) for body in mechanism.bodies],
+        gravity=read(mechanism.gravity),
+        forces=[converted(force, read) for force in mechanism.forces],
     )
-
-
-class _Inputs:
-    """The slots of the programs: state, drivers, then geometry in the order of use."""
-
-    def __init__(self) -> None:
-        self.tape = Tape()
-        self.count = 0
-        self.geometry: list[Ball] = []
-
-    def vector(self, count: int) -> list[Traced]:
-        first, self.count = self.count, self.count + count
-        return [self.tape.input(slot) for slot in range(first, self.count)]
-
-    def lift(self, value: Any) -> Any:
-        """Return a value with its exact numbers as program inputs, or literals if trivial."""
-        if isinstance(value, Exact):
-            return self._number(value)
-        if isinstance(value, Mapping):
-            return {key: self.lift(each) for key, each in value.items()}  # pyright: ignore[reportUnknownVariableType]
-        if isinstance(value, tuple):
-            return tuple(map(self.lift, value))  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
-        if is_dataclass(value) and not isinstance(value, type):
-            return replace(
-                value, **{f.name: self.lift(getattr(value, f.name)) for f in fields(value)}
-            )
-        if isinstance(value, float) and value not in (0.0, 1.0, -1.0):
-            return self._number(Exact.of(Fraction(value)))
-        return value
-
-    def _number(self, value: Exact) -> Scalar:
-        if value.trivial is not None:
-            return value.trivial
-        self.geometry.append(value.ball)
-        return self.vector(1)[0]
-
-
-@dataclass(frozen=True, eq=False)
-class ExactEquations:
-    """The equations of a mechanism for a proof; inputs are state, drivers, then `geometry`.
-
-    Attributes:
-        state: names and sizes of the vectors of the state: displacement "u BODY" [units], Euler
-            parameters "q BODY", coordinates "x JOINT.FREEDOM" [units or rad].
-        drivers: three inputs for each moving driver: value [units or rad], cosine and sine of its
-            half.
-        geometry: values of the further inputs.
-        residuals: as many as scalars of the state: the kept rows, then the lengths of the Euler
-            parameters.
-        derivative: their Jacobian; the slot of an entry is row * size + column, zeros are left out.
-        points: displacement of each point from the design [m], three slots each.
-        tests: the rows left out (`left_out` of them), then the branch tests.
-    """
-
-    frame: Frames
-    state: Mapping[str, int]
-    drivers: tuple[str, ...]
-    geometry: Sequence[Ball]
-    residuals: Program
-    derivative: Program
-    points: Program
-    tests: Program
-    left_out: int
-
-    @property
-    def size(self) -> int:
-        """Number of scalars of the state."""
-        return sum(self.state.values())
-
-
-def equations(
-    mechanism: Mechanism, drivers: Sequence[str], points: Sequence[str], kept: Sequence[int]
-) -> ExactEquations:
-    """Return the programs of an exact mechanism.
-
-    Args:
-        mechanism: from `exact_mechanism`; the call sets the precision of the geometry.
-        drivers: names of the moving drivers.
-        points: names of the output points.
-        kept: the rows to solve; the others are tests.
-    """
-    frame, inputs = frames(mechanism), _Inputs()
-    design = Cartesian.of(mechanism, frame).design
-    parts = {name: inputs.vector(len(value)) for name, value in design.items()}
-    state = [x for part in parts.values() for x in part]
-    drives = {name: _drive(inputs) for name in drivers}
-    formulation = Cartesian(
-        [inputs.lift(c) for c in constraints(mechanism, frame, drives)], frame.moving
-    )
-    at = formulation.configuration(parts)
-    phi = formulation.phi(at)
-    lengths = [
-        0.5 * (q.e0 * q.e0 + q.e @ q.e - 1.0)
-        for q in (quat(p) for n, p in parts.items() if n[0] == "q")
-    ]
-    residuals = [*(phi[k] for k in kept), *lengths]
-    taken = set(kept)
-    left_out = [each for k, each in enumerate(phi) if k not in taken]
-    moved: list[Scalar] = []
-    for name in points:
-        point = mechanism.point(name)
-        pose, arm = (
-            at.poses.get(point.body, GROUND_POSE),
-            inputs.lift(frame.arm(point.body, point.position)),
-        )
-        moved += inputs.lift(Exact.of(Fraction(frame.unit))) * (pose.u + pose.swing(arm))
-    entries = {
-        row * len(state) + column: value
-        for row, gradient in enumerate(jacobian(inputs.tape, residuals, state))
-        for column, value in gradient.items()
-    }
-    return ExactEquations(
-        frame,
-        {name: len(value) for name, value in design.items()},
-        tuple(drivers),
-        inputs.geometry,
-        _program("residuals", inputs.tape, residuals),
-        program("derivative", inputs.tape, entries),
-        _program("points", inputs.tape, moved),
-        _program("tests", inputs.tape, [*left_out, *formulation.branch(at)]),
-        len(left_out),
-    )
-
-
-def _drive(inputs: _Inputs) -> Drive:
-    c, half_cos, half_sin = inputs.vector(3)
-    return Drive(c, 0.0, 0.0, half_cos, half_sin)
-
-
-def _program(name: str, tape: Tape, values: Sequence[Scalar]) -> Program:
-    return program(name, tape, dict(enumerate(values)))

@@ -24,10 +24,11 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import KincheckError
+from ...program import Program
 from ...program.ball_executor import ORDER, Ball, evaluate, flint
 from ...trajectory import Array
-from .exact import ExactEquations
+from .exact_equations import ExactEquations
+from .force_enclosure import EnclosedForces, UnprovedError, enclose_forces
 
 # Radii of B to try, in units of the mechanism's size: the largest that succeeds bounds the region
 # with a single solution.
@@ -49,6 +50,7 @@ class Enclosure:
         contraction: k of the test in that box: below one.
         left_out: residuals of the rows left out, at the solution: zero if the redundant rows agree.
         branch: the branch tests, all proved positive.
+        forces: the forces wanted; None without.
     """
 
     points: Mapping[str, Sequence[Sequence[Ball]]]
@@ -56,10 +58,7 @@ class Enclosure:
     contraction: float
     left_out: Sequence[Ball]
     branch: Sequence[Ball]
-
-
-class UnprovedError(KincheckError, ArithmeticError):
-    """There is no proof for a sample; the message gives the reason."""
+    forces: EnclosedForces | None = None
 
 
 def enclose(
@@ -68,6 +67,7 @@ def enclose(
     pose: Array,
     drives: Sequence[Sequence[Ball]],
     bits: int,
+    angles: Sequence[float] = (),
 ) -> Enclosure:
     """Prove one sample, at the precision of the equations.
 
@@ -77,6 +77,7 @@ def enclose(
         drives: for each moving driver value [units or rad], velocity and acceleration, as exact
             numbers or balls.
         bits: the precision.
+        angles: approximate angles of the joints of torsional springs [rad]; forces need them.
 
     Raises:
         UnprovedError: the pose is singular, too far from a solution, or near one on another branch.
@@ -92,8 +93,8 @@ def enclose(
             " be another one"
         )
     solution = [x + _around(c / (1 - contraction)) for x in X]
-    tests = sample.tests(solution)
-    left_out, branch = tests[: equations.left_out], tests[equations.left_out :]
+    tests, count = sample.tests(solution), len(equations.left_out)
+    left_out, branch = tests[:count], tests[count:]
     for value in branch:
         if not value > 0:
             raise UnprovedError(
@@ -101,13 +102,19 @@ def enclose(
                 f" {value.str(5)}"
             )
     try:
-        motion = sample.motion(solution)
+        inverse = sample.derivative(solution).inv()
     except ZeroDivisionError:
         raise UnprovedError(
             "singular pose: the Jacobian is not proved to have an inverse"
         ) from None
+    motion = sample.motion(solution, inverse)
     return Enclosure(
-        dict(zip(points, motion, strict=True)), alone, _float(contraction), left_out, branch
+        dict(zip(points, sample.points(motion), strict=True)),
+        alone,
+        _float(contraction),
+        left_out,
+        branch,
+        sample.forces(motion, inverse, angles),
     )
 
 
@@ -119,6 +126,11 @@ class _Sample:
         arb, series = flint().arb, flint().arb_series
         self._still: list[Ball] = []
         self._moving: list[Ball] = []
+        self._speeds = [arb(velocity) for _, velocity, _ in drives]
+        self._none: list[Ball] = []
+        if (forces := equations.forces) is not None:
+            count = 2 * equations.size + forces.rows + len(drives) + len(forces.angles)
+            self._none = [arb(0)] * count
         for value, velocity, acceleration in drives:
             half = arb(value) / 2
             self._still += [arb(value), half.cos(), half.sin()]
@@ -126,9 +138,8 @@ class _Sample:
             self._moving += [moving, (moving / 2).cos(), (moving / 2).sin()]
 
     def _run(self, name: str, state: Sequence[Ball], drives: Sequence[Ball]) -> dict[int, Ball]:
-        return evaluate(
-            getattr(self._equations, name), [*state, *drives, *self._equations.geometry]
-        )
+        inputs = [*state, *drives, *self._none, *self._equations.geometry]
+        return evaluate(getattr(self._equations, name), inputs)
 
     def residuals(self, state: Sequence[Ball]) -> Any:
         """Return F, shape (size, 1)."""
@@ -146,27 +157,51 @@ class _Sample:
         """Return the rows left out, then the branch tests."""
         return [*self._run("tests", state, self._still).values()]
 
-    def motion(self, state: Sequence[Ball]) -> list[list[list[Ball]]]:
-        """Return displacement, velocity and acceleration of each point, shape (points, 3, 3).
+    def motion(self, state: Sequence[Ball], inverse: Any) -> list[list[Ball]]:
+        """Return the coefficients of the state's series in time.
 
-        Raises:
-            ZeroDivisionError: F' is not proved to have an inverse.
+        Args:
+            inverse: of F'.
         """
-        series, inverse = flint().arb_series, self.derivative(state).inv()
         coefficients = [list(state)]
         for order in (1, 2):  # the unknown coefficient enters its own order through F' alone
-            known = [series(list(each), prec=ORDER) for each in zip(*coefficients, strict=True)]
-            rest = [
-                _coefficient(x, order) for x in self._run("residuals", known, self._moving).values()
-            ]
+            run = self._run("residuals", _series(coefficients), self._moving)
+            rest = [_coefficient(x, order) for x in run.values()]
             coefficients.append((-inverse * _column(rest)).entries())
-        known = [series(list(each), prec=ORDER) for each in zip(*coefficients, strict=True)]
-        moved = [*self._run("points", known, self._moving).values()]
+        return coefficients
+
+    def points(self, motion: Sequence[Sequence[Ball]]) -> list[list[list[Ball]]]:
+        """Return displacement, velocity and acceleration of each point, shape (points, 3, 3)."""
+        moved = [*self._run("points", _series(motion), self._moving).values()]
         motions = [
             [factor * _coefficient(x, order) for x in moved]
             for order, factor in enumerate((1, 1, 2))
         ]
         return [[each[k : k + 3] for each in motions] for k in range(0, len(moved), 3)]
+
+    def forces(
+        self, motion: Sequence[Sequence[Ball]], inverse: Any, angles: Sequence[float]
+    ) -> EnclosedForces | None:
+        """Return the forces wanted, if any."""
+        equations = self._equations
+        if equations.forces is None:
+            return None
+        state, rates, halves = motion
+
+        def run(program: Program, further: Sequence[Ball]) -> list[Ball]:
+            inputs = [*state, *self._still, *further, *equations.geometry]
+            return [*evaluate(program, inputs).values()]
+
+        return enclose_forces(
+            equations.forces,
+            equations.kept,
+            equations.left_out,
+            run,
+            (rates, [2 * x for x in halves]),
+            self._speeds,
+            angles,
+            inverse,
+        )
 
 
 def _inverse(sample: _Sample, x: Sequence[Ball]) -> Array:
@@ -233,6 +268,10 @@ def _singular(how: str, inverse: Array) -> UnprovedError:
 
 def _column(values: Sequence[Ball]) -> Any:
     return flint().arb_mat(len(values), 1, list(values))
+
+
+def _series(coefficients: Sequence[Sequence[Ball]]) -> list[Ball]:
+    return [flint().arb_series(list(x), prec=ORDER) for x in zip(*coefficients, strict=True)]
 
 
 def _coefficient(x: Ball, order: int) -> Ball:

@@ -14,7 +14,8 @@ from ..continuation.row_exchange import chosen_at
 from ..formulation.cartesian import Cartesian
 from ..formulation.constraints import frames
 from ..structure.degrees_of_freedom import select_rows
-from .exact import as_double, equations, exact_mechanism
+from .exact import as_double, exact_mechanism
+from .exact_equations import equations
 from .krawczyk import Enclosure, enclose
 
 

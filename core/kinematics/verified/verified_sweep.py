@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from time import perf_counter
 
 import numpy as np
 
+from ...mechanism.loads import TorsionSpringDamper
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path, outwards
 from ...program.ball_executor import Ball, flint, precision
@@ -18,11 +19,15 @@ from ..compiled.motion_start import start_of
 from ..compiled.request import Request
 from ..continuation.row_exchange import chosen_at
 from ..continuation.sweep import sweep
+from ..forces.motion_lanes import MotionLanes
+from ..forces.reactions import with_forces
+from ..forces.wanted import WantedForces, wanted_forces
 from ..formulation.cartesian import Cartesian
 from ..formulation.constraints import frames
 from ..formulation.formulation import row_names
 from ..formulation.state_vectors import displaced, state_of
-from .exact import Reading, equations, exact_mechanism
+from .exact import Reading, exact_mechanism
+from .exact_equations import equations
 from .krawczyk import Enclosure, UnprovedError, enclose
 
 Drives = Mapping[str, Sequence[tuple[Fraction, Fraction, Fraction]]]
@@ -58,6 +63,7 @@ def prove(
     reading: Reading,
     bits: int,
     tol: float,
+    forces: Collection[str] = (),
 ) -> Proofs:
     """Prove the samples of a path.
 
@@ -67,6 +73,7 @@ def prove(
         reading: interpretation of the numbers of the mechanism.
         bits: working precision.
         tol: of the native solution; see `solve`.
+        forces: names of joints, drivers and force elements whose forces to enclose.
 
     Raises:
         SolveError: as `solve`.
@@ -78,6 +85,15 @@ def prove(
         Request(tuple(path.motions), tuple(points), tuple(body.name for body in mechanism.moving)),
     )
     native = sweep(model, path, tol)
+    wanted: WantedForces | None = None
+    angles = np.empty((len(native.solved), 0))
+    if forces:
+        wanted = wanted_forces(mechanism, forces)
+        zero = Fraction(0)
+        still = [(zero, zero, zero)] * len(native.solved)
+        drives = {each.name: drives.get(each.name, still) for each in mechanism.drivers}
+        angles = _angles(mechanism, path, native)
+        native = with_forces(mechanism, path, native, forces, native.bodies)
     poses = _states(mechanism, native, path.times, start_of(mechanism, path).time)
     samples: list[Enclosure | UnprovedError] = []
     seconds: list[float] = []
@@ -85,7 +101,7 @@ def prove(
     names = row_names(Cartesian.of(mechanism, model.frame))
     with precision(bits):
         exact, kept = exact_mechanism(mechanism, reading), model.selection.chosen
-        traced = {kept: equations(exact, tuple(drives), points, kept)}
+        traced = {kept: equations(exact, tuple(drives), points, kept, wanted)}
         unit = traced[kept].frame.unit
         units = [1 if mechanism.driver(name).turns else Fraction(unit) for name in drives]
         for k, reached in enumerate(native.solved):
@@ -106,15 +122,28 @@ def prove(
                     else kept
                 )
                 if rows not in traced:
-                    traced[rows] = equations(exact, tuple(drives), points, rows)
+                    traced[rows] = equations(exact, tuple(drives), points, rows, wanted)
                 if rows != kept:
                     others[k] = [names[row] for row in range(len(names)) if row not in rows]
-                samples.append(enclose(traced[rows], points, poses[k], driven, bits))
+                near = angles[k].tolist()
+                samples.append(enclose(traced[rows], points, poses[k], driven, bits, near))
             except UnprovedError as error:
                 samples.append(error)
             seconds.append(perf_counter() - started)
     solved, redundant = ([names[k] for k in each] for each in (kept, model.selection.dropped))
     return Proofs(samples, seconds, native, solved, redundant, others)
+
+
+def _angles(mechanism: Mechanism, path: Path, native: Trajectory) -> Array:
+    """Return the native angles of the joints of torsional springs [rad], shape (n, joints)."""
+    joints = dict.fromkeys(
+        each.joint for each in mechanism.forces if isinstance(each, TorsionSpringDamper)
+    )
+    found = np.full((len(native.solved), len(joints)), np.nan)
+    if joints:
+        lanes = MotionLanes(mechanism, path, native)
+        found[native.solved] = np.stack([lanes.angle(name) for name in joints], axis=1)
+    return found
 
 
 def _ball(x: Fraction) -> Ball:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from ...harness.standard import STANDARD
 from ...report.figure_data import precision_figure, ticked_axis
-from ...report.figures import Figure, Style, plain
+from ...report.figures import Figure, Style
 from ...report.page_model import Plot
 from ...report.sections import Diagram
 from .engines import Bench, effort
@@ -76,11 +76,11 @@ def stage_diagram(found: Bench) -> Diagram:
         {
             "type": "bar",
             "orientation": "h",
-            "name": plain(style.name),
+            "name": style.name,
             "uid": style.key,
             "meta": style.name,
             "x": [each.stages[style.name].median for each in processes],
-            "y": [plain(each.what.rpartition(", ")[2]) for each in processes],
+            "y": [each.what.rpartition(", ")[2] for each in processes],
             "marker": {"color": style.colour},
             "hovertemplate": "%{x:.3f} s",
         }
@@ -114,7 +114,7 @@ def _against(
     for style in styles:
         mine = [(x, y) for name, x, y in points if name == style.name]
         look: Figure = {
-            "name": plain(style.name),
+            "name": style.name,
             "uid": style.key,
             "meta": style.name,
             "line": {"width": 1.8, "color": style.colour, "dash": style.dash},

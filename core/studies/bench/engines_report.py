@@ -8,6 +8,7 @@ from ...harness.labels import against, motion_unit, number
 from ...harness.standard import STANDARD
 from ...report.sections import Report, Section
 from ...trajectory import QUANTITIES
+from ...unit_text import with_unit
 from ..paper.formulation import report as formulation_report
 from . import cost_report as cost
 from . import native_breakdown
@@ -100,7 +101,7 @@ def _precision(found: Bench, case: str, mode: str, entries: Sequence[Entry]) -> 
         "effort",
         "loop",
         "outcome",
-        *(f"{name}\n[{motion_unit('m', name)}]" for name in QUANTITIES),
+        *(with_unit(name, motion_unit("m", name)).replace(" [", "\n[") for name in QUANTITIES),
         f"{counted}\na sample",
     )
     diagrams = (
@@ -218,7 +219,7 @@ def _levels(found: Bench, case: str) -> Section:
         "asked for",
         "loop",
         "outcome",
-        *(f"{name}\n[{motion_unit('m', name)}]" for name in QUANTITIES),
+        *(with_unit(name, motion_unit("m", name)).replace(" [", "\n[") for name in QUANTITIES),
         "µs",
         "quartiles",
         "part",

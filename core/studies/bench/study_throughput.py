@@ -13,7 +13,8 @@ import msgspec
 import numpy as np
 
 from ...case.case import Case, size
-from ...case.variation.variation import Coordinate, Law, Mode, Variation
+from ...case.variation.distributions import Law
+from ...case.variation.variation import Coordinate, Mode, Variation
 from ...joints import Kind
 from ...kinematics import kinds, places
 from ..tolerance.sweep import sweep_designs

@@ -62,15 +62,16 @@ class Sample(msgspec.Struct, frozen=True):
 
 
 class Diagnosis(msgspec.Struct, frozen=True):
-    """The diagnosis. findings: why the case cannot be solved as described; empty where it can.
+    """The diagnosis of a case.
 
     Attributes:
+        findings: why the case cannot be solved as described; empty if it can.
         verdict: whether it can be solved, in one sentence.
         notes: remarks on the joints' geometry.
         freeing: joints of which any one, taken out alone, frees the blocked drivers.
-        binding: numbers of the geometry that cannot be changed alone without contradiction.
+        binding: numbers of the geometry not to be changed alone: redundant rows contradict then.
         signs: sign conventions of the outputs; empty without.
-        not_derived: outputs that depend on more than the pose, without budget and sensitivities.
+        not_derived: outputs of more than the pose, without budget and sensitivities.
         programs: lines on the native engine's programs and the parts left out.
     """
 
@@ -194,8 +195,8 @@ def _samples(swept: Conditioning) -> list[Sample]:
 
 
 def _verdict(ranks: Ranks, findings: list[str], swept: Conditioning | None) -> str:
-    """Return in one plain sentence whether the case can be solved, and if not, of what kind the
-    reason is.
+    """Return in one plain sentence whether the case can be solved, and if not, the kind of the
+    reason.
     """
     dof, drivers = ranks.account.dof, len(ranks.mechanism.drivers)
     count = f"{_counted(dof, 'degree', 'degrees')} of freedom, {_counted(drivers, 'driver')}"

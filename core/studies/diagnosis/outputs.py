@@ -69,7 +69,7 @@ class Sensitivity(msgspec.Struct, frozen=True):
 
 
 def budgets(case: Case, found: Conditioning, tol: float, design: dict[str, Array]) -> list[Budget]:
-    """Return the budget of every output that is a function of the pose alone."""
+    """Return the budget of every output of the pose alone."""
     return [
         _budget(output, found, tol, design) for output in case.outputs if output.orders == ORDERS
     ]
@@ -131,8 +131,8 @@ def sensitivities(case: Case, found: Conditioning, design: dict[str, Array]) -> 
 
 
 def binding(found: Conditioning) -> list[str]:
-    """Return the numbers of the geometry that cannot be changed alone: redundant rows would then
-    contradict the others.
+    """Return the numbers of the geometry not to be changed alone: redundant rows would contradict
+    the others.
     """
     contradicted = np.max(
         [np.abs(pose.contradicted).max(axis=0, initial=0.0) for pose in found.poses], axis=0
@@ -189,7 +189,7 @@ def _two_digits(x: float) -> float:
 
 
 def read_points(case: Case) -> Sequence[str]:
-    """Return the points read by outputs that are functions of the pose."""
+    """Return the points read by outputs of the pose alone."""
     return tuple(
         dict.fromkeys(
             point for output in case.outputs if output.orders == ORDERS for point in output.points

@@ -20,11 +20,11 @@ SAMPLES, PLACES, TERMS = 9, 5, 6
 def print_diagnosis(
     found: Diagnosis, console: Console, *, quiet: bool = False, verbose: bool = False
 ) -> None:
-    """Print the diagnosis: verdict, findings, and the numbers that they rest on.
+    """Print the diagnosis: verdict, findings, and the numbers behind them.
 
     Args:
         quiet: print verdict and findings alone.
-        verbose: print all samples, terms and sensitivities, not those that show where to look.
+        verbose: print all samples, terms and sensitivities, not only the worst.
     """
     for each in _verdict(found):
         console.print(each, soft_wrap=True)

@@ -1,7 +1,7 @@
-"""Examination of an engine from outside, by what the engine protocol promises.
+"""Examination of an engine from outside, against the promises of the engine protocol.
 
-The engine solves a probe of every joint type, mechanisms of several topologies, a motion that ends
-at a fold and a joint that no engine knows, always in a worker process. Each check is a row of the
+The engine solves a probe of every joint type, mechanisms of several topologies, a motion up to a
+fold and a joint unknown to all engines, always in a worker process. Each check is a row of the
 report: the worst number found, the limit with its reason, the place.
 """
 
@@ -54,7 +54,7 @@ def check_engine(
     """Examine an engine.
 
     Args:
-        native: the native engine, the standard where a case has no reference.
+        native: the native engine, the standard of cases without a reference.
         topologies: further cases, by a word on their structure.
         tol: largest accepted constraint residual, as for `Engine.solve`.
         limits: of a pair; those of the command line by default.
@@ -135,7 +135,7 @@ def _compared(name: str, record: Record) -> Finding:
 
 
 def _folded(record: Record, attempt: Attempt) -> Finding:
-    """Check that samples behind a fold have no values, and that the message says why."""
+    """Check samples behind a fold: no values, and a message with the reason."""
     if record.outcome is Outcome.UNSUPPORTED:
         return Finding(BEYOND, Verdict.SKIP, message=record.message)
     beyond = sum(each.contradicted or 0 for each in record.errors.values())
@@ -159,7 +159,7 @@ def _folded(record: Record, attempt: Attempt) -> Finding:
 
 
 def _unknown(record: Record) -> Finding:
-    """Check that a joint of an unknown type is refused with a reason, or solved rightly."""
+    """Check a joint of an unknown type: refused with a reason, or solved rightly."""
     solved = record.outcome in (Outcome.PASS, Outcome.UNJUDGED)
     good = solved or (record.outcome is Outcome.UNSUPPORTED and record.message)
     told = record.outcome.shown + (f": {record.message}" if record.message else "")
@@ -170,7 +170,7 @@ def _unknown(record: Record) -> Finding:
 def _same(
     name: str, pairs: Sequence[Pair], first: Mapping[str, Attempt], solver: Solver
 ) -> Finding:
-    """Check that pairs have the same answers again."""
+    """Check the answers of repeated solves: they are the same."""
     worst, where = 0.0, ""
     for index, attempt in solver(pairs):
         case = pairs[index].case.name

@@ -1,4 +1,4 @@
-"""A joint that no engine knows by name, and that is no chain of known joints."""
+"""A joint unknown to all engines, and not equivalent to a chain of known joints."""
 
 from __future__ import annotations
 

@@ -13,6 +13,7 @@ from ...case.case import Case
 from ...harness.labels import motion_unit
 from ...report.sections import Report, Section
 from ...trajectory import QUANTITIES
+from ...unit_text import with_unit
 from . import formulation_runtime as bench_whole
 from . import operations as bench_operations
 from . import roundoff as bench_roundoff
@@ -32,9 +33,9 @@ class Formulation(msgspec.Struct, frozen=True, kw_only=True):
 
     Attributes:
         states: random states of each round-off figure.
-        digits: of the arithmetic that float64 is compared with.
-        case: whose mechanism is solved in every row style.
-        verdicts: what follows from the figures, by section.
+        digits: of the arithmetic compared with float64.
+        case: the case whose mechanism is solved in every row style.
+        verdicts: conclusions from the figures, by section.
     """
 
     schema: Literal["kincheck-bench-formulation/1"] = "kincheck-bench-formulation/1"
@@ -52,11 +53,12 @@ class Formulation(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def measure(case: Case, seed: int, states: int) -> Formulation:
-    """Count, round and sweep.
+    """Count operations, measure round-off and sweep the case in every row style.
 
     Args:
         case: has a reference for all its outputs, velocities and accelerations included.
-        seed, states: of the random states, and how many.
+        seed: of the random states.
+        states: number of random states.
 
     Raises:
         KincheckError: mpmath is not installed, or a sweep does not reach all its samples.
@@ -87,7 +89,7 @@ def measure(case: Case, seed: int, states: int) -> Formulation:
 
 
 def report(found: Formulation) -> Report:
-    """The results for people."""
+    """Return the results as text and tables."""
     facts = [f"{name} {version}" for name, version in found.versions.items()]
     facts += [
         f"seed {found.seed}",
@@ -155,7 +157,11 @@ def report(found: Formulation) -> Report:
             "Errors of the whole sweep",
             found.verdicts["sweeps"],
             ("Largest error over outputs and samples, against the reference of the case.",),
-            ("row style", "place", *(f"{name} [{motion_unit('m', name)}]" for name in QUANTITIES)),
+            (
+                "row style",
+                "place",
+                *(with_unit(name, motion_unit("m", name)) for name in QUANTITIES),
+            ),
             2,
             [
                 (s.style, s.place, *(f"{getattr(s, name):.1e}" for name in QUANTITIES))

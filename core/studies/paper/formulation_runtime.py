@@ -51,7 +51,7 @@ class SweepError(msgspec.Struct, frozen=True):
 
 
 def measure_whole(case: Case) -> tuple[list[ProgramSize], list[SweepError]]:
-    """Programs of a case's mechanism and errors of its sweep.
+    """Return the program sizes of a case's mechanism and the errors of its sweep.
 
     Raises:
         SolveError: a sweep does not reach all its samples.
@@ -103,7 +103,7 @@ def _swept(case: Case, mechanism: Mechanism, style: str) -> Trajectory:
 
 
 def _outputs(case: Case, found: Trajectory) -> Array:
-    """Position, velocity and acceleration of all outputs, shape (outputs, 3, samples)."""
+    """Return position, velocity and acceleration of all outputs, shape (outputs, 3, samples)."""
     series = [output_series(case, output, found) for output in case.outputs]
     return np.array([[getattr(each, name) for name in QUANTITIES] for each in series])
 
@@ -131,7 +131,7 @@ def _moved(mechanism: Mechanism, by: Vector) -> Mechanism:
 
 
 def verdict_on_programs(programs: Iterable[ProgramSize]) -> list[str]:
-    """What the sizes say."""
+    """Return the conclusions from the sizes."""
     by = {each.style: each.newton for each in programs}
     full, paper, native = (by[style] for style in ("conventional", "paper", "native"))
     return [
@@ -149,7 +149,7 @@ def verdict_on_programs(programs: Iterable[ProgramSize]) -> list[str]:
 
 
 def verdict_on_sweeps(sweeps: Iterable[SweepError]) -> list[str]:
-    """What the errors say."""
+    """Return the conclusions from the errors."""
     sweeps = list(sweeps)
 
     def errors(place: str, pick: Callable[[Iterable[float]], float] = max) -> str:

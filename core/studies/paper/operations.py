@@ -66,7 +66,7 @@ class Counted(msgspec.Struct, frozen=True):
 
     Attributes:
         rows: DOTS or SIMPLIFIED; d10 and d20 are dot products themselves.
-        unit_axes: with joint axes along body axes; null where nothing folds.
+        unit_axes: with joint axes along body axes; null if nothing folds.
     """
 
     condition: str
@@ -97,7 +97,7 @@ PRINTED = {
 
 
 class Executed:
-    """A scalar that counts its operations, except multiplications by literal ones and signs."""
+    """A scalar with a count of its operations, except multiplications by literal ones and signs."""
 
     def __init__(self, tally: list[int]) -> None:
         self.tally = tally
@@ -226,7 +226,7 @@ def count_operations() -> list[Counted]:
 
 
 def _as_printed(vector: Callable[[], Vec3]) -> Iterator[tuple[str, str, str, Sequence[Countable]]]:
-    """Yield condition, rows, form and equations of all that is printed, from constants."""
+    """Yield condition, rows, form and equations of the printed tables, from constants."""
     f, g, h, s_i, s_j, *constant = (vector() for _ in range(8))
     for way, formed in ((MULTIPLIED_OUT, True), (FROM_THE_LEFT, False)):
         simplified: dict[str, Countable] = {"d11": PrintedDot11(f, g, formed=formed)}
@@ -273,7 +273,7 @@ def verdict(counts: Sequence[Counted]) -> list[str]:
 
 
 def _met(counts: Sequence[Counted], gamma: int | None) -> str:
-    """Return the figures of Table 3 that some count meets, or nearly meets."""
+    """Return the figures of Table 3 met, or nearly met, by a count."""
     met: list[str] = []
     nearly: list[str] = []
     for name, row in PRINTED.items():

@@ -1,9 +1,9 @@
 """Round-off of rows: float64 against the same equations in 50-digit arithmetic, on exactly the same
 inputs.
 
-Two bodies where the condition holds, but for a tilt as it is left before Newton's last iteration,
-so that no product cancels by luck; admissible velocities of 1 m/s and 1 rad/s in size. Poses are
-made from Euler parameters in either arithmetic, so that the rounding of A(p) counts too.
+Two bodies meet the condition up to a tilt as before Newton's last iteration: no product cancels by
+luck. Their velocities are admissible, of 1 m/s and 1 rad/s in size. Poses are made from Euler
+parameters in either arithmetic: the rounding of A(p) counts too.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class RoundOff(msgspec.Struct, frozen=True):
 
     Attributes:
         rows: DOTS or SIMPLIFIED, as in `Counted`.
-        distance: of the bodies from the global origin [m]; null where positions do not enter.
+        distance: of the bodies from the global origin [m]; null if positions do not enter.
     """
 
     condition: str
@@ -75,7 +75,7 @@ class Moving:
     w: Vec3
 
     def motion(self, body_axes: bool) -> Twist:
-        """The velocities as rows take them."""
+        """The velocities in the order of the rows' columns."""
         return (
             Twist(self.v, Pose.of(self.u, self.q).A.T @ self.w)
             if body_axes
@@ -88,7 +88,7 @@ class States:
     """Random joints between two bodies on their way; lanes of them.
 
     Attributes:
-        e0: from the origin of body i to that of body j at design, where P_i and P_j coincide.
+        e0: from the origin of body i to the origin of body j at design, with P_i at P_j.
     """
 
     conditions: tuple[Condition, ...]
@@ -98,7 +98,7 @@ class States:
 
 
 def measure_roundoff(seed: int, states: int) -> list[RoundOff]:
-    """Errors of the conditions of Table 3 in all ways, over random states.
+    """Return the errors of the conditions of Table 3 in all ways, over random states.
 
     Raises:
         KincheckError: mpmath is not installed.
@@ -133,7 +133,7 @@ def measure_roundoff(seed: int, states: int) -> list[RoundOff]:
 
 
 def _written(condition: Condition) -> Iterator[tuple[str, str, Sequence[Any]]]:
-    """Rows, style and equations of all ways to write a condition."""
+    """Return rows, style and equations of all ways to write a condition."""
     yield DOTS, "printed", condition.printed(formed=True)
     for style in ("conventional", "paper", "native"):
         yield DOTS, style, condition.unsimplified(style)
@@ -144,7 +144,7 @@ def _written(condition: Condition) -> Iterator[tuple[str, str, Sequence[Any]]]:
 def _errors(
     equations: Sequence[Any], i: Moving, j: Moving, exact: Callable[[Any], Any]
 ) -> list[Error]:
-    """Errors of residual, Jacobian and gamma."""
+    """Return the errors of residual, Jacobian and gamma."""
     to_exact = cast("Callable[[Any], Any]", np.frompyfunc(exact, 1, 1))
     motions = [each.motion(equations[0].body_axes) for each in (i, j)]
     rounded = _values(equations, (i, j), motions)
@@ -161,7 +161,7 @@ def _errors(
 def _values(
     equations: Sequence[Any], bodies: Sequence[Moving], motions: Sequence[Twist]
 ) -> tuple[list[Any], ...]:
-    """Residuals, entries of the Jacobian and right-hand sides."""
+    """Return residuals, entries of the Jacobian and right-hand sides."""
     pair = [Pose.of(body.u, body.q) for body in bodies]
     return (
         [x for each in equations for x in each.phi(*pair)],
@@ -171,7 +171,7 @@ def _values(
 
 
 def _mapped(number: Callable[[Any], Any], value: Any) -> Any:
-    """The same with every number replaced."""
+    """Return a copy with every number replaced."""
     if isinstance(value, list):
         return [_mapped(number, each) for each in cast("list[Any]", value)]
     if is_dataclass(value) and not isinstance(value, type):
@@ -183,7 +183,7 @@ def _mapped(number: Callable[[Any], Any], value: Any) -> Any:
 
 
 def _states(rng: np.random.Generator, n: int, distance: float, *, turning: bool) -> States:
-    """One body turns about the other's h, or slides along it."""
+    """Return states in which one body turns about the other's h, or slides along it."""
 
     def vector() -> Vec3:
         return Vec3(*rng.normal(size=(3, n)))
@@ -222,7 +222,7 @@ def _states(rng: np.random.Generator, n: int, distance: float, *, turning: bool)
 
 
 def verdict(errors: Iterable[RoundOff]) -> list[str]:
-    """What the errors say; every figure in it is one of them, or a ratio of two."""
+    """Return the conclusions from the errors; each figure in it is an error or a ratio of two."""
     by = {(each.condition, each.rows, each.way, each.distance): each for each in errors}
     near = (("d11", None), ("d21", DISTANCES[0]))
 

@@ -1,9 +1,9 @@
 """The rows of Tables 1 and 2 as they are printed (as corrected, formulation section 9): full
 matrices, multiplied from the left.
 
-Nothing is shared and no zero of a skew matrix is left out. No style to solve with: the paper's
-operation counts and its remark on round-off are about these. Body axes, with A_ij = A_i^T A_j and W
-= skew(w):
+Nothing is shared and no zero of a skew matrix is left out. The solver has no such style; the
+paper's operation counts and its remark on round-off are about these rows. Body axes, with
+A_ij = A_i^T A_j and W = skew(w):
 
     dot10   [ 0 | -b^T A_ji skew(a) | 0 | -a^T A_ij skew(b) ]
             gamma = -b^T [ A_ji W_i W_i + W_j W_j A_ji ] a + 2 w_j^T skew(b) A_ji skew(a) w_i
@@ -40,7 +40,7 @@ from ...primitives import (
 
 
 class Countable(Protocol):
-    """What can be counted: a primitive, or rows as printed."""
+    """Equations with countable operations: a primitive, or rows as printed."""
 
     def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
         """Rows of the Jacobian."""
@@ -52,12 +52,12 @@ class Countable(Protocol):
 
 
 def skew(a: Vec3) -> Mat3:
-    """The matrix of a x."""
+    """Return the matrix of the cross product a x."""
     return Mat3(Vec3(0.0, -a.z, a.y), Vec3(a.z, 0.0, -a.x), Vec3(-a.y, a.x, 0.0))
 
 
 def chain(row: Vec3, *factors: Mat3) -> Vec3:
-    """A row vector times one matrix after the other."""
+    """Return a row vector times one matrix after the other."""
     for factor in factors:
         row = factor.T @ row
     return row
@@ -65,8 +65,11 @@ def chain(row: Vec3, *factors: Mat3) -> Vec3:
 
 @dataclass(frozen=True, kw_only=True)
 class AsPrinted:
-    """formed: A_ij is multiplied out wherever it is printed; else a row goes through A_i^T and then
-    A_j.
+    """Rows as printed.
+
+    Attributes:
+        formed: multiply A_ij out wherever it is printed; else a row goes through A_i^T and then
+            A_j.
     """
 
     body_axes: ClassVar[bool] = True
@@ -85,7 +88,7 @@ class PrintedDot10(AsPrinted):
     b: Vec3
 
     def phi(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
-        """(8), zero where a and b are perpendicular."""
+        """(8), zero for perpendicular a and b."""
         return (chain(self.a, *self.relative(i, j)) @ self.b,)
 
     def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
@@ -160,7 +163,7 @@ class PrintedDot11(AsPrinted):
 
 @dataclass(frozen=True)
 class PrintedDot12:
-    """C: the constant A_ij of bodies that turn alike."""
+    """C: the constant A_ij of bodies of equal rotation."""
 
     C: Mat3
 
@@ -201,7 +204,7 @@ class PrintedDot21:
 
 
 class Given(Pose):
-    """A pose whose A is given: D holds A itself."""
+    """A pose with given A: D holds A itself."""
 
     @property
     def A(self) -> Mat3:
@@ -220,7 +223,7 @@ class Condition:
 
     Attributes:
         primitive: the native primitive: simplified where the paper simplifies.
-        dots: the unsimplified scalar products that say the same, one for each row.
+        dots: the equivalent unsimplified scalar products, one for each row.
     """
 
     name: str
@@ -229,15 +232,15 @@ class Condition:
 
     @property
     def is_simplified(self) -> bool:
-        """Whether the paper has other rows for it than those of the scalar products."""
+        """Whether the paper has other rows for it than the scalar products."""
         return self.dots != (self.primitive,)
 
     def simplified(self, style: str) -> tuple[Primitive, ...]:
-        """The condition as the row style "native" or "paper" has it."""
+        """Return the condition in the row style "native" or "paper"."""
         return (self.primitive,) if style == "native" else self.primitive.paper_form()
 
     def unsimplified(self, style: str) -> tuple[Primitive, ...]:
-        """The scalar products as the row style "native", "paper" or "conventional" has them."""
+        """Return the scalar products in the row style "native", "paper" or "conventional"."""
         if style == "native":
             return self.dots
         return tuple(
@@ -247,8 +250,8 @@ class Condition:
         )
 
     def printed(self, *, formed: bool) -> tuple[PrintedDot10 | PrintedDot20, ...]:
-        """The scalar products as printed; the poses they see hold positions, not displacements from
-        the design.
+        """Return the scalar products as printed, for poses with positions in place of displacements
+        from the design.
         """
         return tuple(
             PrintedDot10(each.a, each.b, formed=formed)
@@ -259,8 +262,9 @@ class Condition:
 
 
 def conditions(f: Vec3, g: Vec3, h: Vec3, s_i: Vec3, s_j: Vec3) -> tuple[Condition, ...]:
-    """The conditions of Table 3 for a joint with axes f, g, h and arms s_i, s_j to a point common
-    to both bodies at design.
+    """Return the conditions of Table 3 for a joint with axes f, g, h and arms s_i, s_j.
+
+    The arms lead to a point common to both bodies at design.
     """
     across = Dot20(f, s_i, s_j, ZERO), Dot20(g, s_i, s_j, ZERO)
     frames_coincide = Dot10(g, h), Dot10(h, f), Dot10(f, g)

@@ -10,7 +10,7 @@ from ...report.markdown import escaped, row
 from ...report.sections import Report, Section
 from ...trajectory import QUANTITIES
 from .results import Cell, Finding, Stress
-from .verdicts import ELSEWHERE, Verdict
+from .verdicts import ELSEWHERE, SILENT, Verdict
 
 NAME = "stress"
 SHORT = {
@@ -18,14 +18,21 @@ SHORT = {
     Verdict.REFUSED_RIGHTLY: "refused rightly",
     Verdict.REFUSED_WRONGLY: "refused wrongly",
     Verdict.SILENTLY_WRONG: "silently wrong",
+    Verdict.WRONG_FORCE: "wrong force",
+    Verdict.UNDETERMINED_FORCE: "undetermined force given",
+    Verdict.MISSING_FORCE: "determined force missing",
     Verdict.UNJUDGED: "not judged",
     Verdict.UNSUPPORTED: "unsupported",
 }
+OF_FORCES = (Verdict.WRONG_FORCE, Verdict.UNDETERMINED_FORCE, Verdict.MISSING_FORCE)
+"""Verdicts with a column only where there are any."""
+ERRORS = (*QUANTITIES, "force")
 NOTES = (
     (
         "Right: within 1e-14 of size times condition, of the closed form or of the motion followed"
-        " from the design in extended precision. Position, velocity, acceleration: the largest"
-        " error of specimens without a silent wrong answer, over that."
+        " from the design in extended precision; forces of their balance there. Position, velocity,"
+        " acceleration, force: the largest error of specimens without a silent wrong answer, over"
+        " that."
     ),
     (
         "Refused rightly: nothing, or a singular pose, is there, and the message says so. Not"
@@ -65,7 +72,7 @@ def headline(cells: Sequence[Cell]) -> str:
         for verdict in (Verdict.UNJUDGED, Verdict.UNSUPPORTED)
         if count[verdict]
     ]
-    wrong, examined = count[Verdict.SILENTLY_WRONG], sum(map(_examined, cells))
+    wrong, examined = sum(count[each] for each in SILENT), sum(map(_examined, cells))
     said = (
         f"{wrong or 'None'} of {examined} samples silently wrong"
         if examined
@@ -100,8 +107,19 @@ def idle(found: Stress) -> list[str]:
 
 
 def _shares(found: Stress) -> Section:
+    shown = [
+        verdict
+        for verdict in SHORT
+        if verdict not in OF_FORCES or any(cell.samples[verdict] for cell in found.cells)
+    ]
     rows = [
-        [cell.family, _engine(cell), str(cell.specimens), *_counts(cell), *map(_ratio, cell.worst)]
+        [
+            cell.family,
+            _engine(cell),
+            str(cell.specimens),
+            *_counts(cell, shown),
+            *map(_ratio, cell.worst),
+        ]
         for cell in found.cells
     ]
     for engine in dict.fromkeys(map(_engine, found.cells)):
@@ -117,13 +135,13 @@ def _shares(found: Stress) -> Section:
             elsewhere=sum(cell.elsewhere for cell in cells),
             worst=[
                 max((x for c in cells if (x := c.worst[k]) is not None), default=None)
-                for k in range(3)
+                for k in range(len(ERRORS))
             ],
             bad=sum(cell.bad for cell in cells),
             seconds=sum(cell.seconds for cell in cells),
         )
         rows.append(
-            ["all", engine, str(whole.specimens), *_counts(whole), *map(_ratio, whole.worst)]
+            ["all", engine, str(whole.specimens), *_counts(whole, shown), *map(_ratio, whole.worst)]
         )
     settings = {_engine(cell): cell for cell in found.cells}
     told = [
@@ -131,24 +149,24 @@ def _shares(found: Stress) -> Section:
         + "; ".join(f"{key}: {value}" for key, value in cell.settings.items())
         for name, cell in settings.items()
     ]
-    columns = ["family", "engine", "specimens", *SHORT.values(), *QUANTITIES]
+    columns = ["family", "engine", "specimens", *(SHORT[each] for each in shown), *ERRORS]
     return Section("Samples by outcome", [_verdict(found)], [*NOTES, *told], columns, 2, rows)
 
 
 def _verdict(found: Stress) -> str:
     wrong = {_engine(cell): 0 for cell in found.cells}
     for cell in found.cells:
-        wrong[_engine(cell)] += cell.samples[Verdict.SILENTLY_WRONG]
+        wrong[_engine(cell)] += sum(cell.samples[each] for each in SILENT)
     return (
         "Silently wrong: " + ", ".join(f"{engine} {count}" for engine, count in wrong.items()) + "."
     )
 
 
-def _counts(cell: Cell) -> list[str]:
+def _counts(cell: Cell, shown: Sequence[Verdict]) -> list[str]:
     """Return the number of samples by verdict, with the share of the supported ones."""
     supported = sum(cell.samples.values()) - cell.samples[Verdict.UNSUPPORTED]
     texts: list[str] = []
-    for verdict in SHORT:
+    for verdict in shown:
         count = cell.samples[verdict]
         share = (
             f" ({100 * count / supported:.3g} %)"

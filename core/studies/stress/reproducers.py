@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace as replaced
 from pathlib import Path
 
 from msgspec.structs import replace
 
-from ...case.case import Case
+from ...case.case import MARKER, Case
 from ...case.io.atomic_files import write
 from ...case.io.case_writer import case_text
 from ...case.io.coordinates import with_all_coordinates
@@ -32,7 +33,10 @@ def judge(
     Raises:
         KincheckError: the reference cannot be computed.
     """
-    watched = with_all_coordinates(case, case.points)
+    forces = tuple(each for each in case.outputs if each.forces)
+    moved = [name for name in case.points if not name.startswith(MARKER)]
+    watched = with_all_coordinates(case, moved or None)
+    watched = replaced(watched, outputs=(*watched.outputs, *forces))
     return judge_as(Specimen(case.name, lambda: watched, truth, tol), watched, engine)
 
 

@@ -43,7 +43,7 @@ class Cell(msgspec.Struct, frozen=True, kw_only=True):
     Attributes:
         samples: number of samples by verdict.
         elsewhere: number of silently wrong samples in another assembly, or in none.
-        worst: largest error of position, velocity and acceleration of right samples, over
+        worst: largest error of position, velocity, acceleration and force of right samples, over
             the round-off bound.
         bad: number of specimens with a bad sample.
     """

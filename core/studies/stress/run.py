@@ -222,7 +222,7 @@ def _size(one: Made) -> tuple[int, int]:
 def _cell(
     family: Family, engine: Engine, judgements: Sequence[tuple[Made, Judgement]], seconds: float
 ) -> Cell:
-    worst: list[float | None] = [None, None, None]
+    worst: list[float | None] = [None] * 4
     for _, each in judgements:
         if not each.counts[Verdict.SILENTLY_WRONG]:
             worst = [

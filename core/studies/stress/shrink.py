@@ -169,7 +169,11 @@ def _driven(case: Case, mechanism: Mechanism | None) -> Iterator[Case]:
 def _with(case: Case, mechanism: Mechanism, hidden: set[str]) -> Case:
     shown = [point for point in mechanism.points if point.name not in hidden]
     names = {point.name for point in shown}
-    outputs = tuple(each for each in case.outputs if set(each.points) <= names)
+    members = (*mechanism.joints, *mechanism.drivers, *mechanism.forces)
+    loaded = {each.name for each in members}
+    outputs = tuple(
+        each for each in case.outputs if set(each.points) <= names and set(each.forces) <= loaded
+    )
     return replace(case, mechanism=replace(mechanism, points=shown), outputs=outputs)
 
 
@@ -198,5 +202,5 @@ def rounded(case: Case, digits: int) -> Case | None:
         return None
     first, last = (float(short(case.sweep.values[k])) for k in (0, -1))
     sweep = replace(case.sweep, values=np.linspace(first, last, len(case.sweep.values)))
-    outputs = tuple(each for each in case.outputs if isinstance(each, Output))
+    outputs = tuple(each for each in case.outputs if isinstance(each, Output) or each.forces)
     return replace(case, mechanism=found, sweep=sweep, outputs=outputs)

@@ -18,6 +18,7 @@ from ...harness.execution import Answer, Failure
 from ...harness.record import Outcome
 from ...trajectory import QUANTITIES, Array
 from .families.base import MOTION_ENDS, Specimen
+from .truth.reference_forces import known_forces
 from .truth.reference_motion import Reach, Truth
 
 
@@ -28,11 +29,16 @@ class Verdict(StrEnum):
     REFUSED_RIGHTLY = "refused, right reason"
     REFUSED_WRONGLY = "refused, wrong reason"
     SILENTLY_WRONG = "silently wrong"
+    WRONG_FORCE = "silently wrong force"
+    UNDETERMINED_FORCE = "undetermined force given"
+    MISSING_FORCE = "determined force missing"
     UNJUDGED = "not judged"
     UNSUPPORTED = "unsupported"
 
 
-BAD = (Verdict.SILENTLY_WRONG, Verdict.REFUSED_WRONGLY)
+SILENT = (Verdict.SILENTLY_WRONG, Verdict.WRONG_FORCE, Verdict.UNDETERMINED_FORCE)
+"""The verdicts on wrong numbers without a message."""
+BAD = (*SILENT, Verdict.REFUSED_WRONGLY, Verdict.MISSING_FORCE)
 """The bad verdicts, the worst first."""
 
 # A larger error, relative to the mechanism's size, is another assembly or none, not a lack of
@@ -49,15 +55,15 @@ class Judgement:
 
     Attributes:
         verdicts: verdicts of the samples.
-        worst: largest error of positions, velocities and accelerations over the round-off bound;
-            None if nothing was compared.
+        worst: largest error of positions, velocities, accelerations and forces over the round-off
+            bound; None if nothing was compared.
         elsewhere: number of silently wrong samples in another assembly.
         message: message of the engine.
         told: residual reported by the engine [m or -].
     """
 
     verdicts: NDArray[np.object_]
-    worst: tuple[float | None, ...] = (None, None, None)
+    worst: tuple[float | None, ...] = (None,) * 4
     elsewhere: int = 0
     message: str = ""
     told: float = 0.0
@@ -97,17 +103,20 @@ def judged(
             return _all(n, Verdict.REFUSED_WRONGLY, result.message)
         kinds = [] if result.kind is None else [result.kind]
         return _refused(specimen, truth, n, kinds, result.message)
-    positions = {name: _moved(result, name, "position") for name in case.points}
+    shown = [output.name for output in case.outputs if not output.forces]
+    points = list(dict.fromkeys(name.rpartition(".")[0] for name in shown))
+    positions = {name: _moved(result, name, "position") for name in points}
     solved = np.logical_and.reduce([np.isfinite(each).all(axis=1) for each in positions.values()])
     verdicts = _refused(specimen, truth, n, result.failures, result.message).verdicts
     if truth is None:
         verdicts[solved] = Verdict.SILENTLY_WRONG
         return Judgement(verdicts, message=result.message, elsewhere=int(solved.sum()))
     known = solved & (truth.reach == Reach.REACHED)
-    ratios = np.zeros((3, n))
+    ratios = np.zeros((4, n))
     errors = np.zeros(n)
-    compared = [True, False, False]
-    for name, moved in truth.points.items():
+    compared = [True, False, False, False]
+    for name in points:
+        moved = truth.points[name]
         for k, quantity in enumerate(QUANTITIES):
             found = _moved(result, name, quantity)
             if not np.isfinite(found[known]).any():
@@ -124,15 +133,19 @@ def judged(
             if k == 0:
                 errors[known] = np.maximum(errors[known], off)
     wrong = (ratios > 1.0).any(axis=0)
+    forces = _judged_forces(case, truth, result, known & ~wrong, ratios[3])
+    compared[3] = bool(np.isfinite(ratios[3]).any() and (ratios[3] > 0.0).any())
     told = max(result.residual, float(result.details.get("redundant_residual") or 0.0))
     if specimen.reported and truth.violated is not None:
         wrong |= known & (truth.violated > SPREAD * told)
     verdicts[solved] = Verdict.UNJUDGED
     verdicts[known] = np.where(wrong, Verdict.SILENTLY_WRONG, Verdict.RIGHT)[known]
+    for verdict, where in forces.items():
+        verdicts[where & (verdicts == Verdict.RIGHT)] = verdict
     beyond = solved & (truth.reach == Reach.BEYOND)
     verdicts[beyond] = Verdict.SILENTLY_WRONG
     far = (errors > ELSEWHERE * truth.system.rows.stated.unit) | beyond
-    worst = tuple(float(ratios[k].max()) if compared[k] and known.any() else None for k in range(3))
+    worst = tuple(float(ratios[k].max()) if compared[k] and known.any() else None for k in range(4))
     # notes of an engine beside its samples warn no reader of the samples, but explain the outcome
     message = "; ".join(
         [*filter(None, [result.message]), *map(str, result.details.get("notes", []))]
@@ -140,6 +153,36 @@ def judged(
     return Judgement(
         verdicts, worst, int((far & (verdicts == Verdict.SILENTLY_WRONG)).sum()), message, told
     )
+
+
+def _judged_forces(
+    case: Case, truth: Truth, result: Answer, known: NDArray[np.bool_], ratios: Array
+) -> dict[Verdict, NDArray[np.bool_]]:
+    """Return where forces are wrong, by verdict, the worst first.
+
+    Args:
+        known: samples with the right motion.
+        ratios: largest errors over the round-off bound, filled in here, shape (n,).
+    """
+    found = {each: np.zeros(len(known), np.bool_) for each in (*SILENT[1:], Verdict.MISSING_FORCE)}
+    lacking = np.zeros(len(known), np.bool_)
+    if not case.forces:
+        return found
+    for name, right in known_forces(case, truth).items():
+        series = result.outputs[name]
+        if not series.possible:
+            lacking |= known
+            continue
+        given = np.isfinite(series.position)
+        told = known & np.isfinite(right.values)
+        off = np.abs(series.position - right.values)
+        compared = told & given & right.determined
+        ratios[compared] = np.maximum(ratios[compared], (off / right.bounds)[compared])
+        found[Verdict.WRONG_FORCE] |= compared & (off > right.bounds)
+        found[Verdict.UNDETERMINED_FORCE] |= told & given & right.undetermined
+        # at a singular pose rigid bodies determine no finite force
+        found[Verdict.MISSING_FORCE] |= told & ~given & right.determined & ~truth.singular
+    return {**found, Verdict.UNSUPPORTED: lacking}
 
 
 def _refused(

@@ -17,7 +17,8 @@ from ...harness.execution import said
 from ...harness.workers.distributed import ClusterError, connected, loaded
 from ...harness.workers.messages import pack
 from ...version import VERSION
-from .study import Chunk, Ready, Study
+from .chunk import Chunk
+from .study import Ready, Study
 
 Chunks: TypeAlias = Generator[Chunk]
 Source: TypeAlias = Callable[[Study, int], Chunks]

@@ -4,24 +4,24 @@ script.
 
 from __future__ import annotations
 
-import importlib
-import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-from ...harness.labels import known, notes, number, output_label, signs
+from ...harness.labels import notes, number, output_label, signs
 from ...harness.record import Outcome, Record
-from ...report.axis import DISPLAY, Axis, driver_axis
-from ...report.figures import Figure, plain
-from ...report.report import packed
+from ...report.axis import Axis, driver_axis
+from ...report.figures import Figure
+from ...report.page_parts import environment, figure_parts
+from ...unit_text import with_unit
+from .conformance import Capability
+from .histogram_figure import LIMIT, histogram_figure
+from .limit_words import interval, limit_notes, percent
 from .results import Envelope, Gradient, Numbers, SweepResults
 
 _HERE = Path(__file__).parent
-_LOOK = _HERE.parents[1] / "report"
 
 # Bars of a tornado diagram: what is left out is smaller than all of these.
 MOST_BARS = 15
@@ -42,11 +42,23 @@ class OutputView:
     figure: str
     spread: str
     tornado: str
+    histogram: str
     gradients: Sequence[Gradient]
+    limit: Capability | None
 
     def shown(self, value: float | None) -> str:
         """A value in display units."""
-        return number(None if value is None else self.scale * value)
+        return scaled_number(self.scale, value)
+
+    @property
+    def limits(self) -> dict[str, float]:
+        """The limits in display units, by their names."""
+        ends = (None, None) if self.limit is None else (self.limit.low, self.limit.high)
+        return {
+            name: float(f"{self.scale * value:.{DIGITS}g}")
+            for name, value in zip(("low limit", "high limit"), ends, strict=True)
+            if value is not None
+        }
 
     def ends(self) -> tuple[str, str, str]:
         """The least, the most, and the largest standard deviation, over all samples."""
@@ -63,8 +75,6 @@ class OutputView:
 
 def page(results: SweepResults) -> str:
     """The page as HTML text."""
-    # loaded here, for sweeps that write no page; the package has no types
-    plotly: Any = importlib.import_module("plotly.offline")
     axis = _axis(results)
     figures: dict[str, Figure] = {}
     outputs: list[OutputView] = []
@@ -72,7 +82,8 @@ def page(results: SweepResults) -> str:
         mine = sorted(
             (each for each in results.gradients if each.output == name), key=effect, reverse=True
         )
-        unit, scale = DISPLAY.get(envelope.unit, (envelope.unit, 1.0))
+        unit, scale = results.shown_unit(envelope.unit)
+        limit = next((each for each in results.limits if each.output == name), None)
         view = OutputView(
             name,
             unit,
@@ -81,15 +92,27 @@ def page(results: SweepResults) -> str:
             f"envelope-{index}",
             f"spread-{index}",
             f"tornado-{index}",
+            f"histogram-{index}" if envelope.histogram else "",
             mine,
+            limit,
         )
         figures[view.figure] = envelope_figure(view, axis, about_nominal=False)
         figures[view.spread] = envelope_figure(view, axis, about_nominal=True)
         figures[view.tornado] = tornado_figure(view)
+        if envelope.histogram:
+            figures[view.histogram] = histogram_figure(
+                view.name, unit, scale, envelope.histogram, view.limits
+            )
         outputs.append(view)
-    data = {"drivers": {"sweep": axis.shown}, "figures": figures, "scenes": {}}
+
+    def shown(unit: str, value: float | None) -> str:
+        return scaled_number(results.shown_unit(unit)[1], value)
+
+    def shown_unit(unit: str) -> str:
+        return results.shown_unit(unit)[0]
+
     return (
-        _environment()
+        environment(_HERE)
         .get_template("sweep.html")
         .render(
             results=results,
@@ -102,10 +125,13 @@ def page(results: SweepResults) -> str:
                 key: value for key, value in results.run.items() if key not in ("cases", "engines")
             },
             effect=effect,
-            css=(_LOOK / "report.css").read_text("utf-8"),
-            script=(_LOOK / "report.js").read_text("utf-8"),
-            data=packed(json.dumps(data, allow_nan=False, separators=(",", ":"))),
-            plotlyjs=packed(plotly.get_plotlyjs()),
+            slopes=partial(slopes, results),
+            shown=shown,
+            shown_unit=shown_unit,
+            limit_notes=limit_notes(results),
+            percent=percent,
+            interval=interval,
+            **figure_parts(figures, drivers={"sweep": axis.shown}),
         )
     )
 
@@ -127,25 +153,24 @@ def headline(results: SweepResults) -> str:
     return said
 
 
+def slopes(results: SweepResults, view: OutputView, each: Gradient) -> dict[str, str]:
+    """Return the numbers of a gradient and their unit, in units of the file."""
+    its, factor = results.shown_unit(results.unit_of(each.coordinate))
+    names = ("at_design", "largest", "error")
+    found = {name: scaled_number(view.scale / factor, getattr(each, name)) for name in names}
+    return {**found, "unit": f"({view.unit})/({its})"}
+
+
+def scaled_number(scale: float, value: float | None) -> str:
+    """Return a number times a factor, to three digits; a dash if there is none."""
+    return number(None if value is None else scale * value)
+
+
 def effect(gradient: Gradient) -> float:
     """The size of a bar: the largest gradient times what its coordinate varies by [unit of the
     output].
     """
     return abs(gradient.largest or 0.0) * gradient.scale
-
-
-def _environment() -> Environment:
-    environment = Environment(
-        loader=FileSystemLoader([_HERE, _LOOK]),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    cast("dict[str, Any]", environment.filters).update(
-        number=number, label=output_label, known=known
-    )
-    return environment
 
 
 def _axis(results: SweepResults) -> Axis:
@@ -160,7 +185,12 @@ def _axis(results: SweepResults) -> Axis:
         message="",
         driver=results.driver,
     )
-    return driver_axis(results.run["cases"].get(results.case, {}), [record], ())
+    axis = driver_axis(results.run["cases"].get(results.case, {}), [record], ())
+    unit, scale = results.shown_driver
+    if not unit:
+        return axis
+    title = axis.title.replace(f"[{axis.unit}]", f"[{unit}]")
+    return replace(axis, unit=unit, scale=scale, title=title)
 
 
 def envelope_figure(view: OutputView, axis: Axis, *, about_nominal: bool) -> Figure:
@@ -219,9 +249,14 @@ def envelope_figure(view: OutputView, axis: Axis, *, about_nominal: bool) -> Fig
         line={"width": 1.5, "color": "#D55E00", "dash": "12px,5px"},
         uid="s1",
     )
-    what = f"{output_label(view.name)}{' less nominal' if about_nominal else ''} [{view.unit}]"
-    value_axis: Figure = {"title": {"text": plain(what)}, "hoverformat": ".5g"}
-    moved_axis: Figure = {"title": {"text": plain(axis.title)}, "hoverformat": ".6~g"}
+    if not about_nominal:
+        for name, limit in view.limits.items():
+            curve([limit, limit], [axis.shown[0], axis.shown[-1]], name=name, line=LIMIT, uid=name)
+    what = with_unit(
+        output_label(view.name) + (" less nominal" if about_nominal else ""), view.unit
+    )
+    value_axis: Figure = {"title": {"text": what}, "hoverformat": ".5g"}
+    moved_axis: Figure = {"title": {"text": axis.title}, "hoverformat": ".6~g"}
     if axis.up < 0:
         moved_axis["autorange"] = "reversed"
     sides = (
@@ -241,7 +276,7 @@ def tornado_figure(view: OutputView) -> Figure:
     """
     bars = view.gradients[:MOST_BARS][::-1]
     lengths = [float(f"{view.scale * effect(each):.{DIGITS}g}") for each in bars]
-    names = [plain(each.coordinate) for each in bars]
+    names = [each.coordinate for each in bars]
     look: Figure = {
         "type": "bar",
         "orientation": "h",
@@ -253,10 +288,10 @@ def tornado_figure(view: OutputView) -> Figure:
         {**look, "x": [sign * length for length in lengths], "uid": f"bars{sign}"}
         for sign in (-1, 1)
     ]
-    title = f"change of {output_label(view.name)} [{view.unit}]"
+    title = with_unit(f"change of {output_label(view.name)}", view.unit)
     layout: Figure = {
         "barmode": "overlay",
-        "xaxis": {"title": {"text": plain(title)}, "zeroline": True},
+        "xaxis": {"title": {"text": title}, "zeroline": True},
         "yaxis": {"type": "category"},
     }
     return {"data": traces, "layout": layout}

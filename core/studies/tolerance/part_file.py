@@ -18,7 +18,8 @@ import numpy as np
 
 from ...errors import KincheckError
 from ...history.run_digest import digest
-from .study import Chunk, Study
+from .chunk import Chunk
+from .study import Study
 
 MAGIC = b"kincheck-part/1\n"
 HASH = hashlib.sha256().digest_size

@@ -4,21 +4,19 @@ is null.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import msgspec
 import numpy as np
 
+from ...case.units import ANGLES, LENGTHS, in_units
 from ...dataset import Dataset, Variable
 from ...harness.record import Outcome
+from ...report.axis import DRIVER_UNITS
 from ...tabular import Tabular
-from ...trajectory import Array
+from .conformance import Capability
 from .cross_check import Checked
-from .gradients import Gradients
-from .reduce import QUANTILES, Quantiles, Summary
-from .study import Study
+from .histograms import Histogram
 
 Numbers = list[float | None]
 
@@ -27,9 +25,10 @@ class VariedCoordinate(msgspec.Struct, frozen=True, kw_only=True):
     """A coordinate that varies.
 
     Attributes:
-        law: normal, uniform, or values.
+        law: normal, truncated_normal, uniform, triangular, or values.
         scale: standard deviation, half width, or the largest offset [unit].
         values: the offsets [unit] where they are listed.
+        bound: largest offset of a truncated normal distribution [unit]; zero of all others.
     """
 
     name: str
@@ -38,6 +37,14 @@ class VariedCoordinate(msgspec.Struct, frozen=True, kw_only=True):
     law: str
     scale: float
     values: list[float] = []
+    bound: float = 0.0
+
+
+class Correlated(msgspec.Struct, frozen=True, kw_only=True):
+    """Coordinates that are drawn with a matrix of correlations, by a Gaussian copula."""
+
+    coordinates: list[str]
+    matrix: list[list[float]]
 
 
 class Envelope(msgspec.Struct, frozen=True, kw_only=True):
@@ -50,6 +57,7 @@ class Envelope(msgspec.Struct, frozen=True, kw_only=True):
         quantiles: by probability; `quantiles_of` says of how many variants.
         standard_errors: of the quantiles, by probability; null where they are exact.
         min_variant, max_variant: the variants with the least and the most of all samples.
+        histogram: at the sample of the least capability or, without limits, of the largest spread.
     """
 
     unit: str
@@ -64,6 +72,7 @@ class Envelope(msgspec.Struct, frozen=True, kw_only=True):
     standard_errors: dict[str, Numbers] | None
     min_variant: int | None
     max_variant: int | None
+    histogram: Histogram | None = None
 
 
 class Gradient(msgspec.Struct, frozen=True, kw_only=True):
@@ -120,7 +129,10 @@ class SweepResults(Tabular, msgspec.Struct, frozen=True, kw_only=True):
         samples: how many variants were solved.
         asked: how many there were to be: more than were solved where the sweep was stopped before
             its end.
-        quantiles_of: how many variants the quantiles are of.
+        quantiles_of: how many variants the quantiles and histograms are of.
+        sampling: choice of the drawn variants: random, latin or sobol.
+        length_unit, angle_unit: in which tables and figures show the numbers.
+        limits: how outputs keep their specification limits; the last is of all limits together.
         driver: values at the samples by name, as in a run's records.
         unsolved: variants without a solution somewhere; `failed` lists the first of them.
         retried: variants that were solved again alone, with divided steps.
@@ -148,6 +160,30 @@ class SweepResults(Tabular, msgspec.Struct, frozen=True, kw_only=True):
     check_engine: str | None = None
     checked: list[Checked] = []
     measured: dict[str, Any] = {}
+    sampling: str = "random"
+    correlations: list[Correlated] = []
+    length_unit: str = "m"
+    angle_unit: str = "rad"
+    limits: list[Capability] = []
+
+    def shown_unit(self, unit: str) -> tuple[str, float]:
+        """Return the unit in which tables and figures show numbers of an SI unit, and the factor to
+        it.
+        """
+        name, size = in_units(unit, LENGTHS[self.length_unit], ANGLES[self.angle_unit])
+        return name, 1.0 / size
+
+    @property
+    def shown_driver(self) -> tuple[str, float]:
+        """The unit in which tables and figures show the values of the swept driver, and the factor
+        to it.
+        """
+        case = self.run["cases"].get(self.case, {})
+        return self.shown_unit(DRIVER_UNITS.get(case.get("driver", {}).get("type", ""), ""))
+
+    def unit_of(self, coordinate: str) -> str:
+        """Return the SI unit of a coordinate that varies."""
+        return next(each.unit for each in self.coordinates if each.name == coordinate)
 
     def summary(self) -> str:
         """Return case, mode, variants and what is missing of them."""
@@ -199,97 +235,3 @@ BANDS = ("nominal", "mean", "min", "max", "standard_deviation")
 
 def _bands(each: Envelope) -> list[Numbers]:
     return [getattr(each, name) for name in BANDS]
-
-
-def numbers(values: Array) -> Numbers:
-    """Numbers, null for NaN."""
-    return [value if math.isfinite(value) else None for value in values.tolist()]
-
-
-def envelopes(
-    study: Study, whole: Summary, found: Sequence[Quantiles], nominal: Array
-) -> dict[str, Envelope]:
-    """The envelope of every row, by name."""
-    spread = whole.deviation
-    result: dict[str, Envelope] = {}
-    for k, (row, quantiles) in enumerate(zip(study.rows, found, strict=True)):
-        low, high = (int(each) for each in whole.extremes[k])
-        result[row.name] = Envelope(
-            unit=row.unit,
-            sense=row.output.sense or None,
-            nominal=numbers(nominal[k]),
-            count=whole.count[k].tolist(),
-            min=numbers(whole.least[k]),
-            max=numbers(whole.most[k]),
-            mean=numbers(whole.mean[k]),
-            standard_deviation=numbers(spread[k]),
-            quantiles=_by_probability(quantiles.values),
-            standard_errors=None if quantiles.errors is None else _by_probability(quantiles.errors),
-            min_variant=low if low >= 0 else None,
-            max_variant=high if high >= 0 else None,
-        )
-    return result
-
-
-def _by_probability(values: Array) -> dict[str, Numbers]:
-    return {f"{p:g}": numbers(each) for p, each in zip(QUANTILES, values, strict=True)}
-
-
-def gradient_table(study: Study, found: Gradients) -> list[Gradient]:
-    """Every gradient, by output and coordinate."""
-    table: list[Gradient] = []
-    for r, row in enumerate(study.rows):
-        for c, coordinate in enumerate(study.variation.coordinates):
-            along = found.along[c, r]
-            known = np.isfinite(along).any()
-            sample = int(np.nanargmax(np.abs(along))) if known else None
-            table.append(
-                Gradient(
-                    output=row.name,
-                    coordinate=coordinate.name,
-                    unit=f"({row.unit})/{coordinate.unit}",
-                    at_design=None
-                    if found.design is None
-                    else numbers(found.design[c, r : r + 1])[0],
-                    along=numbers(along),
-                    largest=None if sample is None else float(along[sample]),
-                    sample=sample,
-                    error=numbers(found.error[c, r : r + 1])[0],
-                    accurate=bool(found.accurate[c, r]),
-                    scale=coordinate.scale,
-                )
-            )
-    return table
-
-
-def effect_table(study: Study, effects: Mapping[int, Array]) -> list[Effect]:
-    """What each variant of one at a time changes; effects by variant, shape (rows,)."""
-    table: list[Effect] = []
-    for variant, changes in effects.items():
-        offsets = study.variation.of_variant(study.seed, variant)
-        (moved,) = np.flatnonzero(offsets)
-        each = study.variation.coordinates[int(moved)]
-        by_row = {
-            row.name: change for row, change in zip(study.rows, numbers(changes), strict=True)
-        }
-        table.append(
-            Effect(
-                variant=variant, coordinate=each.name, offset=float(offsets[moved]), changes=by_row
-            )
-        )
-    return table
-
-
-def coordinates(study: Study) -> list[VariedCoordinate]:
-    """The coordinates that vary."""
-    return [
-        VariedCoordinate(
-            name=each.name,
-            hardpoint=each.hardpoint,
-            unit=each.unit,
-            law=str(each.law),
-            scale=each.scale,
-            values=[*each.values],
-        )
-        for each in study.variation.coordinates
-    ]

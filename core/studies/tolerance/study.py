@@ -1,5 +1,5 @@
-"""A study: which variants of which case, what is wanted of them, and what one chunk of them gives.
-Plain data, sent anywhere.
+"""A study: which variants of which case, and what is wanted of them. Plain data, sent anywhere.
+Made ready, it solves chunks of the variants.
 """
 
 from __future__ import annotations
@@ -12,15 +12,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...algebra import Vec3
-from ...case.case import Case, Quantity
+from ...case.case import Case, Quantity, without_forces
 from ...case.held import require_no_held
+from ...case.measures import ForceMeasure
 from ...case.rotation import counted
-from ...case.variation.variation import Mode, Stream, Variation, generator
+from ...case.variation.modes import Mode
+from ...case.variation.sampling import Stream, generator
+from ...case.variation.variation import Variation
+from ...errors import KincheckError
 from ...jet import Jet
-from ...kinematics import NativeSolver, PreparedDesigns, Variants, placed
+from ...kinematics import ForcesOfDesigns, NativeSolver, PreparedDesigns, Variants, placed
 from ...mechanism.motions import Path
 from ...trajectory import PER_TIME, QUANTITIES, Array
-from .reduce import Summary
+from .chunk import Chunk, Unsolved
+from .limit_counts import COUNTS, RowLimit, limit_counts
 from .streaming_totals import Totals
 
 # Variants that are solved together: what calls cost that reduce them is lost among as many.
@@ -101,6 +106,25 @@ class Study:
             for derivative in range(min(self.order + 1, output.orders))
         )  # fmt: skip
 
+    @cached_property
+    def limits(self) -> tuple[RowLimit, ...]:
+        """The limits of the variation, by rows.
+
+        Raises:
+            KincheckError: a limited derivative is not reduced.
+        """
+        names = [row.name for row in self.rows]
+        for each in self.variation.limits:
+            if each.output not in names:
+                raise KincheckError(
+                    f"limits of {each.output}: the study has no such row; give --order 1 for"
+                    " velocities and 2 for accelerations too"
+                )
+        return tuple(
+            RowLimit(names.index(each.output), each.low, each.high)
+            for each in self.variation.limits
+        )
+
     def of_variant(self, index: int) -> Case:
         """The case with the geometry of one variant."""
         values = self.variation.values(self.variation.of_variant(self.seed, index))
@@ -108,44 +132,6 @@ class Study:
         return replace(
             self.case, name=name, mechanism=placed(self.case.mechanism, values), reference={}
         )
-
-
-@dataclass(frozen=True)
-class Unsolved:
-    """A variant that has no solution at some samples, and why."""
-
-    variant: int
-    samples: int
-    message: str
-
-
-@dataclass(frozen=True, eq=False)
-class Chunk:
-    """What became of a chunk of variants.
-
-    Attributes:
-        count: of variants.
-        kept: values of the random subset, shape (rows, n, some).
-        picked: values of picked variants, by variant, shape (rows, n).
-        unsolved: the first of the variants without a solution somewhere.
-        failures: how many those are.
-        retried: variants that were solved again alone, with divided steps.
-        effects: one at a time only: the largest change of each row over the samples, signed, shape
-            (rows, count).
-        values, offsets: where all are wanted: shape (rows, n, count) and (coordinates, count).
-    """
-
-    index: int
-    count: int
-    summary: Summary
-    kept: Array
-    picked: Mapping[int, Array]
-    unsolved: tuple[Unsolved, ...]
-    failures: int
-    retried: int
-    effects: Array | None = None
-    values: Array | None = None
-    offsets: Array | None = None
 
 
 @dataclass(eq=False)
@@ -166,9 +152,10 @@ class Ready:
         )
         varied = tuple(study.variation.places)
         solver = NativeSolver(order=order)
-        return Ready(
-            study, solver.prepare_designs(case.mechanism, case.sweep.path, varied, case.points)
+        designs = solver.prepare_designs(
+            case.mechanism, case.sweep.path, varied, without_forces(case).points, case.forces
         )
+        return Ready(study, designs)
 
     def along(self, path: Path) -> Ready:
         """The same model on another path of the same drivers."""
@@ -190,14 +177,16 @@ class Ready:
         """
         geometry = self.study.variation.geometry(offsets)
         found = self.designs.solve(geometry, self.study.tol)
-        return self._rows(found, geometry), found.solved, found.retried, found.messages
+        forces = self.designs.forces(found, geometry, self.study.tol)
+        rows = self._rows(found, geometry, forces)
+        return rows, found.solved, found.retried, found.messages
 
-    def _rows(self, found: Variants, geometry: Array) -> Array:
+    def _rows(self, found: Variants, geometry: Array, forces: ForcesOfDesigns | None) -> Array:
         at: dict[str, Vec3] = {}
         design: dict[str, Vec3] = {}
         numbers = self._numbers
         unknown = np.full((1, 1), np.nan)
-        for name in self.study.case.points:
+        for name in without_forces(self.study.case).points:
             known = self.designs.motion(found, name)
             x, v, a = (known[k] if k < len(known) else (unknown,) * 3 for k in range(3))
             at[name] = Vec3(*(Jet(*each) for each in zip(x, v, a, strict=True)))
@@ -213,8 +202,13 @@ class Ready:
         with np.errstate(all="ignore"):
             case = self.study.case
             path = case.sweep.path
-            jets = {o.name: counted(o.of(at, design), o.period, path) for o in case.outputs}
+            moved = without_forces(case).outputs
+            jets = {o.name: counted(o.of(at, design), o.period, path) for o in moved}
             for k, row in enumerate(self.study.rows):
+                if isinstance(row.output, ForceMeasure):
+                    assert forces is not None  # the case asks for them
+                    values[k] = forces.read(row.output.values)
+                    continue
                 jet = jets[row.output.name]
                 values[k] = (jet.x, jet.v, jet.a)[row.derivative]
         if not np.isfinite(values.sum()):
@@ -245,10 +239,12 @@ class Ready:
         effects: list[Array] = []
         stored: list[Array] = []
         failures = retried = 0
+        limited = np.zeros((len(study.limits) + 1, COUNTS), dtype=np.int64)
         for start in range(0, count, self.lanes):
             part = slice(start, min(start + self.lanes, count))
             values, solved, again, messages = self.values(offsets[:, part])
             totals.take(values, first + start)
+            limited += limit_counts(values, study.limits)
             kept.append(values[:, :, chosen[part]])
             picked |= {k: values[:, :, k - first - start].copy() for k in self._picked(first, part)}
             failures += len(messages)
@@ -270,6 +266,7 @@ class Ready:
             tuple(unsolved[:MOST_MESSAGES]),
             failures,
             retried,
+            limited,
             np.concatenate(effects, axis=1) if effects else None,
             np.concatenate(stored, axis=2) if stored else None,
             offsets if study.whole else None,

@@ -11,32 +11,34 @@ from contextlib import closing
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
-from itertools import islice
 from time import perf_counter, process_time
 from typing import Any, Protocol
 
 from ...case.case import Case
-from ...case.variation.variation import Mode, Variation
+from ...case.variation.modes import Mode
+from ...case.variation.sampling import Sampling
+from ...case.variation.variation import Variation
 from ...errors import KincheckError
 from ...harness.engine import Engine
 from ...harness.execution import Solver
 from ...harness.interrupts import deferred, hold
 from ...harness.provenance import circumstances
 from ...harness.workers.distributed import ClusterError
-from ...trajectory import Array
-from . import cross_check, results
+from . import cross_check, result_tables, results
+from .chunk import Chunk
 from .chunk_execution import Source, on_threads
+from .conformance import capabilities
+from .gathered import Gathered
 from .gradients import gradients
+from .histograms import histogram, worst_sample
 from .part_file import Part
-from .reduce import merged, nothing, quantiles
-from .study import Chunk, Ready, Study, Unsolved
+from .reduce import quantiles
+from .study import Ready, Study
 
 # Variants kept for quantiles: the standard error of a 1 % quantile is then a tenth of a percent.
 KEPT = 10_000
 # Limit of their memory [bytes]; many outputs over many samples leave room for fewer variants.
 KEPT_BYTES = 64_000_000
-# Unsolved variants listed in the results; all are counted.
-LISTED = 50
 # A larger grid is a mistake: at ten microseconds a variant this is a day.
 MOST_VARIANTS = 10**10
 
@@ -79,6 +81,7 @@ def sweep_designs(
     *,
     samples: int | None = None,
     seed: int = 0,
+    sampling: Sampling = Sampling.RANDOM,
     order: int = 0,
     tol: float = 1e-12,
     jobs: int = 1,
@@ -98,6 +101,7 @@ def sweep_designs(
         variation: the varied coordinates, from `read_variation`.
         samples: number of variants to draw; None where the variation lists them.
         seed: of the draws; equal seeds give equal variants on any machine and with any `jobs`.
+        sampling: choice of the points that are drawn.
         order: highest time derivative of the outputs to reduce: 0, 1 or 2.
         tol: largest accepted constraint residual, relative to the mechanism's size.
         jobs: threads.
@@ -117,15 +121,15 @@ def sweep_designs(
     """
     started = datetime.now(UTC)
     case = replace(case, reference={})
-    study = Study(
-        case, variation, how_many(variation, samples), seed, order, tol, whole=store is not None
-    )
+    count = how_many(variation, samples)
+    variation = variation.sampled(sampling, count)
+    study = Study(case, variation, count, seed, order, tol, whole=store is not None)
     if check is not None:
         cross_check.require_able(study, check.engine, check.solver, check.tol)
         study = replace(study, picked=cross_check.chosen(study.samples, check.share, seed))
     study = replace(study, subset=min(1.0, _kept(study) / study.samples))
     ready = Ready.of(study)
-    found = _Gathered(study)
+    found = Gathered(study)
     for chunk in part.finished(study) if part is not None else ():
         found.add(chunk)
         if store is not None:
@@ -180,6 +184,11 @@ def sweep_designs(
         and found.done == study.samples
     )
     by_row = [[each[k] for each in found.kept] for k in range(len(study.rows))]
+    limits = capabilities(study, found.limited, found.summary, by_row)
+    histograms = [
+        histogram(parts, worst_sample(study, limits, found.summary, k))
+        for k, parts in enumerate(by_row)
+    ]
     with ThreadPoolExecutor(jobs) as pool:  # sorting runs without Python's lock
         kept = list(pool.map(partial(quantiles, exact=exact), by_row))
     run = circumstances([case], started=started, tol=tol, command=command)
@@ -191,15 +200,20 @@ def sweep_designs(
         seed=seed,
         samples=found.done,
         asked=study.samples,
-        coordinates=results.coordinates(study),
+        coordinates=result_tables.coordinates(study),
         driver={name: values.tolist() for name, values in case.sweep.moved.items()},
-        outputs=results.envelopes(study, found.summary, kept, ready.nominal),
+        sampling=str(sampling),
+        correlations=result_tables.correlations(study),
+        length_unit=variation.units.length,
+        angle_unit=variation.units.angle,
+        outputs=result_tables.envelopes(study, found.summary, kept, ready.nominal, histograms),
+        limits=limits,
         quantiles_of=kept[0].kept,
-        gradients=results.gradient_table(study, slopes),
+        gradients=result_tables.gradient_table(study, slopes),
         gradient_messages={
             variation.coordinates[k].name: message for k, message in sorted(slopes.messages.items())
         },
-        effects=results.effect_table(study, found.effects),
+        effects=result_tables.effect_table(study, found.effects),
         unsolved=found.failures,
         failed=[
             results.Failed(variant=each.variant, samples=each.samples, message=each.message)
@@ -210,33 +224,6 @@ def sweep_designs(
         checked=checked,
         measured=measured | {"peak_memory_mb": _peak_memory()},
     )
-
-
-class _Gathered:
-    """Results of the chunks so far."""
-
-    def __init__(self, study: Study) -> None:
-        self.summary = nothing(len(study.rows), len(study.case.sweep.values))
-        self.kept: list[Array] = []
-        self.picked: dict[int, Array] = {}
-        self.unsolved: list[Unsolved] = []
-        self.effects: dict[int, Array] = {}
-        self.done = self.chunks = self.failures = self.retried = 0
-
-    def add(self, chunk: Chunk) -> None:
-        """Add a chunk; chunks come in order."""
-        self.summary = merged(self.summary, chunk.summary)
-        self.kept.append(chunk.kept)
-        self.picked |= chunk.picked
-        self.unsolved += islice(chunk.unsolved, LISTED - len(self.unsolved))
-        if chunk.effects is not None:  # the first variant is the nominal design
-            self.effects |= {
-                self.done + k: each for k, each in enumerate(chunk.effects.T) if self.done + k
-            }
-        self.done += chunk.count
-        self.chunks += 1
-        self.failures += chunk.failures
-        self.retried += chunk.retried
 
 
 def how_many(variation: Variation, samples: int | None) -> int:

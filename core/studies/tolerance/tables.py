@@ -1,40 +1,40 @@
-"""The results of a study as tables: on the terminal, as CSV, and the values of all variants as
-Parquet.
-"""
+"""The results of a study on the terminal, in the units of its file."""
 
 from __future__ import annotations
 
-import csv
-import io
-import json
-from collections.abc import Iterable, Sequence
-from pathlib import Path
-from types import TracebackType
-from typing import Any, Self, TextIO
+from typing import TextIO
 
-import numpy as np
+from rich.console import Console
 from rich.text import Text
 
-from ...case.io.escape import cell
-from ...case.variation.variation import Coordinate
-from ...errors import KincheckError
-from ...extras import library
 from ...harness.labels import notes, number
 from ...report import terminal
 from ...report.fitting_table import FittingTable
 from ...report.table import print_signs
+from .histograms import sparkline
+from .limit_words import interval, limit_notes, percent
 from .page import effect, headline
-from .results import SweepResults
-from .study import Chunk, Study
+from .results import Envelope, Numbers, SweepResults
 
 
 def print_sweep(results: SweepResults, file: TextIO) -> None:
-    """Print the signs of outputs, a line for each output, what could not be solved, what deviates,
-    and how fast it was.
+    """Print the signs of outputs, a line for each output, histograms, limits, what could not be
+    solved, what deviates, and how fast it was.
     """
     console = terminal.console(file)
     console.print(Text(headline(results), style="bold"))
     print_signs(results.run, console)
+    console.print(_extremes(results))
+    if any(each.histogram for each in results.outputs.values()):
+        console.print()
+        console.print(_distributions(results))
+    if results.limits:
+        _print_limits(results, console)
+    for line in remarks(results):
+        console.print(Text(line), soft_wrap=True)
+
+
+def _extremes(results: SweepResults) -> FittingTable:
     table = FittingTable()
     for name in ("output", "unit"):
         table.add_column(name)
@@ -42,27 +42,83 @@ def print_sweep(results: SweepResults, file: TextIO) -> None:
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("largest effect\n(gradient x scale)")
     for name, each in results.outputs.items():
+        unit, scale = results.shown_unit(each.unit)
         bands = zip(each.quantiles["0.01"], each.quantiles["0.99"], strict=True)
         widths = [high - low for low, high in bands if low is not None and high is not None]
         top = max((g for g in results.gradients if g.output == name), key=effect, default=None)
         table.add_row(
             Text(name),
-            each.unit,
-            *(
-                number(min((v for v in each.min if v is not None), default=None)),
-                str(each.min_variant),
-            ),
-            *(
-                number(max((v for v in each.max if v is not None), default=None)),
-                str(each.max_variant),
-            ),
-            number(max((v for v in each.standard_deviation if v is not None), default=None)),
-            number(max(widths, default=None)),
-            Text("–" if top is None else f"{top.coordinate} {number(effect(top))}"),
+            unit,
+            *(_shown(scale, min(_known(each.min), default=None)), str(each.min_variant)),
+            *(_shown(scale, max(_known(each.max), default=None)), str(each.max_variant)),
+            _shown(scale, max(_known(each.standard_deviation), default=None)),
+            _shown(scale, max(widths, default=None)),
+            Text("–" if top is None else f"{top.coordinate} {_shown(scale, effect(top))}"),
         )
+    return table
+
+
+def _distributions(results: SweepResults) -> FittingTable:
+    swept = next(iter(results.driver))
+    driver_unit, factor = results.shown_driver
+    table = FittingTable(title="Distribution at one sample")
+    table.add_column("output")
+    table.add_column("unit")
+    table.add_column(f"at {swept}\n[{driver_unit}]", justify="right", no_wrap=True)
+    for name in ("mean", "st. dev.", "1 %", "50 %", "99 %"):
+        table.add_column(name, justify="right", no_wrap=True)
+    table.add_column("histogram", no_wrap=True)
+    for name, each in results.outputs.items():
+        found = each.histogram
+        if found is None:
+            continue
+        unit, scale = results.shown_unit(each.unit)
+        values = [column[found.sample] for column in _columns(each)]
+        table.add_row(
+            Text(name),
+            unit,
+            _shown(factor, results.driver[swept][found.sample]),
+            *(_shown(scale, value) for value in values),
+            sparkline(found),
+        )
+    return table
+
+
+def _columns(each: Envelope) -> list[Numbers]:
+    quantiles = (each.quantiles[p] for p in ("0.01", "0.5", "0.99"))
+    return [each.mean, each.standard_deviation, *quantiles]
+
+
+def _print_limits(results: SweepResults, console: Console) -> None:
+    table = FittingTable(title="Specification limits")
+    table.add_column("output")
+    table.add_column("unit")
+    for name in ("low", "high", "below", "above", "yield", "95 % interval", "Cp", "Cpk"):
+        table.add_column(name, justify="right", no_wrap=True)
+    table.add_column("Cpk by\nquantiles", justify="right", no_wrap=True)
+    for each in results.limits:
+        unit, scale = results.shown_unit(each.unit)
+        table.add_row(
+            Text(each.output or "all together"),
+            unit,
+            *(_shown(scale, value) for value in (each.low, each.high)),
+            *(str(each.below), str(each.above)),
+            percent(each.share),
+            interval(each),
+            *(number(value) for value in (each.cp, each.cpk, each.by_quantiles)),
+        )
+    console.print()
     console.print(table)
-    for line in remarks(results):
+    for line in limit_notes(results):
         console.print(Text(line), soft_wrap=True)
+
+
+def _known(values: Numbers) -> list[float]:
+    return [value for value in values if value is not None]
+
+
+def _shown(scale: float, value: float | None) -> str:
+    return number(None if value is None else scale * value)
 
 
 def remarks(results: SweepResults) -> list[str]:
@@ -103,161 +159,3 @@ def remarks(results: SweepResults) -> list[str]:
         f"{key.replace('_', ' ')} {number(value)}" for key, value in results.measured.items()
     )
     return [*lines, speed]
-
-
-def envelope_csv(results: SweepResults) -> str:
-    """A line for each output and sample [SI]; empty where there is no value. A column says of how
-    many variants a part is.
-    """
-    swept = next(iter(results.driver))
-    probabilities = list(next(iter(results.outputs.values())).quantiles)
-    columns = [
-        "output",
-        "unit",
-        "sample",
-        swept,
-        "nominal",
-        "count",
-        "min",
-        "max",
-        "mean",
-        "standard_deviation",
-    ]
-    errors = any(each.standard_errors for each in results.outputs.values())
-    columns += [f"quantile_{p}" for p in probabilities] + (
-        [f"standard_error_{p}" for p in probabilities] if errors else []
-    )
-    columns += ["partial"] if results.partial else []
-    rows: list[Sequence[Any]] = []
-    for name, each in results.outputs.items():
-        numbers = [
-            each.nominal,
-            each.count,
-            each.min,
-            each.max,
-            each.mean,
-            each.standard_deviation,
-            *each.quantiles.values(),
-        ]
-        numbers += list((each.standard_errors or {}).values())
-        for k, value in enumerate(results.driver[swept]):
-            partial = [f"{results.partial} variants"] if results.partial else []
-            rows.append([name, each.unit, k, value, *(column[k] for column in numbers), *partial])
-    return _csv(columns, rows)
-
-
-def gradient_csv(results: SweepResults) -> str:
-    """A line for each output and coordinate [SI]."""
-    columns = [
-        "output",
-        "coordinate",
-        "unit",
-        "at_design",
-        "largest",
-        "sample",
-        "error",
-        "accurate",
-        "scale",
-        "effect",
-    ]
-    return _csv(
-        columns,
-        (
-            [*(getattr(each, name) for name in columns[:-1]), effect(each)]
-            for each in results.gradients
-        ),
-    )
-
-
-def _csv(columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows([cell(each) for each in row] for row in rows)
-    return text.getvalue()
-
-
-class ParquetStore:
-    """Writes the values of all variants as they come: a row for each variant, a row group for each
-    chunk.
-
-    Columns: variant, the offset of each coordinate [SI], and each output as a list over the
-    samples, NaN where there is no value. A coordinate that is named like an output, W.x say, has
-    the column W.x.offset. The file's metadata under the key "kincheck" says case, seed, mode,
-    units, signs and the driver's values, as JSON; where not all variants are there,
-    "kincheck.partial" says how many of how many.
-
-    Raises:
-        KincheckError: pyarrow is not installed, or the file cannot be written.
-    """
-
-    def __init__(self, path: Path, study: Study) -> None:
-        self._arrow = library("--store", "pyarrow", "parquet")
-        parquet = library("--store", "pyarrow.parquet", "parquet")
-        arrow, self._first, self._samples = self._arrow, 0, study.samples
-        n = len(study.case.sweep.values)
-        fields = [arrow.field("variant", arrow.int64())]
-        offsets = _offset_columns(study)
-        fields += [arrow.field(name, arrow.float64()) for name in offsets]
-        fields += [arrow.field(row.name, arrow.list_(arrow.float64(), n)) for row in study.rows]
-        about = {
-            "case": study.case.name,
-            "seed": study.seed,
-            "mode": str(study.variation.mode),
-            "units": (
-                {row.name: row.unit for row in study.rows}
-                | {name: each.unit for name, each in offsets.items()}
-            ),
-            "signs": study.case.signs,
-            "driver": {name: values.tolist() for name, values in study.case.sweep.moved.items()},
-        }
-        self._schema = arrow.schema(fields, metadata={"kincheck": json.dumps(about)})
-        try:
-            self._writer = parquet.ParquetWriter(path, self._schema)
-        except OSError as error:
-            raise KincheckError(
-                f"--store {path}: cannot be written ({error.strerror or error}); give a file"
-                " elsewhere"
-            ) from error
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        if self._first < self._samples:
-            self._writer.add_key_value_metadata(
-                {"kincheck.partial": f"{self._first} of {self._samples} variants"}
-            )
-        self._writer.close()
-
-    def write(self, chunk: Chunk) -> None:
-        """Take a chunk; see `Store`."""
-        assert chunk.values is not None
-        assert chunk.offsets is not None
-        arrow = self._arrow
-        columns: list[Any] = [arrow.array(np.arange(self._first, self._first + chunk.count))]
-        columns += [arrow.array(each) for each in chunk.offsets]
-        for values in chunk.values:
-            flat = arrow.array(np.ascontiguousarray(values.T).ravel())
-            columns.append(arrow.FixedSizeListArray.from_arrays(flat, values.shape[0]))
-        try:
-            self._writer.write_table(arrow.table(columns, schema=self._schema))
-        except OSError as error:
-            raise KincheckError(
-                f"--store: cannot be written ({error}); free some room, or give a file elsewhere"
-            ) from error
-        self._first += chunk.count
-
-
-def _offset_columns(study: Study) -> dict[str, Coordinate]:
-    """The coordinates by the names of their columns."""
-    taken = {"variant", *(row.name for row in study.rows)}
-    return {
-        f"{each.name}.offset" if each.name in taken else each.name: each
-        for each in study.variation.coordinates
-    }

@@ -11,15 +11,15 @@ from ....errors import remedy
 from ....joints import Joint, Translational
 from ....mechanism.drivers import Driver, JointDisplacement, PointCoordinate
 from ....mechanism.mechanism import GROUND, Body, Mechanism, Point, Vector
-from ....mechanism.motions import Ramp
-from ....trajectory import Array
+from ....mechanism.motions import Motion, Ramp
 from ...case import Sweep
 from ...io.coordinates import AXES
 from ...io.document import fault, shown
 from ...suspension import Side
 from .templates.base import TIEROD_INNER, WHEEL_CENTER, Template
+from .travels import Travels
 
-RACK, RACK_TRAVEL, STROKE = "rack", "rack_travel", "stroke"
+RACK, SLIDE, RACK_TRAVEL, STROKE = "rack", "rack_slide", "rack_travel", "stroke"
 
 
 class AxleMotion(StrEnum):
@@ -31,21 +31,33 @@ class AxleMotion(StrEnum):
 
 
 def one_wheel(
-    name: str, template: Template, at: Mapping[str, Vector], travel: Array
+    file: Path, template: Template, at: Mapping[str, Vector], travels: Travels
 ) -> tuple[Mechanism, Sweep]:
-    """Return the mechanism of the left wheel, and its travel up and down.
+    """Return the mechanism of the left wheel and its motion: up and down, and with the rack if that
+    moves.
 
     Raises:
+        CaseError: the rack moves, and there are no tie rods.
         MechanismError: the places make no such mechanism.
     """
-    joints = template.joints(at)
-    drivers = [PointCoordinate(STROKE, WHEEL_CENTER.name, AXES["z"])]
-    mechanism = Mechanism(name, _bodies(joints), joints, template.points(at), drivers)
-    return mechanism, Sweep(STROKE, travel)
+    joints = [*template.joints(at)]
+    drivers: list[Driver] = [PointCoordinate(STROKE, WHEEL_CENTER.name, AXES["z"])]
+    motions: dict[str, Motion] = {}
+    if travels.rack is not None:
+        _require_tie_rod(file, "--rack", "a travel", template)
+        joints = [
+            replace(joint, i=RACK) if joint.name == template.steered else joint for joint in joints
+        ]
+        slide, driver = _rack(at)
+        joints.append(slide)
+        drivers.append(driver)
+        motions[RACK_TRAVEL] = travels.of_rack
+    mechanism = Mechanism(file.stem, _bodies(joints), joints, template.points(at), drivers)
+    return mechanism, Sweep(STROKE, travels.wheel, motions=motions)
 
 
 def whole_axle(
-    file: Path, said: str, template: Template, at: Mapping[str, Vector], travel: Array
+    file: Path, said: str, template: Template, at: Mapping[str, Vector], travels: Travels
 ) -> tuple[Mechanism, Sweep]:
     """Return the mechanism of both wheels, the right one being the mirror image of the left, and
     its motion.
@@ -62,12 +74,11 @@ def whole_axle(
         raise fault(
             file, "--axle", f"found {shown(said)}, expected a motion; {remedy(said, [*AxleMotion])}"
         )
-    steered = TIEROD_INNER.name in at
-    if said == AxleMotion.STEER and not steered:
-        problem = (
-            f"found {said}, but template {template.name} has no tie rod, expected heave or roll"
-        )
-        raise fault(file, "--axle", f"{problem}; choose one of them")
+    steered = bool(template.steered)
+    if said == AxleMotion.STEER:
+        _require_tie_rod(file, "--axle", said, template)
+    if travels.rack is not None:
+        _require_tie_rod(file, "--rack", "a travel", template)
     joints: list[Joint] = []
     points: list[Point] = []
     drivers: list[Driver] = []
@@ -85,14 +96,33 @@ def whole_axle(
         name = name_of(side, STROKE)
         drivers.append(PointCoordinate(name, name_of(side, WHEEL_CENTER.name), AXES["z"]))
     if steered:
-        joints.append(Translational("rack_slide", GROUND, RACK, at[TIEROD_INNER.name], AXES["y"]))
-        drivers.append(JointDisplacement(RACK_TRAVEL, "rack_slide"))
+        slide, driver = _rack(at)
+        joints.append(slide)
+        drivers.append(driver)
     mechanism = Mechanism(file.stem, _bodies(joints), joints, points, drivers)
     if said == AxleMotion.STEER:
-        return mechanism, Sweep(RACK_TRAVEL, travel)
+        if travels.rack is not None:
+            problem = "found it beside --axle steer, whose --travel is that of the rack"
+            raise fault(file, "--rack", f"{problem}, expected one of them; leave it out")
+        return mechanism, Sweep(RACK_TRAVEL, travels.wheel)
     left, right = (name_of(side, STROKE) for side in Side)
-    rate = 1.0 if said == AxleMotion.HEAVE else -1.0
-    return mechanism, Sweep(left, travel, motions={right: Ramp(rate)})
+    motions: dict[str, Motion] = {right: Ramp(1.0 if said == AxleMotion.HEAVE else -1.0)}
+    if travels.rack is not None:
+        motions[RACK_TRAVEL] = travels.of_rack
+    return mechanism, Sweep(left, travels.wheel, motions=motions)
+
+
+def _require_tie_rod(file: Path, option: str, said: str, template: Template) -> None:
+    if not template.steered:
+        problem = f"found {said}, but template {template.name} has no tie rod"
+        expected = "expected heave or roll" if option == "--axle" else "expected none"
+        raise fault(file, option, f"{problem}, {expected}; leave out the steering")
+
+
+def _rack(at: Mapping[str, Vector]) -> tuple[Joint, Driver]:
+    """Return the slide of the rack along y, and its driver."""
+    slide = Translational(SLIDE, GROUND, RACK, at[TIEROD_INNER.name], AXES["y"])
+    return slide, JointDisplacement(RACK_TRAVEL, SLIDE)
 
 
 def name_of(side: Side, name: str) -> str:

@@ -121,19 +121,30 @@ def _length(file: Path, option: str, text: str | None) -> float | None:
 
 
 def with_suspension_outputs(
-    case: Case, template: Template, wheel: Wheel, at: Mapping[str, Vector], motion: str | None
+    case: Case,
+    template: Template,
+    wheel: Wheel,
+    at: Mapping[str, Vector],
+    motion: str | None,
+    *,
+    steered: bool = False,
 ) -> Case:
     """Return the case with the suspension outputs, their slopes, and the coordinates of the
     template's watched points.
 
     Args:
         motion: of both wheels; None for one wheel.
+        steered: whether the rack moves while the wheel travels.
     """
     axle = motion is not None
     extent = size(case)
     outputs: list[Quantity] = []
     watched: list[str] = []
-    vehicles = [_vehicle(side, template, wheel, axle) for side in (Side if axle else [Side.LEFT])]
+    travel = tuple(name_of(each, STROKE) for each in Side) if axle else (STROKE,) * steered
+    vehicles = [
+        replace(_vehicle(side, template, wheel, axle), travel=travel)
+        for side in (Side if axle else [Side.LEFT])
+    ]
     for vehicle in vehicles:
         prefix = f"{vehicle.side}_" if axle else ""
         for name, cls, own in _types(template, wheel, at):
@@ -142,7 +153,8 @@ def with_suspension_outputs(
             outputs.append(cls(prefix + name, vehicle, *given, **{**own, **ends}))
         watched += [prefix + role for role in template.watched]
     if axle and wheel.radius is not None:
-        names = [*AXLE, *(ACKERMANN if wheel.wheelbase and motion == AxleMotion.STEER else ())]
+        turning = steered or motion == AxleMotion.STEER
+        names = [*AXLE, *(ACKERMANN if wheel.wheelbase and turning else ())]
         for name in names:
             cls = SuspensionOutput.registry[name]
             given = default(extent, cls.measure)
@@ -170,7 +182,6 @@ def _vehicle(side: Side, template: Template, wheel: Wheel, axle: bool) -> Vehicl
         wheel_radius=wheel.radius,
         wheelbase=wheel.wheelbase,
         kingpin=prefixed(prefix, template.kingpin),
-        travel=tuple(name_of(each, STROKE) for each in Side) if axle else (),
     )
 
 

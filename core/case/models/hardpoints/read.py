@@ -4,48 +4,41 @@ the steering stand still; or both wheels of an axle and a rack move.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from ....errors import MOST_NAMED, brief, remedy, shortened, similar
 from ....mechanism.mechanism import Vector
-from ....trajectory import Array
 from ...case import Case, Truth
-from ...io.document import decimal, explained, fault, shown
+from ...io.document import explained, fault, shown
 from ...io.escape import visible
 from ...io.reader_options import LEFT_OUT, Supplied
-from ...io.schema import MOST_SAMPLES
 from .axle import one_wheel, whole_axle
 from .default_outputs import wheel_of, with_suspension_outputs
 from .own_names import read_own_names
 from .table import HardpointTable, coordinate, placed, require_size, unit_of
 from .templates import TEMPLATES, Template
-from .templates.base import WHEEL_CONTACT, normal
+from .templates.base import WHEEL_CONTACT, normal, side_of
+from .travels import read_travels
 
-Reader = Callable[[Path, str], HardpointTable]
-
-# The middle of the wheel travel of passenger cars, which is about 0.08 m each way; samples every
-# 2.5 mm.
-TRAVEL, SAMPLES = 0.05, 41
 WHEEL = "wheel_center"
+# Racks with joints near the middle have them a little beyond it; no point of one wheel's
+# suspension is farther across than this part of the half track.
+ACROSS = 0.25
 # Cars have some tens of hardpoints at a corner; names of many more are not searched for those that
 # are missing.
 MOST_POINTS = 10_000
 
 
-def read_hardpoints(file: Path, text: str, reader: Reader, supplied: Supplied) -> Case:
-    """The case of a suspension: its outputs are those of suspensions that its points define,
+def case_of_hardpoints(table: HardpointTable, supplied: Supplied) -> Case:
+    """Return the case of a suspension: its outputs are those of suspensions that its points define,
     and the coordinates of three points of the knuckle; it is consensus_only.
 
     Raises:
-        CaseError: the file cannot be read, does not say enough, or does not fill the roles of the
-            template.
+        CaseError: the table does not say enough, or does not fill the roles of the template.
     """
-    table = reader(file, text)
+    file = table.file
     if len(table.points) > MOST_POINTS:
         raise fault(
             file,
@@ -59,13 +52,13 @@ def read_hardpoints(file: Path, text: str, reader: Reader, supplied: Supplied) -
     at = {role: points[name] for role, name in named.items()}
     require_size(table, at, supplied.units)
     wheel = wheel_of(table, named, at, supplied.wheel_radius, supplied.wheelbase)
-    travel = _travel(file, supplied.travel)
+    travels = read_travels(file, supplied.travel, supplied.rack)
     _require_left_and_upright(table, template, named, at, supplied)
     with explained(file, "", unit_of(table, supplied.units)):
         if supplied.axle is None:
-            mechanism, sweep = one_wheel(file.stem, template, at, travel)
+            mechanism, sweep = one_wheel(file, template, at, travels)
         else:
-            mechanism, sweep = whole_axle(file, supplied.axle, template, at, travel)
+            mechanism, sweep = whole_axle(file, supplied.axle, template, at, travels)
     others = [*(name for name in points if name not in named.values()), *table.left_out]
     source = (
         f"{table.tool} hardpoints of {file.name} on the template {template.name},"
@@ -76,7 +69,9 @@ def read_hardpoints(file: Path, text: str, reader: Reader, supplied: Supplied) -
     source += f"{LEFT_OUT}{_listed(others)}"
     case = Case(file.stem, source, Truth.CONSENSUS_ONLY, mechanism, sweep, ())
     case = replace(case, length_unit=unit_of(table, supplied.units).name)
-    return with_suspension_outputs(case, template, wheel, at, supplied.axle)
+    return with_suspension_outputs(
+        case, template, wheel, at, supplied.axle, steered=supplied.rack is not None
+    )
 
 
 def _template(table: HardpointTable, said: str | None) -> Template:
@@ -120,8 +115,12 @@ def _filled(table: HardpointTable, template: Template, own: Path | None) -> dict
         own: file of the user's own names.
     """
     by_normal_name: dict[str, list[str]] = {}
+    by_left_name: dict[str, list[str]] = {}
     for name in table.points:
         by_normal_name.setdefault(normal(name), []).append(name)
+        plain, side = side_of(name)
+        if side == "left":
+            by_left_name.setdefault(plain, []).append(name)
     filled: dict[str, str] = {}
     if own is not None:
         filled |= read_own_names(
@@ -130,9 +129,9 @@ def _filled(table: HardpointTable, template: Template, own: Path | None) -> dict
     for role in (*template.roles, *template.optional):
         if role.name in filled:
             continue
-        found = [
-            name for each in dict.fromkeys(role.names) for name in by_normal_name.get(each, ())
-        ]
+        names = dict.fromkeys(role.names)
+        found = [name for each in names for name in by_normal_name.get(each, ())]
+        found = found or [name for each in names for name in by_left_name.get(each, ())]
         if len(found) > 1:
             places = " and ".join(f"{name!r} ({table.points[name].where})" for name in found)
             raise fault(
@@ -187,7 +186,16 @@ def _require_left_and_upright(
             table.file,
             named[WHEEL],
             f"found {written(WHEEL, 1)}, not left of the middle, expected the left side; {advice},"
-            " or give the left points",
+            " or give the left points; those of the right side are read as left ones if --axes"
+            " says left for right",
+        )
+    across = [role for role, (_, y, _) in at.items() if y < -ACROSS * at[WHEEL][1]]
+    for role in across[:1]:
+        raise fault(
+            table.file,
+            named[role],
+            f"found {written(role, 1)}, on the other side than {named[WHEEL]} with"
+            f" {written(WHEEL, 1)}, expected all points on one side; correct its sign",
         )
     arms = [(f"{role.removesuffix('_rear')}_front", role) for role in at if role.endswith("_rear")]
     for front, rear in (*arms, *template.ahead):
@@ -206,22 +214,3 @@ def _require_left_and_upright(
                 f"found {written(high, 2)}, not above {named[low]} with {written(low, 2)}, expected"
                 f" it above; {advice}",
             )
-
-
-def _travel(file: Path, said: str | None) -> Array:
-    """Wheel travel [m], down to up."""
-    travel, samples = TRAVEL, SAMPLES
-    if said is not None:
-        try:
-            first, _, last = said.partition(":")
-            travel, samples = decimal(first), int(last or SAMPLES)
-        except ValueError:
-            travel = math.nan
-        if not (0.0 < travel < math.inf and 1 < samples <= MOST_SAMPLES):
-            raise fault(
-                file,
-                "--travel",
-                f"found {shown(said)}, expected METRES or METRES:SAMPLES, 2 to {MOST_SAMPLES} of"
-                " them; say --travel 0.05 for 50 mm up and down",
-            )
-    return np.linspace(-travel, travel, samples)

@@ -5,6 +5,7 @@ forward, y left, z up.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +23,12 @@ _UNIT_NAMES: Mapping[str, str] = {
     "millimetre": "mm",
     "centimeter": "cm",
     "centimetre": "cm",
+    "meters": "m",
+    "metres": "m",
+    "millimeters": "mm",
+    "millimetres": "mm",
+    "centimeters": "cm",
+    "centimetres": "cm",
     "in": "inch",
     "inches": "inch",
     "ft": "foot",
@@ -41,6 +48,20 @@ _NAMED_AXES: Mapping[str, str] = {
     "sae": "forward,right,down",
     "adams": "rearward,right,up",
 }
+_ADVICE: Sequence[tuple[re.Pattern[str], str]] = (
+    (
+        re.compile(r"[=+@-]?[A-Za-z=]+.*[!(]|=|[+-]?\$?[A-Z]{1,3}\$?\d+"),
+        "write the value of the formula: save the table anew from the spreadsheet program",
+    ),
+    (re.compile(r"[-+]?\d{1,3}([\s'’]\d{3})+"), "remove the separators of thousands"),
+    (
+        re.compile(r"[-+]?[\d.,]+\s*(mm|cm|m|in|inch|ft|\")$"),
+        "leave the unit out, and state it in the head or by --units",
+    ),
+    (re.compile(r"[\u2010-\u2015]"), "write the minus sign as a hyphen, -"),
+    (re.compile(r"\d{4}-\d\d-\d\d"), "a spreadsheet took the number for a date: type it anew"),
+)
+"""Remedies for texts that are no coordinates."""
 
 
 @dataclass(frozen=True)
@@ -88,11 +109,21 @@ def number(file: Path, where: str, text: object, sign: str = ".") -> float:
     found = math.nan
     if isinstance(text, str | int | float) and not isinstance(text, bool):
         try:
-            found = decimal(text.replace(sign, ".")) if isinstance(text, str) else float(text)
+            # word processors write the minus sign of typography
+            found = (
+                decimal(text.replace(sign, ".").replace("\u2212", "-"))
+                if isinstance(text, str)
+                else float(text)
+            )
         except (ValueError, OverflowError):
             found = math.nan
     if not usable(found):
-        raise fault(file, where, f"found {shown(text)}, expected a coordinate; correct the number")
+        advice = next((advice for kind, advice in _ADVICE if kind.match(str(text))), "")
+        raise fault(
+            file,
+            where,
+            f"found {shown(text)}, expected a coordinate; {advice or 'correct the number'}",
+        )
     return found
 
 

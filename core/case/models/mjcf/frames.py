@@ -156,7 +156,7 @@ def _orientation(element: Element, name: str, compiler: Compiler) -> Quat:
     x = _nonzero(element, name, numbers[:3])
     y = vec(numbers[3:])
     y = _nonzero(element, name, (*(y - (x @ y) * x),))
-    return _of_axes(x, y, cross(x, y))
+    return of_axes(x, y, cross(x, y))
 
 
 def euler_turn(angles: Sequence[float], compiler: Compiler) -> Quat:
@@ -194,7 +194,7 @@ def _z_towards(axis: Vec3) -> Quat:
     return _about((1.0 / sine) * normal, math.atan2(sine, axis.z))
 
 
-def _of_axes(x: Vec3, y: Vec3, z: Vec3) -> Quat:
+def of_axes(x: Vec3, y: Vec3, z: Vec3) -> Quat:
     """The quaternion of a frame, from the largest of its components (Shepperd's choice), which
     cannot vanish.
     """

@@ -8,12 +8,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from ....algebra import Quat
 from ....errors import remedy
 from ....joints import Revolute
 from ....kinematics import degrees_of_freedom
 from ....mechanism.drivers import JointAngle, JointDisplacement, JointDriver
-from ....mechanism.mechanism import Body, Mechanism, Point
+from ....mechanism.mechanism import Mechanism, Point
 from ....mechanism.motions import Absolute, Motion, Table
 from ...case import Case, Sweep, Truth
 from ...closing import within_digits
@@ -22,6 +21,7 @@ from ...io.document import explained, fault
 from ...io.reader_options import LEFT_OUT, Supplied
 from .assembly import Assembled, assemble, size_of
 from .attributes import EXPANDED, MAKE_BODIES, ROOT, WRITE_OUT
+from .bodies import bodies_of, gravity_of
 from .classes import read_classes
 from .digits import Digits, digits_of
 from .driving import Driving, read_driving
@@ -31,7 +31,7 @@ from .expand import expanded
 from .frames import coordinates, read_compiler
 from .freedom import taken
 from .parts import Parts, parts_of, require_coupled
-from .rods import spins
+from .rods import Spin, spins
 from .start import read_start
 from .tree import Tree, read_tree
 
@@ -48,6 +48,7 @@ _LEFT_OUT = (
     "deformable",
     "asset",
 )
+NO_GRAVITY = (0.0, 0.0, 0.0)
 
 
 def read_mjcf(file: Path, text: str, supplied: Supplied) -> Case:
@@ -101,7 +102,7 @@ def case_of(file: Path, document: Document, supplied: Supplied) -> Case:
     axes = {name: spin.axis for name, spin in free.items()}
     driving = taken(file, root, model, driving, axes, hold_rest=supplied.hold_rest)
     parts = parts_of(model.tree, model.equalities, driving, free)
-    return _case(file, document, model, driving, parts)
+    return _case(file, document, model, driving, parts, free)
 
 
 def _digits(root: Element, size: float, closure: float | None) -> Digits:
@@ -109,21 +110,35 @@ def _digits(root: Element, size: float, closure: float | None) -> Digits:
     return digits_of(root, size) if closure is None else Digits(closure, "--closure")
 
 
-def _case(file: Path, document: Document, model: Assembled, driving: Driving, parts: Parts) -> Case:
+def _case(
+    file: Path,
+    document: Document,
+    model: Assembled,
+    driving: Driving,
+    parts: Parts,
+    free: Mapping[str, Spin],
+) -> Case:
     """Return the case of the parts, without rows that are redundant within the digits."""
     tree, digits = model.tree, model.digits
     points = _points(tree, parts)
-    bodies = [
-        Body(name, coordinates(at.at), _euler_parameters(at.turn), name in parts.fixed)
-        for name, at in parts.bodies.items()
-    ]
+    found = bodies_of(tree, parts, free)
+    gravity = gravity_of(document.root) if found.weighed else NO_GRAVITY
     with explained(file):
         drivers = [_driver(parts, name) for name in driving.joints]
         joints, couplers = list(parts.joints.values()), list(parts.couplers.values())
-        mechanism = Mechanism(file.stem, bodies, joints, points, drivers, couplers)
+        mechanism = Mechanism(
+            file.stem, found.bodies, joints, points, drivers, couplers, gravity=gravity
+        )
     counted = tree.left_out if document.left_out is None else document.left_out
-    others = [*parts.left_out, *(f"{what} ({count})" for what, count in counted.items())]
-    source = f"{document.described}, from {model.start}{LEFT_OUT}{', '.join(others) or 'nothing'}"
+    others = [
+        *parts.left_out,
+        *found.left_out,
+        *(f"{what} ({count})" for what, count in counted.items()),
+    ]
+    heavy = ", with the masses of its bodies" * found.weighed
+    source = (
+        f"{document.described}, from {model.start}{heavy}{LEFT_OUT}{', '.join(others) or 'nothing'}"
+    )
     sweep = _sweep(tree, driving)
     case = Case(file.stem, source, Truth.CONSENSUS_ONLY, mechanism, sweep, (), assembly=model.notes)
     dof = degrees_of_freedom(mechanism)
@@ -166,11 +181,6 @@ def _require_model(root: Element) -> None:
             raise element.fault(f"cannot be read, because {MAKE_BODIES[element.tag]}; {WRITE_OUT}")
         if element.tag not in (*ROOT, *EXPANDED):
             raise element.fault(f"unknown in a model; {remedy(element.tag, ROOT)}")
-
-
-def _euler_parameters(turn: Quat) -> tuple[float, float, float, float]:
-    e0, e1, e2, e3 = turn
-    return float(e0), float(e1), float(e2), float(e3)
 
 
 def _driver(parts: Parts, joint: str) -> JointDriver:

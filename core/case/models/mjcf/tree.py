@@ -11,13 +11,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from ....algebra import Vec3, X, vec
-from ....errors import remedy
+from ....errors import CaseError, remedy
 from ....mechanism.mechanism import GROUND
 from ...io.document import shown
 from .attributes import DYNAMIC, IN_BODY, KNOWN, MAKE_BODIES, WRITE_OUT
 from .classes import MAIN, Classes
 from .elements import Element
 from .frames import HERE, Compiler, Place, joint_axis, read_place
+from .masses import Mass, Scales, read_scales
 
 WORLD = "world"
 # Scenes have many bodies, robots and hands at most some tens that move, a joint each; the freedom
@@ -66,11 +67,14 @@ class Tree:
         chain: all joints, free ones too, in the order of MuJoCo's coordinates: outer ones first.
         sites: by name, the body of the mechanism they are on, and their global places.
         names: of all bodies of the file that have one.
+        masses: of each moving body with a mass, in its frame; several of bodies that move as one.
+        unweighed: moving bodies whose masses cannot be read.
         left_out: how many there are of what has no meaning for kinematics, by what it is called.
     """
 
     classes: Classes
     compiler: Compiler
+    scales: Scales = field(default_factory=Scales)
     places: dict[str, Place] = field(default_factory=lambda: {WORLD: HERE})
     carriers: dict[str, str] = field(default_factory=lambda: {WORLD: GROUND})
     moving: dict[str, Place] = field(default_factory=dict[str, Place])
@@ -81,6 +85,8 @@ class Tree:
     sites: dict[str, tuple[str, Place]] = field(default_factory=dict[str, tuple[str, Place]])
     left_out: dict[str, int] = field(default_factory=dict[str, int])
     names: set[str] = field(default_factory=set[str])
+    masses: dict[str, list[Mass]] = field(default_factory=dict[str, list[Mass]])
+    unweighed: set[str] = field(default_factory=set[str])
 
     def read(self, around: Element, place: Place, body: str, childclass: str) -> None:
         """What is in a body, or in a frame of it; `place` is that of the body or frame, `body` one
@@ -106,8 +112,8 @@ class Tree:
                 self.read(element, inner, body, _class(element, childclass))
             elif element.tag == "site":
                 self._site(self.classes.complete(element, "site", childclass), place, body)
-            elif element.tag not in ("joint", "freejoint"):
-                self.count(f"{element.tag}s" if element.tag != "inertial" else "inertia")
+            elif element.tag not in ("joint", "freejoint", "inertial"):
+                self.count(f"{element.tag}s")
 
     def _frame(self, element: Element, around: Place) -> Place:
         element.require_known(KNOWN["frame"])
@@ -166,7 +172,22 @@ class Tree:
             carrier = name
             self._joints(name, elements, place, outer)
         self.places[name], self.carriers[name] = place, carrier
+        if carrier != GROUND:
+            self._weigh(element, place, carrier, childclass)
         self.read(element, place, carrier, childclass)
+
+    def _weigh(self, element: Element, place: Place, carrier: str, childclass: str) -> None:
+        """Read the mass of a body, which motion does not need: what makes no sense is left out."""
+        if float(*element.numbers("gravcomp", (1,), (0.0,))) != 0.0:
+            self.count("gravity compensation of bodies")
+        try:
+            found = self.scales.body(element, self.classes, self.compiler, childclass)
+        except CaseError:
+            self.unweighed.add(carrier)
+            return
+        if found is not None:
+            seen = found.seen_in(place.seen_from(self.moving[carrier]))
+            self.masses.setdefault(carrier, []).append(seen)
 
     def _joints(
         self, body: str, elements: list[tuple[Element, Place]], place: Place, outer: str
@@ -253,7 +274,7 @@ def _class(element: Element, childclass: str) -> str:
 
 def read_tree(root: Element, classes: Classes, compiler: Compiler) -> Tree:
     """Read the tree of a model."""
-    tree = Tree(classes, compiler)
+    tree = Tree(classes, compiler, read_scales(root))
     for world in root.only("worldbody"):
         world.require_known(KNOWN["worldbody"])
         tree.names |= {

@@ -14,7 +14,7 @@ from ....algebra import Quat, Vec3
 from ..mjcf.elements import DEEPEST, Element
 from ..mjcf.frames import HERE, Place, unit_quaternion
 from ..mjcf.tree import WORLD
-from .robot import Connection, Described, Loop, Move, Robot
+from .robot import Connection, Described, Inertial, Loop, Move, Robot
 from .tree import spanned
 
 FIXED = ("world", "ground")
@@ -66,6 +66,10 @@ class _Writer:
                 self.body(name, WORLD, [free], robot.elements[name])
         for joint in tree:
             outer, inner = joint.links
+            if self.is_world(joint):
+                self.bodies[inner], self.names[inner] = self.world, WORLD
+                self.depth[inner] = 0
+                continue
             if joint.free:
                 around, joints = WORLD, [self.element("freejoint", {"name": joint.name}, joint)]
             else:
@@ -87,6 +91,7 @@ class _Writer:
         }
         root = robot.root
         name = root.attributes.get("name", root.file.stem)
+        gravity = " ".join(map(_number, robot.gravity))
         return Element(
             root.file,
             "mujoco",
@@ -94,6 +99,7 @@ class _Writer:
             root.line,
             [
                 Element(root.file, "compiler", {"angle": "radian"}, root.line),
+                Element(root.file, "option", {"gravity": gravity}, root.line),
                 *(
                     Element(root.file, tag, {}, root.line, list(each))
                     for tag, each in sections.items()
@@ -113,6 +119,12 @@ class _Writer:
         children = [] if children is None else children
         return Described(source.file, tag, attributes, source.line, children, words=str(source))
 
+    def is_world(self, joint: Connection) -> bool:
+        """Return whether a joint fixes a link of the world's names and place to the world."""
+        outer, inner = joint.links
+        fixed = not (joint.moves or joint.free) and self.names.get(outer) == WORLD
+        return fixed and inner in FIXED and self.places[inner] == HERE
+
     def body(self, name: str, outer: str, inside: list[Element], origin: Element) -> None:
         """Add a body to another one, or to the world."""
         self.depth[name] = self.depth[outer] + 1
@@ -122,6 +134,8 @@ class _Writer:
                 " take out those that are not looked at"
             )
         self.names[name], self.bodies[name] = name, inside
+        if (inertial := self.robot.inertials.get(name)) is not None:
+            inside.append(self.element("inertial", _mass(inertial), origin))
         pose = _pose(self.places[name].seen_from(self.places[outer]))
         self.bodies[outer].append(self.element("body", {"name": name, **pose}, origin, inside))
 
@@ -231,6 +245,14 @@ def fitted(here: Place, there: Place, moves: Sequence[Move]) -> Place:
         if math.hypot(twist.e0, *twist.e) > 0.0:
             turn = unit_quaternion(twist) * here.turn
     return Place(at, turn)
+
+
+def _mass(inertial: Inertial) -> dict[str, str]:
+    """Return the attributes of an <inertial>; none of one that cannot be read."""
+    if inertial.mass is None:
+        return {}
+    entries = " ".join(map(_number, inertial.inertia))
+    return {**_pose(inertial.place), "mass": _number(inertial.mass), "fullinertia": entries}
 
 
 def _pose(place: Place) -> dict[str, str]:

@@ -8,7 +8,7 @@ from typing import Literal, TypeAlias
 
 from ....algebra import Vec3
 from ..mjcf.elements import Element
-from ..mjcf.frames import Place
+from ..mjcf.frames import HERE, Place
 
 Kind: TypeAlias = Literal["hinge", "slide", "ball"]
 
@@ -115,6 +115,21 @@ class Mimic:
     element: Element
 
 
+@dataclass(frozen=True)
+class Inertial:
+    """Mass of a link.
+
+    Attributes:
+        place: centre of mass and axes of the inertia, in the frame of the link.
+        mass: [kg]; None if it cannot be read.
+        inertia: entries xx, yy, zz, xy, xz, yz of the matrix about the centre [kg m^2].
+    """
+
+    place: Place = HERE
+    mass: float | None = None
+    inertia: Sequence[float] = ()
+
+
 @dataclass
 class Robot:
     """A robot of a file.
@@ -123,6 +138,8 @@ class Robot:
         format: the file's, for messages and notes: "URDF robot".
         links: places of the links.
         fixed: links of the world.
+        inertials: masses of links.
+        gravity: [m/s^2].
         frames: names of places on links, for outputs: link and place.
         actuated: coordinates with a motor.
         left_out: number of omitted items, by name.
@@ -134,6 +151,8 @@ class Robot:
     links: dict[str, Place] = field(default_factory=dict[str, Place])
     elements: dict[str, Element] = field(default_factory=dict[str, Element])
     fixed: set[str] = field(default_factory=set[str])
+    inertials: dict[str, Inertial] = field(default_factory=dict[str, Inertial])
+    gravity: Sequence[float] = (0.0, 0.0, -9.81)
     joints: list[Connection] = field(default_factory=list[Connection])
     loops: list[Loop] = field(default_factory=list[Loop])
     rods: list[Rod] = field(default_factory=list[Rod])

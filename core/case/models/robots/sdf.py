@@ -9,8 +9,10 @@ from ....algebra import Vec3, X
 from ...io.document import shown
 from ..mjcf.elements import Element
 from ..mjcf.frames import HERE, Place
-from .robot import Connection, Coupling, Mimic, Move, Robot
-from .sdf_frames import MODEL, SCOPE, Frames, flag, text_of
+from .inertials import UNIT, sdf_inertial
+from .robot import Connection, Coupling, Inertial, Mimic, Move, Robot
+from .sdf_drake import add_ties, mimic_of
+from .sdf_frames import MODEL, Frames, Short, flag, text_of
 from .values import direction, numbers_of, only_child, require_children
 
 # Three for each body that other models may have.
@@ -33,7 +35,9 @@ IN_JOINT = (
     *("screw_thread_pitch", "gearbox_ratio", "gearbox_reference_body"),
 )
 IN_AXIS = ("xyz", "limit", "dynamics", "mimic", "use_parent_model_frame", "initial_position")
-_COUNTED = ("inertial", "visual", "collision", "sensor", "light", "plugin")
+_COUNTED = ("visual", "collision", "sensor", "light", "plugin")
+GRAVITY = (0.0, 0.0, -9.8)
+"""Gravity of a world unless given [m/s^2]."""
 # Axes were in the model's frame before this version.
 _AXES_IN_JOINT = (1, 5)
 
@@ -44,7 +48,7 @@ def read_sdf(root: Element) -> Robot:
     Raises:
         CaseError: included models, unknown frames, or an unknown joint.
     """
-    robot = Robot("SDF model", root)
+    robot = Robot("SDF model", root, gravity=GRAVITY)
     top = [*root.only("model"), *root.only("world")]
     if not top:
         raise root.fault("has no model, expected one; give a model that moves")
@@ -58,7 +62,7 @@ def read_sdf(root: Element) -> Robot:
     frames.read(root, "")
     for world in root.only("world"):
         frames.read(world, "")
-    short = _Short(frames)
+    short = Short(frames)
     if len(frames.found) > MOST_FRAMES:
         raise root.fault(
             f"found {len(frames.found)} links, joints and frames, expected {MOST_FRAMES} at most;"
@@ -71,6 +75,8 @@ def read_sdf(root: Element) -> Robot:
         robot.elements[name] = framed.element
         if frames.still(full):
             robot.fixed.add(name)
+        if (inertial := sdf_inertial(framed.element)) is not None:
+            robot.inertials[name] = inertial
         for child in framed.element.only(*_COUNTED):
             robot.count(child.tag)
     if not robot.links:
@@ -80,7 +86,12 @@ def read_sdf(root: Element) -> Robot:
         for child in framed.element.only(*_COUNTED):
             robot.count(child.tag)
         frames.place(framed.element, full)
+    _default_masses(robot)
+    for world in root.only("world"):
+        if (gravity := only_child(world, "gravity")) is not None:
+            robot.gravity = numbers_of(gravity, (3,), GRAVITY)
     _joints(robot, frames, short, _version(root))
+    add_ties(robot, frames, short)
     for full, framed in frames.found.items():
         if framed.element.tag == "frame":
             link = frames.link(framed.element, framed.attached)
@@ -88,6 +99,16 @@ def read_sdf(root: Element) -> Robot:
                 place = frames.place(framed.element, full)
                 robot.frames[short(full)] = short(link), place
     return robot
+
+
+def _default_masses(robot: Robot) -> None:
+    """Give links without a mass that of SDF, 1 kg, if others have one."""
+    if not robot.inertials:
+        return
+    for name in robot.links:
+        if name not in robot.inertials and name not in robot.fixed:
+            robot.inertials[name] = Inertial(HERE, 1.0, UNIT)
+            robot.count("masses of links without one, 1 kg each as in SDF")
 
 
 def _version(root: Element) -> tuple[int, ...]:
@@ -100,19 +121,7 @@ def _version(root: Element) -> tuple[int, ...]:
         ) from None
 
 
-class _Short:
-    """Full names without the model, if there is only one at the top."""
-
-    def __init__(self, frames: Frames) -> None:
-        tops = [full for full, each in frames.models.items() if not each.scope]
-        outside = any(not each.scope for each in (*frames.links.values(), *frames.joints.values()))
-        self.prefix = f"{tops[0]}{SCOPE}" if len(tops) == 1 and not outside else ""
-
-    def __call__(self, full: str) -> str:
-        return full.removeprefix(self.prefix)
-
-
-def _joints(robot: Robot, frames: Frames, short: _Short, version: tuple[int, ...]) -> None:
+def _joints(robot: Robot, frames: Frames, short: Short, version: tuple[int, ...]) -> None:
     world = "world"
     while world in robot.links:
         world += "'"
@@ -136,6 +145,8 @@ def _joints(robot: Robot, frames: Frames, short: _Short, version: tuple[int, ...
         joint = _joint(robot, frames, full, short(full), links, place, version)
         robot.joints.append(joint)
         _mimics(robot, frames, short, full, joint.moves)
+        if (mimic := mimic_of(frames, short, full, joint)) is not None:
+            robot.mimics.append(mimic)
 
 
 def _joint(
@@ -208,7 +219,7 @@ def _axis(frames: Frames, full: str, tag: str, place: Place, version: tuple[int,
     return place.direction(direction(axis if xyz is None else xyz, numbers))
 
 
-def _mimics(robot: Robot, frames: Frames, short: _Short, full: str, moves: Sequence[Move]) -> None:
+def _mimics(robot: Robot, frames: Frames, short: Short, full: str, moves: Sequence[Move]) -> None:
     """Add the mimics of the axes."""
     framed = frames.joints[full]
     for tag, move in zip(("axis", "axis2"), moves, strict=False):

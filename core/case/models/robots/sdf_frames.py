@@ -174,6 +174,18 @@ class Frames:
         return False
 
 
+class Short:
+    """Full names without the model, if there is only one at the top."""
+
+    def __init__(self, frames: Frames) -> None:
+        tops = [full for full, each in frames.models.items() if not each.scope]
+        outside = any(not each.scope for each in (*frames.links.values(), *frames.joints.values()))
+        self.prefix = f"{tops[0]}{SCOPE}" if len(tops) == 1 and not outside else ""
+
+    def __call__(self, full: str) -> str:
+        return full.removeprefix(self.prefix)
+
+
 def joined(scope: str, name: str) -> str:
     """Return the full name of a name in a scope."""
     return f"{scope}{SCOPE}{name}" if scope else name

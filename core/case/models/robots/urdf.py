@@ -19,6 +19,7 @@ from ..mjcf.elements import Element
 from ..mjcf.frames import HERE, Place
 from .as_mjcf import fitted
 from .beside import read_beside
+from .inertials import urdf_inertial
 from .robot import Connection, Kind, Loop, Mimic, Move, Robot
 from .values import direction, named, only_child, require_children, required, roll_pitch_yaw
 
@@ -102,8 +103,11 @@ def _links(robot: Robot) -> None:
             )
         robot.elements[name] = element
         require_children(element, IN_LINK)
+        if (inertial := urdf_inertial(element)) is not None:
+            robot.inertials[name] = inertial
         for child in element.children:
-            robot.count(child.tag)
+            if child.tag != "inertial":
+                robot.count(child.tag)
     if not robot.elements:
         raise robot.root.fault("has no link, expected a mechanism; give a robot that moves")
 

@@ -6,6 +6,7 @@ from .base import Role, Template
 from .double_wishbone import DOUBLE_WISHBONE, REDUCED_DOUBLE_WISHBONE
 from .five_link import FIVE_LINK
 from .mcpherson import MCPHERSON
+from .pushrod import PUSHROD_KNUCKLE, PUSHROD_LOWER_ARM, PUSHROD_UPPER_ARM
 from .semi_trailing_arm import SEMI_TRAILING_ARM
 from .three_link import THREE_LINK
 
@@ -15,6 +16,9 @@ TEMPLATES = {
         MCPHERSON,
         DOUBLE_WISHBONE,
         REDUCED_DOUBLE_WISHBONE,
+        PUSHROD_LOWER_ARM,
+        PUSHROD_UPPER_ARM,
+        PUSHROD_KNUCKLE,
         FIVE_LINK,
         THREE_LINK,
         SEMI_TRAILING_ARM,

@@ -17,6 +17,11 @@ from .....mechanism.mechanism import GROUND, Point, Vector
 KNUCKLE = "knuckle"
 """The body that carries the wheel, in every template."""
 
+_SIDES = (
+    re.compile(r"(?P<name>.+?)_(?P<side>left|right|l|r|fl|fr|rl|rr)"),
+    re.compile(r"(?P<side>left|right|fl|fr|rl|rr)_(?P<name>.+)"),
+)
+"""Side or corner at the end of a normal name, or before it."""
 
 Kingpin: TypeAlias = tuple[str, str] | tuple[tuple[str, str], ...]
 
@@ -96,6 +101,18 @@ def normal(name: str) -> str:
     return re.sub(r"^hp[ls]_", "", plain)
 
 
+def side_of(name: str) -> tuple[str, str]:
+    """Return a hardpoint's normal name without the side or corner in it, and the side: "left",
+    "right" or none.
+    """
+    plain = normal(name)
+    for pattern in _SIDES:
+        if found := pattern.fullmatch(plain):
+            side = found["side"]
+            return found["name"], "left" if side in ("left", "l", "fl", "rl") else "right"
+    return plain, ""
+
+
 def flattened(kingpin: Kingpin | tuple[()]) -> list[str]:
     """Return the roles of a steering axis."""
     return [role for each in kingpin for role in ([each] if isinstance(each, str) else each)]
@@ -117,16 +134,34 @@ def between(a: Vector, b: Vector) -> Vector:
     return b[0] - a[0], b[1] - a[1], b[2] - a[2]
 
 
-WHEEL_CENTER = Role("wheel_center", "the wheel's centre", ("wheel", "Spindle/COM"))
+WHEEL_CENTER = Role(
+    "wheel_center", "the wheel's centre", ("wheel", "Spindle/COM", "wheel_center_point")
+)
 TIEROD_INNER = Role(
     "tierod_inner",
     "the tie rod's joint on the rack or chassis",
-    ("Tierod/Location Chassis", "tierod_chassis", "tierod_rack"),
+    (
+        "Tierod/Location Chassis",
+        "tierod_chassis",
+        "tierod_rack",
+        "tierod_inboard",
+        "trackrod_inboard",
+        "Inner track rod ball joint",
+        "CHAS_TiePnt",
+    ),
 )
 TIEROD_OUTER = Role(
     "tierod_outer",
     "the tie rod's joint on the knuckle",
-    ("Tierod/Location Upright", "tierod_upright", "tierod_knuckle"),
+    (
+        "Tierod/Location Upright",
+        "tierod_upright",
+        "tierod_knuckle",
+        "tierod_outboard",
+        "trackrod_outboard",
+        "Outer track rod ball joint",
+        "UPRI_TiePnt",
+    ),
 )
 WHEEL_CONTACT = Role(
     "wheel_contact",

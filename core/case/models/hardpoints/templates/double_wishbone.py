@@ -48,22 +48,45 @@ def _rods(at: Mapping[str, Vector]) -> Sequence[Joint]:
 
 
 def _arm(arm: str, level: str) -> tuple[Role, Role, Role]:
+    """Return the roles of an arm, with its names in Project Chrono, OptimumK (CHAS_LowFor) and
+    Lotus Suspension Analysis (Lower wishbone front pivot).
+    """
     chrono, plain = f"{level.capitalize()} Control Arm", f"{level}_arm"
+    wishbone, optimum = f"{level}_wishbone", level[:3].capitalize()
     return (
         Role(
             f"{arm}_front",
             f"the {level} arm's front pivot on the chassis",
-            (f"{chrono}/Location Chassis Front", f"{plain}_front"),
+            (
+                f"{chrono}/Location Chassis Front",
+                f"{plain}_front",
+                f"{wishbone}_front_pivot",
+                f"{wishbone}_inboard_front",
+                f"CHAS_{optimum}For",
+            ),
         ),
         Role(
             f"{arm}_rear",
             f"the {level} arm's rear pivot on the chassis",
-            (f"{chrono}/Location Chassis Back", f"{plain}_rear"),
+            (
+                f"{chrono}/Location Chassis Back",
+                f"{plain}_rear",
+                f"{wishbone}_rear_pivot",
+                f"{wishbone}_inboard_rear",
+                f"CHAS_{optimum}Aft",
+            ),
         ),
         Role(
             f"{arm}_outer",
             f"the {level} arm's ball joint on the knuckle",
-            (f"{chrono}/Location Upright", f"{plain}_outer"),
+            (
+                f"{chrono}/Location Upright",
+                f"{plain}_outer",
+                f"{level}_ball_joint",
+                f"{wishbone}_outer_ball_joint",
+                f"{wishbone}_outboard",
+                f"UPRI_{optimum}Pnt",
+            ),
         ),
     )
 

@@ -11,7 +11,7 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from ...io.document import fault, shown
+from .document import fault, shown
 
 _SIGNS = re.compile(r"[.,]")
 _GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")

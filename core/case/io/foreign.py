@@ -1,0 +1,103 @@
+"""Files of other programs that people give for a text: recognised by their first bytes, each with
+its name and a remedy.
+"""
+
+from __future__ import annotations
+
+import codecs
+import io
+import re
+import zipfile
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+
+EXCEL, ARCHIVE = "an Excel workbook", "a zip archive"
+_TABLE = "export the table as CSV or .xlsx"
+_OFFICE = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
+_ZIP = b"PK\x03\x04"
+_SIGNATURES: Sequence[tuple[bytes, str, str]] = (
+    (b"%PDF", "a PDF document", "export the numbers from the program that made it, as CSV"),
+    (b"%!PS", "a PostScript document", "export the numbers from the program that made it, as CSV"),
+    (b"{\\rtf", "a rich text document", "copy the table into a spreadsheet and save it as CSV"),
+    (b"\x89PNG", "a PNG image", "type the numbers into a table"),
+    (b"\xff\xd8\xff", "a JPEG image", "type the numbers into a table"),
+    (b"GIF8", "a GIF image", "type the numbers into a table"),
+    (b"II*\x00", "a TIFF image", "type the numbers into a table"),
+    (b"MM\x00*", "a TIFF image", "type the numbers into a table"),
+    (b"RIFF", "an image or a sound", "type the numbers into a table"),
+    (b"\x1f\x8b", "a gzip archive", "unpack it and give the file inside"),
+    (b"7z\xbc\xaf\x27\x1c", "a 7z archive", "unpack it and give the file inside"),
+    (b"Rar!", "a RAR archive", "unpack it and give the file inside"),
+    (b"BZh", "a bzip2 archive", "unpack it and give the file inside"),
+    (b"\xfd7zXZ", "an xz archive", "unpack it and give the file inside"),
+    (b"MATLAB 5.0 MAT-file", "a MATLAB file", "write the table in MATLAB: writetable(T, 'a.csv')"),
+    (b"\x89HDF", "an HDF5 file", _TABLE),
+    (b"SQLite format 3", "an SQLite database", _TABLE),
+    (b"PAR1", "a Parquet file", _TABLE),
+    (
+        _OFFICE,
+        "an Excel file before 2007 (.xls), another old Office file, or one with a password",
+        "save it as .xlsx without a password, or as CSV",
+    ),
+)
+# A web page begins so; models in XML have other first elements.
+_HTML = re.compile(rb"\s*(?:<!doctype\s+html|<html|<table|<meta)\b", re.IGNORECASE)
+_MEMBERS: Sequence[tuple[Callable[[str], bool], str, str]] = (
+    (
+        lambda name: name.startswith("xl/"),
+        EXCEL,
+        "name it .xlsx, or save the sheet as CSV",
+    ),
+    (
+        lambda name: name.startswith("word/"),
+        "a Word document",
+        "copy the table into a spreadsheet and save it as CSV",
+    ),
+    (
+        lambda name: name.startswith("ppt/"),
+        "a PowerPoint presentation",
+        "copy the table into a spreadsheet and save it as CSV",
+    ),
+    (
+        lambda name: name == "content.xml",
+        "an OpenDocument file (.ods, .odt)",
+        "save it as .xlsx or as CSV",
+    ),
+)
+# Tab, line feed, form feed and carriage return are the only control characters of texts.
+_CONTROL = re.compile(rb"[\x00-\x08\x0b\x0e-\x1a\x1c-\x1f]")
+
+
+def foreign(data: bytes) -> str:
+    """Return what a file is if it is known to be no text, and what to do: "found a PDF document,
+    expected text; export ..."; empty for any other.
+    """
+    what, advice = recognised(data)
+    return f"found {what}, expected text; {advice}" if what else ""
+
+
+def binary(data: bytes) -> bool:
+    """Return whether data has control characters, which texts do not have."""
+    return _CONTROL.search(data) is not None
+
+
+def recognised(data: bytes) -> tuple[str, str]:
+    """Return what a file is, and what to do; empty texts if it may be a text."""
+    if data.startswith(_ZIP):
+        return _archive(data)
+    for start, what, advice in _SIGNATURES:
+        if data.startswith(start):
+            return what, advice
+    if _HTML.match(data.removeprefix(codecs.BOM_UTF8)):
+        return "a web page (HTML)", "open it in a spreadsheet program and save it as CSV or .xlsx"
+    return "", ""
+
+
+def _archive(data: bytes) -> tuple[str, str]:
+    """Return what an archive is by the names inside it; a damaged one is an archive."""
+    with suppress(zipfile.BadZipFile, ValueError, NotImplementedError, OSError):
+        names = zipfile.ZipFile(io.BytesIO(data)).namelist()
+        for known, what, advice in _MEMBERS:
+            if any(map(known, names)):
+                return what, advice
+    return ARCHIVE, "unpack it and give the file inside"

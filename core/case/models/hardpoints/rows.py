@@ -1,0 +1,204 @@
+"""Hardpoints in rows of cells, of a text or of a spreadsheet: a head `name,x,y,z`, then a row a
+point; or columns instead of rows.
+
+Titles above the head, further columns, a row of units, and rows that are no points are left out
+and listed. Rows above the head say facts: `units: mm`, `axes: rearward,right,up`, `template:
+mcpherson`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from ....errors import brief
+from ...io.decimal_sign import find_decimal_sign
+from ...io.document import fault, shown
+from ...io.workbook import Cell, Row
+from ...units import LENGTHS
+from .head import HEAD, Head, as_head, upright, written
+from .table import Hardpoint, HardpointTable, length_name, number
+from .templates import TEMPLATES
+from .templates.base import normal
+
+_UNIT = re.compile(r"[\[(]?\s*([a-z]+)\s*[\])]?", re.IGNORECASE)
+_REMARK = re.compile(r"(#?)\s*(unit|axes|template)s?\s*[:=,]+\s*(.+)", re.IGNORECASE)
+_ROLES = {
+    name
+    for template in TEMPLATES.values()
+    for role in (*template.roles, *template.optional)
+    for name in role.names
+}
+
+
+def read_rows(
+    file: Path,
+    tool: str,
+    rows: Sequence[Row],
+    said: Mapping[str, str],
+    delimiter: str = "",
+) -> HardpointTable:
+    """Return the points by name.
+
+    Args:
+        tool: program of the format.
+        rows: rows that are not blank.
+        said: facts from comments: unit, axes, template.
+        delimiter: the sign between the fields of a text.
+
+    Raises:
+        CaseError: no such head, or a row that does not match it.
+    """
+    found = upright(file, rows)
+    if found is None:
+        where, cells = rows[0]
+        raise fault(
+            file,
+            where,
+            f"found {shown(written(cells))}, expected the head {','.join(HEAD)}; write it above"
+            " the points",
+        )
+    rows, place = found
+    head = as_head(file, *rows[place])
+    assert head is not None  # its place was found by it
+    facts = dict(said)
+    left_out: list[str] = []
+    for where, cells in rows[:place]:
+        if fact := remark(cells):
+            facts.setdefault(*fact)
+        else:
+            left_out.append(f"{where} ({brief(written(cells))})")
+    body = list(rows[place + 1 :])
+    unit = head.unit
+    if unit is None and body and (below := _units(body[0][1])):
+        unit, body = below, body[1:]
+    if unit and length_name(facts.get("unit", unit)) != length_name(unit):
+        raise fault(
+            file,
+            rows[place][0],
+            f"found coordinates in {unit}, and {facts['unit']} in a comment, expected one unit;"
+            " correct either",
+        )
+    notes = [row for row in body if _is_note(row[1], head)]
+    points = _points(
+        file,
+        [
+            (where, _complete(file, where, cells, head, delimiter))
+            for where, cells in body
+            if not _is_note(cells, head)
+        ],
+        "," if delimiter == "," else ".,",
+    )
+    if not points:
+        raise fault(
+            file, "", "found a head and no row, expected hardpoints; the file was cut: save it anew"
+        )
+    left_out += [f"{where} ({brief(written(cells))})" for where, cells in notes]
+    left_out += [f"column {brief(name)}" for name in head.others]
+    return HardpointTable(
+        file,
+        tool,
+        points,
+        unit or facts.get("unit"),
+        facts.get("axes"),
+        facts.get("template"),
+        left_out,
+    )
+
+
+def remark(cells: Sequence[Cell], *, comment: bool = False) -> tuple[str, str] | None:
+    """Return the fact that a row says, and its value; None if it says none.
+
+    A spreadsheet divides a comment at its commas, and a title `units: mm` is in one cell or two.
+
+    Args:
+        comment: whether the row must be a comment.
+    """
+    text = written([cell for cell in cells if cell != ""])
+    found = _REMARK.fullmatch(text)
+    if found is None or (comment and not found.group(1)):
+        return None
+    return found.group(2).lower(), found.group(3).strip()
+
+
+def _points(
+    file: Path, body: Sequence[tuple[str, Sequence[Cell]]], grouping: str
+) -> dict[str, Hardpoint]:
+    places: list[tuple[str, list[tuple[str, Cell]]]] = []
+    points: dict[str, Hardpoint] = {}
+    lines: dict[str, str] = {}
+    for where, (cell, *cells) in body:
+        name = written([cell])
+        if not name or not name.isprintable():
+            raise fault(
+                file,
+                where,
+                f"found the name {name!r}, expected printable characters; name the point",
+            )
+        if name in lines:
+            raise fault(
+                file,
+                where,
+                f"{name}: given before, in {lines[name]}, expected once; remove one of them",
+            )
+        lines[name] = where
+        places.append(
+            (
+                name,
+                [
+                    (f"{where}: {name}: {axis}", each)
+                    for axis, each in zip("xyz", cells, strict=True)
+                ],
+            )
+        )
+    texts = [(where, cell) for _, cells in places for where, cell in cells if isinstance(cell, str)]
+    sign = find_decimal_sign(file, texts, grouping)
+    for name, cells in places:
+        x, y, z = (number(file, where, cell, sign) for where, cell in cells)
+        points[name] = Hardpoint((x, y, z), lines[name])
+    return points
+
+
+def _units(cells: Sequence[Cell]) -> str | None:
+    """Return the unit in a row of units below the head; None if the row is of a point."""
+    found = [
+        _UNIT.fullmatch(cell) if isinstance(cell, str) else None for cell in cells[1:] if cell != ""
+    ]
+    names = {length_name(each.group(1)) if each else "" for each in found}
+    return names.pop() if len(found) >= 3 and len(names) == 1 and names <= LENGTHS.keys() else None
+
+
+def _is_note(cells: Sequence[Cell], head: Head) -> bool:
+    """Return whether a row is no point: it lacks coordinates, and has the name of no point of a
+    template.
+    """
+    name, *coordinates = (cells[k] if k < len(cells) else "" for k in head.columns)
+    lacking = any(cell == "" for cell in coordinates)
+    return lacking and not (isinstance(name, str) and normal(name) in _ROLES)
+
+
+def _complete(
+    file: Path, where: str, cells: Sequence[Cell], head: Head, delimiter: str
+) -> list[Cell]:
+    """Return name, x, y and z of a row.
+
+    A decimal comma between commas makes a field of its own. It cannot be told from a value of a
+    further column, if the row may be shorter or longer than the head.
+    """
+    filled = len(cells)
+    while filled and cells[filled - 1] == "":
+        filled -= 1
+    headed = {k for k, name in enumerate(head.names) if name} | set(head.columns)
+    surplus = delimiter and any(cell != "" and k not in headed for k, cell in enumerate(cells))
+    exact = delimiter != "," or not head.others or len(cells) == len(head.names)
+    if surplus or not exact or max(head.columns) >= filled:
+        expected = [name or HEAD[0] for k, name in enumerate(head.names) if k in headed]
+        comma = "; a decimal comma needs semicolons between the fields" if delimiter == "," else ""
+        raise fault(
+            file,
+            where,
+            f"found {filled} fields, expected {len(expected)}: {', '.join(map(brief, expected))};"
+            f" complete the row{comma}",
+        )
+    return [cells[k] for k in head.columns]

@@ -1,0 +1,38 @@
+"""Hardpoints on a sheet of a spreadsheet file, see `rows`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ...io.document import fault, shown
+from ...io.workbook import one_sheet, read_sheets
+from .head import HEAD, has_head
+from .rows import read_rows
+from .table import HardpointTable
+
+# The most points that are read, and as many rows between them.
+MOST_ROWS = 20_000
+
+
+def read_spreadsheet(file: Path, wanted: str | None) -> HardpointTable:
+    """Return the points by name.
+
+    Args:
+        wanted: name of the sheet; None for the only one with a head.
+
+    Raises:
+        CaseError: the file is no readable workbook, no sheet or several have a head, or a row does
+            not match it.
+    """
+    sheets = read_sheets(file, wanted, MOST_ROWS)
+    tables = [sheet for sheet in sheets if has_head(file, sheet.rows)]
+    if sheets and not tables:
+        names = ", ".join(shown(sheet.name) for sheet in sheets)
+        raise fault(
+            file,
+            "",
+            f"found no head on the sheets {names}, expected {','.join(HEAD)}; write it above the"
+            " points",
+        )
+    sheet = one_sheet(file, tables, "--sheet NAME")
+    return read_rows(file, f"Sheet {shown(sheet.name)}:", sheet.rows, {})

@@ -1,0 +1,50 @@
+"""Units of a variation file: of offsets, and of the outputs of its study."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from ...joints import Kind
+from ...mechanism.dimension import ANGLE, LENGTH, Dimension
+from ..case import Case
+from ..io.document import fault
+from ..units import ANGLES, LENGTHS, RADIAN
+from .variation_schema import VaryUnits
+
+
+@dataclass(frozen=True)
+class FileUnits:
+    """Names of the units in which a study's outputs are shown and limited."""
+
+    length: str = "m"
+    angle: str = "rad"
+
+    @classmethod
+    def of(cls, units: VaryUnits, case: Case) -> FileUnits:
+        """Return those of a variation file, or of its case where it names none."""
+        return cls(units.length or case.length_unit, units.angle or case.angle_unit)
+
+
+SI = FileUnits()
+
+
+def unit_of_offsets(
+    file: Path, key: str, units: VaryUnits, kind: Kind, dimension: Dimension | None
+) -> tuple[str, float]:
+    """Return the SI unit of the offsets of a place, and the size of the file's unit in it.
+
+    Raises:
+        CaseError: the file names no unit of length, and needs one.
+    """
+    needed = ANGLE if kind is Kind.DIRECTION else dimension or LENGTH
+    if needed.length and units.length is None:
+        raise fault(
+            file,
+            "units.length",
+            f'missing, expected "m" or "mm" for {key}; say which unit it is in',
+        )
+    length = LENGTHS[units.length or "m"]
+    angle = RADIAN if units.angle is None else ANGLES[units.angle]
+    size = angle.power(length.power(1.0, needed.length), needed.angle)
+    return str(needed), size

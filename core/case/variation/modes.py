@@ -1,0 +1,13 @@
+"""Modes of a study: how its variants are chosen."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+
+class Mode(StrEnum):
+    """Choice of the variants."""
+
+    MONTE_CARLO = "monte_carlo"
+    GRID = "grid"
+    ONE_AT_A_TIME = "one_at_a_time"

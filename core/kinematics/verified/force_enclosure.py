@@ -1,0 +1,131 @@
+"""Forces of a proved sample as balls.
+
+The multipliers solve F'^T mu = G with the inverse of F' that the motion is enclosed by; see
+`exact_forces`. Rows left out as redundant carry nothing. What they could carry shows how far each
+force is determined: with the multiplier one of a row left out, the others balance it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from ...errors import KincheckError
+from ...program import Program
+from ...program.ball_executor import Ball, flint
+from .exact_forces import ForcePrograms
+
+WRENCH = 6
+"""Numbers of a joint's reaction: force, then moment."""
+
+Run = Callable[[Program, Sequence[Ball]], Sequence[Ball]]
+"""Runs a program at the proved state, with rates, accelerations, multipliers, speeds and angles."""
+
+
+class UnprovedError(KincheckError, ArithmeticError):
+    """There is no proof for a sample; the message gives the reason."""
+
+
+@dataclass(frozen=True, eq=False)
+class EnclosedForces:
+    """Forces of a sample, as balls.
+
+    Attributes:
+        joints: force [N] and moment [N m] by joint, six balls.
+        drivers, elements: effort or force by name [N or N m].
+        free: for each row left out what a multiplier of one adds to the joints and drivers, with
+            the unit of the frames in place of the metre.
+        power: sum of the powers [W], which contains zero.
+    """
+
+    joints: Mapping[str, Sequence[Ball]]
+    drivers: Mapping[str, Ball]
+    elements: Mapping[str, Ball]
+    free: Sequence[tuple[Mapping[str, Sequence[Ball]], Mapping[str, Ball]]]
+    power: Ball
+
+
+def enclose_forces(
+    programs: ForcePrograms,
+    kept: Sequence[int],
+    left_out: Sequence[int],
+    run: Run,
+    motion: Sequence[Sequence[Ball]],
+    speeds: Sequence[Ball],
+    near: Sequence[float],
+    inverse: Ball,
+) -> EnclosedForces:
+    """Return the forces of a sample.
+
+    Args:
+        kept, left_out: numbers of the rows solved, and of the others.
+        motion: first and second derivative of the state by time.
+        speeds: rates of the drivers [units/s or rad/s].
+        near: approximate angles of the joints of torsional springs [rad], which count their turns.
+        inverse: of F'.
+
+    Raises:
+        UnprovedError: an angle is not near the approximate one, or power is not balanced.
+    """
+    arb, matrix = flint().arb, flint().arb_mat
+    size = len(motion[0])
+    begin = [*motion[0], *motion[1]]
+    nothing = [arb(0)] * programs.rows
+
+    def further(multipliers: Sequence[Ball], angles: Sequence[Ball]) -> list[Ball]:
+        return [*begin, *multipliers, *speeds, *angles]
+
+    halves = run(programs.half_angles, further(nothing, [arb(0)] * len(near)))
+    angles = [
+        _angle(halves[2 * k], halves[2 * k + 1], about, programs.angles[k])
+        for k, about in enumerate(near)
+    ]
+
+    def carried(right: Sequence[Ball]) -> list[Ball]:
+        """Return the multipliers of all rows; zero of those left out."""
+        solved = (inverse.transpose() * matrix(size, 1, list(right))).entries()
+        found = list(nothing)
+        for row, value in zip(kept, solved, strict=False):  # those of lengths come last
+            found[row] = value
+        return found
+
+    demand = run(programs.demand, further(nothing, angles))
+    joints, drivers, rest = _split(programs, run(programs.forces, further(carried(demand), angles)))
+    *amounts, power = rest
+    if not power.contains(0):
+        raise UnprovedError(
+            f"the powers of drivers, masses and force elements sum up to {power.str(5)} W, expected"
+            " zero: an equation of the forces is wrong, please report it"
+        )
+    free: list[tuple[Mapping[str, Sequence[Ball]], Mapping[str, Ball]]] = []
+    rows = run(programs.left_out, further(nothing, angles))
+    for k, row in enumerate(left_out):
+        multipliers = carried([-x for x in rows[k * size : (k + 1) * size]])
+        multipliers[row] = arb(1)
+        free.append(_split(programs, run(programs.forces, further(multipliers, angles)))[:2])
+    return EnclosedForces(
+        joints, drivers, dict(zip(programs.wanted.elements, amounts, strict=True)), free, power
+    )
+
+
+def _split(
+    programs: ForcePrograms, values: Sequence[Ball]
+) -> tuple[dict[str, Sequence[Ball]], dict[str, Ball], Sequence[Ball]]:
+    """Return values by joint and driver, and the others."""
+    wanted = programs.wanted
+    last = WRENCH * len(wanted.joints)
+    joints = {name: values[WRENCH * k : WRENCH * (k + 1)] for k, name in enumerate(wanted.joints)}
+    end = last + len(wanted.drivers)
+    return joints, dict(zip(wanted.drivers, values[last:end], strict=True)), values[end:]
+
+
+def _angle(sine: Ball, cosine: Ball, near: float, joint: str) -> Ball:
+    """Return the angle of a joint near an approximate one."""
+    principal, turn = 2 * flint().arb.atan2(sine, cosine), 2 * flint().arb.pi()
+    angle = principal + round((near - float(principal.mid())) / math.tau) * turn
+    if not abs(angle - near) < 0.5:
+        raise UnprovedError(
+            f"the angle of joint {joint!r}, {angle.str(5)}, is not near the approximate {near:.5g}"
+        )
+    return angle

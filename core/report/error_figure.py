@@ -1,0 +1,131 @@
+"""Figures of differences to the standard, on log axes with a floor for exact zeros."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from ..harness.record import Deviation
+from ..unit_text import with_unit
+from .axis import Axis
+from .figures import MARKERS, Figure, Style, Values, taken, ticks
+
+RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def error_figure(
+    motion: str,
+    unit: str,
+    axis: Axis,
+    curves: Sequence[tuple[Style, Values, Deviation]],
+    standard: Values,
+) -> Figure:
+    """Absolute error of each engine per sample on a log axis, with the tolerance and the worst
+    sample.
+
+    An error of zero has no place on the axis: the page draws it on a labelled floor,
+    `layout.meta.floor`.
+
+    Args:
+        unit: of the errors.
+        curves: the judged engines and their deviations; at least one.
+        standard: the values compared with.
+    """
+    traces: list[Figure] = []
+    for style, values, _ in curves:
+        errors = taken(absolute_errors(values, standard), axis.kept, 1.0)
+        # three digits are as many as an error deserves, and keep the page small
+        rounded = [None if e is None else float(f"{e:.2e}") for e in errors]
+        line = {"width": 1.2, "color": style.colour, "dash": style.dash}
+        marker = {
+            "size": 5,
+            "symbol": style.symbol,
+            "color": style.colour,
+            "maxdisplayed": 3 * MARKERS,
+        }
+        look = {
+            "name": style.name,
+            "uid": style.key,
+            "meta": style.name,
+            "line": line,
+            "marker": marker,
+        }
+        traces.append(
+            {"type": "scatter", "mode": "lines+markers", "x": "driver", "y": rounded, **look}
+        )
+    worst = max((deviation for *_, deviation in curves), key=lambda deviation: deviation.max_abs)
+    if worst.worst_step < len(axis.values) and 0 < worst.max_abs < math.inf:
+        place = {
+            "x": [axis.scale * axis.values[worst.worst_step]],
+            "y": [worst.max_abs],
+            "hoverinfo": "skip",
+        }
+        ring = {"size": 15, "symbol": "circle-open", "color": "#7f7f7f", "line": {"width": 2}}
+        traces.append(
+            {
+                "type": "scatter",
+                "mode": "markers",
+                **place,
+                "marker": ring,
+                "uid": "worst",
+                "meta": "worst",
+            }
+        )
+    tolerance = worst.tolerance
+    positive = [e for trace in traces for e in trace["y"] if e]
+    ends = positive + ([tolerance] if tolerance else [])
+    low, high = min(positive, default=(tolerance or 1e-9) * 1e-6), max(ends, default=1.0)
+    side, floor = log_axis(with_unit(f"{motion} difference", unit), low, high)
+    layout: Figure = {
+        "xaxis": (
+            {"title": {"text": axis.label}, "hoverformat": ".6~g", "zeroline": False} | ticks(axis)
+        ),
+        "yaxis": side,
+        "hovermode": "x unified",
+        "meta": {"floor": floor},
+    }
+    if tolerance:
+        line = {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": tolerance, "y1": tolerance}
+        below = {
+            "type": "rect",
+            "xref": "paper",
+            "x0": 0,
+            "x1": 1,
+            "y0": floor / 10,
+            "y1": tolerance,
+            "layer": "below",
+        }
+        layout["shapes"] = [
+            {**below, "line": {"width": 0}, "fillcolor": "rgba(0,158,115,0.07)"},
+            {**line, "line": {"width": 1.5, "dash": "dot", "color": "#7f7f7f"}},
+        ]
+    return {"data": traces, "layout": layout}
+
+
+def log_axis(title: str, low: float, high: float) -> tuple[Figure, float]:
+    """A log axis for errors, and its lowest line: the floor, on which the page draws errors of
+    exactly zero.
+
+    Args:
+        low, high: the smallest and the largest value, both above zero.
+    """
+    first, last = math.floor(math.log10(low)) - 1, math.ceil(math.log10(high)) + 0.5
+    stride = max(1, math.ceil((last - first) / 6))
+    decades = range(first + 1, math.floor(last) + 1, stride)
+    powers = [f"10{str(d).translate(RAISED)}" for d in decades]
+    axis: Figure = {
+        "type": "log",
+        "title": {"text": title},
+        "range": [first - 0.4, last],
+        "tickvals": [10.0**first, *(10.0**d for d in decades)],
+        "ticktext": ["exactly 0", *powers],
+    }
+    return axis, 10.0**first
+
+
+def absolute_errors(values: Values, standard: Values) -> list[float | None]:
+    """Return the distance from the standard at each sample; None if either is unknown."""
+    return [
+        None if a is None or b is None else abs(a - b)
+        for a, b in zip(values, standard, strict=True)
+    ]

@@ -1,0 +1,87 @@
+"""The parts that all pages share: style sheet, scripts, packed data, and the templates' filters."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+import zlib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, cast
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+from ..case.io.escape import file_name
+from ..harness.labels import against, engine_name, known, number, output_label
+from ..unit_text import value_text, with_unit
+from .figures import Figure
+
+_HERE = Path(__file__).parent
+_SCRIPTS = ("axes.js", "plot.js", "scene.js", "report.js")
+
+LONG = 300
+"""Characters of a message that the page shows at once; the rest unfolds."""
+
+
+def environment(*folders: Path) -> Environment:
+    """Return the templates of these folders and of this one, with the filters of the macros."""
+    made = Environment(
+        loader=FileSystemLoader([*folders, _HERE]),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    cast("dict[str, Any]", made.filters).update(
+        number=number,
+        label=output_label,
+        engine=engine_name,
+        against=against,
+        known=known,
+        file_name=file_name,
+        parted=parted,
+        value_text=value_text,
+        with_unit=with_unit,
+    )
+    return made
+
+
+def style_sheet() -> str:
+    """Return the style sheet of all pages."""
+    return (_HERE / "report.css").read_text("utf-8")
+
+
+def figure_parts(
+    figures: Mapping[str, Figure],
+    *,
+    drivers: Mapping[str, Sequence[float]] | None = None,
+    scenes: Mapping[str, Any] | None = None,
+) -> dict[str, str]:
+    """Return style sheet, script and data of a page with figures, by their names in templates.
+
+    Args:
+        drivers: values for "driver" in traces, by section.
+        scenes: drawings of mechanisms, by section.
+    """
+    data = {"drivers": drivers or {}, "figures": figures, "scenes": scenes or {}}
+    return {
+        "css": style_sheet(),
+        "script": "\n".join((_HERE / name).read_text("utf-8") for name in _SCRIPTS),
+        "data": packed(json.dumps(data, allow_nan=False, separators=(",", ":"))),
+    }
+
+
+def parted(message: str) -> tuple[str, str]:
+    """Return the start of a long message, to the end of a line or sentence, and its rest."""
+    if len(message) <= LONG:
+        return message, ""
+    ends = [found.end() for found in re.finditer(r"\n+|[.;:] +", message) if found.end() <= LONG]
+    return (message[: ends[-1]], message[ends[-1] :]) if ends else (message, "")
+
+
+def packed(text: str) -> str:
+    """Return text as base64 of its zlib stream: a third of the size, and nothing in it can end its
+    script element.
+    """
+    return base64.b64encode(zlib.compress(text.encode(), 9)).decode("ascii")

@@ -1,0 +1,81 @@
+"""Values of force outputs from enclosed forces, and the reason where they are undetermined."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..forces import DETERMINED, Forces, Reaction
+from ..kinematics import EnclosedForces, Enclosure, Proofs
+from .native_error import Column
+
+FORCES_NOTE = (
+    " Forces are those of the solution: the multipliers of the rows solved, the rows left out carry"
+    " nothing. A component is printed where a multiplier of one of a row left out changes it by at"
+    f" most {DETERMINED:g}. Turns of torsional springs are counted as the native engine does."
+)
+
+
+def force_values(output: Any, found: Proofs) -> tuple[Sequence[Column], str | None]:
+    """Return a force output's values at the samples, as balls, and the reason if there are none.
+
+    A value is None where there is no proof, and where redundant rows leave it undetermined; there
+    are no rates.
+    """
+    column: list[Any] = [None] * len(found.samples)
+    none = [*column]
+    there = {
+        k: each.forces
+        for k, each in enumerate(found.samples)
+        if isinstance(each, Enclosure) and each.forces is not None
+    }
+    if not there:
+        return [none] * 3, None
+    forces = _forces([*there.values()])
+    values: list[Any] = output.values(forces).tolist()
+    for k, value in zip(there, values, strict=True):
+        column[k] = None if isinstance(value, float) else value
+    known = any(value is not None for value in column)
+    return [column, none, none], None if known else output.undetermined(_as_floats(forces)) or None
+
+
+def _forces(samples: Sequence[EnclosedForces]) -> Forces:
+    """Return the forces over the samples, in arrays of balls."""
+    first, n = samples[0], len(samples)
+
+    def reaction(name: str) -> Reaction:
+        table: Any = np.array([each.joints[name] for each in samples], dtype=object)
+        free: Any = np.zeros((n, 6, len(first.free)), dtype=object)
+        for k, each in enumerate(samples):
+            for column, (joints, _) in enumerate(each.free):
+                free[k, :, column] = joints[name]
+        return Reaction(table[:, :3], table[:, 3:], free)
+
+    def effort(each: EnclosedForces, name: str) -> Any:
+        unknown = any(not abs(drivers[name]) <= DETERMINED for _, drivers in each.free)
+        return np.nan if unknown else each.drivers[name]
+
+    def lanes(values: Sequence[Any]) -> Any:
+        return np.array(values, dtype=object)
+
+    return Forces(
+        {name: reaction(name) for name in first.joints},
+        {name: lanes([effort(each, name) for each in samples]) for name in first.drivers},
+        {name: lanes([each.elements[name] for each in samples]) for name in first.elements},
+        lanes([each.power for each in samples]),
+        np.zeros(n),
+    )
+
+
+def _as_floats(forces: Forces) -> Forces:
+    def floats(values: Any) -> Any:
+        return np.array(values, dtype=np.float64)
+
+    joints = {
+        name: Reaction(floats(each.force), floats(each.moment), floats(each.free))
+        for name, each in forces.joints.items()
+    }
+    drivers = {name: floats(each) for name, each in forces.drivers.items()}
+    return Forces(joints, drivers, {}, floats(forces.power), forces.largest_power)

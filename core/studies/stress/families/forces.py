@@ -1,0 +1,190 @@
+"""Mechanisms with loads: reactions, efforts and forces of elements, determined or not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from ....case.case import Case, Quantity
+from ....case.markers import with_markers
+from ....case.measures import DriverEffort, ElementForce, JointForce, JointMoment
+from ....joints import Joint, Revolute
+from ....mechanism.body import Body, Inertia
+from ....mechanism.drivers import JointAngle
+from ....mechanism.loads import (
+    Axes,
+    Force,
+    ForceElement,
+    SpringDamper,
+    Torque,
+    TorsionSpringDamper,
+)
+from ....mechanism.mechanism import GROUND, Mechanism
+from ....mechanism.motions import Motion, Sine
+from .base import Family, Rng, Specimen, as_case, bodies, direction, power, triple
+from .dimensions import crank_rocker
+from .loops import Builder
+from .planar import any_plane, four_bar
+
+LARGEST = 8
+# Shorter springs have directions that a small error turns far [m].
+SHORTEST = 0.1
+# Of the reach of loops: most specimens come to no singular pose, where forces grow without limit.
+NEAR = 0.3
+# Forces have bounds of their own here; an output cannot be without a tolerance.
+TOLERANCE = (1e-6, 1e-9, "the stress truth has bounds of its own")
+
+
+class Forces(Family):
+    """What joints and drivers carry."""
+
+    name = "forces"
+    about = (
+        f"loops of 3 to {LARGEST} bodies and planar four-bars with random masses, gravity, springs,"
+        " dampers and constant loads; some hinges twice, which leaves forces undetermined"
+    )
+    samples = 11
+
+    def specimen(self, rng: Rng, samples: int) -> Specimen:
+        """Every third one a four-bar of four hinges, of the others every second with a hinge
+        twice.
+        """
+        if rng.random() < 1.0 / 3.0:
+            plane = any_plane(rng)
+            mechanism, reach, what = four_bar(plane, *crank_rocker(rng)), 1.0, "four_bar"
+            along: Sequence[np.ndarray] = (plane.e1, plane.e2, np.array(plane.normal))
+        else:
+            mechanism, reach = _loop(rng)
+            reach *= NEAR
+            what, along = f"loop of {len(mechanism.bodies)} bodies", (direction(rng),)
+            if rng.random() < 0.5 and (doubled := _doubled(rng, mechanism)) is not None:
+                mechanism, what = doubled, f"{what}, a hinge twice"
+        mechanism = _loaded(rng, mechanism)
+        motions: dict[str, Motion] = {d.name: Sine(0.1 * reach, 0.7) for d in mechanism.drivers[1:]}
+        values = np.linspace(-reach, reach, samples)
+        rate = power(rng, -1.0, 1.0) * reach
+        outputs = _outputs(rng, mechanism, along)
+        return Specimen(
+            what,
+            partial(_case, mechanism, values, rate, motions, outputs),
+            facts=(("bodies", len(mechanism.bodies)),),
+        )
+
+
+def _case(
+    mechanism: Mechanism,
+    values: np.ndarray,
+    rate: float,
+    motions: dict[str, Motion],
+    outputs: Sequence[Quantity],
+) -> Case:
+    case = as_case(mechanism, mechanism.drivers[0].name, values, rate=rate, motions=motions)
+    return replace(
+        case,
+        mechanism=with_markers(mechanism, outputs),
+        outputs=(*case.outputs, *outputs),
+    )
+
+
+def _loop(rng: Rng) -> tuple[Mechanism, float]:
+    while (found := Builder(rng, bodies(rng, LARGEST)).built()) is None:
+        pass
+    return found
+
+
+def _doubled(rng: Rng, mechanism: Mechanism) -> Mechanism | None:
+    """Return the mechanism with a second hinge on the axis of a hinge: five redundant rows."""
+    hinges = [joint for joint in mechanism.joints if isinstance(joint, Revolute)]
+    if not hinges:
+        return None
+    hinge = hinges[int(rng.integers(len(hinges)))]
+    point = np.array(hinge.point) + rng.uniform(0.2, 0.5) * np.array(hinge.axis)
+    twin = replace(hinge, name=f"{hinge.name}_twin", point=triple(point))
+    return replace(mechanism, joints=[*mechanism.joints, twin])
+
+
+def _loaded(rng: Rng, mechanism: Mechanism) -> Mechanism:
+    """Return the mechanism with masses, gravity and force elements; some bodies have no mass, some
+    masses no inertia.
+    """
+    loaded = [_with_mass(rng, body, mechanism) for body in mechanism.bodies]
+    gravity = triple(9.81 * direction(rng)) if rng.random() < 0.9 else (0.0, 0.0, 0.0)
+    return replace(mechanism, bodies=loaded, gravity=gravity, forces=_elements(rng, mechanism))
+
+
+def _place(rng: Rng, mechanism: Mechanism, body: str) -> np.ndarray:
+    """Return a place near a joint of a body."""
+    near = [p for joint in mechanism.joints if body in joint.bodies for p in joint.points_on(body)]
+    start = np.array(near[int(rng.integers(len(near)))]) if near else np.zeros(3)
+    return start + rng.uniform(0.05, 0.3) * direction(rng)
+
+
+def _with_mass(rng: Rng, body: Body, mechanism: Mechanism) -> Body:
+    if rng.random() < 0.2:
+        return body
+    mass, inertia = power(rng, -1.0, 1.0), None
+    if rng.random() < 0.8:
+        points = 0.1 * rng.normal(size=(6, 3))
+        matrix = mass / 6.0 * (np.trace(points.T @ points) * np.eye(3) - points.T @ points)
+        inertia = _six(matrix)
+    center = triple(_place(rng, mechanism, body.name))
+    return replace(body, mass=mass, center_of_mass=center, inertia=inertia)
+
+
+def _six(matrix: np.ndarray) -> Inertia:
+    xx, yy, zz = (float(matrix[k, k]) for k in range(3))
+    return xx, yy, zz, float(matrix[0, 1]), float(matrix[1, 2]), float(matrix[0, 2])
+
+
+def _elements(rng: Rng, mechanism: Mechanism) -> list[ForceElement]:
+    """Return force elements; at least one, so that something acts without masses too."""
+    names = [GROUND, *(body.name for body in mechanism.bodies)]
+    found: list[ForceElement] = []
+    for k in range(int(rng.integers(1, 3))):
+        i, j = (str(name) for name in rng.choice(names, 2, replace=False))
+        start, end = (_place(rng, mechanism, name) for name in (i, j))
+        length = float(np.linalg.norm(end - start))
+        if length > SHORTEST:
+            stiffness, damping = power(rng, 1.0, 3.0), float(rng.choice([0.0, 1.0, 10.0]))
+            free = float(rng.uniform(0.5, 1.5)) * length
+            ends = (triple(start), triple(end))
+            found.append(SpringDamper(f"spring_{k + 1}", i, j, ends, stiffness, damping, free))
+    axes, body = rng.choice(list(Axes), 2), str(rng.choice(names[1:]))
+    place = triple(_place(rng, mechanism, body))
+    found.append(Force("push", body, place, triple(20.0 * direction(rng)), Axes(axes[0])))
+    if rng.random() < 0.5:
+        twist = triple(5.0 * direction(rng))
+        found.append(Torque("twist", str(rng.choice(names[1:])), twist, Axes(axes[1])))
+    driver = mechanism.drivers[0]
+    if isinstance(driver, JointAngle):
+        stiffness, angle = power(rng, 0.0, 2.0), float(rng.uniform(-0.5, 0.5))
+        found.append(TorsionSpringDamper("coil", driver.joint, stiffness, 0.5, angle))
+    return found
+
+
+def _outputs(rng: Rng, mechanism: Mechanism, along: Sequence[np.ndarray]) -> tuple[Quantity, ...]:
+    """Return forces of two joints, of a hinge and its twin if there is one, of all drivers and of
+    all force elements.
+    """
+    twins = [joint for joint in mechanism.joints if joint.name.endswith("_twin")]
+    others = [joint for joint in mechanism.joints if joint not in twins]
+    chosen: list[Joint] = [others[k] for k in rng.choice(len(others), 2, replace=False)]
+    axes = [*np.eye(3), *along]
+    found: list[Quantity] = [
+        cls(f"{joint.name}.{what}{k}", *TOLERANCE, joint=joint.name, direction=triple(axis))
+        for joint in (*chosen, *twins)
+        for cls, what in ((JointForce, "force"), (JointMoment, "moment"))
+        for k, axis in enumerate(axes)
+    ]
+    found += [
+        DriverEffort(f"{driver.name}.effort", *TOLERANCE, driver=driver.name)
+        for driver in mechanism.drivers
+    ]
+    found += [
+        ElementForce(f"{element.name}.amount", *TOLERANCE, force=element.name)
+        for element in mechanism.forces
+    ]
+    return tuple(output.bound(mechanism) for output in found)

@@ -1,0 +1,173 @@
+"""Variants inside and outside of specification limits, and capability indices.
+
+A variant keeps the limits of an output if it does so at every sample. The yield is the share of
+variants that do, of those that are known: a variant with missing samples counts only where one of
+its others is outside.
+
+    Cp  = (high - low) / (6 s)
+    Cpk = min(high - m, m - low) / (3 s)
+
+with the mean m and the standard deviation s of the variants at one sample; both suppose a normal
+distribution. By quantiles, without this supposition (ISO 22514-2, percentile method):
+
+    min((high - x50) / (x99.865 - x50), (x50 - low) / (x50 - x0.135))
+
+Of each index the least over the samples counts.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from ...case.variation.modes import Mode
+from ...trajectory import Array
+from .reduce import Summary
+from .study import Study
+
+CONFIDENCE = 0.95
+# Shares of a normal distribution below and above three standard deviations.
+TAIL = 0.00135
+# A spread below this part of the limits or of the mean is round-off: all variants are the same.
+NO_SPREAD = 1e-12
+
+
+class Capability(msgspec.Struct, frozen=True, kw_only=True):
+    """How an output keeps its limits over all variants [SI].
+
+    Attributes:
+        output: its name; empty for all limits together.
+        low, high: the limits; null where there is none.
+        known: variants that are inside or outside.
+        below, above: variants below and above somewhere; a variant may be both.
+        outside: variants outside somewhere.
+        unknown: variants with missing samples that are not outside elsewhere.
+        share: the yield, (known - outside) / known.
+        interval: 95 % confidence interval of the yield, by Clopper and Pearson; null unless
+            variants are drawn.
+        cp, cpk, by_quantiles: least index over the samples; null where the spread is zero, no
+            distribution is drawn or, by quantiles, where variants are too few.
+        sample: where Cpk is least.
+    """
+
+    output: str
+    unit: str
+    low: float | None
+    high: float | None
+    known: int
+    below: int
+    above: int
+    outside: int
+    unknown: int
+    share: float | None
+    interval: tuple[float, float] | None
+    cp: float | None = None
+    cpk: float | None = None
+    by_quantiles: float | None = None
+    sample: int | None = None
+
+
+@dataclass(frozen=True)
+class _Least:
+    """The least of an index over the samples, and where it is."""
+
+    value: float | None
+    sample: int | None
+
+    @staticmethod
+    def of(index: Array) -> _Least:
+        if np.isnan(index).all():
+            return _Least(None, None)
+        sample = int(np.nanargmin(index))
+        value = float(index[sample])
+        return _Least(value if math.isfinite(value) else None, sample)
+
+
+def capabilities(
+    study: Study, counts: NDArray[np.int64], whole: Summary, kept: Sequence[Sequence[Array]]
+) -> list[Capability]:
+    """Return how every limited output keeps its limits, then all of them together.
+
+    Args:
+        counts: as of a chunk, summed over all.
+        kept: values of the random subset by row, parts of shape (n, some).
+    """
+    if not study.limits:
+        return []
+    found = [
+        _with_indices(study, k, _of_counts(study, k, counts[k]), whole, kept)
+        for k in range(len(study.limits))
+    ]
+    return [*found, _of_counts(study, None, counts[-1])]
+
+
+def _of_counts(study: Study, index: int | None, counts: NDArray[np.int64]) -> Capability:
+    total, below, above, outside, unknown = map(int, counts)
+    known = total - unknown
+    drawn = study.variation.mode is Mode.MONTE_CARLO
+    limit = None if index is None else study.limits[index]
+    row = None if limit is None else study.rows[limit.row]
+    return Capability(
+        output="" if row is None else row.name,
+        unit="" if row is None else row.unit,
+        low=None if limit is None or math.isinf(limit.low) else limit.low,
+        high=None if limit is None or math.isinf(limit.high) else limit.high,
+        known=known,
+        below=below,
+        above=above,
+        outside=outside,
+        unknown=unknown,
+        share=(known - outside) / known if known else None,
+        interval=_interval(known - outside, known) if known and drawn else None,
+    )
+
+
+def _interval(inside: int, known: int) -> tuple[float, float]:
+    stats: Any = importlib.import_module("scipy.stats")  # loaded on use: it takes a second
+    found = stats.binomtest(inside, known).proportion_ci(CONFIDENCE, method="exact")
+    return float(found.low), float(found.high)
+
+
+def _with_indices(
+    study: Study,
+    index: int,
+    found: Capability,
+    whole: Summary,
+    kept: Sequence[Sequence[Array]],
+) -> Capability:
+    if study.variation.mode is not Mode.MONTE_CARLO:
+        return found
+    limit = study.limits[index]
+    mean, spread = whole.mean[limit.row], whole.deviation[limit.row]
+    size = np.fmax(np.abs(mean), limit.size)
+    spread = np.where(spread > NO_SPREAD * size, spread, 0.0)
+    values = np.concatenate(kept[limit.row], axis=1)
+    with np.errstate(all="ignore"):
+        cp = _Least.of((limit.high - limit.low) / (6.0 * spread))
+        cpk = _Least.of(np.minimum(limit.high - mean, mean - limit.low) / (3.0 * spread))
+    both = math.isfinite(limit.high - limit.low)
+    return msgspec.structs.replace(
+        found,
+        cp=cp.value if both else None,
+        cpk=cpk.value,
+        by_quantiles=_by_quantiles(values[spread > 0.0], limit.low, limit.high),
+        sample=cpk.sample,
+    )
+
+
+def _by_quantiles(values: Array, low: float, high: float) -> float | None:
+    """Return the least index by quantiles of variants, shape (n, V); None of too few."""
+    if values.shape[1] * TAIL < 1.0 or not np.isfinite(values).any():
+        return None
+    known = values[np.isfinite(values).any(axis=1)]
+    below, middle, above = np.nanquantile(known, (TAIL, 0.5, 1.0 - TAIL), axis=1)
+    with np.errstate(all="ignore"):
+        index = np.minimum((high - middle) / (above - middle), (middle - low) / (middle - below))
+    return _Least.of(index).value

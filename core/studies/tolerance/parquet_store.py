@@ -1,0 +1,102 @@
+"""Store of the values of all variants, as Parquet."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+
+from ...case.variation.variation import Coordinate
+from ...errors import KincheckError
+from ...extras import library
+from .chunk import Chunk
+from .study import Study
+
+
+class ParquetStore:
+    """Writes the values of all variants as they come: a row for each variant, a row group for each
+    chunk.
+
+    Columns: variant, the offset of each coordinate [SI], and each output as a list over the
+    samples, NaN where there is no value. A coordinate that is named like an output, W.x say, has
+    the column W.x.offset. The file's metadata under the key "kincheck" says case, seed, mode,
+    units, signs and the driver's values, as JSON; where not all variants are there,
+    "kincheck.partial" says how many of how many.
+
+    Raises:
+        KincheckError: pyarrow is not installed, or the file cannot be written.
+    """
+
+    def __init__(self, path: Path, study: Study) -> None:
+        self._arrow = library("--store", "pyarrow", "parquet")
+        parquet = library("--store", "pyarrow.parquet", "parquet")
+        arrow, self._first, self._samples = self._arrow, 0, study.samples
+        n = len(study.case.sweep.values)
+        fields = [arrow.field("variant", arrow.int64())]
+        offsets = _offset_columns(study)
+        fields += [arrow.field(name, arrow.float64()) for name in offsets]
+        fields += [arrow.field(row.name, arrow.list_(arrow.float64(), n)) for row in study.rows]
+        about = {
+            "case": study.case.name,
+            "seed": study.seed,
+            "mode": str(study.variation.mode),
+            "units": (
+                {row.name: row.unit for row in study.rows}
+                | {name: each.unit for name, each in offsets.items()}
+            ),
+            "signs": study.case.signs,
+            "driver": {name: values.tolist() for name, values in study.case.sweep.moved.items()},
+        }
+        self._schema = arrow.schema(fields, metadata={"kincheck": json.dumps(about)})
+        try:
+            self._writer = parquet.ParquetWriter(path, self._schema)
+        except OSError as error:
+            raise KincheckError(
+                f"--store {path}: cannot be written ({error.strerror or error}); give a file"
+                " elsewhere"
+            ) from error
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._first < self._samples:
+            self._writer.add_key_value_metadata(
+                {"kincheck.partial": f"{self._first} of {self._samples} variants"}
+            )
+        self._writer.close()
+
+    def write(self, chunk: Chunk) -> None:
+        """Take a chunk; see `Store`."""
+        assert chunk.values is not None
+        assert chunk.offsets is not None
+        arrow = self._arrow
+        columns: list[Any] = [arrow.array(np.arange(self._first, self._first + chunk.count))]
+        columns += [arrow.array(each) for each in chunk.offsets]
+        for values in chunk.values:
+            flat = arrow.array(np.ascontiguousarray(values.T).ravel())
+            columns.append(arrow.FixedSizeListArray.from_arrays(flat, values.shape[0]))
+        try:
+            self._writer.write_table(arrow.table(columns, schema=self._schema))
+        except OSError as error:
+            raise KincheckError(
+                f"--store: cannot be written ({error}); free some room, or give a file elsewhere"
+            ) from error
+        self._first += chunk.count
+
+
+def _offset_columns(study: Study) -> dict[str, Coordinate]:
+    """The coordinates by the names of their columns."""
+    taken = {"variant", *(row.name for row in study.rows)}
+    return {
+        f"{each.name}.offset" if each.name in taken else each.name: each
+        for each in study.variation.coordinates
+    }

@@ -1,0 +1,189 @@
+"""Masses of models: those of MuJoCo itself, of URDF and SDF alike, and what is not read of them."""
+
+import kincheck.cases
+import numpy as np
+import pytest
+from kincheck.adapters.writers import mjcf, sdf
+from kincheck.core.algebra import vec
+from kincheck.core.case.io.model_writer import written
+from kincheck.core.case.io.reader_options import Supplied
+from kincheck.core.case.models.files import load
+from kincheck.core.case.models.mjcf.masses import Mass, together
+from kincheck.core.errors import CaseError
+from kincheck.core.kinematics import NativeSolver
+from kincheck.core.mechanism.body import inertia_matrix
+
+from .test_mjcf_start import tree_of
+
+mujoco = pytest.importorskip("mujoco")
+
+# Sums of some ten masses in metre-sized frames.
+EXACT = 1e-12
+
+WEIGHED = """<mujoco><compiler boundmass="0.01" balanceinertia="true" inertiagrouprange="0 2"/>
+<default><geom density="500"/><default class="c"><geom type="capsule" size="0.1 0.2"/></default></default>
+<worldbody><geom size="1"/>
+<body name="a" pos="1 0 2" euler="0 40 0"><joint name="h"/><geom class="c" pos="1 2 3" euler="10 20 30"/>
+  <geom type="box" size="0.1 0.2 0.3" quat="1 2 3 4" mass="3"/><geom size="1" mass="0"/>
+  <frame pos="1 0 0" euler="0 90 0" childclass="c"><geom/><geom type="ellipsoid" size="0.1 0.2 0.3"/></frame>
+  <body pos="0 0 1" euler="30 0 0"><geom type="cylinder" size="0.1" fromto="0 0 0 1 1 1"/>
+    <geom type="capsule" size="0.1" fromto="0 0 0 1 -1 1"/><geom type="box" size="0.1" fromto="0 0 0 1 -1 1"/>
+    <geom type="ellipsoid" size="0.1 0.3" fromto="0 0 0 1 -1 1"/><geom size="1" group="4"/></body></body>
+<body name="b" euler="1 2 3" pos="0 1 0"><joint type="slide"/><geom size="3"/>
+  <inertial pos="1 2 3" quat="1 .5 .2 0" mass="2" diaginertia="1 2 2.5"/></body>
+<body name="c" euler="1 2 3" pos="0 1 0"><joint type="ball"/><geom size="3"/>
+  <frame euler="20 30 40"><inertial pos="1 2 3" mass="2" fullinertia="1 2 2.5 .1 .2 .3"/></frame></body>
+<body name="d"><joint/><inertial pos="0 0 0" mass="0.001" diaginertia="1 2 4.5"/></body>
+</worldbody></mujoco>"""  # noqa: E501
+SETTINGS = {
+    "auto": "",
+    "geoms alone": '<compiler inertiafromgeom="true"/>',
+    "bounds": '<compiler boundmass="3" boundinertia="4"/>',
+    "all groups": '<compiler inertiagrouprange="0 5"/>',
+}
+
+
+@pytest.mark.parametrize("settings", SETTINGS.values(), ids=SETTINGS)
+def test_masses_are_those_of_mujoco(tmp_path, settings):
+    file = tmp_path / "model.xml"
+    file.write_text(WEIGHED.replace("<default>", settings + "<default>", 1))
+    model = mujoco.MjModel.from_xml_path(str(file))
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    _, tree = tree_of(file)
+    assert not tree.unweighed
+    for joint, k in zip(tree.chain, model.jnt_bodyid, strict=True):
+        parts = []
+        for body in np.flatnonzero(model.body_weldid == k):
+            axes = data.ximat[body].reshape(3, 3)
+            inertia = axes @ np.diag(model.body_inertia[body]) @ axes.T
+            parts.append(Mass(model.body_mass[body], vec(data.xipos[body]), inertia))
+        theirs = together(parts)
+        ours = together(tree.masses[joint.inner]).seen_in(tree.moving[joint.inner])
+        assert ours.mass == pytest.approx(theirs.mass, rel=EXACT)
+        assert np.allclose([*ours.center], [*theirs.center], rtol=0, atol=EXACT)
+        size = np.abs(theirs.inertia).max()
+        assert np.allclose(ours.inertia, theirs.inertia, rtol=0, atol=EXACT * size)
+
+
+MJCF = """<mujoco><compiler angle="radian" eulerseq="XYZ"/><worldbody><body name="arm" pos="0 0 1" euler="0.1 0.2 0.3"><joint name="J" axis="0 1 0"/>
+<inertial pos="0.5 0.1 0.2" mass="2" fullinertia="0.4 0.5 0.6 0.01 0.02 0.03"/>
+<body name="tip" pos="1 0 0"><inertial pos="0.1 0 0" euler="0 0 0.5" mass="1" diaginertia="0.1 0.2 0.25"/></body></body></worldbody></mujoco>"""  # noqa: E501
+URDF = """<robot name="r"><link name="base"/>
+<link name="arm"><inertial><origin xyz="0.5 0.1 0.2"/><mass value="2"/>
+<inertia ixx="0.4" iyy="0.5" izz="0.6" ixy="0.01" ixz="0.02" iyz="0.03"/></inertial></link>
+<link name="tip"><inertial><origin xyz="0.1 0 0" rpy="0 0 0.5"/><mass value="1"/><inertia ixx="0.1" iyy="0.2" izz="0.25"/></inertial></link>
+<joint name="J" type="continuous"><parent link="base"/><child link="arm"/><origin xyz="0 0 1" rpy="0.1 0.2 0.3"/><axis xyz="0 1 0"/></joint>
+<joint name="t" type="fixed"><parent link="arm"/><child link="tip"/><origin xyz="1 0 0"/></joint></robot>"""  # noqa: E501
+SDF = """<sdf version="1.11"><world name="w"><gravity>0 0 -9.81</gravity><model name="m">
+<link name="arm"><pose>0 0 1 0.1 0.2 0.3</pose><inertial><pose>0.5 0.1 0.2 0 0 0</pose><mass>2</mass>
+<inertia><ixx>0.4</ixx><iyy>0.5</iyy><izz>0.6</izz><ixy>0.01</ixy><ixz>0.02</ixz><iyz>0.03</iyz></inertia></inertial></link>
+<link name="tip"><pose relative_to="arm">1 0 0 0 0 0</pose><inertial><pose>0.1 0 0 0 0 0.5</pose><mass>1</mass>
+<inertia><ixx>0.1</ixx><iyy>0.2</iyy><izz>0.25</izz></inertia></inertial></link>
+<joint name="J" type="revolute"><parent>world</parent><child>arm</child><axis><xyz>0 1 0</xyz></axis></joint>
+<joint name="t" type="fixed"><parent>arm</parent><child>tip</child></joint></model></world></sdf>"""  # noqa: E501
+DRIVEN = Supplied(drive=("J:-0.4:0.4:5",))
+
+
+def case_of(tmp_path, text, supplied=DRIVEN):
+    ending = {"<m": "xml", "<r": "urdf", "<s": "sdf"}[text[:2]]
+    file = tmp_path / f"robot.{ending}"
+    file.write_text(text)
+    return load(file, supplied)
+
+
+def test_all_formats_have_the_same_masses(tmp_path):
+    cases = [case_of(tmp_path, text) for text in (MJCF, URDF, SDF)]
+    bodies = [case.mechanism.body("arm") for case in cases]
+    for case, body in zip(cases, bodies, strict=True):
+        assert case.mechanism.gravity == (0.0, 0.0, -9.81)
+        assert "with the masses of its bodies" in case.source
+        assert body.mass == 3.0
+        assert np.allclose(body.center_of_mass, bodies[0].center_of_mass, rtol=0, atol=EXACT)
+        assert np.allclose(body.inertia, bodies[0].inertia, rtol=0, atol=EXACT)
+
+
+def test_the_effort_of_a_robot_is_that_of_mujoco(tmp_path):
+    case = case_of(tmp_path, MJCF)
+    found = NativeSolver(compiled=False).prepare(case.mechanism, case.sweep.path, forces=["J"])(
+        1e-12
+    )
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "robot.xml"))
+    data = mujoco.MjData(model)
+    for angle, effort in zip(case.sweep.values, found.forces.drivers["J"], strict=True):
+        data.qpos[:], data.qvel[:] = angle, 1.0
+        mujoco.mj_inverse(model, data)
+        assert effort == pytest.approx(data.qfrc_inverse[0], rel=0, abs=1e-11)
+
+
+ROD = """<mujoco><worldbody><body name="a"><joint name="J" axis="0 1 0"/><inertial pos="0 0 1" mass="1" diaginertia="1 1 1"/>
+<body name="rod" pos="0 0 2"><joint name="B" type="ball"/><inertial pos="1 0 0" mass="2" diaginertia="0.1 1 1"/></body></body>
+<body name="c" pos="4 0 0"><joint name="D" axis="0 1 0"/><inertial pos="0 0 1" mass="1" diaginertia="1 1 1"/></body></worldbody>
+<equality><connect body1="rod" body2="c" anchor="4 0 0"/></equality></mujoco>"""  # noqa: E501
+
+
+def test_a_rod_has_its_mass_at_its_ends(tmp_path):
+    """Two kilograms, a quarter of the length from its first end."""
+    case = case_of(tmp_path, ROD)
+    assert "moments of inertia of rods, whose masses are at their ends: rod" in case.source
+    masses = {body.name: body for body in case.mechanism.bodies}
+    assert masses.keys() == {"a", "c"}
+    assert masses["a"].mass == 2.5
+    assert masses["c"].mass == 1.5
+    # the rod's weight at its centre, 1 m beside the crank's pin, is lifted by both
+    assert masses["a"].center_of_mass == pytest.approx((0.0, 0.0, (1.0 + 1.5 * 2.0) / 2.5))
+
+
+UNREADABLE = {
+    "a negative mass": (MJCF, 'mass="2"', 'mass="-2"', "arm"),
+    "no number": (URDF, 'value="2"', 'value="heavy"', "arm"),
+    "no rigid body": (URDF, 'ixx="0.4"', 'ixx="-4"', "arm"),
+    "of collisions": (SDF, "<inertial><pose>0.5", '<inertial auto="true"><pose>0.5', "arm"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "old", "new", "body"), UNREADABLE.values(), ids=UNREADABLE)
+def test_a_mass_that_cannot_be_read_never_stops_a_motion(tmp_path, text, old, new, body):
+    assert old in text
+    case = case_of(tmp_path, text.replace(old, new))
+    assert f"masses that cannot be read, of {body}" in case.source
+
+
+def test_a_mesh_has_an_unknown_mass(tmp_path):
+    text = (
+        '<mujoco><worldbody><body name="arm"><joint name="J"/><geom type="mesh" mesh="m"/></body>'
+        "</worldbody></mujoco>"
+    )
+    case = case_of(tmp_path, text)
+    assert "masses that cannot be read, of arm" in case.source
+    assert case.mechanism.gravity == (0.0, 0.0, 0.0)  # as long as nothing has a mass
+
+
+def test_settings_of_masses_are_checked(tmp_path):
+    with pytest.raises(CaseError, match="inertiafromgeom: found 'yes'"):
+        case_of(tmp_path, MJCF.replace("<compiler", '<compiler inertiafromgeom="yes"'))
+
+
+@pytest.mark.parametrize("writer", [mjcf, sdf], ids=["mjcf", "sdf"])
+def test_stand_ins_are_no_masses(tmp_path, writer):
+    """What kincheck writes for a mechanism without masses is read as one without masses."""
+    texts = written(load(kincheck.cases.FOLDER / "five_bar.toml"), writer.write)
+    file = tmp_path / ("model" + next(iter(texts)))
+    file.write_text(next(iter(texts.values())))
+    case = load(file, Supplied(drive=("left_pivot:0:0.1:3",), hold_rest=True))
+    assert not any(body.mass for body in case.mechanism.bodies)
+    assert "with the masses" not in case.source
+
+
+def test_inertia_is_in_global_axes_at_design(tmp_path):
+    """A bar along x in a body turned by 90 degrees about z lies along y."""
+    text = (
+        '<mujoco><option gravity="0 1 0"/><worldbody><body name="arm" euler="0 0 90">'
+        '<joint name="J"/><inertial pos="1 0 0" mass="1" diaginertia="0.1 1 1"/></body>'
+        "</worldbody></mujoco>"
+    )
+    case = case_of(tmp_path, text)
+    body = case.mechanism.body("arm")
+    assert np.allclose(body.center_of_mass, [0, 1, 0], rtol=0, atol=EXACT)
+    assert np.allclose(inertia_matrix(body.inertia), np.diag([1, 0.1, 1]), rtol=0, atol=EXACT)
+    assert case.mechanism.gravity == (0.0, 1.0, 0.0)

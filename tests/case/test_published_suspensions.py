@@ -1,0 +1,197 @@
+"""From public tables to curves: a published sweep of another program, and a Formula Student corner
+with pushrod and rocker against an independent solution.
+
+Sources are in tests/data/README.md.
+"""
+
+import csv
+from pathlib import Path
+
+import kincheck.cases
+import numpy as np
+import pytest
+from kincheck.adapters.native import Native
+from kincheck.core.case.io.reader_options import Supplied
+from kincheck.core.case.models.files import load
+from kincheck.core.cli.main import main
+from kincheck.core.harness.execution import Answer, Pair, attempt
+from scipy.optimize import least_squares
+
+DATA = Path(__file__).parents[1] / "data" / "hardpoints"
+# A tyre 270/55 on a 13 inch rim: 0.5 * 13 * 25.4 + 0.55 * 270 mm.
+RADIUS = 0.3136
+EXPLORER = Supplied(travel="-0.04:0.12:41", rack="-0.04:0.04", wheel_radius=str(RADIUS))
+
+
+def solved(case):
+    found = attempt(Pair(case, Native(), 1e-12, timed=False)).result
+    assert isinstance(found, Answer), found
+    assert found.message == ""
+    return {name: series.position for name, series in found.outputs.items()}
+
+
+@pytest.fixture(scope="module")
+def explorer():
+    return solved(load(DATA / "wishbone_explorer.csv", EXPLORER))
+
+
+@pytest.fixture(scope="module")
+def published():
+    with (DATA / "wishbone_explorer_sweep.csv").open() as lines:
+        rows = [{key: float(value) for key, value in row.items()} for row in csv.DictReader(lines)]
+    return {key: np.array([row[key] for row in rows]) for key in rows[0]}
+
+
+DEGREE, MM = np.pi / 180.0, 1e-3
+# Rack and wheel of the published sweep are up to 3e-6 mm off their targets (its columns target_rack
+# and wheel_travel). The slopes of all these curves by either are below 0.4 degrees/mm and 1 mm/mm,
+# those of the slopes below 0.01 degrees/mm^2; five such errors are allowed.
+ANGLE, LENGTH, SLOPE = 5 * 0.4 * 3e-6 * DEGREE, 5 * 3e-6 * MM, 5 * 0.01 * 3e-6 * DEGREE / MM
+SAME = {
+    "toe_angle": ("toe", DEGREE, ANGLE),
+    "caster": ("caster", DEGREE, ANGLE),
+    "kpi": ("kingpin_inclination", DEGREE, ANGLE),
+    "steering_axis_offset_ground": ("scrub_radius", MM, LENGTH),
+    "mechanical_trail": ("mechanical_trail", MM, LENGTH),
+    "wheel_center_x": ("wheel_center.x", MM, LENGTH),
+    "wheel_center_y": ("wheel_center.y", MM, LENGTH),
+    "deriv_toe_angle_wrt_hub_z": ("toe.per_travel", DEGREE / MM, SLOPE),
+    "deriv_caster_wrt_hub_z": ("caster.per_travel", DEGREE / MM, SLOPE),
+    "deriv_kpi_wrt_hub_z": ("kingpin_inclination.per_travel", DEGREE / MM, SLOPE),
+    "deriv_half_track_wrt_hub_z": ("half_track_change.per_travel", 1.0, SLOPE),
+}
+
+
+@pytest.mark.parametrize("theirs", SAME)
+def test_the_published_sweep(explorer, published, theirs):
+    """Rack and wheel move together; derivatives hold the rack."""
+    ours, unit, allowed = SAME[theirs]
+    assert np.abs(explorer[ours] - unit * published[theirs]).max() < allowed
+
+
+def test_the_published_half_track(explorer, published):
+    half_track = MM * published["half_track"]
+    change = explorer["half_track_change"] + 0.95 + RADIUS * 5.0 / np.hypot(150.0, 5.0)
+    assert np.abs(change - half_track).max() < LENGTH
+
+
+def test_the_published_camber(explorer, published):
+    """Seen from the front, where ISO 8855 has the angle of the wheel plane itself."""
+    toe, camber = explorer["toe"], explorer["camber"]
+    seen = np.arctan2(np.tan(camber), np.cos(toe))
+    assert np.abs(seen - DEGREE * published["camber"]).max() < ANGLE
+    by_camber = 1.0 / np.cos(camber) ** 2 / np.cos(toe)
+    by_toe = np.tan(camber) * np.sin(toe) / np.cos(toe) ** 2
+    slope = by_camber * explorer["camber.per_travel"] + by_toe * explorer["toe.per_travel"]
+    theirs = DEGREE / MM * published["deriv_camber_wrt_hub_z"]
+    assert np.abs(slope * np.cos(seen) ** 2 - theirs).max() < SLOPE
+
+
+def turn(w):
+    """A rotation matrix from a quaternion of which only the vector is given."""
+    x, y, z = w
+    s = np.sqrt(1.0 - np.dot(w, w))
+    k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + 2.0 * s * k + 2.0 * k @ k
+
+
+def corner(at, travel, start):
+    """Wheel and rocker at a travel, by distances alone: the upright on five rods, the pushrod, and
+    two distances that hold each rocker point to the rocker's axis.
+
+    Returns:
+        unknowns: shift and quaternion vector of the upright, place of two points of the rocker.
+    """
+    rods = [
+        ("lower_wishbone_inboard_front", "lower_wishbone_outboard"),
+        ("lower_wishbone_inboard_rear", "lower_wishbone_outboard"),
+        ("upper_wishbone_inboard_front", "upper_wishbone_outboard"),
+        ("upper_wishbone_inboard_rear", "upper_wishbone_outboard"),
+        ("trackrod_inboard", "trackrod_outboard"),
+    ]
+    wheel, outer = at["wheel_center"], at["pushrod_outboard"]
+    inner, spring = at["pushrod_inboard"], at["strut_bottom"]
+    ends = at["rocker_axis_a"], at["rocker_axis_b"]
+
+    def gaps(u):
+        def moved(point):
+            return wheel + u[:3] + turn(u[3:6]) @ (point - wheel)
+
+        a, b = u[6:9], u[9:12]
+        pairs = [(at[p], moved(at[q]), at[p], at[q]) for p, q in rods]
+        pairs += [(moved(outer), a, outer, inner), (a, b, inner, spring)]
+        pairs += [(end, now, end, then) for end in ends for now, then in ((a, inner), (b, spring))]
+        distances = [
+            np.dot(p - q, p - q) - np.dot(then - there, then - there) for p, q, then, there in pairs
+        ]
+        return [*distances, u[2] - travel]
+
+    found = least_squares(gaps, start, xtol=3e-16, ftol=3e-16, gtol=3e-16, x_scale="jac")
+    assert np.abs(found.fun).max() < 1e-13
+    return found.x
+
+
+def test_a_formula_student_corner_with_pushrod_and_rocker():
+    file = DATA / "formula_student_pushrod.csv"
+    case = load(file, Supplied(travel="0.03:7"))
+    found = solved(case)
+    rows = [line.split(",") for line in file.read_text().splitlines() if line[0] != "#"][1:]
+    at = {name: np.array([*map(float, xyz)]) / 1000.0 for name, *xyz in rows}
+    rest = np.concatenate([np.zeros(6), at["pushrod_inboard"], at["strut_bottom"]])
+    step = 1e-4
+    for k, travel in enumerate(case.sweep.values):
+        u = corner(at, travel, rest)
+        s = turn(u[3:6]) @ (0.0, 1.0, 0.0)
+        lengths = [
+            np.linalg.norm(corner(at, travel + d, u)[9:] - at["strut_top"])
+            for d in (-2 * step, -step, step, 2 * step)
+        ]
+        # by central differences of the fourth order: 1e-9 of rounding, less of truncation
+        rate = (lengths[0] - 8 * lengths[1] + 8 * lengths[2] - lengths[3]) / (12 * step)
+        true = {
+            "toe": np.arctan2(s[0], s[1]),
+            "camber": -np.arcsin(s[2]),
+            "wheel_center.x": u[0],
+            "wheel_center.y": u[1] + 0.6,
+        }
+        assert {name: found[name][k] for name in true} == pytest.approx(true, abs=1e-10)
+        assert found["spring_ratio"][k] == pytest.approx(-rate, abs=1e-8)
+
+
+STRUT = """# template: mcpherson
+# units: m
+# axes: rearward,left,up
+name,x,y,z
+lca_front,1.07,0.353,0.005
+lca_rear,1.27,0.353,0.005
+lca_outer,0.9676,0.66,-0.01
+strut_lower,0.97772,0.605,0.18
+strut_upper,1.0,0.55,0.6
+tierod_inner,1.14,0.355,0.1455
+tierod_outer,1.115,0.665,0.118
+wheel_center,0.975,0.715,0.101
+"""
+"""Points of the built-in case mcpherson_suspension, mirrored to the left by their axes."""
+ROAD = ("scrub_radius", "mechanical_trail", "roll_center_height", "half_track_change")
+
+
+def test_the_strut_of_the_paper(tmp_path):
+    """Against 50 digits of an independent solution; see the head of the built-in table."""
+    file = tmp_path / "strut.csv"
+    file.write_text(STRUT)
+    found = solved(load(file, Supplied(travel="0.08:33", wheel_radius="0.3")))
+    lines = (kincheck.cases.FOLDER / "mcpherson_suspension.csv").read_text().splitlines()
+    rows = [*csv.DictReader(line for line in lines if not line.startswith("#"))]
+    for name in ("toe", "camber", "caster", "kingpin_inclination", *ROAD):
+        true = np.array([float(row[name]) for row in rows])
+        assert np.abs(found[name] - true).max() < 1e-13, name
+
+
+def test_by_the_command_line(tmp_path, explorer):
+    """The curves leave as a table; there is nothing to compare a single engine with."""
+    options = ["--travel=-0.04:0.12:3", "--rack", "0.04", "--wheel-radius", str(RADIUS)]
+    file, out = str(DATA / "wishbone_explorer.csv"), tmp_path / "curves.csv"
+    assert main(["run", file, "--engine", "native", "--csv", str(out), *options]) == 2
+    rows = [row for row in csv.DictReader(out.read_text().splitlines()) if row["output"] == "toe"]
+    toe = [float(row["position"]) for row in rows]
+    assert toe == pytest.approx(explorer["toe"][::20], abs=1e-13)

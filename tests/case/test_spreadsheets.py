@@ -1,0 +1,220 @@
+"""Hardpoints and references in workbooks (.xlsx): values, titles, sheets; and what is refused."""
+
+import sys
+import zipfile
+from dataclasses import replace
+from datetime import datetime
+
+import numpy as np
+import pytest
+from kincheck.adapters.native import Native
+from kincheck.core.case.io import workbook
+from kincheck.core.case.io.case_file import load_case
+from kincheck.core.case.io.reader_options import LEFT_OUT
+from kincheck.core.case.models.files import load
+from kincheck.core.case.models.hardpoints import spreadsheet
+from kincheck.core.cli.main import main
+from kincheck.core.errors import CaseError
+from kincheck.core.harness.record import Outcome
+from kincheck.core.harness.run import run
+
+from ..support.case_texts import write
+from .test_hardpoint_dialects import POINTS, SAID, read, table
+from .test_reference_grid import AT, CRANK, OWN, curve
+
+openpyxl = pytest.importorskip("openpyxl")
+HEAD = ["name", "x", "y", "z"]
+ROWS = [HEAD, *([name, *at] for name, at in POINTS.items())]
+
+
+def book(folder, sheets, name="car.xlsx"):
+    """A workbook of sheets: rows of values by name, or a function that fills it."""
+    made = openpyxl.Workbook()
+    made.remove(made.active)
+    for title, rows in sheets.items():
+        sheet = made.create_sheet(title)
+        if callable(rows):
+            rows(sheet)
+        else:
+            for row in rows:
+                sheet.append(row)
+    file = folder / name
+    made.save(file)
+    return file
+
+
+@pytest.fixture
+def plain(tmp_path):
+    return read(tmp_path, table().replace(";", ",")).mechanism
+
+
+def merged(sheet):
+    sheet.append(["Front suspension, left", None, None, None, "rev 3"])
+    sheet.merge_cells("A1:D1")
+    sheet.append([])
+    sheet.append([None, "Coordinates", None, None])
+    sheet.merge_cells("B3:D3")
+    for row in ROWS:
+        sheet.append([None, *row])
+    sheet.append([])
+    sheet.append([None, "all from CAD"])
+    sheet.sheet_properties.tabColor = "1072BA"
+
+
+SHEETS = {
+    "as it is": {"Front": ROWS},
+    "merged titles, blank column": {"Front": merged},
+    "empty sheets beside": {"Notes": [["who", "when"], ["me", "now"]], "Empty": [], "Front": ROWS},
+    "texts for numbers": {"Front": [HEAD, *([n, *map(str, at)] for n, at in POINTS.items())]},
+    "German texts": {
+        "Vorn": [HEAD, *([n, *(str(x).replace(".", ",") for x in at)] for n, at in POINTS.items())]
+    },
+    "columns for rows": {"Front": [*map(list, zip(*ROWS, strict=True))]},
+    "units below": {"Front": [HEAD, [None, "mm", "mm", "mm"], *ROWS[1:]]},
+    "no head over the names": {"Front": [[None, "X [mm]", "Y [mm]", "Z [mm]"], *ROWS[1:]]},
+    "facts above": {"Front": [["units", "mm"], ["axes:", "rearward", "right", "up"], *ROWS]},
+    "three decimals": {"Front": [HEAD, *ROWS[1:-1], ["wheel_center", 0.25, -611.75, 228.25]]},
+}
+
+
+@pytest.mark.parametrize("kind", SHEETS)
+def test_sheets(tmp_path, plain, kind):
+    assert load(book(tmp_path, SHEETS[kind]), SAID).mechanism == plain
+
+
+def test_numbers_of_three_decimals_are_no_thousands(tmp_path):
+    """A text 1.125 beside whole numbers may be grouped; a number of a sheet is what it is."""
+    rows = [HEAD, *([name, *map(int, at)] for name, at in POINTS.items())]
+    rows[1][1] = -89.125
+    assert load(book(tmp_path, {"a": rows}), SAID).mechanism.points
+
+
+def test_the_left_out_is_listed(tmp_path):
+    source = load(book(tmp_path, {"Front": merged}), SAID).source
+    assert source.startswith("Sheet 'Front': hardpoints of car.xlsx on the template")
+    for part in ("row 1 (Front suspension, left", "row 3 (", "(,all from CAD)"):
+        assert part in source.split(LEFT_OUT)[1]
+
+
+def test_formulas_are_read_by_their_values(tmp_path, plain):
+    """openpyxl writes no values; a spreadsheet program does, as here into the file."""
+    rows = [list(row) for row in ROWS]
+    rows[1][1] = "=-90+0.25"
+    file = book(tmp_path, {"Front": rows})
+    with pytest.raises(CaseError, match=r"row 2: uca_front: x: found '=-90\+0.25'.*save the table"):
+        load(file, SAID)
+    with zipfile.ZipFile(file) as old:
+        parts = {name: old.read(name) for name in old.namelist()}
+    key = "xl/worksheets/sheet1.xml"
+    assert b"<v></v>" in parts[key] or b"<v />" in parts[key] or b"<v/>" in parts[key]
+    for empty in (b"<v></v>", b"<v />", b"<v/>"):
+        parts[key] = parts[key].replace(empty, b"<v>-89.75</v>", 1)
+    with zipfile.ZipFile(file, "w") as new:
+        for name, data in parts.items():
+            new.writestr(name, data)
+    assert load(file, SAID).mechanism == plain
+
+
+def test_a_sheet_is_chosen(tmp_path, plain, capsys):
+    rear = [HEAD, *([name, x, 2 * y, z] for name, (x, y, z) in POINTS.items())]
+    file = book(tmp_path, {"Front axle": ROWS, "Rear axle": rear, "Notes": [["x"]]})
+    with pytest.raises(
+        CaseError, match=r"on the sheets 'Front axle', 'Rear axle', .* --sheet NAME"
+    ):
+        load(file, SAID)
+    options = ["--template", "double_wishbone", "--units", "mm", "--axes", "adams"]
+    assert load(file, replace(SAID, sheet="Front axle")).mechanism == plain
+    assert main(["explain", str(file), *options, "--sheet", "Front"]) == 2
+    assert "found no sheet 'Front'" in capsys.readouterr().err
+    csv = tmp_path / "car.csv"
+    csv.write_text(table())
+    assert main(["explain", str(csv), *options, "--sheet", "Front"]) == 2
+    assert "--sheet: found for a hardpoint table" in capsys.readouterr().err
+
+
+FAULTS = {
+    "a date": (
+        {"a": [*ROWS[:-1], ["wheel_center", 0.25, datetime(2026, 5, 1), 228.25]]},
+        ["row 10: wheel_center: y", "'2026-05-01 00:00:00'", "took the number for a date"],
+    ),
+    "an error": (
+        {"a": [*ROWS[:-1], ["wheel_center", 0.25, "#DIV/0!", 228.25]]},
+        ["row 10: wheel_center: y", "'#DIV/0!'", "correct the number"],
+    ),
+    "a truth": (
+        {"a": [*ROWS[:-1], ["wheel_center", 0.25, True, 228.25]]},
+        ["row 10: wheel_center: y", "'True'"],
+    ),
+    "an empty coordinate": (
+        {"a": [*ROWS[:-1], ["wheel_center", 0.25, None, 228.25]]},
+        ["row 10: wheel_center: y", "''"],
+    ),
+    "no head": ({"a": ROWS[1:], "b": [["x"]]}, ["no head on the sheets 'a', 'b'", "name,x,y,z"]),
+    "nothing": ({"a": []}, ["no sheet with cells"]),
+    "many rows": ({"a": [*ROWS, *([f"p{k}", 1, 2, 3] for k in range(91))]}, ["than 100 rows"]),
+    "many columns": ({"a": [[*HEAD, *range(1200)]]}, ["1000 columns"]),
+}
+
+
+@pytest.mark.parametrize("kind", FAULTS)
+def test_faults(tmp_path, monkeypatch, kind):
+    monkeypatch.setattr(spreadsheet, "MOST_ROWS", 100)
+    sheets, fragments = FAULTS[kind]
+    file = book(tmp_path, sheets)
+    with pytest.raises(CaseError) as caught:
+        load(file, SAID)
+    message = str(caught.value)
+    assert message.startswith(f"{file}: ")
+    assert [each for each in fragments if each not in message] == [], message
+
+
+def test_a_damaged_workbook(tmp_path):
+    file = book(tmp_path, {"a": ROWS})
+    data = file.read_bytes()
+    for part in (data[: len(data) // 2], data[:30] + b"\0" * 200 + data[230:]):
+        file.write_bytes(part)
+        with pytest.raises(CaseError, match=r"workbook \(.*; save it anew as \.xlsx, or as CSV"):
+            load(file, SAID)
+
+
+def test_a_workbook_that_unpacks_to_much(tmp_path, monkeypatch):
+    monkeypatch.setattr(workbook, "MOST_BYTES", 10_000)
+    file = tmp_path / "car.xlsx"
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("xl/workbook.xml", " " * 10_001)
+    with pytest.raises(CaseError, match="unpacks to 10001 bytes, expected 10000"):
+        load(file, SAID)
+
+
+def test_without_openpyxl(tmp_path, monkeypatch):
+    file = book(tmp_path, {"a": ROWS})
+    monkeypatch.setitem(sys.modules, "openpyxl", None)
+    with pytest.raises(CaseError, match=r"needs openpyxl, .* pip install .*openpyxl.*as CSV"):
+        load(file, SAID)
+
+
+def judged(folder, sheets, sheet="", sweep=AT):
+    book(folder, sheets, "rig.xlsx")
+    text = CRANK.replace("SWEEP", sweep).replace("ATOL", "1e-6").replace("rig.csv", "rig.xlsx")
+    (record,) = run([load_case(write(folder, text + sheet))], [Native()], tol=1e-12).records
+    return record
+
+
+def test_a_reference_in_a_workbook(tmp_path):
+    """Typed with six digits, below a title, judged by them; shifted by two tolerances, found."""
+    rows = [[float(f"{x:.6g}") for x in row] for row in curve(OWN)]
+    sheets = {"Rig": [["Rig 3, sheet 12"], ["turn", "x", "y"], *rows]}
+    right = judged(tmp_path, sheets)
+    assert right.outcome is Outcome.PASS
+    assert "printed to 6 digits" in right.evidence.limits["x"]
+    shift = 2e3 * max(each.position.tolerance for each in right.errors.values())
+    sheets = {"Rig": [["turn", "x", "y"], *([t, x, y + shift] for t, x, y in rows)]}
+    assert judged(tmp_path, sheets).outcome is Outcome.FAIL
+
+
+def test_a_sheet_of_a_reference_is_chosen(tmp_path):
+    rows = np.array(curve(OWN)).tolist()
+    sheets = {"Rig": [["turn", "x", "y"], *rows], "Old": [["turn", "x", "y"], [0, 1, 2]]}
+    assert judged(tmp_path, sheets, 'sheet = "Rig"').outcome is Outcome.PASS
+    with pytest.raises(CaseError, match=r"sheets 'Rig', 'Old'.*sheet = \"NAME\" in \[reference\]"):
+        judged(tmp_path, sheets)

@@ -1,0 +1,177 @@
+"""Proved forces: closed forms to all digits, every case with masses, and what is refused."""
+
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from kincheck import cases
+from kincheck.core import kinematics
+from kincheck.core.kinematics.forces import equations
+from kincheck.core.kinematics.verified import exact_forces
+from kincheck.core.kinematics.verified.exact import as_decimal, as_double
+from kincheck.core.kinematics.verified.verified_sweep import prove
+from kincheck.core.mechanism.mechanism import Mechanism
+from kincheck.core.mechanism.motions import Path, Ramp
+from kincheck.core.program.ball_executor import precision
+from kincheck.core.studies.verified_reference import prove_case
+
+from ..support.loaded import loaded, pushed
+
+flint = pytest.importorskip("flint")
+BITS = 200
+# One exact rate, and angles on both sides of the design and beyond a turn.
+RATE = 1.5
+ANGLES = [-0.75, 0.0, 0.5, 7.0]
+
+
+def proved(mechanism: Mechanism, values=ANGLES, rate=RATE, reading=as_double):
+    """The samples of a sweep, and the native motion."""
+    (driver,) = mechanism.drivers
+    values = np.asarray(values, dtype=float)
+    drives = {
+        driver.name: [(Fraction(x), Fraction(rate), Fraction(0)) for x in values.tolist()],
+    }
+    members = (*mechanism.joints, *mechanism.drivers, *mechanism.forces)
+    names = [each.name for each in members]
+    path = Path({driver.name: Ramp(rate)}, values / rate)
+    found = prove(mechanism, path, ["tip"], drives, reading, BITS, 1e-12, names)
+    for each in found.samples:
+        assert isinstance(each, kinematics.Enclosure), each
+    return found
+
+
+def closed_form(angle):
+    """Effort, rod's pull along x on the slider, and spring tension of `loaded`, by work alone."""
+    # the angle grows in time at the rate; energies are series in the time
+    a = flint.arb_series([angle, RATE], prec=3)
+    half = flint.arb("0.5")
+    s = -2 - half * a.sin() + (4 - (half * (1 - a.cos())) ** 2).sqrt()
+    v, turned = s.derivative(), a.derivative()
+    crank_x = flint.arb("0.125") * a.cos()
+    stored = flint.arb("1.75") * v * v + half * 800 * (flint.arb("0.25") - s) ** 2
+    stored += half * 4 * (a + flint.arb("0.25")) ** 2
+    stored -= half * (2 * crank_x + flint.arb("3.5") * s)  # gravity along x is 0.5
+    lost = 16 * v * v + half * turned * turned + 8 * v - 3 * turned
+    effort = (stored.derivative() + lost)[0] / RATE
+    tension = (800 * (flint.arb("0.25") - s) - 16 * v)[0]
+    pull = flint.arb("3.5") * (v.derivative()[0] - half) - tension + 8
+    return effort, pull, tension
+
+
+@pytest.fixture(scope="module")
+def slider_crank():
+    return proved(loaded())
+
+
+def test_balls_hold_the_closed_form_of_every_load(slider_crank):
+    """Springs, dampers, constant loads, gravity: the truth is energy and one body's balance."""
+    with precision(BITS):
+        for angle, each in zip(ANGLES, slider_crank.samples, strict=True):
+            effort, pull, tension = closed_form(angle)
+            found = each.forces
+            pairs = (
+                (found.drivers["turn"], effort),
+                (found.joints["rod"][0], pull),
+                (found.elements["spring"], tension),
+                (found.elements["clock"], -(4 * flint.arb(angle + 0.25) + flint.arb("0.5") * RATE)),
+            )
+            for ball, truth in pairs:
+                assert ball.overlaps(truth)
+                assert ball.rad() < 1e-40
+            assert found.power.contains(0)
+
+
+def test_the_native_forces_are_in_the_balls_but_for_round_off(slider_crank):
+    native = slider_crank.native.forces
+    largest = max(np.abs(each.force).max() for each in native.joints.values())
+    for k, each in enumerate(slider_crank.samples):
+        for name, balls in each.forces.joints.items():
+            wrench = np.concatenate([native.joints[name].force[k], native.joints[name].moment[k]])
+            assert np.abs(wrench - [float(x) for x in balls]).max() < 1e-14 * largest
+
+
+def test_a_driven_point_has_its_effort():
+    """The same slider-crank, pushed at its tip: at one pose and rate the powers are equal."""
+    found = proved(pushed(), [0.25], 0.5)
+    (each,) = found.samples
+    effort = found.native.forces.drivers["push_tip"][0]
+    assert abs(float(each.forces.drivers["push_tip"]) - effort) < 1e-12 * abs(effort)
+
+
+def test_masses_are_read_as_decimals_or_doubles():
+    def tension(reading):
+        mechanism = loaded()
+        heavy = [replace(each, mass=0.1 * each.mass) for each in mechanism.bodies]
+        sample = proved(replace(mechanism, bodies=heavy), [0.5], reading=reading).samples[0]
+        with precision(BITS):
+            return sample.forces.joints["rod"][0]
+
+    difference = abs(float(tension(as_decimal) - tension(as_double)))
+    assert 1e-20 < difference < 1e-14
+
+
+CASES = [
+    "andrews_squeezer",
+    "bennett",
+    "bricard",
+    "four_bar",
+    "hooke_joint",
+    "mcpherson_strut_loaded",
+    "modelica_four_bar_distance",
+    "planar_slider_crank",
+    "rssr",
+    "rssr_other_branch",
+    "spatial_slider_crank",
+]
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_forces_of_every_case_with_masses_are_enclosed(name):
+    case = cases.load(name)
+    values = case.sweep.values[[1, len(case.sweep.values) // 3]]
+    outputs = tuple(each for each in case.outputs if each.forces)
+    few = replace(case, sweep=replace(case.sweep, values=values), outputs=outputs, reference={})
+    found, errors = prove_case(few, digits=30, numbers="double", tol=1e-12)
+    assert found.proved == 2
+    for output in outputs:
+        series = found.outputs[output.name]
+        assert series.reason is None
+        assert series.radius[0] < 1e-30
+        assert series.velocity == [None, None]
+    largest = max(abs(float(x)) for each in found.outputs.values() for x in each.position)
+    assert max(error.largest[0] for error in errors) < 1e-13 * largest
+
+
+def test_an_undetermined_component_is_refused_with_the_reason():
+    case = cases.load("four_bar")
+    (pin, *_) = [each for each in case.outputs if each.name == "coupler_pin_force_e1"]
+    loose = replace(pin, name="loose", direction=(0.3, 0.5, 0.7))
+    values = case.sweep.values[[1, 30]]
+    few = replace(
+        case, sweep=replace(case.sweep, values=values), outputs=(pin, loose), reference={}
+    )
+    found, errors = prove_case(few, digits=30, numbers="double", tol=1e-12)
+    assert found.outputs["coupler_pin_force_e1"].reason is None
+    assert "3 of 6 of both" in found.outputs["loose"].reason
+    assert found.outputs["loose"].position == [None, None]
+    assert {error.output: error.largest[0] for error in errors}["loose"] is None
+
+
+# Planted mistakes
+
+
+def test_a_wrong_sign_of_gravity_is_no_proof(monkeypatch):
+    right = equations.inertial
+    monkeypatch.setattr(equations, "inertial", lambda body, at, g: right(body, at, -g))
+    with pytest.raises(AssertionError, match="the powers of drivers, masses and force elements"):
+        proved(loaded(), [0.5])
+
+
+def test_a_wrong_torque_of_euler_parameters_is_no_proof(monkeypatch):
+    right = exact_forces._by_state
+    monkeypatch.setattr(
+        exact_forces, "_by_state", lambda traced, demand: [0.5 * x for x in right(traced, demand)]
+    )
+    with pytest.raises(AssertionError, match="the powers of drivers, masses and force elements"):
+        proved(loaded(), [0.5])
