@@ -110,12 +110,11 @@ class _Model:
             _text(marker, "socket_parent_frame", _path(point.body))
             _text(marker, "location", numbers(self.local(point.body, point.position)))
 
+        self.sprung = set[str]()
         if mechanism.forces:
             forces = ET.SubElement(model, "ForceSet", name="forceset")
             forces = ET.SubElement(forces, "objects")
-            for force in mechanism.forces:
-                self.add_spring(forces, force)
-        self.sprung = {each.name for each in mechanism.forces}
+            self.sprung = {f.name for f in mechanism.forces if self.add_spring(forces, f)}
 
     def frame(self, body: str) -> Body:
         """Return the frame of a link at design."""
@@ -181,8 +180,8 @@ class _Model:
         if tie.length is not None:
             _text(element, "constant_distance", numbers([tie.length]))
 
-    def add_spring(self, forces: ET.Element, force: ForceElement) -> None:
-        """Add a spring-damper."""
+    def add_spring(self, forces: ET.Element, force: ForceElement) -> bool:
+        """Add a spring-damper; return whether OpenSim has it."""
         if isinstance(force, SpringDamper):
             element = ET.SubElement(forces, SPRINGS[0], name=_name(force.name))
             for k, (link, at) in enumerate(zip(force.bodies, force.points, strict=True), 1):
@@ -193,13 +192,18 @@ class _Model:
             )
             # what pulls the points together is positive
             _text(element, "expression", f"{stiffness}*(d-{length})+{damping}*ddot")
-        elif isinstance(force, TorsionSpringDamper):
+            return True
+        if isinstance(force, TorsionSpringDamper):
+            coordinate = self.tree.coordinates.get((force.joint, "rotation"))
+            if coordinate is None:  # between fixed bodies
+                return False
             element = ET.SubElement(forces, SPRINGS[1], name=_name(force.name))
-            coordinate = self.tree.coordinates[force.joint, "rotation"]
             _text(element, "coordinate", _name(coordinate))
             _text(element, "stiffness", numbers([force.stiffness]))
             _text(element, "rest_length", numbers([force.free_angle]))
             _text(element, "viscosity", numbers([force.damping]))
+            return True
+        return False
 
     def couple(
         self, constraints: ET.Element, name: str, one: str, other: str, follows: Sequence[float]

@@ -186,8 +186,10 @@ class _Model:
             _text(element, f"{SPRING}_damping", numbers([force.damping]))
             return True
         if isinstance(force, TorsionSpringDamper):
-            axis = self.joints[self.tree.coordinates[force.joint, "rotation"]].find("axis")
-            if axis is None or axis.find("dynamics") is not None:  # a second spring of the joint
+            name = self.tree.coordinates.get((force.joint, "rotation"))
+            axis = self.joints[name].find("axis") if name else None
+            # between fixed bodies, or a second one
+            if axis is None or axis.find("dynamics") is not None:
                 return False
             dynamics = ET.SubElement(axis, "dynamics")
             _text(dynamics, "damping", numbers([force.damping]))

@@ -214,6 +214,28 @@ def test_simbody_begins_to_turn(tmp_path):
     assert "Left out: force 'push' (force), force 'pull'" in found
 
 
+@pytest.mark.parametrize(
+    ("to", "names"), [("mjcf", "dead second"), ("sdf", "dead second short"), ("osim", "dead")]
+)
+def test_springs_without_a_place_are_named(to, names):
+    """Between fixed bodies; a second one of a joint; of no free length, which Drake refuses."""
+    forces = [
+        TorsionSpringDamper("dead", "bolt", 1.0),
+        TorsionSpringDamper("first", "pin", 1.0),
+        TorsionSpringDamper("second", "pin", 2.0),
+        SpringDamper("short", "ground", "arm", (HOOK, EYE), 10.0, 0.0, 0.0),
+    ]
+    mechanism = arm()
+    bolt = Revolute("bolt", "ground", "base", point=(0.0, 0.0, 0.0), axis=(0.0, 1.0, 0.0))
+    bodies = [Body("base", fixed=True), *mechanism.bodies]
+    joints = [bolt, *mechanism.joints]
+    mechanism = replace(mechanism, bodies=bodies, joints=joints, forces=forces)
+    (text,) = texts(to, mechanism).values()
+    _, found = text.split("Left out: ")
+    told = [each for each in ("dead", "first", "second", "short") if f"'{each}'" in found[:200]]
+    assert told == names.split()
+
+
 @pytest.mark.parametrize("to", adapters.WRITERS)
 def test_the_file_of_a_case_without_masses_has_none(to):
     """Gravity alone moves nothing: the file is that of the mechanism without."""
