@@ -2,29 +2,59 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.polynomial import Polynomial as Powers
 
 from ...core.algebra import Vec3, vec
-from ...core.joints import Distance, Joint
+from ...core.joints import Coupler, Distance, Joint, Polynomial
 from ...core.joints.base import Kind
 from ...core.mechanism.body import Body, inertia_matrix
+from ...core.mechanism.loads import ForceElement, SpringDamper, TorsionSpringDamper
 from ...core.mechanism.mechanism import Mechanism, Vector
 from ...core.trajectory import BodyMotion
-from .poses import Displacement, displacements, rotated
+from .joint_chains import CHAINS
+from .loop_closures import ends_of
+from .poses import Displacement, displacements, link_coordinates, rotated
 
 
 def at_start(mechanism: Mechanism, way: Mapping[str, BodyMotion]) -> Mechanism:
     """Return the same mechanism with the end of the way as its design position.
 
     A joint's point goes with its second body and its axis with its first, so that a point stays on
-    its line or plane; pairs go with a body each. Distances keep their lengths. Drivers and force
-    elements are left out.
+    its line or plane; pairs go with a body each. Distances keep their lengths. Coordinates of
+    polynomials and of torsional springs count from the start. Drivers, forces and torques are left
+    out.
     """
     placed = displacements(mechanism, way)
+
+    def coordinate(joint: Joint, freedom: str) -> float:
+        links = CHAINS[type(joint)](joint, ends_of(mechanism, joint)[0])
+        values = link_coordinates(joint, links, placed)
+        found = {link.name: value[0] for link, value in zip(links, values, strict=True)}
+        return found[freedom]
+
+    def coupler(each: Coupler) -> Coupler:
+        if not isinstance(each, Polynomial):
+            return each
+        named = zip(each.joints, each.freedoms, strict=True)
+        y, x = (coordinate(mechanism.joint(name), freedom) for name, freedom in named)
+        moved = Powers(each.coefficients)(Powers((x, 1.0))) - y
+        return replace(each, coefficients=(*moved.coef.tolist(),))
+
+    def springs() -> Iterator[ForceElement]:
+        for each in mechanism.forces:
+            if isinstance(each, SpringDamper):
+                ends = zip(each.bodies, each.points, strict=True)
+                P, Q = (_last(placed[body].of(vec(point))) for body, point in ends)
+                yield replace(each, points=(P, Q))
+            elif isinstance(each, TorsionSpringDamper):
+                angle = coordinate(mechanism.joint(each.joint), "rotation")
+                yield replace(each, free_angle=each.free_angle - angle)
+
     return replace(
         mechanism,
         bodies=[_body(body, placed[body.name], way) for body in mechanism.bodies],
@@ -34,7 +64,8 @@ def at_start(mechanism: Mechanism, way: Mapping[str, BodyMotion]) -> Mechanism:
             for point in mechanism.points
         ],
         drivers=[],
-        forces=[],
+        couplers=[coupler(each) for each in mechanism.couplers],
+        forces=[*springs()],
     )
 
 

@@ -18,7 +18,7 @@ from ...core.joints import Distance, Joint
 from ...core.mechanism.body import Body
 from ...core.mechanism.mechanism import GROUND, Mechanism, Vector
 from ...core.mechanism.topology import spanning_tree
-from ..shared.joint_chains import CHAINS, Link, end_of_loop, relations
+from ..shared.joint_chains import CHAINS, Link, end_of_loop, polynomial_in_tree, relations
 from ..shared.loop_closures import ends_of
 from .xml_text import link_names
 
@@ -64,6 +64,9 @@ class Tree:
         frames: of all links at design, parents before children; an auxiliary one is parallel to
             the global axes.
         relations: name, and weights by coordinate: the weighted sum stays zero.
+        curves: name, driven and driving coordinate, and the polynomial's coefficients, the constant
+            first.
+        coordinates: names by joint and freedom.
     """
 
     frames: dict[str, Body] = field(default_factory=dict[str, Body])
@@ -72,20 +75,18 @@ class Tree:
     relations: list[tuple[str, dict[str, float]]] = field(
         default_factory=list[tuple[str, dict[str, float]]]
     )
+    curves: list[tuple[str, str, str, list[float]]] = field(
+        default_factory=list[tuple[str, str, str, list[float]]]
+    )
+    coordinates: dict[tuple[str, str], str] = field(default_factory=dict[tuple[str, str], str])
 
 
 def require_known(mechanism: Mechanism, title: str) -> None:
-    """Refuse joints and couplers without a counterpart.
+    """Refuse joints without a counterpart.
 
     Raises:
-        KincheckError: a joint is neither a chain nor a distance, or a coupler is not linear.
+        KincheckError: a joint is neither a chain nor a distance.
     """
-    for coupler in mechanism.couplers:
-        if coupler.curve:
-            raise KincheckError(
-                f"{coupler} has no counterpart in {title} here, whose coordinates begin at the"
-                " start; write MJCF or URDF instead"
-            )
     for joint in mechanism.joints:
         if type(joint) not in CHAINS and type(joint) is not Distance:
             raise KincheckError(
@@ -96,7 +97,7 @@ def require_known(mechanism: Mechanism, title: str) -> None:
 
 def hung(mechanism: Mechanism) -> Tree:
     """Return the mechanism as tree, ties and relations, at its design position."""
-    tree, coordinates = Tree(), dict[tuple[str, str], str]()
+    tree = Tree()
     for body in mechanism.bodies:
         if body.fixed:
             tree.frames[body.name] = body
@@ -111,18 +112,22 @@ def hung(mechanism: Mechanism) -> Tree:
         P = ends_of(mechanism, joint)[0]
         links, forward = CHAINS[type(joint)](joint, P), joint.j == body.name
         parent = joint.bodies[not forward]
-        _hang(tree, coordinates, joint, links, parent, body, P, forward=forward)
+        _hang(tree, joint, links, parent, body, P, forward=forward)
     for joint in spanning.cut:
-        _close(tree, coordinates, mechanism, joint)
+        _close(tree, mechanism, joint)
     for coupler in mechanism.couplers:
-        weights = {coordinates[each, freedom]: weight for each, freedom, weight in coupler.terms}
-        tree.relations.append((coupler.name, weights))
+        terms = [(tree.coordinates[each, freedom], w) for each, freedom, w in coupler.terms]
+        if coupler.curve:
+            (driven, _), (driving, weight) = terms
+            follows = polynomial_in_tree(weight, coupler.curve, 1.0, 1.0)
+            tree.curves.append((coupler.name, driven, driving, follows))
+        else:
+            tree.relations.append((coupler.name, dict(terms)))
     return tree
 
 
 def _hang(
     tree: Tree,
-    coordinates: dict[tuple[str, str], str],
     joint: Joint,
     links: Sequence[Link],
     parent: str,
@@ -143,24 +148,22 @@ def _hang(
         tree.frames[child.name] = child
         tree.joints.append(Hung(name, link.move, parent, child.name, link.point, axis))
         if link.name:
-            coordinates[joint.name, link.name] = name
+            tree.coordinates[joint.name, link.name] = name
         parent = child.name
     if end is not None and not chain:
         tree.frames[end.name] = end
         tree.joints.append(Hung(joint.name, "fixed", parent, end.name, P))
     for relation in relations(joint):
-        weights = {coordinates[name, freedom]: weight for name, freedom, weight in relation}
+        weights = {tree.coordinates[name, freedom]: weight for name, freedom, weight in relation}
         tree.relations.append((joint.name, weights))
     return parent
 
 
-def _close(
-    tree: Tree, coordinates: dict[tuple[str, str], str], mechanism: Mechanism, joint: Joint
-) -> None:
+def _close(tree: Tree, mechanism: Mechanism, joint: Joint) -> None:
     ends = ends_of(mechanism, joint)
     if isinstance(joint, Distance):
         tree.ties.append(Tie(joint.name, joint.bodies, ends, length=joint.rod_length))
         return
     links, point, turns = end_of_loop(CHAINS[type(joint)](joint, ends[0]), ends[0])
-    last = _hang(tree, coordinates, joint, links, joint.i, None, point)
+    last = _hang(tree, joint, links, joint.i, None, point)
     tree.ties.append(Tie(joint.name, (last, joint.j), (point, point), whole=not turns))

@@ -3,7 +3,8 @@
 The file has no state of velocities and its ball joints lock at a right angle, so the model is
 written in the pose of its start: there all coordinates are zero. A body has the frame that the case
 gives it. Loops are closed by Simbody's constraints of a point, a distance or a whole frame;
-coordinate couplers tie coordinates to one another. Names of OpenSim are parts of paths: what has
+coordinate couplers tie coordinates to one another, by a factor or a polynomial. Spring-dampers are
+forces of OpenSim. Names of OpenSim are parts of paths: what has
 another meaning there becomes an underscore.
 """
 
@@ -11,12 +12,13 @@ from __future__ import annotations
 
 import re
 import xml.etree.ElementTree as ET
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from ...core.algebra import IDENTITY, Quat, vec
 from ...core.mechanism.body import Body
+from ...core.mechanism.loads import ForceElement, SpringDamper, TorsionSpringDamper
 from ...core.mechanism.mechanism import GROUND, Mechanism, Vector
 from ...core.trajectory import BodyMotion
 from ..shared.joint_chains import dependence
@@ -62,9 +64,9 @@ def write(
     at = ", ".join(f"{name} = {value!r}" for name, value in start.items())
     facts = (loads.PLAIN, "")
     if mechanism.has_loads:
-        facts = (loads.LOADED, loads.left_out(mechanism, (), True))
+        facts = (loads.LOADED, loads.left_out(mechanism, model.sprung, True))
     model.root.insert(0, ET.Comment(NOTE.format(facts[0], at and f" ({at})", facts[1])))
-    sets = [["Body"], [*KINDS.values()], ["Coordinate"], ["Marker"], [*TIES]]
+    sets = [["Body"], [*KINDS.values()], ["Coordinate"], ["Marker"], [*TIES], [*SPRINGS]]
     return {".osim": document(model.root, sets, reserved=[GROUND])}
 
 
@@ -74,6 +76,9 @@ TIES = (
     "ConstantDistanceConstraint",
     "CoordinateCouplerConstraint",
 )
+
+
+SPRINGS = ("ExpressionBasedPointToPointForce", "SpringGeneralizedForce")
 
 
 class _Model:
@@ -96,11 +101,20 @@ class _Model:
         for tie in self.tree.ties:
             self.add_tie(constraints, tie)
         for k, (name, weights) in enumerate(self.tree.relations):
-            self.relate(constraints, f"{name}.{k}", weights)
+            one, other, factor = dependence(weights.items())
+            self.couple(constraints, f"{name}.{k}", one, other, [0.0, factor])
+        for name, driven, driving, follows in self.tree.curves:
+            self.couple(constraints, name, driven, driving, follows)
         for point in mechanism.points:
             marker = ET.SubElement(markers, "Marker", name=_name(point.name))
             _text(marker, "socket_parent_frame", _path(point.body))
             _text(marker, "location", numbers(self.local(point.body, point.position)))
+
+        self.sprung = set[str]()
+        if mechanism.forces:
+            forces = ET.SubElement(model, "ForceSet", name="forceset")
+            forces = ET.SubElement(forces, "objects")
+            self.sprung = {f.name for f in mechanism.forces if self.add_spring(forces, f)}
 
     def frame(self, body: str) -> Body:
         """Return the frame of a link at design."""
@@ -166,14 +180,41 @@ class _Model:
         if tie.length is not None:
             _text(element, "constant_distance", numbers([tie.length]))
 
-    def relate(self, constraints: ET.Element, name: str, weights: Mapping[str, float]) -> None:
-        """Couple two coordinates."""
-        one, other, factor = dependence(weights.items())
+    def add_spring(self, forces: ET.Element, force: ForceElement) -> bool:
+        """Add a spring-damper; return whether OpenSim has it."""
+        if isinstance(force, SpringDamper):
+            element = ET.SubElement(forces, SPRINGS[0], name=_name(force.name))
+            for k, (link, at) in enumerate(zip(force.bodies, force.points, strict=True), 1):
+                _text(element, f"body{k}", _path(link))
+                _text(element, f"point{k}", numbers(self.local(link, at)))
+            stiffness, length, damping = (
+                numbers([each]) for each in (force.stiffness, force.free_length, force.damping)
+            )
+            # what pulls the points together is positive
+            _text(element, "expression", f"{stiffness}*(d-{length})+{damping}*ddot")
+            return True
+        if isinstance(force, TorsionSpringDamper):
+            coordinate = self.tree.coordinates.get((force.joint, "rotation"))
+            if coordinate is None:  # between fixed bodies
+                return False
+            element = ET.SubElement(forces, SPRINGS[1], name=_name(force.name))
+            _text(element, "coordinate", _name(coordinate))
+            _text(element, "stiffness", numbers([force.stiffness]))
+            _text(element, "rest_length", numbers([force.free_angle]))
+            _text(element, "viscosity", numbers([force.damping]))
+            return True
+        return False
+
+    def couple(
+        self, constraints: ET.Element, name: str, one: str, other: str, follows: Sequence[float]
+    ) -> None:
+        """Let one coordinate follow a polynomial of another, the constant first."""
         element = ET.SubElement(constraints, "CoordinateCouplerConstraint", name=_name(name))
         function = ET.SubElement(
-            ET.SubElement(element, "coupled_coordinates_function"), "LinearFunction"
+            ET.SubElement(element, "coupled_coordinates_function"),
+            "LinearFunction" if len(follows) == 2 else "PolynomialFunction",
         )
-        _text(function, "coefficients", numbers([factor, 0.0]))
+        _text(function, "coefficients", numbers(follows[::-1]))
         _text(element, "independent_coordinate_names", _name(other))
         _text(element, "dependent_coordinate_name", _name(one))
 

@@ -2,9 +2,9 @@
 and joints that mimic others.
 
 SDF has no state, so the model is written in the pose of its start: there all joints are at zero. A
-link has the frame that the case gives its body. Drake's ball constraint is the only tie that its
-parser knows: a frame is tied by three points, a rod is a link between a cross and a ball. Drake
-has constraints in discrete plants only.
+link has the frame that the case gives its body; spring-dampers are Drake's. Drake's ball constraint
+is the only tie that its parser knows: a frame is tied by three points, a rod is a link between a
+cross and a ball. Drake has constraints in discrete plants only.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import numpy as np
 from ...core.errors import KincheckError
 from ...core.joints.base import unit
 from ...core.mechanism.body import Body
+from ...core.mechanism.loads import ForceElement, SpringDamper, TorsionSpringDamper
 from ...core.mechanism.mechanism import GROUND, Mechanism, Vector
 from ...core.trajectory import BodyMotion
 from ..shared.joint_chains import dependence
@@ -35,6 +36,7 @@ NOTE = (
 KINDS = {"slide": "prismatic", "hinge": "revolute", "ball": "ball", "fixed": "fixed"}
 WORLD = "world"
 MIMIC = "drake:mimic"
+SPRING = "drake:linear_spring_damper"
 DRAKE = "http://drake.mit.edu"
 
 
@@ -47,13 +49,19 @@ def write(
         KincheckError: a joint has no counterpart here, or a name cannot be used.
     """
     require_known(mechanism, "SDF")
+    for coupler in mechanism.couplers:
+        if coupler.curve:
+            raise KincheckError(
+                f"{coupler} has no counterpart in SDF, whose joints mimic others by a factor; write"
+                " MJCF, URDF or OpenSim instead"
+            )
     model = _Model(at_start(mechanism, way))
     at = ", ".join(f"{name} = {value!r}" for name, value in start.items())
     facts = (loads.PLAIN, "")
     if mechanism.has_loads:
-        facts = (loads.LOADED, loads.left_out(mechanism, (), False))
+        facts = (loads.LOADED, loads.left_out(mechanism, model.sprung, False))
     model.root.insert(0, ET.Comment(NOTE.format(facts[0], at and f" ({at})", facts[1])))
-    kinds = (["link", "frame", "joint", "drake:ball_constraint"],)
+    kinds = (["link", "frame", "joint", "drake:ball_constraint"], [SPRING])
     return {".sdf": document(model.root, kinds, reserved=[WORLD])}
 
 
@@ -85,6 +93,7 @@ class _Model:
         for tie in self.tree.ties:
             if tie.length is None:
                 self.add_tie(tie, arm)
+        self.sprung = {each.name for each in mechanism.forces if self.add_spring(each)}
 
     def size(self) -> float:
         """Return the largest distance of joints along an axis, or 1 m where all are in one
@@ -160,7 +169,38 @@ class _Model:
                 end = "P" if side == "A" else "Q"
                 _text(element, f"drake:ball_constraint_body_{side}", link)
                 name = f"drake:ball_constraint_p_{side}{end}"
-                _text(element, name, numbers(local(self.tree.frames[link], point)))
+                _text(element, name, numbers(self.local(link, point)))
+
+    def add_spring(self, force: ForceElement) -> bool:
+        """Add a spring-damper; return whether Drake has it."""
+        if isinstance(force, SpringDamper):
+            assert force.free_length is not None  # a spring without one has that of design
+            if force.free_length <= 0.0:  # Drake refuses it
+                return False
+            element = ET.SubElement(self.model, SPRING, name=force.name)
+            for side, end, link, P in zip("AB", "PQ", force.bodies, force.points, strict=True):
+                _text(element, f"{SPRING}_body_{side}", link)
+                _text(element, f"{SPRING}_p_{side}{end}", numbers(self.local(link, P)))
+            _text(element, f"{SPRING}_free_length", numbers([force.free_length]))
+            _text(element, f"{SPRING}_stiffness", numbers([force.stiffness]))
+            _text(element, f"{SPRING}_damping", numbers([force.damping]))
+            return True
+        if isinstance(force, TorsionSpringDamper):
+            name = self.tree.coordinates.get((force.joint, "rotation"))
+            axis = self.joints[name].find("axis") if name else None
+            # between fixed bodies, or a second one
+            if axis is None or axis.find("dynamics") is not None:
+                return False
+            dynamics = ET.SubElement(axis, "dynamics")
+            _text(dynamics, "damping", numbers([force.damping]))
+            _text(dynamics, "spring_reference", numbers([force.free_angle]))
+            _text(dynamics, "spring_stiffness", numbers([force.stiffness]))
+            return True
+        return False
+
+    def local(self, link: str, P: Vector) -> Vector:
+        """Return a point, global at the start, in the axes of a link [m]."""
+        return local(self.tree.frames[link], P)
 
     def relate(self, name: str, weights: Mapping[str, float]) -> None:
         """Let one coordinate of a relation mimic the other.

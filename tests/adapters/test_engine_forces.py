@@ -14,7 +14,7 @@ from kincheck.core.mechanism.drivers import JointAngle
 from kincheck.core.mechanism.loads import TorsionSpringDamper
 from kincheck.core.mechanism.mechanism import GROUND, Mechanism
 
-from ..support.engine_forces import Beside, beside, force_case, pushed, values
+from ..support.engine_forces import Beside, force_case, pushed, values
 from ..support.loads import loaded
 from .test_closures import TYPES, crank_only, on_crank
 
@@ -118,35 +118,53 @@ def geared():
     )
 
 
+@cache
+def gear_train():
+    case = force_case(pushed(loaded(geared())), (-0.4, 0.0, 7.0), rate=2.0)
+    return case, values(case, "native")[0]
+
+
 @pytest.mark.parametrize("engine", ENGINES)
 def test_gears_racks_and_welds(engine):
-    case = force_case(pushed(loaded(geared())), (-0.4, 0.0, 7.0), rate=2.0)
-    compared = beside(case, here(engine))
+    case, native = gear_train()
+    compared = Beside(native, values(case, here(engine))[0])
     assert compared.same_missing
     assert compared.worst <= AGREE[engine]
+
+
+@cache
+def few_samples(name):
+    case = cases.load(name)
+    few = case.sweep.values[:: len(case.sweep.values) // 4]
+    judged = force_case(loaded(case.mechanism), few, case.sweep.rate)
+    judged = replace(judged, sweep=replace(case.sweep, values=few))
+    return judged, values(judged, "native")[0]
 
 
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("name", ["four_bar", "bennett", "mcpherson_strut"])
 def test_redundant_rows_leave_the_same_undetermined(name, engine):
-    case = cases.load(name)
-    few = case.sweep.values[:: len(case.sweep.values) // 4]
-    mechanism = loaded(case.mechanism)
-    judged = force_case(mechanism, few, case.sweep.rate)
-    compared = beside(replace(judged, sweep=replace(case.sweep, values=few)), here(engine))
+    case, native = few_samples(name)
+    compared = Beside(native, values(case, here(engine))[0])
     assert compared.same_missing
     assert np.isnan(compared.native).any() == (name != "mcpherson_strut")
     assert compared.worst <= AGREE[engine]
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-def test_springs_on_cut_joints_count_turns(engine):
-    """The hinge that closes the loop turns round twice; its spring is wound up."""
+@cache
+def wound_up():
     case = cases.load("four_bar")
     spring = TorsionSpringDamper("clock", "crank_pin", 2.0, damping=0.3, free_angle=0.2)
     mechanism = replace(loaded(case.mechanism), forces=[spring])
     judged = force_case(mechanism, np.linspace(0.0, 9.0, 19), case.sweep.rate, names=["crank_pin"])
-    compared = beside(judged, here(engine))
+    return judged, values(judged, "native")[0]
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_springs_on_cut_joints_count_turns(engine):
+    """The hinge that closes the loop turns round twice; its spring is wound up."""
+    case, native = wound_up()
+    compared = Beside(native, values(case, here(engine))[0])
     assert compared.worst <= AGREE[engine]
     assert np.ptp(compared.native[-1]) > 2.0 * 2.0 * np.pi
 

@@ -12,12 +12,13 @@ from kincheck.core.studies.stress.families.base import as_case
 from kincheck.core.studies.stress.families.folds import Folds
 from kincheck.core.studies.stress.families.planar import any_plane, slider_crank
 from kincheck.core.studies.stress.run import specimen, stress
+from kincheck.core.studies.stress.solving import once
 from kincheck.core.studies.stress.truth.first_fold import turning
 from kincheck.core.studies.stress.truth.reference_motion import Reach, followed
 from kincheck.core.studies.stress.verdicts import Verdict
 
 BEYOND = Path(__file__).parents[1] / "data" / "beyond_a_fold.toml"
-SIMULATORS = ["mujoco", "pinocchio", "exudyn"]
+SIMULATORS = ["mujoco", "pinocchio", "exudyn", "drake", "dart", "simbody"]
 
 
 def installed(name):
@@ -57,16 +58,20 @@ def test_the_end_of_a_stroke_is_a_fold():
     assert turning(case, -1.0) == pytest.approx(rod - crank - c[0], abs=1e-8)
 
 
-def test_no_simulator_steps_over_a_fold():
+def test_no_simulator_steps_over_a_fold(monkeypatch):
     """A small part of a campaign: `kincheck stress --family folds --engine mujoco --samples
-    15000`.
+    15000`. In this process, because workers take longer to begin than to solve.
     """
-    engines = [installed(name) for name in SIMULATORS]
-    found, _ = stress([Family.registry["folds"]], engines, samples=30, seed=0, prove=False)
+    monkeypatch.setattr(
+        "kincheck.core.studies.stress.run.solve_all", lambda pairs: [*map(once, pairs)]
+    )
+    engines = [each for each in map(adapters.engine, SIMULATORS) if each.version()]
+    found, _ = stress([Family.registry["folds"]], engines, samples=16, seed=0, prove=False)
+    assert len(found.cells) == len(engines) > 0
     for cell in found.cells:
         assert cell.samples[Verdict.SILENTLY_WRONG] == cell.samples[Verdict.REFUSED_WRONGLY] == 0
-        assert cell.samples[Verdict.RIGHT] > 10
-        assert cell.samples[Verdict.REFUSED_RIGHTLY] > 5
+        assert cell.samples[Verdict.RIGHT] > 5
+        assert cell.samples[Verdict.REFUSED_RIGHTLY] > 3
 
 
 # What is asked of a step

@@ -185,7 +185,7 @@ def test_projection_has_efforts_with_the_same_predictor(name):
     assert name == "native" or (errors[0] > 1e-6 > 1e-8 > errors[1] > errors[-1])
 
 
-@pytest.mark.parametrize("name", ["mujoco", "pinocchio", "exudyn"])
+@pytest.mark.parametrize("name", [name for name in adapters.ENGINES if name != "native"])
 def test_a_floor_says_what_was_counted(name):
     engine = adapters.engine(name)
     if engine.version() is None:

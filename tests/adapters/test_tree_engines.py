@@ -28,6 +28,8 @@ ROOT = Path(__file__).parents[2]
 TREES = ("pinocchio", "drake", "dart", "simbody")
 # Round-off of the strut's coordinates, of about a metre, in each of the simulators [m, m/s, m/s^2].
 STRUT = {"position": 1e-14, "velocity": 1e-13, "acceleration": 1e-12}
+# Of the probes, whose rods are amplified by their closures: some times of what was measured.
+PROBES = {"position": 1e-14, "velocity": 1e-13, "acceleration": 5e-12}
 
 
 def installed(name: str) -> Any:
@@ -43,7 +45,7 @@ def thinned(case: Case, samples: int) -> Case:
     return replace(case, sweep=replace(case.sweep, values=values), reference={})
 
 
-@pytest.mark.parametrize("name", TREES)
+@pytest.mark.parametrize("name", ["mujoco", "exudyn", *TREES])
 def test_the_strut_is_the_truth_to_round_off(name: str) -> None:
     (record,) = run([cases.load("mcpherson_strut")], [installed(name)], tol=1e-12).records
     assert record.outcome is Outcome.PASS, record.message
@@ -69,9 +71,9 @@ def test_every_joint_is_as_in_the_native_solver(name: str) -> None:
         found = engine.solve(engine.build(case), case, 1e-12)
         assert found.solved.all(), (case.name, found.message)
         for point in case.points:
-            gap = found.points[point].position - expected.points[point].position
-            # the worst of the long runs has 4e-15 m
-            assert np.abs(gap).max() <= 1e-14, (case.name, point)
+            for quantity, limit in PROBES.items():
+                one, other = (getattr(each.points[point], quantity) for each in (found, expected))
+                assert np.abs(one - other).max() <= limit, (case.name, point, quantity)
 
 
 @pytest.mark.parametrize("name", TREES)

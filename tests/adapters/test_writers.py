@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 from kincheck import adapters
+from kincheck.adapters.shared.start_pose import at_start
 from kincheck.core import (
     GROUND,
     Body,
@@ -19,6 +20,7 @@ from kincheck.core import (
     KincheckError,
     Mechanism,
     Point,
+    Polynomial,
     RackPinion,
     Revolute,
     Screw,
@@ -206,7 +208,7 @@ def assert_read(found, mechanism, path, elsewhere):
         )
 
 
-NO_POLYNOMIAL = {"exudyn": "Exudyn", "sdf": "SDF", "osim": "OpenSim"}
+NO_POLYNOMIAL = {"exudyn": "Exudyn", "sdf": "SDF"}
 
 
 @pytest.mark.parametrize("elsewhere", [False, True], ids=["design", "elsewhere"])
@@ -219,6 +221,18 @@ def test_a_written_model_closes_where_the_native_engine_says(to, name, elsewhere
         return
     found, path = reading(to, name, tmp_path, elsewhere)
     assert_read(found, CASES[name].mechanism, path, elsewhere)
+
+
+def test_polynomials_count_from_the_start():
+    """With y = x + 0.2 x^2, and x = 0.5 at the start."""
+    hinges = [
+        Revolute(name, "ground", name.upper(), (k, 0.0, 0.0), Z) for k, name in enumerate("ab")
+    ]
+    cam = Polynomial("cam", ("b", "a"), (0.0, 1.0, 0.2))
+    bodies, turn = [Body("A"), Body("B", (1.0, 0.0, 0.0))], JointAngle("turn", "a")
+    mechanism = Mechanism("cams", bodies, hinges, [], [turn], [cam])
+    (moved,) = at_start(mechanism, way_to(case(mechanism, 0.5), 0.5)).couplers
+    np.testing.assert_allclose(moved.coefficients, [0.0, 1.2, 0.2], rtol=0.0, atol=1e-15)
 
 
 def cut_elsewhere(mechanism):

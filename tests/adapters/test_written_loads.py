@@ -87,6 +87,18 @@ def start(springs, loads):
     return torque @ AXIS / (AXIS @ cloud(np.zeros(3)) @ AXIS)
 
 
+SPEED = 2.0
+
+
+def slowed():
+    """Return the change of the angular acceleration by the dampers at that speed [rad/s^2]."""
+    eye = turned(EYE)
+    along = (HOOK - eye) / np.linalg.norm(HOOK - eye)
+    arm_of_pull = np.cross(eye, along) @ AXIS
+    damping = 5.0 * arm_of_pull**2 + 0.25
+    return -damping * SPEED / (AXIS @ cloud(np.zeros(3)) @ AXIS)
+
+
 def texts(to, mechanism):
     case = Case("c", "s", Truth.CONSENSUS_ONLY, mechanism, Sweep("turn", np.array([ANGLE])), ())
     return adapters.writer(to)(mechanism, way_to(case, ANGLE), {})
@@ -118,6 +130,7 @@ def test_exudyn_begins_to_turn(tmp_path):
     model = runpy.run_path(str(script))
     mbs = model["mbs"]
     settings = exu.SimulationSettings()
+    settings.solution.file.write = False  # in the working directory
     static, solver = exu.MainSolverStatic(), exu.MainSolverImplicitSecondOrder()
     assert static.InitializeSolver(mbs, settings)
     static.ComputeNewtonJacobian(mbs, settings)
@@ -163,16 +176,21 @@ def test_pinocchio_begins_to_turn():
 def test_drake_begins_to_turn():
     plants = pytest.importorskip("pydrake.multibody.plant", reason="drake is not installed")
     found = texts("sdf", arm(forces=[*SPRINGS, *LOADS]))[".sdf"]
-    plant = plants.MultibodyPlant(1e-3)
+    plant = plants.MultibodyPlant(0.0)
     parsing = importlib.import_module("pydrake.multibody.parsing")
     parsing.Parser(plant).AddModelsFromString(found, "sdf")
     plant.mutable_gravity_field().set_gravity_vector(GRAVITY)
     plant.Finalize()
     context = plant.CreateDefaultContext()
-    [[mass]] = plant.CalcMassMatrix(context)
-    [force] = plant.CalcGravityGeneralizedForces(context)
-    assert force / mass == pytest.approx(start(springs=False, loads=False), rel=1e-12)
-    assert "Left out: gravity [1.0, 0.5, -9.80665] m/s^2, force 'spring' (spr" in found
+
+    def acceleration():
+        return plant.EvalTimeDerivatives(context).CopyToVector()[-1]
+
+    assert acceleration() == pytest.approx(start(springs=True, loads=False), rel=1e-12)
+    still = acceleration()
+    plant.SetVelocities(context, [SPEED])
+    assert acceleration() - still == pytest.approx(slowed(), rel=1e-9)
+    assert "Left out: gravity [1.0, 0.5, -9.80665] m/s^2, force 'push' (force), f" in found
 
 
 def test_simbody_begins_to_turn(tmp_path):
@@ -183,10 +201,39 @@ def test_simbody_begins_to_turn(tmp_path):
     file.write_text(found, encoding="utf-8")
     model = o.Model(str(file))
     state = model.initSystem()
-    model.realizeAcceleration(state)
-    [acceleration] = state.getUDot().to_numpy()
-    assert acceleration == pytest.approx(start(springs=False, loads=False), rel=1e-12)
-    assert "Left out: force 'spring' (spring_damper), force 'clock'" in found
+
+    def acceleration():
+        model.realizeAcceleration(state)
+        [found] = state.getUDot().to_numpy()
+        return found
+
+    assert acceleration() == pytest.approx(start(springs=True, loads=False), rel=1e-12)
+    still = acceleration()
+    state.setU(o.Vector.createFromMat(np.array([SPEED])))
+    assert acceleration() - still == pytest.approx(slowed(), rel=1e-9)
+    assert "Left out: force 'push' (force), force 'pull'" in found
+
+
+@pytest.mark.parametrize(
+    ("to", "names"), [("mjcf", "dead second"), ("sdf", "dead second short"), ("osim", "dead")]
+)
+def test_springs_without_a_place_are_named(to, names):
+    """Between fixed bodies; a second one of a joint; of no free length, which Drake refuses."""
+    forces = [
+        TorsionSpringDamper("dead", "bolt", 1.0),
+        TorsionSpringDamper("first", "pin", 1.0),
+        TorsionSpringDamper("second", "pin", 2.0),
+        SpringDamper("short", "ground", "arm", (HOOK, EYE), 10.0, 0.0, 0.0),
+    ]
+    mechanism = arm()
+    bolt = Revolute("bolt", "ground", "base", point=(0.0, 0.0, 0.0), axis=(0.0, 1.0, 0.0))
+    bodies = [Body("base", fixed=True), *mechanism.bodies]
+    joints = [bolt, *mechanism.joints]
+    mechanism = replace(mechanism, bodies=bodies, joints=joints, forces=forces)
+    (text,) = texts(to, mechanism).values()
+    _, found = text.split("Left out: ")
+    told = [each for each in ("dead", "first", "second", "short") if f"'{each}'" in found[:200]]
+    assert told == names.split()
 
 
 @pytest.mark.parametrize("to", adapters.WRITERS)

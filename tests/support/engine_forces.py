@@ -102,7 +102,3 @@ def values(case, engine):
     found = given.solve(given.build(case), case, 1e-12)
     assert found.solved.all(), found.message
     return np.array([output.values(found.forces) for output in case.outputs]), found
-
-
-def beside(case, engine):
-    return Beside(values(case, "native")[0], values(case, engine)[0])
