@@ -57,7 +57,7 @@ endif
 LOCK := uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --upgrade
 lock: .venv/ready
 	$(LOCK) --extra dev pyproject.toml --output-file requirements.lock
-	$(LOCK) --extra engines --extra fast --extra proofs --extra parquet --constraint requirements.lock \
+	$(LOCK) --extra engines --extra fast --extra proofs --extra yaml --extra parquet --constraint requirements.lock \
 		pyproject.toml --output-file requirements-runtime.lock
 
 # An hour on each reader.

@@ -116,3 +116,10 @@ def test_run_takes_cases_files_and_engines_of_its_own():
 def test_wrong_names_are_told(cases, engines, message):
     with pytest.raises(kincheck.KincheckError, match=message):
         kincheck.run(cases, engines)
+
+
+@pytest.mark.parametrize("path", ["core/__init__.py", "core/kincheck/__init__.py"])
+def test_type_checkers_see_no_function_for_any_name(path):
+    """It would hide every misspelt name from them."""
+    syntax = ast.parse((ROOT / path).read_text(encoding="utf-8"))
+    assert "__getattr__" not in {getattr(node, "name", "") for node in syntax.body}

@@ -26,13 +26,15 @@ __all__ = ["check_engine", "load", "run"]
 __all__ += core.__all__
 
 
-def __getattr__(name: str) -> Any:
-    """Import a public name on first use."""
-    if name not in __all__:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    module = import_module("kincheck.by_name") if name in _BY_NAME else core
-    found = globals()[name] = getattr(module, name)
-    return found
+if not TYPE_CHECKING:  # type checkers would take any name for one of these
+
+    def __getattr__(name: str) -> Any:
+        """Import a public name on first use."""
+        if name not in __all__:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        module = import_module("kincheck.by_name") if name in _BY_NAME else core
+        found = globals()[name] = getattr(module, name)
+        return found
 
 
 def __dir__() -> list[str]:
