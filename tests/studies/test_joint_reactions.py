@@ -1,5 +1,6 @@
 """Reactions in check-joint: sound joints pass, and each check finds its mistake."""
 
+import importlib
 from dataclasses import replace
 
 import pytest
@@ -9,7 +10,6 @@ from kincheck.core.case.joint_probe import AXIS, probe
 from kincheck.core.harness.native_engine import NativeEngine
 from kincheck.core.joints import Joint
 from kincheck.core.joints.base import unit
-from kincheck.core.kinematics.forces import equations
 from kincheck.core.studies.findings import Verdict
 from kincheck.core.studies.joint_check import reactions as checks
 from kincheck.core.studies.joint_check.loaded_probe import loaded, solved
@@ -19,6 +19,7 @@ from kincheck.core.studies.stress.solving import interpreted
 from .test_check_joint_mistakes import mistaken, negative_gamma
 
 pytestmark = pytest.mark.usefixtures("own_joint_types")
+equations = importlib.import_module("kincheck.core.kinematics.forces.equations")
 CHECKS = ["power", "no work", "acts and reacts", "order", "units", "place"]
 
 

@@ -17,6 +17,7 @@ from kincheck.core.cli import main
 from kincheck.core.errors import CaseError
 from kincheck.core.studies.stress.report import headline, markdown, report
 from kincheck.core.studies.stress.results import Cell, Finding, Stress
+from kincheck.core.studies.stress.verdicts import Verdict
 
 from ..support.fakes import Fake
 
@@ -142,18 +143,14 @@ def test_an_engine_that_supports_nothing_is_not_praised(tmp_path, capsys, monkey
 
 
 def test_samples_without_a_verdict_are_counted_apart():
-    samples = {
-        "right": 5,
-        "refused, right reason": 2,
-        "refused, wrong reason": 0,
-        "silently wrong": 0,
-    }
+    none = dict.fromkeys(map(str, Verdict), 0)
+    samples = none | {"right": 5, "refused, right reason": 2}
     cell = {
         "engine": "one",
         "mode": "projection",
         "version": "1",
         "settings": {},
-        "worst": [None] * 3,
+        "worst": [None] * 4,
         "seconds": 0.0,
     }
     cell |= {"family": "arms", "specimens": 1, "elsewhere": 0, "bad": 0}
@@ -193,7 +190,7 @@ def test_text_of_files_is_no_markup():
         "mode": "projection",
         "version": "1",
         "settings": {},
-        "worst": [None] * 3,
+        "worst": [None] * 4,
         "seconds": 0.0,
     }
     counts = dict.fromkeys(

@@ -1,5 +1,6 @@
 """Forces in the stress run: what is right, and every kind of mistake found."""
 
+import importlib
 from dataclasses import replace
 
 import numpy as np
@@ -7,7 +8,6 @@ import pytest
 from kincheck.core.forces import Forces
 from kincheck.core.harness.execution import Pair
 from kincheck.core.harness.native_engine import NativeEngine
-from kincheck.core.kinematics.forces import demand
 from kincheck.core.studies.stress.families import Family
 from kincheck.core.studies.stress.reproducers import judge
 from kincheck.core.studies.stress.run import specimen
@@ -16,6 +16,7 @@ from kincheck.core.studies.stress.solving import interpreted, once
 from kincheck.core.studies.stress.truth.reference_forces import known_forces
 from kincheck.core.studies.stress.verdicts import Verdict, judged
 
+demand = importlib.import_module("kincheck.core.kinematics.forces.demand")
 FORCES = Family.registry["forces"]
 # Numbers of specimens: a hinge twice, a four-bar of four hinges, a fast loop.
 TWICE, FOUR_BAR, SPINNING = 0, 4, 5

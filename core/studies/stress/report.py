@@ -66,7 +66,7 @@ def headline(cells: Sequence[Cell]) -> str:
     """Return the number of silently wrong samples among the examined ones, and the
     number not examined.
     """
-    count = {verdict: sum(cell.samples[verdict] for cell in cells) for verdict in Verdict}
+    count = {verdict: sum(cell.samples.get(verdict, 0) for cell in cells) for verdict in Verdict}
     apart = [
         f"{count[verdict]} {SHORT[verdict]}"
         for verdict in (Verdict.UNJUDGED, Verdict.UNSUPPORTED)
@@ -85,8 +85,8 @@ def _examined(cell: Cell) -> int:
     """Return the number of samples with a verdict on an answer."""
     return (
         sum(cell.samples.values())
-        - cell.samples[Verdict.UNJUDGED]
-        - cell.samples[Verdict.UNSUPPORTED]
+        - cell.samples.get(Verdict.UNJUDGED, 0)
+        - cell.samples.get(Verdict.UNSUPPORTED, 0)
     )
 
 
@@ -110,7 +110,7 @@ def _shares(found: Stress) -> Section:
     shown = [
         verdict
         for verdict in SHORT
-        if verdict not in OF_FORCES or any(cell.samples[verdict] for cell in found.cells)
+        if verdict not in OF_FORCES or any(cell.samples.get(verdict, 0) for cell in found.cells)
     ]
     rows = [
         [
@@ -156,7 +156,7 @@ def _shares(found: Stress) -> Section:
 def _verdict(found: Stress) -> str:
     wrong = {_engine(cell): 0 for cell in found.cells}
     for cell in found.cells:
-        wrong[_engine(cell)] += sum(cell.samples[each] for each in SILENT)
+        wrong[_engine(cell)] += sum(cell.samples.get(each, 0) for each in SILENT)
     return (
         "Silently wrong: " + ", ".join(f"{engine} {count}" for engine, count in wrong.items()) + "."
     )
@@ -164,10 +164,10 @@ def _verdict(found: Stress) -> str:
 
 def _counts(cell: Cell, shown: Sequence[Verdict]) -> list[str]:
     """Return the number of samples by verdict, with the share of the supported ones."""
-    supported = sum(cell.samples.values()) - cell.samples[Verdict.UNSUPPORTED]
+    supported = sum(cell.samples.values()) - cell.samples.get(Verdict.UNSUPPORTED, 0)
     texts: list[str] = []
     for verdict in shown:
-        count = cell.samples[verdict]
+        count = cell.samples.get(verdict, 0)
         share = (
             f" ({100 * count / supported:.3g} %)"
             if supported and count and verdict is not Verdict.UNSUPPORTED
