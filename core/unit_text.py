@@ -14,6 +14,11 @@ def with_unit(name: str, unit: str) -> str:
     return f"{name} [{shown}]" if shown else name
 
 
+def motion_word(motion: str, unit: str) -> str:
+    """Return the word for a motion of an output of this unit: a force has a value, no position."""
+    return "value" if motion == "position" and unit.startswith("N") else motion
+
+
 def value_text(value: str, unit: str) -> str:
     """Return a printed number with its unit, such as 12 mm or 12°; a ratio has none."""
     shown = unit_text(unit)

@@ -39,7 +39,7 @@ from ..errors import CaseError
 from ..jet import Jet
 from ..mechanism.mechanism import Vector
 from ..trajectory import PER_TIME, QUANTITIES, Array, PointMotion, Trajectory
-from ..unit_text import value_text
+from ..unit_text import motion_word, value_text
 from .record import Deviation, Deviations, OutputSeries
 
 NO_VALUE = "has no value at"
@@ -281,12 +281,13 @@ def describe(
     Args:
         unit: of the output.
     """
+    word = motion_word(quantity, unit)
     if worst.max_abs <= worst.tolerance:
-        return f"{output}: {quantity} has no value at samples where {worst.against} has one"
+        return f"{output}: {word} has no value at samples where {worst.against} has one"
     unit += PER_TIME[QUANTITIES.index(quantity)]
     off, tolerance = (value_text(f"{size:.3g}", unit) for size in (worst.max_abs, worst.tolerance))
     return (
-        f"{output}: {quantity} is off by {off} at sample {worst.worst_step}"
+        f"{output}: {word} is off by {off} at sample {worst.worst_step}"
         f" ({driver} = {values[worst.worst_step]:.9g}), tolerance {tolerance},"
         f" against {worst.against}"
     )

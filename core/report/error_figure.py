@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from ..harness.record import Deviation
-from ..unit_text import with_unit
+from ..unit_text import motion_word, with_unit
 from .axis import Axis
 from .figures import MARKERS, Figure, Style, Values, taken, ticks
 
@@ -75,7 +75,7 @@ def error_figure(
     positive = [e for trace in traces for e in trace["y"] if e]
     ends = positive + ([tolerance] if tolerance else [])
     low, high = min(positive, default=(tolerance or 1e-9) * 1e-6), max(ends, default=1.0)
-    side, floor = log_axis(with_unit(f"{motion} difference", unit), low, high)
+    side, floor = log_axis(with_unit(f"{motion_word(motion, unit)} difference", unit), low, high)
     layout: Figure = {
         "xaxis": (
             {"title": {"text": axis.label}, "hoverformat": ".6~g", "zeroline": False} | ticks(axis)

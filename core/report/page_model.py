@@ -12,7 +12,7 @@ from ..harness.labels import against, engine_name, motion_unit, number, output_l
 from ..harness.record import Deviation, OutputSeries, Record, Results
 from ..harness.standard import STANDARD
 from ..trajectory import QUANTITIES
-from ..unit_text import value_text
+from ..unit_text import motion_word, value_text
 from .axis import Axis, driver_axis
 from .drawing import Drawing, drawing
 from .error_figure import error_figure
@@ -36,6 +36,11 @@ class Judged:
         return (
             d.max_abs / d.tolerance if d.tolerance > 0 else float("inf") if d.max_abs > 0 else 0.0
         )
+
+    @property
+    def word(self) -> str:
+        """The motion, as messages call it."""
+        return motion_word(self.motion, self.unit)
 
     @property
     def unit(self) -> str:
@@ -200,7 +205,8 @@ def _output(
             (styles[engine_name(j.record)], getattr(j.record.outputs[output], motion), j.deviation)
             for j in here
         ]
-        title = f"{motion} difference of {label} against {axis.name}, log axis"
+        word = motion_word(motion, here[0].unit)
+        title = f"{word} difference of {label} against {axis.name}, log axis"
         compared.append(motion)
         errors.append(Plot(f"{key}-{motion}", title, _worst_caption(here, axis)))
         figures[f"{key}-{motion}"] = error_figure(motion, here[0].unit, axis, found, values)

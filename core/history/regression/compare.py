@@ -11,7 +11,7 @@ from ...case.io.tolerance import DEFAULT_ATOL
 from ...harness.labels import UNMADE, motion_unit, number
 from ...harness.record import Outcome, OutputSeries, Record
 from ...trajectory import QUANTITIES
-from ...unit_text import value_text
+from ...unit_text import motion_word, value_text
 from ..queries import History, Pair
 from .circumstance_changes import same_machine
 from .findings import Finding, Kind, finding_of
@@ -153,7 +153,8 @@ def _moved(now: Record, before: Record) -> Iterator[Finding]:
             )
             if off > limit:
                 size = value_text(number(off), motion_unit(old.unit, motion))
-                told = f"{output} {motion} differs by up to {size} from what it was"
+                word = motion_word(motion, old.unit)
+                told = f"{output} {word} differs by up to {size} from what it was"
                 yield finding_of(
                     Kind.MOVED, now, told, now=off, limit=limit, output=output, motion=motion
                 )
@@ -218,7 +219,8 @@ def _errors(now: Record, before: Record) -> Iterator[Finding]:
                 )
                 times = f"×{number(b.max_abs / a.max_abs)}, " if a.max_abs else ""
                 size = f"{number(a.max_abs)} → {value_text(number(b.max_abs), unit)}"
-                told = f"{output} {motion} error {size} ({times}tolerance {number(b.tolerance)})"
+                word = motion_word(motion, unit)
+                told = f"{output} {word} error {size} ({times}tolerance {number(b.tolerance)})"
                 ratio = b.max_abs / a.max_abs if a.max_abs else None
                 yield finding_of(
                     Kind.DRIFTED,
@@ -243,7 +245,7 @@ def _references(record: Record, now: References, before: References) -> Iterator
             )
             if off > SAME_SAMPLE * max((abs(x) for x in was if x is not None), default=0.0):
                 told = (
-                    f"{output} {motion} differs by up to {number(off)}"
+                    f"{output} {motion_word(motion, old.unit)} differs by up to {number(off)}"
                     f" {motion_unit(old.unit, motion)} from what it was"
                 )
                 yield finding_of(

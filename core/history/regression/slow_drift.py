@@ -12,7 +12,7 @@ import numpy as np
 
 from ...harness.labels import motion_unit, number
 from ...trajectory import QUANTITIES
-from ...unit_text import value_text
+from ...unit_text import motion_word, value_text
 from ..queries import History
 from .change_points import above_floor, errors_of
 from .findings import Finding, Kind
@@ -70,7 +70,8 @@ def crept(subject: Subject, around: History, told: Sequence[Finding]) -> Iterato
                     engine=record.engine,
                     mode=record.mode,
                     message=(
-                        f"{output} {motion} error {size}, little by little since run {entry.run} "
+                        f"{output} {motion_word(motion, unit)} error {size}, little by little "
+                        f"since run {entry.run} "
                         f"(tolerance {number(now.tolerance)})"
                     ),
                     output=output,
