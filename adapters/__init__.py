@@ -1,5 +1,5 @@
-"""Adapters: one file an engine or a format, each made from the neutral mechanism. They are imported
-only when they are used.
+"""Adapters: one file for each engine or format, each translating the neutral mechanism. An adapter
+is imported at its first use.
 """
 
 import importlib
@@ -14,7 +14,7 @@ ENGINES = {
     "dart": ("dart.dart", "Dart"),
     "simbody": ("simbody.simbody", "Simbody"),
 }
-"""Name on the command line: module and class of the engine in projection mode."""
+"""Engines in projection mode: name on the command line -> module and class."""
 
 SIMULATIONS = {
     "mujoco": ("mujoco.steps", "stiff"),
@@ -29,12 +29,12 @@ SIMULATIONS = {
     "dart": ("dart.steps", "Steps"),
     "simbody": ("simbody.assembly", "Assembly"),
 }
-"""Name on the command line -> module and what makes the engine: simulate mode. A simulator's bare
-name is its recommended solver.
+"""Engines in simulate mode: name on the command line -> module and maker of the engine. A
+simulator's bare name is its recommended solver.
 
-A record is one of a case, an engine and a mode, and the same name in two modes is two products; a
-further variant of a simulator needs a name. A mode of its own for each variant would have made what
-may be ranked with what a matter of a list.
+A record belongs to a case, an engine and a mode, so one name in two modes is two products. A
+further variant of a simulator gets a name. A further mode for each variant would need a list of the
+modes to rank together.
 """
 
 
@@ -45,13 +45,13 @@ def engine(name: str, mode: str = "projection") -> Any:
 
 
 WRITERS = ("mjcf", "exudyn", "urdf", "sdf", "osim")
-"""Formats, as on the command line; that of a name is the function `write` of the module
-writers.NAME.
+"""Formats, as on the command line; the function `write` of the module writers.NAME writes format
+NAME.
 """
 
 
 def writer(name: str) -> Any:
-    """The function that writes a mechanism in the format of that name; no simulator is needed for
-    it.
+    """Return the function to write a mechanism in a format, by the format's name; no simulator is
+    needed.
     """
     return importlib.import_module(f".writers.{name}", __name__).write

@@ -1,4 +1,4 @@
-"""The native engine as on the command line, with its efforts."""
+"""The native engine on the command line, with its efforts."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from ..core.case.case import Case
 from ..core.harness.native_engine import NativeEngine
 from ..core.kinematics import LAST_ITERATION
 
-# Residuals from which Newton's last step starts, by effort: what that step leaves is about its
-# square.
+# Largest residual at the start of Newton's last step, by effort. This step leaves about the square
+# of that residual.
 EFFORTS: Mapping[str, float] = {
     "1 Newton step": math.inf,
     "last step from below 1e-4": 1e-4,
@@ -25,8 +25,8 @@ class Native(NativeEngine):
     """The native engine; see `Measurable`."""
 
     def efforts(self) -> Mapping[str, Native]:
-        """Return the efforts by how near to the solution Newton's last step starts; the predictor
-        is the same.
+        """Return the efforts: how near to the solution Newton's last step starts; all have the same
+        predictor.
         """
         return {
             label: replace(self, solver=replace(self.solver, last_iteration=last))
@@ -34,4 +34,4 @@ class Native(NativeEngine):
         }
 
     def floor(self, case: Case) -> None:
-        """Return None: its loop is compiled."""
+        """Return None: the engine's loop is compiled."""

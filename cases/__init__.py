@@ -1,9 +1,9 @@
-"""Built-in cases: NAME.toml each, with samples (NAME.csv) or a closed form (NAME.py) beside it as
-the truth.
+"""Built-in cases: a file NAME.toml each, with its truth beside it.
 
-Variants of a mechanism share a truth: NAME_VARIANT.toml names the samples in its [reference], or
-takes the closed form of NAME.py, there the function VARIANT where it has one, else `motion`. A
-function `forces` beside `motion`, or VARIANT_forces, gives the outputs that are forces.
+The truth is a table of samples (NAME.csv) or a closed form (NAME.py). Variants of a mechanism share
+a truth: NAME_VARIANT.toml names the samples in its [reference], or uses the closed form of NAME.py.
+Its motion is then the function VARIANT of NAME.py, or else the function `motion`. The function
+`forces` beside `motion`, or VARIANT_forces, returns the force outputs.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ FOLDER = Path(__file__).resolve().parent  # in an editable installation, files a
 
 
 def names() -> tuple[str, ...]:
-    """The names of the built-in cases, sorted."""
+    """Return the names of the built-in cases, sorted."""
     return tuple(sorted(file.stem for file in FOLDER.glob("*.toml")))
 
 
 def load(name: str) -> Case:
-    """The built-in case of that name, with its truth.
+    """Return a built-in case by its name, with its truth.
 
     Raises:
         CaseError: there is no such case.
@@ -49,7 +49,7 @@ def load(name: str) -> Case:
 
 
 def summary(name: str) -> tuple[Truth, str]:
-    """The kind of reference and the source of a built-in case, as `load` finds them, without its
+    """Return the kind of reference and the source of a built-in case, as in `load`, without the
     motion.
     """
     with (FOLDER / f"{name}.toml").open("rb") as file:
@@ -60,8 +60,10 @@ def summary(name: str) -> tuple[Truth, str]:
 
 
 def closed_form(name: str) -> Callable[..., Motion] | None:
-    """Takes the drivers' changes from the design, as jets in the order of the case file, to the
-    points; None if there is none.
+    """Return the closed form of a case; None if there is none.
+
+    It takes the drivers' changes from the design, as jets in the order of the case file, and
+    returns the points.
     """
     stem = _module(name)
     if not stem:
@@ -71,7 +73,7 @@ def closed_form(name: str) -> Callable[..., Motion] | None:
 
 
 def _module(name: str) -> str:
-    """The module with the closed form of a case; empty if there is none."""
+    """Return the name of the module with a case's closed form; empty if there is none."""
     stems = (file.stem for file in FOLDER.glob("*.py") if f"{name}_".startswith(f"{file.stem}_"))
     return max(stems, key=len, default="")
 
@@ -81,10 +83,10 @@ def with_closed_form(
     motion: Callable[..., Motion],
     forces: Callable[..., Mapping[str, Lanes]] | None = None,
 ) -> Case:
-    """The case with a closed form as the reference of its outputs that are coordinates or forces.
+    """Return the case with a closed form as the reference of its coordinate and force outputs.
 
     Args:
-        forces: takes the mechanism and the drivers' changes to outputs by name.
+        forces: function from the mechanism and the drivers' changes to force outputs by name.
     """
     drivers = [driver.name for driver in case.mechanism.drivers]
     values, rates, seconds = case.sweep.path.drive(drivers, case.sweep.path.times)
@@ -101,7 +103,7 @@ def with_closed_form(
 
 
 def _title(motion: Callable[..., Motion]) -> str:
-    """What the module of a closed form says of it, in one line, and where it is."""
+    """Return the first line of a closed form's module docstring, and the module's name."""
     first, *_ = (sys.modules[motion.__module__].__doc__ or "").strip().splitlines()
     return f"{' '.join(first.split()).rstrip('.')} ({motion.__module__})"
 

@@ -1,10 +1,10 @@
 """Closed form of Andrews' squeezing mechanism.
 
-From the crank on, every further point is where two circles meet.
-Names and numbers are those of the Bari test set for initial value problems (problem andrews; Hairer
-and Wanner, Solving Ordinary Differential Equations II, VII.7). The crank leads from the origin to
-F, a rod from there to E; E is also on the circle of the triangle B D E about B. Two rods each lead
-over G and over H from E to A. The sides are those of the published start.
+Every further point, from the crank on, is an intersection of two circles. Names and numbers are
+those of the Bari test set for initial value problems (problem andrews; Hairer and Wanner, Solving
+Ordinary Differential Equations II, VII.7). The crank leads from the origin to F, a rod from there
+to E; E is also on the circle of the triangle B D E about B. Two rods each lead over G and over H
+from E to A. The published start selects the intersections.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from .dynamics import Three, effort
 from .jet import Jet, Lanes, Motion, cos, sin
 from .vectors import Vec, fixed, meet_in_plane
 
-# with the misprint x = +0.03635 found for B nothing closes
+# with the misprint x = +0.03635 of some sources for B, the loops do not close
 A, B = (-0.06934, -0.00227, 0.0), (-0.03635, 0.03273, 0.0)
 # OF, FE, BE, EG, AG, EH, AH [m]
 RR, D_, SS, E_, ZT, ZF, U = 0.007, 0.028, 0.035, 0.02, 0.04, 0.02, 0.04

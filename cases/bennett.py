@@ -1,10 +1,9 @@
 """Closed form of the Bennett linkage: four links and four skew hinges, mobile by its geometry.
 
-By count the linkage has no freedom, by geometry one.
-
-Opposite links are alike, their lengths a and b in proportion to the sines of their twists alpha and
-beta. From hinge to hinge one turns by an angle about the axis z, goes the link's length along the
-new x, and turns by its twist about that. The angles are p, q, -p and -q with
+The linkage has no freedom by count, but one by geometry. Opposite links are alike. Their lengths a
+and b are in proportion to the sines of their twists alpha and beta. The step from hinge to hinge is
+a turn by an angle about the axis z, a shift by the link's length along the new x, and a turn by the
+link's twist about the new x. The angles are p, q, -p and -q with
 
     tan(p / 2) tan(q / 2) = K = sin((beta + alpha) / 2) / sin((beta - alpha) / 2)
 
@@ -28,8 +27,8 @@ TRACER = (0.2, 0.3, 0.1)
 
 
 def motion(turn: Jet) -> Motion:
-    """Return both hinges of the coupler and a point it carries, the crank `turn` [rad] from the
-    design, where q = 90 degrees.
+    """Return both hinges of the coupler and a point on it, the crank turned by `turn` [rad] from
+    the design with q = 90 degrees.
     """
     c, s = -sin(turn), cos(turn)  # of q
     x, z = fixed((1.0, 0.0, 0.0), turn), fixed((0.0, 0.0, 1.0), turn)

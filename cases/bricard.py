@@ -3,12 +3,11 @@
 Six links of 1 m and six revolutes, neighbouring axes at right angles. The angles between
 neighbouring links are alternately p and q, with  cos p + cos q + cos p cos q = 0  (Chen, You and
 Tarnai, Threefold-symmetric Bricard linkages for deployable structures, Int. J. Solids Structures
-42, 2005).
-At the benchmark's start, six edges of a cube, p = q = 90 degrees; q comes to zero, the driver's
-dead centre, at p = 120 degrees.
+42, 2005). The benchmark starts as six edges of a cube: p = q = 90 degrees. At p = 120 degrees q is
+zero; this is the driver's dead centre.
 
-From link to link the direction u turns about the axis z by the angle, and the axis about the new u
-by a right angle, to one side and the other: the next axis is  -u x z,  then  u x z.
+From link to link, the direction u turns about the axis z by the angle. The axis then turns about
+the new u by a right angle, to one side and the other: the next axis is  -u x z,  then  u x z.
 """
 
 from __future__ import annotations
@@ -22,14 +21,14 @@ from .vectors import cross, fixed
 
 
 def motion(turn: Jet) -> Motion:
-    """The ends of the links that follow the grounded one, its neighbour turned from the design by
+    """Return the ends of the links after the grounded one, its neighbour turned from the design by
     `turn` [rad].
     """
     return {f"P{k + 2}": end for k, (_, end, _) in enumerate(chain(turn))}
 
 
 def chain(turn: Jet) -> list[Three]:
-    """Return start, end and a point of the hinge at the end, of four links from the ground on."""
+    """Return start, end and a point of the end's hinge, of four links from the ground on."""
     c, s = -sin(turn), cos(turn)  # of p = 90 degrees + turn
     d = -(c / (1.0 + c))  # cosine of q
     angles = (c, s), (d, sqrt(1.0 - d * d))

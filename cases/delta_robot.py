@@ -1,10 +1,10 @@
 """Closed form of a delta robot (after R. Clavel).
 
-The platform keeps its orientation, so each pair of rods is one sphere.
-Arm k hangs on the base at the angle 120 k degrees about z and swings in its own upright plane; a
-pair of equal parallel rods leads to the platform. Seen from the platform's centre X, the elbow less
-the rods' place on the platform, E_k - p_k, is the rods' length away: X is where three spheres meet,
-below their centres.
+The platform keeps its orientation, so each pair of rods is one sphere. Arm k hangs on the base at
+the angle 120 k degrees about z and swings in an upright plane. A pair of equal parallel rods joins
+it to the platform. Let E_k be the elbow, and p_k the place of the rods on the platform, seen from
+the platform's centre X. The distance from E_k - p_k to X is the rods' length: X is the intersection
+of three spheres below their centres.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ ROD_SQUARED = (BASE + ARM - PLATFORM) ** 2 + DROP**2
 
 
 def motion(first: Jet, second: Jet, third: Jet) -> Motion:
-    """The platform's centre with the arms turned down from the design by those angles [rad]."""
+    """Return the platform's centre with the arms turned down from the design by angles [rad]."""
     a, b, c = (
         _centre(math.radians(120.0 * k), turn) for k, turn in enumerate((first, second, third))
     )
@@ -30,7 +30,7 @@ def motion(first: Jet, second: Jet, third: Jet) -> Motion:
 
 
 def _centre(angle: float, turn: Jet) -> Vec:
-    """Elbow less the rods' place on the platform; the hinge's axis is tangential, so that a
+    """Return the elbow less the rods' place on the platform. The hinge's axis is tangential: a
     positive turn is down.
     """
     c, s = math.cos(angle), math.sin(angle)

@@ -1,7 +1,7 @@
 """Closed form of two Hooke's joints in a row, bent alike: the last shaft turns as the first.
 
-The yokes between the joints are parallel. At the first joint  tan t2 = tan t1 / cos b;  at the
-second  tan t3 = cos b tan t2,  as its driving yoke is across the plane at design.
+The yokes between the joints are parallel. At the first joint  tan t2 = tan t1 / cos b.  At the
+second  tan t3 = cos b tan t2,  because its driving yoke is across the plane at design.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ TWICE = BEND[0] ** 2 - BEND[1] ** 2, 2.0 * BEND[0] * BEND[1]
 
 
 def motion(turn: Jet) -> Motion:
-    """A point of the shaft between and the tip of the last with the first turned from the design by
-    `turn` [rad].
+    """Return a point of the middle shaft and the tip of the last one, the first shaft turned from
+    the design by `turn` [rad].
     """
     return {
         "between": on_shaft((0.0, 0.0, 0.0), BEND, *driven(turn, BEND[0])),

@@ -1,8 +1,8 @@
 """Efforts of drivers in closed form, by the balance of power.
 
-The power of the one driver is that of the accelerated masses, less that of gravity, plus that of
-the springs; no reaction of a joint enters. Masses are those of the case file, the motion is that of
-the case's closed form: each body by three points of it.
+The power of the one driver equals the power of the accelerated masses, less the power of gravity,
+plus the power of the springs. No reaction of a joint enters. The case file gives the masses. The
+case's closed form gives the motion, as three points of each body.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ def effort(mechanism: Mechanism, turn: Jet, bodies: Callable[[Jet], Mapping[str,
     """Return the effort of the only driver over the samples [N or N m].
 
     Args:
-        turn: change of the driver's coordinate since design, which moves at every sample.
-        bodies: takes the change to three points of each moving body, not on one line.
+        turn: change of the driver's coordinate since design; it moves at every sample.
+        bodies: function from the change to three points of each moving body, not on one line.
     """
     now, design = bodies(turn), bodies(standing(turn))
     power = np.zeros_like(turn.x)
@@ -58,7 +58,7 @@ def effort(mechanism: Mechanism, turn: Jet, bodies: Callable[[Jet], Mapping[str,
 def turning_power(inertia: Numbers, design: Three, now: Three) -> Lanes:
     """Return  omega . I omega-dot  of a body, in its axes at design [W].
 
-    Its axes e_k carried along give  omega = 1/2 sum e_k x e_k-dot.
+    Its axes e_k, carried by the body, give  omega = 1/2 sum e_k x e_k-dot.
     """
     like = now[0].x
     origin = fixed((0.0, 0.0, 0.0), like)

@@ -1,4 +1,4 @@
-"""Closed form of a five-bar robot: the tool is where circles about the two cranks' pins meet."""
+"""Closed form of a five-bar robot: circles about the cranks' pins intersect at the tool."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Z = (0.0, 0.0, 1.0)
 
 
 def motion(left: Jet, right: Jet) -> Motion:
-    """The tool with the cranks turned from the design by those angles about z [rad]."""
+    """Return the tool with the cranks turned from the design by angles about z [rad]."""
     a, b = (
         Circle.about(LEFT, Z, LEFT_PIN).turned(left),
         Circle.about(RIGHT, Z, RIGHT_PIN).turned(right),

@@ -1,8 +1,9 @@
-"""Closed form of the planar four-bar: the coupler pin is where two circles meet.
+"""Closed form of the planar four-bar: the coupler pin is an intersection of two circles.
 
-In the plane of motion it has the coupler's length from the crank pin, and the rocker's from the
-rocker's pivot. As a crank-rocker (shortest + longest = 0.39 m < 0.446 m, Grashof) it never
-stretches out, so the side is that of the design.
+In the plane of motion, its distance from the crank pin is the coupler's length, and its distance
+from the rocker's pivot is the rocker's length. The linkage is a crank-rocker (shortest + longest =
+0.39 m < 0.446 m, Grashof). It never stretches out, so the coupler pin stays on the side of the
+design.
 """
 
 from __future__ import annotations
@@ -71,7 +72,7 @@ def bodies(turn: Jet) -> Mapping[str, Three]:
 def forces(mechanism: Mechanism, turn: Jet) -> Mapping[str, Lanes]:
     """Return the torque of the crank, and the force of the coupler on the rocker in the plane.
 
-    The moments of the coupler about the crank pin and of the rocker about its pivot are two
+    The moments of the coupler about the crank pin and of the rocker about its pivot give two
     equations for the two components.
     """
     pin, at = pins(turn)

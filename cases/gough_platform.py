@@ -1,7 +1,7 @@
-"""Closed form of a Gough platform of the 3-2-1 kind, whose six legs change independently.
+"""Closed form of a Gough platform of the 3-2-1 kind; its six legs change independently.
 
-Three legs lead to the first point, two to the second, one to the third. Each point is where three
-spheres meet, about feet of legs and about the points found before, from which it has constant
+Three legs lead to the first point, two to the second, one to the third. Each point is an
+intersection of three spheres. Their centres are feet of legs, and known points at constant
 distances.
 """
 
@@ -26,7 +26,7 @@ TOOL = (0.6, 0.5, 1.3)
 
 
 def motion(a: Jet, b: Jet, c: Jet, d: Jet, e: Jet, f: Jet) -> Motion:
-    """The platform's three points and its tool with the legs lengthened from the design by those
+    """Return the platform's three points and its tool, the legs lengthened from the design by these
     lengths [m].
     """
     feet, heads = [fixed(foot, a) for foot in FEET], tuple(fixed(head, a) for head in HEADS)

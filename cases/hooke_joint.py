@@ -1,11 +1,11 @@
 """Closed form of Hooke's joint,  tan t2 = tan t1 / cos b  (any textbook).
 
 The driving yoke is in the plane of the shafts at t1 = 0. The driven yoke is normal to its own shaft
-and to the driving yoke, from which
+and to the driving yoke. Hence
 
     cos t2 = cos b cos t1 / n,  sin t2 = sin t1 / n,  n^2 = sin^2 t1 + cos^2 b cos^2 t1:
 
-the same without a quadrant to choose.
+the same relation, with the right quadrant.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from .vectors import Numbers, Vec, fixed
 
 # cos b, sin b: the driving shaft is along x, the driven one turned from it towards z
 BEND = 0.8, 0.6
-TIP = 0.3, 0.2  # of the driven shaft: this far along it, and off it, along y at design [m]
+TIP = 0.3, 0.2  # of the driven shaft: distance along it, and off it along y, at design [m]
 
 
 def driven(turn: Jet, cosine: float) -> tuple[Jet, Jet]:
-    """Cosine and sine of the driven shaft's turn, the driving one's being `turn` [rad] and the
-    cosine of b given.
+    """Return cosine and sine of the driven shaft's turn, from the driving shaft's `turn` [rad] and
+    the cosine of b.
     """
     c, s = cosine * cos(turn), sin(turn)
     n = sqrt(s * s + c * c)
@@ -32,8 +32,8 @@ def driven(turn: Jet, cosine: float) -> tuple[Jet, Jet]:
 
 
 def on_shaft(start: Numbers, bend: tuple[float, float], c: Jet, s: Jet) -> Vec:
-    """The tip of a shaft that starts there, bent from x towards z (cosine and sine of the angle),
-    turned as c and s say.
+    """Return the tip of a shaft from its start, bent from x towards z by an angle (cosine, sine)
+    and turned by an angle (cosine c, sine s).
     """
     direction, aside = (bend[0], 0.0, bend[1]), (-bend[1], 0.0, bend[0])  # aside = direction x y
     off = c * fixed((0.0, 1.0, 0.0), c) + s * fixed(aside, c)
@@ -41,7 +41,7 @@ def on_shaft(start: Numbers, bend: tuple[float, float], c: Jet, s: Jet) -> Vec:
 
 
 def motion(turn: Jet) -> Motion:
-    """The tip of the driven shaft with the driving one turned from the design by `turn` [rad]."""
+    """Return the driven shaft's tip, the driving shaft turned from the design by `turn` [rad]."""
     return {"driven_tip": on_shaft((0.0, 0.0, 0.0), BEND, *driven(turn, BEND[0]))}
 
 

@@ -1,7 +1,7 @@
-"""Jets: a number with its first and second derivative by time, so that a closed form gives exact
-velocities and accelerations.
+"""Jets: a number with its first and second derivative by time, for exact velocities and
+accelerations of closed forms.
 
-The closed forms of the cases are written with these alone; they share no code with any engine.
+The closed forms of the cases use jets alone; they share no code with any engine.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class Jet:
         if isinstance(b, float | int):
             return Jet(self.x * b, self.v * b, self.a * b)
         if not isinstance(b, Jet):  # pyright: ignore[reportUnnecessaryIsInstance]
-            return NotImplemented  # a vector knows what to do
+            return NotImplemented  # a vector has its own product
         return Jet(
             self.x * b.x,
             self.v * b.x + self.x * b.v,
@@ -66,32 +66,32 @@ class Jet:
 
 
 def sqrt(a: Jet) -> Jet:
-    """The square root; a must be positive."""
+    """Return the square root; a must be positive."""
     x = np.sqrt(a.x)  # x x = a, differentiated once and twice
     v = a.v / (2.0 * x)
     return Jet(x, v, (a.a - 2.0 * v * v) / (2.0 * x))
 
 
 def sin(a: Jet) -> Jet:
-    """The sine [rad]."""
+    """Return the sine of an angle [rad]."""
     s, c = np.sin(a.x), np.cos(a.x)
     return Jet(s, c * a.v, c * a.a - s * a.v * a.v)
 
 
 def cos(a: Jet) -> Jet:
-    """The cosine [rad]."""
+    """Return the cosine of an angle [rad]."""
     s, c = np.sin(a.x), np.cos(a.x)
     return Jet(c, -s * a.v, -s * a.a - c * a.v * a.v)
 
 
 def constant(value: float, like: Jet) -> Jet:
-    """A number that does not change."""
+    """Return a constant number as a jet."""
     zero = np.zeros_like(like.x)
     return Jet(zero + value, zero, zero)
 
 
 def steady(values: Lanes, rate: float) -> Jet:
-    """Something that passes these values [rad or m] at a constant rate, shape (n,)."""
+    """Return a coordinate with these values [rad or m] and a constant rate, shape (n,)."""
     return Jet(values, np.full_like(values, rate), np.zeros_like(values))
 
 

@@ -14,7 +14,7 @@ UPRIGHT = Upright((1.14, 0.355, 0.1455), (1.115, 0.665, 0.118), (0.975, 0.715, 0
 
 
 def motion(turn: Jet, rack: Jet) -> Motion:
-    """Points of the suspension with the arm turned by `turn` [rad] and the rack shifted along y by
-    `rack` [m] from the design.
+    """Return the points of the suspension, the arm turned by `turn` [rad] and the rack shifted
+    along y by `rack` [m] from the design.
     """
     return macpherson(ARM, TOP, CLAMP, UPRIGHT, turn, rack)

@@ -1,8 +1,8 @@
 """Closed form of Modelica's spatial four-bar, for every choice of joints at its rod.
 
-The crank pin is  R_x(t) (0, 0.5, 0.1),  the slider's pin  (x, 0.2, 0),  and the rod between them
-has the squared length 1.1:  x = sqrt(1.1 - (y - 0.2)^2 - z^2)  with the crank pin's y and z;
-s = x - 1.2 is Modelica's displacement.
+The crank pin is  R_x(t) (0, 0.5, 0.1),  the slider's pin  (x, 0.2, 0).  The rod between them has
+the squared length 1.1. Hence  x = sqrt(1.1 - (y - 0.2)^2 - z^2)  with the crank pin's y and z.
+Modelica's displacement is  s = x - 1.2.
 """
 
 from __future__ import annotations

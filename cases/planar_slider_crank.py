@@ -1,7 +1,7 @@
 """Closed form of the planar slider-crank: x = r cos t + sqrt(l^2 - r^2 sin^2 t).
 
-x is the slider's position (any textbook). Its forces follow body by body: the slider's acceleration
-gives the rod's push along the guide, the rod's moments about the crank pin the one across it.
+x is the slider's position (any textbook). Its forces follow body by body. The slider's acceleration
+gives the rod's push along the guide; the rod's moments about the crank pin give its push across it.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ CRANK, ROD = 1.0, 3.0  # r, l [m]
 
 
 def motion(turn: Jet) -> Motion:
-    """Points of the mechanism with the crank turned from the design, stretched out, by `turn`
-    [rad].
+    """Return the points of the mechanism, the crank turned by `turn` [rad] from the stretched-out
+    design.
     """
     zero = constant(0.0, turn)
     px, py = CRANK * cos(turn), CRANK * sin(turn)

@@ -1,9 +1,9 @@
 """Closed form of the spatial slider-crank, after the IFToMM multibody benchmark.
 
 The crank pin is  B = (0, Ay - r sin t, Az + r cos t), the slider at  x = sqrt(l^2 - By^2 - Bz^2)
-on the x axis. The conrod turns with the unit vectors  u  from the slider to B,
-a = X x u / |X x u|  and  u x a:  a is the universal joint's axis on the conrod, perpendicular to
-both u and the joint's axis X on the slider.
+on the x axis. Three unit vectors turn with the conrod: u from the slider to B,
+a = X x u / |X x u|, and u x a. X is the universal joint's axis on the slider; a is its axis on the
+conrod, perpendicular to both u and X.
 """
 
 from __future__ import annotations

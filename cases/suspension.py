@@ -1,8 +1,9 @@
-"""Closed forms of wheel suspensions that are driven at an arm: point after point, and the wheel is
-carried by three of them.
+"""Closed forms of wheel suspensions driven at an arm.
 
-Driven at the wheel instead, the same motions have none: the arm's angle is then the root of a
-transcendental equation.
+The points follow one after another; three of them carry the wheel.
+
+The same motions have no closed form with the wheel as driver: the arm's angle is then the root of
+a transcendental equation.
 """
 
 from __future__ import annotations
@@ -25,14 +26,14 @@ class Arm:
 
     @property
     def circle(self) -> Circle:
-        """The way of its ball about the axis from back to front."""
+        """The path of its ball about the axis from back to front."""
         return Circle.about(self.back, np.subtract(self.front, self.back).tolist(), self.ball)
 
 
 @dataclass(frozen=True)
 class Upright:
-    """What the wheel carrier has besides its balls: the tie rod's ends, inner and outer, and the
-    wheel's centre, at design [m].
+    """The wheel carrier without its balls: inner and outer end of the tie rod, and the wheel's
+    centre, at design [m].
     """
 
     inner: Numbers
@@ -46,11 +47,11 @@ class Upright:
 
 
 def double_wishbone(lower: Arm, upper: Arm, upright: Upright, turn: Jet) -> dict[str, Vec]:
-    """The points of a double wishbone suspension with the lower arm turned from the design by
+    """Return the points of a double wishbone suspension, the lower arm turned from the design by
     `turn` [rad].
 
-    The upper ball is on its circle at the upright's length from the lower ball; the tie rod's outer
-    end has its distances from both balls and from the inner end.
+    The upper ball is on its circle, at the upright's length from the lower ball. The tie rod's
+    outer end has constant distances from both balls and from the inner end.
     """
     low, high, inner, outer = (
         fixed(each, turn) for each in (lower.ball, upper.ball, upright.inner, upright.outer)
@@ -70,15 +71,14 @@ def double_wishbone(lower: Arm, upper: Arm, upright: Upright, turn: Jet) -> dict
 def macpherson(
     arm: Arm, top: Numbers, clamp: Numbers, upright: Upright, turn: Jet, rack: Jet
 ) -> dict[str, Vec]:
-    """The points of a MacPherson strut, the arm turned by `turn` [rad] and the rack shifted along y
-    by `rack` [m] from the design.
+    """Return the points of a MacPherson strut, the arm turned by `turn` [rad] and the rack shifted
+    along y by `rack` [m] from the design.
 
-    The strut's axis from its clamp to its top is a line of the upright and slides through the top.
-    In the upright's own axes the top is at  t u  from the foot of the ball on the line, with
-    t^2 = distance^2 - offset^2,  the distance being that from top to ball and the offset, which is
-    constant, that of the ball from the line. So the tie rod's outer end has known
-    distances from ball, top and inner end, and the upright is carried by ball, outer end and,
-    moving along u, the top.
+    The strut's axis, from its clamp to its top, is a line of the upright and slides through the
+    top. In the upright's own axes the top is at  t u  from the foot of the ball on this line, with
+    t^2 = distance^2 - offset^2.  Here `distance` is from top to ball, and the constant `offset`
+    from ball to line. So the tie rod's outer end has known distances from ball, top and inner end.
+    Ball, outer end and the top, moving along u, carry the upright.
     """
     u = np.subtract(top, clamp) / np.linalg.norm(np.subtract(top, clamp))
     slid = float(np.subtract(top, arm.ball) @ u)
@@ -109,6 +109,6 @@ def _square(a: Vec) -> Jet:
 
 
 def _side(upright: Upright, b: Numbers, c: Numbers) -> float:
-    """On which side of the plane through the inner end, b and c the outer end is at design."""
+    """Return the side of the outer end at design, from the plane through inner end, b and c."""
     p, q, r = (np.subtract(each, upright.inner) for each in (b, c, upright.outer))
     return float(np.sign(np.cross(p, q) @ r))

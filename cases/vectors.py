@@ -1,10 +1,9 @@
-"""Vectors of jets, and where circles and spheres meet: what the closed forms of linkages are made
-of.
+"""Vectors of jets, and intersections of circles and spheres: the parts of the closed forms of
+linkages.
 
-A mechanism is put together point after point, each from its distances to points that are known
-already. Two such points exist in the plane, on a circle and in space; the side is told by the
-design position, from which a motion leads to the other side only through a position where both are
-one.
+A mechanism is assembled point after point, each from its distances to known points. There are two
+such points in the plane, on a circle and in space. The design position selects the side. A motion
+reaches the other side only through a position with both points in one.
 """
 
 from __future__ import annotations
@@ -45,20 +44,20 @@ class Vec:
 
 
 def fixed(point: Numbers, like: Jet) -> Vec:
-    """A vector that does not change."""
+    """Return a vector that does not change."""
     x, y, z = point
     return Vec(constant(x, like), constant(y, like), constant(z, like))
 
 
 def cross(a: Vec, b: Vec) -> Vec:
-    """The vector product."""
+    """Return the vector product."""
     return Vec(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
 
 
 @dataclass(frozen=True)
 class Circle:
-    """The way of a point about an axis: centre + radius, seen at design along u and a right angle
-    later along v [m].
+    """The path of a point about an axis: centre and radius. The radius is u at design, and v after
+    a right angle [m].
     """
 
     centre: Numbers
@@ -67,18 +66,18 @@ class Circle:
 
     @staticmethod
     def about(on_axis: Numbers, direction: Numbers, point: Numbers) -> Circle:
-        """The circle of a point about an axis through another, by the right hand."""
+        """Return the circle of a point about an axis through another point, right-handed."""
         axis = np.array(direction) / np.linalg.norm(direction)
         centre = np.array(on_axis) + axis * (axis @ np.subtract(point, on_axis))
         u = np.array(point) - centre
         return Circle(centre.tolist(), u.tolist(), np.cross(axis, u).tolist())
 
     def at(self, c: Jet, s: Jet) -> Vec:
-        """The point at the angle of that cosine and sine."""
+        """Return the point at an angle, given by its cosine and sine."""
         return fixed(self.centre, c) + c * fixed(self.u, c) + s * fixed(self.v, c)
 
     def turned(self, angle: Jet) -> Vec:
-        """The point at that angle from the design [rad]."""
+        """Return the point at an angle from the design [rad]."""
         return self.at(cos(angle), sin(angle))
 
     def meet(self, point: Vec, distance: float, side: float) -> Vec:
@@ -105,13 +104,13 @@ class Circle:
 
 
 def meet_in_plane(a: Vec, aa: float, b: Vec, bb: float, side: float) -> Vec:
-    """The point of the x-y plane with squared distances aa from a and bb from b.
+    """Return the point of the x-y plane with squared distances aa from a and bb from b.
 
     The point is  a + k p + h p_perp  with  p = b - a,  k = (p.p + aa - bb) / (2 p.p)  and
     k^2 + h^2 = aa / p.p.
 
     Args:
-        side: +1 to the left of the way from a to b, -1 to its right.
+        side: +1 to the left of the line from a to b, -1 to its right.
     """
     p = b - a
     pp = p.x * p.x + p.y * p.y
@@ -121,13 +120,13 @@ def meet_in_plane(a: Vec, aa: float, b: Vec, bb: float, side: float) -> Vec:
 
 
 def meet_in_space(a: Vec, aa: Jet, b: Vec, bb: Jet, c: Vec, cc: Jet, side: float) -> Vec:
-    """The point with squared distances aa, bb and cc from three points (trilateration).
+    """Return the point with squared distances aa, bb and cc from three points (trilateration).
 
     With p = b - a, q = c - a and n = p x q the point is  a + k p + l q + h n.  Its products with p
     and q,  (p.p + aa - bb) / 2  and  (q.q + aa - cc) / 2,  give k and l; h is the rest of aa.
 
     Args:
-        side: +1 where n points to, seen from the three points; else -1.
+        side: +1 on the side of n, seen from the three points; else -1.
     """
     p, q = b - a, c - a
     n = cross(p, q)
@@ -138,10 +137,10 @@ def meet_in_space(a: Vec, aa: Jet, b: Vec, bb: Jet, c: Vec, cc: Jet, side: float
 
 
 def carried(before: tuple[Vec, Vec, Vec], now: tuple[Vec, Vec, Vec], point: Vec) -> Vec:
-    """Where a point of a body is now, from three other points of it, before and now.
+    """Return the present place of a point of a body, from three other points before and now.
 
-    Its components along the three points' triangle and normal are those before, taken with the dual
-    basis.
+    Its components along the three points' triangle and normal do not change; the dual basis gives
+    them.
     """
     (a, b, c), (d, e, f) = before, now
     p, q, r = b - a, c - a, point - a

@@ -13,6 +13,7 @@ WORD = re.compile(r"[A-Za-z]+")
 
 PLAIN = (
     "adapters",
+    "adapters/*.py",
     "adapters/dart",
     "adapters/drake",
     "adapters/exudyn",
@@ -21,6 +22,7 @@ PLAIN = (
     "adapters/shared",
     "adapters/simbody",
     "adapters/writers",
+    "cases",
     "core/*.py",
     "core/case",
     "core/case/measures",
@@ -35,6 +37,7 @@ PLAIN = (
     "core/kinematics/compiled",
     "core/kinematics/continuation",
     "core/kinematics/diagnosis",
+    "core/kinematics/forces",
     "core/kinematics/formulation",
     "core/kinematics/sparse",
     "core/kinematics/structure",

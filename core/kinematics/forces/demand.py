@@ -1,4 +1,4 @@
-"""Newton-Euler: the wrench that each body's motion demands of joints and drivers, over any scalar.
+"""Newton-Euler: the wrench demanded by a body's motion from joints and drivers, over any scalar.
 
 M a + h - Q   for one body: force, and torque about the body's internal origin, in SI units.
 """
@@ -65,7 +65,7 @@ class BodyStates:
         return self.twists.get(body, GROUND_TWIST).w
 
     def turned(self, body: str, vector: Sequence[float]) -> Vec3:
-        """Return a vector that turns with a body; given at design."""
+        """Return a vector fixed in a body, given at design, in its current direction."""
         return self._pose(body).turn(vec(vector))
 
     def _pose(self, body: str) -> Pose:
@@ -73,7 +73,7 @@ class BodyStates:
 
 
 def inertial(body: Body, at: BodyStates, gravity: Vec3) -> Wrench:
-    """Return the wrench that a body with mass demands: m (a - g), and I wdot + w x I w at C."""
+    """Return the demanded wrench of a body with mass: m (a - g), and I wdot + w x I w at C."""
     arm = arm_of_center(body, at)
     force = body.mass * (acceleration_of_center(body, at) - gravity)
     return Wrench(force, cross(at.frame.unit * arm, force) + spin_change(body, at))
@@ -93,7 +93,7 @@ def acceleration_of_center(body: Body, at: BodyStates) -> Vec3:
 def spin_change(body: Body, at: BodyStates) -> Vec3:
     """Return the change of a body's angular momentum about its centre of mass [N m].
 
-    The inertia at design is in global axes, so it is constant in axes that turn with the body.
+    The inertia at design has global axes. It is therefore constant in the body's own axes.
     """
     I = inertia_of(body)  # noqa: E741 - the field's letter
     if I is None:
@@ -103,7 +103,7 @@ def spin_change(body: Body, at: BodyStates) -> Vec3:
 
 
 def spin_of(body: Body, at: BodyStates) -> tuple[Vec3, Vec3]:
-    """Return w and wdot of a body in axes that turn with it, global at design."""
+    """Return w and wdot of a body in its own axes, global at design."""
     back = at.poses[body.name].D.T
     w, w_t = at.twists[body.name].w, at.accelerations[body.name].w_t
     return w + back @ w, w_t + back @ w_t
@@ -124,9 +124,9 @@ class Applied:
     Attributes:
         amount: tension of a spring [N], torque on the joint's second body [N m], or the amount of a
             constant force [N] or torque [N m].
-        wrenches: on each of its bodies.
-        stored: rate of the energy stored in it [W].
-        lost: power that it dissipates, less the power of a constant force or torque [W].
+        wrenches: wrench on each body of the element, by body.
+        stored: rate of its stored energy [W].
+        lost: dissipated power, less the power of a constant force or torque [W].
     """
 
     amount: Scalar
@@ -141,10 +141,10 @@ def at_work(
     """Return all force elements at work, by name.
 
     Args:
-        angle: gives a joint's angle by its name [rad], continuous, zero at design.
+        angle: function from a joint's name to its angle [rad], continuous, zero at design.
 
     Raises:
-        SolveError: an element is of a kind that the native solver does not know.
+        SolveError: the native solver does not know an element's type.
     """
 
     def at_work_now(each: Any) -> Applied:
@@ -160,7 +160,7 @@ def at_work(
 
 
 def spring(each: SpringDamper, at: BodyStates) -> Applied:
-    """Return a spring-damper at work: its tension draws the ends together."""
+    """Return a spring-damper at work; a positive tension draws its ends together."""
     (i, P), (j, Q) = zip((each.i, each.j), each.points, strict=True)
     d = (vec(Q) - vec(P)) + (at.place(j, Q) - at.place(i, P))
     length = root(d @ d)

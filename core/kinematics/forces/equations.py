@@ -1,8 +1,8 @@
 """The equations of forces at one state, over any scalar: J^T lambda = M a + h - Q.
 
-J has all native rows, of joints and of drivers. On the manifold the simplified rows of a whole
-joint span what the exact ones span, so the wrench of a joint does not depend on the row style: the
-forces of all styles are those of the native rows.
+J has all native rows of joints and drivers. On the manifold, the simplified rows of a whole joint
+span the same space as its exact rows. The wrench of a joint is therefore independent of the row
+style, and all styles take their forces from the native rows.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from .demand import NO_WRENCH, Applied, BodyStates, inertial
 
 @dataclass(frozen=True, eq=False)
 class ForceEquations:
-    """The rows of joints and drivers at one state, what they carry, and what multipliers mean.
+    """The rows of joints and drivers at one state, their demand, and the meaning of multipliers.
 
     Attributes:
-        formulation: the native one, of the whole mechanism.
+        formulation: native formulation of the whole mechanism.
         at: its configuration.
-        states: how the bodies move.
+        states: poses, twists and accelerations of the bodies.
         applied: force elements at work, by name.
     """
 
@@ -42,12 +42,12 @@ class ForceEquations:
 
     @cached_property
     def rows(self) -> Rows:
-        """The Jacobian of all rows, lengths in the unit of the frames."""
+        """Return the Jacobian of all rows, lengths in the unit of the frames."""
         return self.formulation.rows(self.at)
 
     @cached_property
     def demand(self) -> list[Scalar]:
-        """M a + h - Q by the unknowns [J]; zero for the coordinates of joints."""
+        """Return M a + h - Q by the unknowns [J]; zero for the coordinates of joints."""
         found: list[Scalar] = [0.0] * self.formulation.unknowns
         gravity = vec(self.mechanism.gravity)
         for name, first in self.formulation.columns.items():
@@ -64,7 +64,7 @@ class ForceEquations:
 
     @cached_property
     def _numbered(self) -> list[tuple[int, Constraint | Relation]]:
-        """The constraint of every row, with the row's number: joints, couplers, drivers."""
+        """Return the constraint and number of every row: joints, couplers, drivers."""
         every = (
             c
             for c in self.formulation.constraints
@@ -74,7 +74,7 @@ class ForceEquations:
 
     @cached_property
     def _of_joints(self) -> Mapping[str, list[tuple[int, Constraint | Relation]]]:
-        """The rows of each joint; a coupler or driver may have the name of a joint."""
+        """Return the rows by joint; a coupler or driver may have the name of a joint."""
         mechanism, every = self.mechanism, self.formulation.constraints
         last = len(every) - len(mechanism.couplers) - len(mechanism.drivers)
         own = {id(c) for c in every[:last]}
@@ -86,17 +86,17 @@ class ForceEquations:
 
     @cached_property
     def _measuring(self) -> Mapping[str, int]:
-        """The row that measures each coordinate."""
+        """Return the number of the measuring row by coordinate."""
         return {
             c.coordinate: k for k, c in self._numbered if isinstance(c, Constraint) and c.coordinate
         }
 
     def _parts(self, joint: Joint, multipliers: Sequence[Scalar]) -> Iterator[tuple[int, Scalar]]:
-        """Yield rows that act on the bodies of a joint, with the multipliers that are its own.
+        """Yield the rows acting on the bodies of a joint, with the joint's part of each multiplier.
 
-        A row that measures a joint's coordinate carries what the relations of this coordinate ask
-        for: it counts as theirs. So a gear's torque is not the reaction of the joints that it
-        couples, and a screw's thrust is the screw's.
+        A row can measure a coordinate of a joint. Its multiplier then carries the loads of this
+        coordinate's relations, and they count as loads of the relations, not of the joint. A gear's
+        torque is thus no reaction of the coupled joints, and a screw's thrust is the screw's.
         """
         for k, c in self._of_joints[joint.name]:
             if isinstance(c, Relation):
@@ -110,7 +110,7 @@ class ForceEquations:
     def reaction(self, joint: Joint, multipliers: Sequence[Scalar]) -> tuple[Vec3, Vec3]:
         """Return force [J / unit of the frames] and moment [N m] of a joint on its second body.
 
-        The moment is about the joint's point as carried by that body.
+        The moment is about the joint's point, carried by the second body.
         """
         body, sign = (joint.j, 1.0) if joint.j in self.formulation.columns else (joint.i, -1.0)
         first, force, torque = self.formulation.columns[body], ZERO, ZERO
@@ -123,7 +123,7 @@ class ForceEquations:
     def _arm(self, joint: Joint, body: str) -> Vec3:
         """Return the arm from a body's internal origin to the joint's point, turned [units].
 
-        The point is the one that the second body carries.
+        The second body carries the point.
         """
         held = self.at.poses.get(joint.j, GROUND_POSE)
         frame = self.states.frame
@@ -139,7 +139,7 @@ class ForceEquations:
         drivers = self.mechanism.drivers
         c: Any = self.formulation.constraints[drivers.index(driver) - len(drivers)]
         first = next(k for k, each in self._numbered if each is c)
-        # nu is linear in the driver's rate: at rate one it is the power of a multiplier
+        # nu is linear in the driver's rate: at rate one it is the power per unit multiplier
         at_rate_one = replace(c.primitive, drive=replace(c.primitive.drive, c_t=1.0))
         pair = (self.at.poses.get(b, GROUND_POSE) for b in (c.i, c.j))
         found: Scalar = 0.0

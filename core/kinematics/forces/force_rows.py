@@ -1,4 +1,4 @@
-"""Multipliers of the rows over a solved motion, by singular values, and what they mean."""
+"""Multipliers of the rows over a solved motion by singular values, and forces from them."""
 
 from __future__ import annotations
 
@@ -22,15 +22,19 @@ from ..formulation.state_vectors import state_of
 from .equations import ForceEquations
 from .motion_lanes import MotionLanes
 
-# Below this part of the largest singular value of the rows, the pose is singular: the effort that
-# holds it is not finite, or not unique.
+# The pose is singular if a singular value of the rows is below this part of the largest: the
+# balancing effort is then infinite or not unique.
 SINGULAR = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class Multipliers:
-    """Multipliers of the rows [J], shape (n, rows), a basis of their undetermined combinations,
-    shape (n, rows, redundant rows), and whether the pose is singular, shape (n,).
+    """Multipliers of the rows at n samples.
+
+    Attributes:
+        multipliers: [J], shape (n, rows).
+        null: basis of their undetermined combinations, shape (n, rows, redundant rows).
+        singular: whether the pose is singular, shape (n,).
     """
 
     multipliers: Array
@@ -61,7 +65,10 @@ class ForceRows:
 
     @cached_property
     def matrix(self) -> Array:
-        """The Jacobian of all rows, lengths in the unit of the frames, (n, rows, unknowns)."""
+        """Return the Jacobian of all rows, lengths in the unit of the frames.
+
+        Shape (n, rows, unknowns).
+        """
         found = np.zeros((self.lanes.n, self.count, self.formulation.unknowns))
         for k, row in enumerate(self.equations.rows):
             for column, value in row.items():
@@ -70,11 +77,11 @@ class ForceRows:
 
     @cached_property
     def demand(self) -> Array:
-        """M a + h - Q by the unknowns [J], shape (n, unknowns)."""
+        """Return M a + h - Q by the unknowns [J], shape (n, unknowns)."""
         return self._stacked(self.equations.demand)
 
     def solve(self, part: slice) -> Multipliers:
-        """Return the multipliers of a part of the samples: of all solutions the shortest."""
+        """Return the multipliers at a part of the samples: the shortest of all solutions."""
         rows, demand = self.matrix[part], self.demand[part]
         inverse = _inverse(rows)
         if inverse is not None:
@@ -89,8 +96,9 @@ class ForceRows:
         return Multipliers(np.einsum("nru,nu->nr", u[:, :, :rank], along), u[:, :, rank:], singular)
 
     def reaction(self, joint: Joint, multipliers: Array, null: Array) -> tuple[Array, Array, Array]:
-        """Return force [N], moment [N m] and undetermined directions of a joint's wrench on its
-        second body, about the joint's point as carried by that body.
+        """Return force [N], moment [N m] and undetermined directions of a joint's wrench.
+
+        The wrench acts on the joint's second body, about the joint's point carried by this body.
         """
         force, moment = self._wrench(joint, multipliers)
         free = np.empty((self.lanes.n, 6, null.shape[2]))
@@ -103,7 +111,7 @@ class ForceRows:
         return self._stacked(pair[0]), self._stacked(pair[1])
 
     def effort(self, driver: Driver, multipliers: Array, null: Array) -> Array:
-        """Return the effort of a driver [N or N m], shape (n,); NaN where redundant rows leave it
+        """Return the effort of a driver [N or N m], shape (n,); NaN if redundant rows leave it
         undetermined.
         """
         effort: Array = self.equations.effort(driver, [*multipliers.T]) + np.zeros(self.lanes.n)
@@ -118,8 +126,10 @@ class ForceRows:
 
 
 def _inverse(rows: Array) -> Array | None:
-    """Return the inverses of square matrices that are all far from singular, shape (n, size, size),
-    in a tenth of the time of singular values; None if singular values must decide.
+    """Return the inverses of square matrices, shape (n, size, size).
+
+    Return None if they are not square or one may be singular: singular values must decide then.
+    Inversion takes a tenth of their time.
     """
     if rows.shape[1] != rows.shape[2]:
         return None

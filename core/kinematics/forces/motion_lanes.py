@@ -27,11 +27,11 @@ class MotionLanes:
 
     Attributes:
         frame, times, n: frames of the mechanism, times of the solved samples [s], and their number.
-        poses: of the moving bodies.
+        poses: poses of the moving bodies.
         at: poses, twists and accelerations.
         drive: value from design, velocity and acceleration of every driver [SI], shape
             (3, drivers, n).
-        values, rates: the first two by driver.
+        values, rates: value from design and velocity, by driver.
         applied: force elements at work, by name.
 
     Raises:
@@ -74,7 +74,7 @@ class MotionLanes:
             arm = self.poses[body.name].turn(self.frame.arm(body.name, body.origin))
             per_unit = 1.0 / self.frame.unit
             twists[body.name] = Twist(per_unit * vec([*v[:3]]) - cross(w, arm), w)
-            # that of the origin, less what the arm from the internal origin adds
+            # the origin's acceleration, less the part of the arm from the internal origin
             added = Acceleration(ZERO, w_t).of(arm, twists[body.name])
             accelerations[body.name] = Acceleration(per_unit * vec([*a[:3]]) - added, w_t)
         return BodyStates(self.frame, self.poses, twists, accelerations)
@@ -82,8 +82,8 @@ class MotionLanes:
     def angle(self, name: str) -> Array:
         """Return the angle of a joint over the samples [rad], continuous, zero at design.
 
-        That of a driven joint, or of one geared to it, is exact. Others are followed by their rates
-        from the sample nearest to the design, which must be within half a turn of it.
+        The angle of a driven joint, or of a joint geared to one, is exact. Other angles follow the
+        rates from the sample nearest to the design; this sample must be within half a turn of it.
         """
         known = self._driven.get((name, "rotation"))
         if known is not None:
@@ -107,7 +107,7 @@ class MotionLanes:
 
     @cached_property
     def _driven(self) -> Mapping[tuple[str, str], Array]:
-        """Coordinates that drivers give, directly or by couplers: joint and freedom -> value."""
+        """Return coordinates given by drivers or their couplers: joint and freedom -> value."""
         found: dict[tuple[str, str], Array] = {
             (each.joint, each.freedom): self.values[each.name]
             for each in self.mechanism.drivers
@@ -115,7 +115,7 @@ class MotionLanes:
         }
         for _ in self.mechanism.couplers:  # a chain is as long as their number
             for coupler in self.mechanism.couplers:
-                if coupler.curve:  # not linear: its joints are followed by their rates
+                if coupler.curve:  # not linear: the rates give the angles of its joints
                     continue
                 terms = coupler.terms
                 for (one, freedom, a), (other, its, b) in (terms, terms[::-1]):

@@ -1,4 +1,4 @@
-"""The balance of power, a check without reference: what drivers put in is stored or dissipated."""
+"""Balance of power, a check without reference: drivers' power is stored or dissipated."""
 
 from __future__ import annotations
 
@@ -26,7 +26,8 @@ def powers(
     """Return the powers of drivers, less the changes of energy and the dissipation [W].
 
     Their sum is zero. Kinetic energy changes by m v a + w I wdot: the gyroscopic term does no work.
-    No joint and no row enters, so the balance shows a wrong sign, point or inertia of the others.
+    The balance uses no joint and no row. A wrong sign, point or inertia in the equations of forces
+    therefore breaks it.
     """
     found: list[Scalar] = [efforts[name] * rates[name] for name in efforts]
     gravity = vec(mechanism.gravity)

@@ -1,7 +1,7 @@
 """Forces of a solved motion: reactions of joints and efforts of drivers.
 
-All samples are evaluated at once, as numpy lanes. Singular values tell what redundant rows leave
-undetermined, and where a pose is singular.
+All samples are evaluated at once, as numpy lanes. Singular values show singular poses and the
+forces left undetermined by redundant rows.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from .power import powers
 from .wanted import wanted_forces
 
 Lanes: TypeAlias = NDArray[np.bool_]
-# Numbers of a matrix of rows over all samples that are solved at once: some 64 MB.
+# Size limit of the matrices solved at once, in numbers over all samples: some 64 MB.
 AT_ONCE = 8_000_000
 
 
@@ -34,7 +34,7 @@ def with_forces(
     names: Collection[str] | None = None,
     bodies: Collection[str] = (),
 ) -> Trajectory:
-    """Return a solved motion with its forces, of the bodies only those named; see `forces_of`."""
+    """Return a solved motion with its forces and only the named bodies; see `forces_of`."""
     found = forces_of(mechanism, path, motion, names)
     return Trajectory(
         motion.points,
@@ -55,10 +55,10 @@ def forces_of(
     """Return the forces of a solved motion.
 
     Args:
-        mechanism: with masses, gravity and force elements.
-        path: of the drivers, that the motion follows.
-        motion: of all moving bodies, with accelerations.
-        names: of joints, drivers and force elements; all unless given.
+        mechanism: mechanism with masses, gravity and force elements.
+        path: drivers' path followed by the motion.
+        motion: motion of all moving bodies, with accelerations.
+        names: names of joints, drivers and force elements; by default all.
 
     Raises:
         SolveError: a name is unknown, or the motion lacks a body.
@@ -92,7 +92,7 @@ def forces_of(
 
 @dataclass(frozen=True, eq=False)
 class _Spread:
-    """Puts values of the solved samples at their places among all samples, NaN elsewhere."""
+    """Place values of the solved samples among all samples, with NaN at the others."""
 
     solved: Lanes
     singular: Lanes

@@ -1,4 +1,4 @@
-"""The forces that are wanted of a mechanism, by name."""
+"""The wanted forces of a mechanism, by name."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from ...mechanism.mechanism import Mechanism
 
 @dataclass(frozen=True)
 class WantedForces:
-    """Names of joints whose reactions are wanted, of drivers with their efforts, and of force
-    elements.
+    """Names of the joints with wanted reactions, of the drivers with wanted efforts, and of the
+    wanted force elements.
     """
 
     joints: tuple[str, ...]
@@ -21,7 +21,7 @@ class WantedForces:
 
 
 def wanted_forces(mechanism: Mechanism, names: Collection[str] | None) -> WantedForces:
-    """Return what names of joints, drivers and force elements mean; all of them unless given.
+    """Return the wanted forces for names of joints, drivers and force elements; by default all.
 
     Raises:
         SolveError: a name is unknown.
