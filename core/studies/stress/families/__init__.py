@@ -1,5 +1,5 @@
-"""Families of nasty situations, by theme. Every module in this folder is loaded, so a new class in
-a new file is a new family.
+"""Families of hard situations, by theme. The study loads every module in this folder, so a new
+class in a new file is a new family.
 """
 
 import importlib

@@ -1,4 +1,4 @@
-"""Arms driven at every joint: their poses are products of turns, whatever the number of bodies."""
+"""Arms driven at every joint: their poses are products of turns, for any number of bodies."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ LARGEST = 30
 
 
 class Arms(Family):
-    """Trees of bodies, all drivers moving at once, each in its own way."""
+    """Trees of bodies with all drivers moving at once, each in its own way."""
 
     name = "arms"
     about = (
@@ -33,7 +33,7 @@ class Arms(Family):
     samples = 41
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
-        """A tree whose joints are a third of a metre apart, or a chain."""
+        """Return a random tree or a chain, its joints 0.1 to 0.3 m apart."""
         count = bodies(rng, LARGEST)
         chain = rng.random() < 0.3
         parts, joints, drivers = list[Body](), list[Joint](), list[Driver]()
@@ -47,7 +47,7 @@ class Arms(Family):
             parts.append(Body(name))
             joints.append(joint)
             ends[name] = place
-            # a thread's turn says its shift
+            # a screw's turn determines its shift
             for freedom in joint.freedoms[:1] if kind is Screw else joint.freedoms:
                 of = JointAngle if freedom == "rotation" else JointDisplacement
                 drivers.append(of(f"{joint.name}_{freedom}", joint.name))
@@ -91,7 +91,7 @@ def _joint(
 
 
 def forward(mechanism: Mechanism) -> Closed:
-    """The closed form of a tree whose joints stand in an order in which parents come first."""
+    """Return the closed form of a tree; joints must stand in the order from parents to children."""
 
     def motion(drives: Real) -> Mapping[str, tuple[Real, Real, Real]]:
         values = {
@@ -138,12 +138,12 @@ _DRIVEN = (JointAngle, JointDisplacement)
 
 
 def _swing(q: Real, a: Real) -> Real:
-    """(R - 1) a, shape (3, n)."""
+    """Return (R - 1) a, shape (3, n)."""
     return np.einsum("abn,bn->an", Poses(a[None], q[None]).turned[0], a)
 
 
 def _product(p: Real, q: Real) -> Real:
-    """The turn q, then p, in the axes at design, shape (4, n)."""
+    """Return the turn q followed by p, in the axes at design, shape (4, n)."""
     a, b = p[1:], q[1:]
     vector = p[0] * b + q[0] * a + np.cross(a, b, axis=0)
     return np.concatenate([(p[0] * q[0] - (a * b).sum(axis=0))[None], vector])

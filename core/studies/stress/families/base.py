@@ -1,5 +1,5 @@
-"""What a family is: a way to make specimens at random, each a case, its truth, and the refusals
-that are right.
+"""The base of families: a family makes random specimens, each with a case, its truth and its right
+refusals.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from ..truth.reference_motion import Truth as Known
 from ..truth.reference_motion import followed
 
 TOL = 1e-12
-"""Largest accepted residual, as of `kincheck run`."""
+"""Largest accepted residual, as in `kincheck run`."""
 
-# A refusal at or behind a singular pose, or beyond the end of the motion, is right for any of these
-# reasons: Newton's iteration finds no pose there, or one of another motion.
+# Right kinds of refusal at or behind a singular pose, or beyond the end of the motion: Newton's
+# iteration finds no pose there, or a pose of another motion.
 MOTION_ENDS = frozenset(
     {
         FailureKind.LOCKED,
@@ -52,14 +52,15 @@ class Specimen:
     """One mechanism and its sweep.
 
     Attributes:
-        describe: makes the case; may refuse to (KincheckError), which is the outcome for every
-            engine then.
-        truth: of the case; None where no sample makes sense and every answer is wrong.
-        reasons: kinds of failures that are right, beyond singular poses and the end of the motion.
-        excused: whether it may be refused for these reasons though solutions exist.
-        reported: whether an answer must report what the geometry contradicts itself by
+        describe: makes the case. It may raise KincheckError; this is then the outcome for every
+            engine.
+        truth: computes the reference of the case; None if every answer is wrong.
+        reasons: further right kinds of failure, beside those of singular poses and the end of the
+            motion.
+        excused: whether a refusal for these reasons is right although solutions exist.
+        reported: whether an answer must report the contradiction of the geometry
             (`Known.violated`).
-        facts: what there is to say of it, by name.
+        facts: properties of the specimen, by name.
     """
 
     name: str
@@ -76,10 +77,10 @@ class Family(ABC):
     """Base of the families. Declaring one with a name registers it.
 
     Attributes:
-        about: what is nasty, and its sizes, in a sentence.
-        samples: the most that one specimen has, and so how fine its sweep can be; coarse ones are
-            drawn as often.
-        several: whether samples are shared out among several specimens rather than given to one.
+        about: the hard situation and its sizes, in a sentence.
+        samples: largest number of samples of a specimen. It limits the fineness of the sweep;
+            coarse sweeps are drawn as often as fine ones.
+        several: whether several specimens share the samples; else one specimen has them all.
     """
 
     name: ClassVar[str]
@@ -115,7 +116,7 @@ def as_case(
 
 
 def triple(x: Sequence[float] | Array) -> tuple[float, float, float]:
-    """Three numbers as the descriptions have them."""
+    """Return three numbers as a tuple for descriptions."""
     a, b, c = (float(each) for each in x)
     return a, b, c
 
@@ -132,7 +133,7 @@ def power(rng: Rng, low: float, high: float) -> float:
 
 
 def bodies(rng: Rng, most: int) -> int:
-    """How many bodies, 3 to the most: the cost grows with the square, so that half of them have
-    five or fewer.
+    """Return a random number of bodies, from 3 to the most. Half of the numbers are five or less,
+    because the cost grows with the square.
     """
     return int(3.0 * ((most + 1) / 3.0) ** (rng.random() ** 2))

@@ -1,5 +1,5 @@
-"""Four-bars near their change points, in coarse steps: sharp corners that more rows than are solved
-must not hide.
+"""Four-bars near their change points, in coarse steps: sharp corners of their motion, not to be
+hidden by redundant rows or a second loop.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from .dimensions import crank_rocker
 from .pairs import beside, beside_motion
 from .planar import JOINTS_OF_A_LOOP, Plan, any_plane, flats, four_bar, four_bar_motion, meet
 
-# The design is not to be near a corner itself: of what is folded more, coordinates hold too few
-# digits of the shape.
+# The design must not be near a corner itself: the coordinates of a nearly folded shape hold too few
+# digits of it.
 FOLDED = 0.05
 SMALL = "small "
 
-# Crank, ground, coupler and rocker, of three sizes and by how much they are off.
+# Lengths of crank, ground, coupler and rocker, from three sizes and an error.
 SHAPES: Mapping[str, Callable[[float, float, float, float], tuple[float, float, float, float]]] = {
     "kite": lambda a, g, x, off: (g + off, g, x, x),
     "kite on its side": lambda a, g, x, off: (a, g, a + off, g),
@@ -32,7 +32,7 @@ SHAPES: Mapping[str, Callable[[float, float, float, float], tuple[float, float, 
 
 
 class Corners(Family):
-    """What turns round sharply, or cannot pass by a little, anywhere along a step."""
+    """Motions with a sharp turn, or a narrowly missed passage, anywhere along a step."""
 
     name = "corners"
     about = (
@@ -45,7 +45,7 @@ class Corners(Family):
     samples = 31
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
-        """One of them."""
+        """Return a random four-bar, half of them beside a regular loop."""
         plane, way = any_plane(rng), str(rng.choice(["universals", "revolutes", *JOINTS_OF_A_LOOP]))
         off = power(rng, -7.0, -1.0) * float(rng.choice([-1.0, 1.0]))
         kind = tuple(SHAPES)[int(rng.integers(len(SHAPES)))]
@@ -53,7 +53,7 @@ class Corners(Family):
         last = float(rng.uniform(2.0, 6.2) * rng.choice([-1.0, 1.0]))
         mechanism, motion = four_bar(plane, b, d, c, way), four_bar_motion(plane, b, d, c)
         name, facts = f"{kind} with {way}, off by {off:.2g}", [("off", off)]
-        # its singular values are small everywhere, and hide those of the large loop
+        # the small loop's singular values are small everywhere, and hide those of the large loop
         if rng.random() < 0.5:
             ratio, hung = power(rng, -3.0, -0.5), str(rng.choice(JOINTS_OF_A_LOOP))
             small = crank_rocker(rng, ratio)
@@ -72,7 +72,7 @@ class Corners(Family):
 
 
 def _loop(rng: Rng, kind: str, off: float) -> tuple[Plan, Plan, Plan]:
-    """B, D and C of such a four-bar, at any pose that is not folded."""
+    """Return B, D and C of a four-bar of this kind, at any unfolded pose."""
     while True:
         a, g, x = (float(each) for each in rng.uniform(0.3, 1.5, 3))
         crank, ground, coupler, rocker = SHAPES[kind](a, g, x, off)
@@ -82,7 +82,7 @@ def _loop(rng: Rng, kind: str, off: float) -> tuple[Plan, Plan, Plan]:
         pin, rest = (extended(each)[:, None] for each in (b, d))
         met = meet(pin, extended([coupler]) ** 2, rest, extended([rocker]) ** 2, side)
         c: Plan = (float(met[0, 0]), float(met[1, 0]))
-        # the area; not a number where they do not meet
+        # twice the area; NaN if the circles do not meet
         twice = (c[0] - b[0]) * (d[1] - b[1]) - (c[1] - b[1]) * (d[0] - b[0])
         if min(coupler, rocker) > 0.1 and abs(twice) > FOLDED * float(
             np.hypot(d[0] - b[0], d[1] - b[1])

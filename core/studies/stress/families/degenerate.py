@@ -1,5 +1,5 @@
-"""Degenerate descriptions: links without length, points that coincide, axes that are antiparallel,
-freedoms that nobody drives.
+"""Degenerate descriptions: links without length, coincident points, antiparallel axes, undriven
+freedoms.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ NOT_CLOSED = frozenset({FailureKind.NOT_CLOSED, FailureKind.NO_POSE})
 
 
 class Degenerate(Family):
-    """What is no mechanism must be refused, by its name; what merely looks odd must be solved."""
+    """Refuse an invalid mechanism, naming its defect; solve a valid one of odd appearance."""
 
     name = "degenerate"
     about = (
@@ -49,7 +49,7 @@ class Degenerate(Family):
     samples = 21
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
-        """One of them."""
+        """Return an invalid mechanism (70 %) or a valid one of odd appearance."""
         make, reasons = (
             WRONG[int(rng.integers(len(WRONG)))]
             if rng.random() < 0.7
@@ -71,7 +71,7 @@ def _described(make: Callable[[Rng], Mechanism], rng: Rng, values: Values) -> Ca
 
 
 def _pair(joint: Callable[..., Joint], **given: Any) -> Mechanism:
-    """A driven crank that carries a body by a joint."""
+    """Return a driven crank with a second body, joined to it by a joint."""
     return Mechanism(
         "pair",
         [Body("a"), Body("b")],
@@ -122,7 +122,7 @@ def _shafts_that_turn_back(rng: Rng) -> Mechanism:
 
 
 def _body_that_spins_freely(rng: Rng) -> Mechanism:
-    """A coupler between two balls."""
+    """Return a four-bar with a coupler between two balls."""
     b, d, c = crank_rocker(rng)
     plane = any_plane(rng)
     found = four_bar(plane, b, d, c, "rod")
@@ -139,7 +139,7 @@ def _rocker_of_length_zero(rng: Rng) -> Mechanism:
 
 
 def _driver_across_the_motion(rng: Rng) -> Mechanism:
-    """The crank pin is driven along the crank."""
+    """Return a four-bar with its crank pin driven along the crank."""
     b, d, c = crank_rocker(rng)
     plane = any_plane(rng)
     return replace(
@@ -186,24 +186,24 @@ WRONG: tuple[tuple[Callable[[Rng], Mechanism], frozenset[FailureKind]], ...] = (
     (_rod_too_long_to_close, NOT_CLOSED),
     (_same_ball_twice, FREE),
 )
-"""Descriptions of no mechanism, and the kinds of their right refusals."""
+"""Makers of invalid mechanisms, each with the kinds of its right refusals."""
 
 
 def _crank_of_length_zero(rng: Rng) -> Mechanism:
-    """Turns, and nothing moves with it."""
+    """Return a slider-crank with a turning crank and nothing else in motion."""
     return slider_crank(
         any_plane(rng), (0.0, 0.0), (1.0, float(rng.uniform(0.1, 0.5))), "rod", "turn"
     )
 
 
 def _pivots_that_coincide(rng: Rng) -> Mechanism:
-    """Crank and rocker about one axis: with the coupler a triangle that turns as one."""
+    """Return a four-bar with crank and rocker about one axis: the whole triangle turns as one."""
     b, _, c = crank_rocker(rng)
     return four_bar(any_plane(rng), b, (0.0, 0.0), c, str(rng.choice(["rod", "revolutes"])))
 
 
 def _hinges_the_other_way_round(rng: Rng) -> Mechanism:
-    """Axes of any sign and length."""
+    """Return a four-bar with hinge axes of any sign and length."""
     found = four_bar(any_plane(rng), *crank_rocker(rng))
     each: list[Any] = list(found.joints)
     joints = [
@@ -214,7 +214,7 @@ def _hinges_the_other_way_round(rng: Rng) -> Mechanism:
 
 
 def _bodies_far_from_their_joints(rng: Rng) -> Mechanism:
-    """Body origins a thousand sizes away: only a name for a frame."""
+    """Return a four-bar with body origins a thousand sizes away; an origin only names a frame."""
     found = four_bar(any_plane(rng), *crank_rocker(rng))
     return replace(
         found, bodies=[replace(body, origin=triple(1e3 * direction(rng))) for body in found.bodies]
@@ -227,4 +227,4 @@ SOUND: tuple[Callable[[Rng], Mechanism], ...] = (
     _hinges_the_other_way_round,
     _bodies_far_from_their_joints,
 )
-"""What looks odd and moves."""
+"""Makers of valid mechanisms of odd appearance."""

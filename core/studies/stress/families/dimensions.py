@@ -11,12 +11,12 @@ from .planar import Plan, meet
 
 
 def nearly_parallel(rng: Rng) -> tuple[Plan, Plan, Plan, float]:
-    """B, D and C of a parallelogram, exact or off by the last: it folds flat twice a turn."""
+    """Return B, D and C of a parallelogram, and its error; it folds flat twice a turn."""
     off = 0.0 if rng.random() < 0.25 else power(rng, -12.0, -2.0) * float(rng.choice([-1.0, 1.0]))
     crank, up = float(rng.uniform(0.2, 0.5)), float(rng.uniform(0.8, 2.2))
     b: Plan = (crank * float(np.cos(up)), crank * float(np.sin(up)))
-    # the crank is the shortest, and by Grashof turns if the rocker is longer, the coupler being as
-    # long as the ground
+    # The crank is the shortest bar, and the coupler is as long as the ground. By Grashof the crank
+    # turns if the rocker is longer than the crank.
     c: Plan = (b[0] + 1.0, b[1])
     if off:
         met = meet(
@@ -31,8 +31,8 @@ def nearly_parallel(rng: Rng) -> tuple[Plan, Plan, Plan, float]:
 
 
 def nearly_kite(rng: Rng) -> tuple[Plan, Plan, Plan, float]:
-    """B, D and C of a kite: the crank is as long as the ground, but for the last, and passes the
-    rocker's pivot.
+    """Return B, D and C of a kite, and its error. The crank is as long as the ground, except for
+    the error, and passes the rocker's pivot.
     """
     off, up = power(rng, -9.0, -2.0), float(rng.uniform(0.8, 2.2))
     crank, long = 0.4 * (1.0 - off), float(rng.uniform(0.8, 1.2))
@@ -44,8 +44,8 @@ def nearly_kite(rng: Rng) -> tuple[Plan, Plan, Plan, float]:
 
 
 def rockers(rng: Rng) -> tuple[Plan, Plan, Plan]:
-    """B, D and C of a four-bar whose longest bar is between the pivots: neither the crank nor the
-    rocker turns round.
+    """Return B, D and C of a four-bar. Its longest bar is between the pivots: neither the crank nor
+    the rocker turns fully.
     """
     b = (float(rng.uniform(-0.2, 0.2)), float(rng.uniform(0.4, 0.6)))
     d: Plan = (float(rng.uniform(1.0, 1.1)), 0.0)
@@ -53,8 +53,9 @@ def rockers(rng: Rng) -> tuple[Plan, Plan, Plan]:
 
 
 def crank_rocker(rng: Rng, scale: float = 1.0, grid: float = 0.0) -> tuple[Plan, Plan, Plan]:
-    """B, D and C of a four-bar whose crank turns freely, far from its change points; on a grid
-    unless that is zero.
+    """Return B, D and C of a four-bar, far from its change points; its crank turns freely.
+
+    The points lie on a grid, unless the grid is zero.
     """
     while True:
         turn, high = rng.uniform(0.0, 2.0 * np.pi), rng.choice([-1.0, 1.0])
@@ -75,8 +76,8 @@ def crank_rocker(rng: Rng, scale: float = 1.0, grid: float = 0.0) -> tuple[Plan,
 
 
 def turning_crank(rng: Rng, grid: float = 0.0) -> tuple[Plan, Plan]:
-    """B and C of a slider-crank whose crank turns freely; the guide along the first axis may pass
-    the pivot.
+    """Return B and C of a slider-crank; its crank turns freely. The guide along the first axis may
+    pass the pivot.
     """
     turn, crank, offset = (
         rng.uniform(0.0, 2.0 * np.pi),

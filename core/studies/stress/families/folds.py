@@ -1,4 +1,4 @@
-"""Coarse sweeps of small closed mechanisms that end at a fold or pass near one."""
+"""Coarse sweeps of small closed mechanisms, ending at a fold or passing near one."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from .base import Family, Rng, Specimen, as_case, power
 from .loops import Builder
 
 LARGEST, DRIVERS = 4, 3
-# A fold is looked for so many times as far as the rates at design would turn something by a third
-# of a radian to a whole one.
+# The search for a fold ends after this multiple of the reach. Over one reach, the rates at design
+# would turn or shift something by 0.3 to 1 [rad or m].
 FARTHER = 5.0
-# A sample stands before the fold by such a part of the way there. The next one is ahead by so many
-# times that way: [powers of ten].
+# Way from a sample to the fold ahead of it, and way from that sample to the next: both as parts of
+# the way from the design to the fold [powers of ten].
 BEFORE, STEP = (-4.0, -0.3), (-1.0, 0.7)
 
 
 class Folds(Family):
-    """Steps so long that a motion may turn round between two samples, and another assembly go
-    on.
+    """Steps so long as to span a fold: the motion turns back between two samples, and another
+    assembly may go on.
     """
 
     name = "folds"
@@ -35,7 +35,7 @@ class Folds(Family):
     samples = 2
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
-        """Return a sweep past the first fold, where there is one; the other drivers swing."""
+        """Return a sweep past the first fold, if there is one; the other drivers swing."""
         while True:
             count = int(rng.integers(1, LARGEST + 1))
             found = Builder(rng, count, DRIVERS).built()

@@ -30,16 +30,17 @@ from .loops import Builder
 from .planar import any_plane, four_bar
 
 LARGEST = 8
-# Shorter springs have directions that a small error turns far [m].
+# Minimum length of springs [m]: a small error turns the direction of a shorter one far.
 SHORTEST = 0.1
-# Of the reach of loops: most specimens come to no singular pose, where forces grow without limit.
+# Part of the reach of loops: most specimens meet no singular pose there; forces grow without limit
+# near one.
 NEAR = 0.1
-# Forces have bounds of their own here; an output cannot be without a tolerance.
+# Tolerance of force outputs, required by the case. The truth has its own bounds for forces.
 TOLERANCE = (1e-6, 1e-9, "the stress truth has bounds of its own")
 
 
 class Forces(Family):
-    """What joints and drivers carry."""
+    """Forces of joints, drivers and elements."""
 
     name = "forces"
     about = (
@@ -49,8 +50,8 @@ class Forces(Family):
     samples = 11
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
-        """Every third one a four-bar of four hinges, of the others every second with a hinge
-        twice.
+        """Return a loaded mechanism: one third are four-bars of four hinges; half of the others
+        have a hinge twice.
         """
         if rng.random() < 1.0 / 3.0:
             plane = any_plane(rng)
@@ -107,7 +108,7 @@ def _doubled(rng: Rng, mechanism: Mechanism) -> Mechanism | None:
 
 
 def _loaded(rng: Rng, mechanism: Mechanism) -> Mechanism:
-    """Return the mechanism with masses, gravity and force elements; some bodies have no mass, some
+    """Return the mechanism with masses, gravity and force elements. Some bodies have no mass, some
     masses no inertia.
     """
     loaded = [_with_mass(rng, body, mechanism) for body in mechanism.bodies]
@@ -140,7 +141,7 @@ def _six(matrix: np.ndarray) -> Inertia:
 
 
 def _elements(rng: Rng, mechanism: Mechanism) -> list[ForceElement]:
-    """Return force elements; at least one, so that something acts without masses too."""
+    """Return force elements: at least one, to load mechanisms without masses too."""
     names = [GROUND, *(body.name for body in mechanism.bodies)]
     found: list[ForceElement] = []
     for k in range(int(rng.integers(1, 3))):
@@ -166,8 +167,8 @@ def _elements(rng: Rng, mechanism: Mechanism) -> list[ForceElement]:
 
 
 def _outputs(rng: Rng, mechanism: Mechanism, along: Sequence[np.ndarray]) -> tuple[Quantity, ...]:
-    """Return forces of two joints, of a hinge and its twin if there is one, of all drivers and of
-    all force elements.
+    """Return force outputs: two joints, a hinge and its twin if there is one, all drivers and all
+    force elements.
     """
     twins = [joint for joint in mechanism.joints if joint.name.endswith("_twin")]
     others = [joint for joint in mechanism.joints if joint not in twins]

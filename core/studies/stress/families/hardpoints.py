@@ -1,4 +1,4 @@
-"""Suspensions whose hardpoints are off: by what a table rounds to what a wrong cell is off by."""
+"""Suspensions with errors of their hardpoints, from the rounding of a table to a wrong cell."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from ....mechanism.mechanism import GROUND, Body, Mechanism, Point
 from .base import Family, Rng, Specimen, as_case, power, triple
 
 At = Callable[[float, float, float], tuple[float, float, float]]
-"""A hardpoint [m], perturbed."""
+"""Function from a hardpoint to the perturbed hardpoint [m]."""
 
 
 class Hardpoints(Family):
-    """The corners of cars."""
+    """Wheel suspensions of cars."""
 
     name = "hardpoints"
     about = (
@@ -26,7 +26,7 @@ class Hardpoints(Family):
     )
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
-        """Driven at the wheel centre."""
+        """Return a suspension driven at its wheel centre."""
         off = power(rng, -6.0, -1.3)
 
         def at(x: float, y: float, z: float) -> tuple[float, float, float]:

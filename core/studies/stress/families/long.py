@@ -1,4 +1,4 @@
-"""Much of something: turns and samples, rates, and digits asked for."""
+"""Large numbers: many turns and samples, extreme rates, very small tolerances."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .planar import JOINTS_OF_A_LOOP, any_plane, four_bar, four_bar_motion
 from .sizes import linkage
 
 TURNS = 1000
-# Refusals of a tolerance that is too small name the residual.
+# Right refusals of a tolerance below round-off; they name the residual.
 BELOW_ROUNDING = frozenset(
     {
         FailureKind.BELOW_ROUNDING,
@@ -24,13 +24,13 @@ BELOW_ROUNDING = frozenset(
         FailureKind.NO_POSE,
     }
 )
-# From one sample to the next: a step is gone in 2,000 parts at most, of which a turn takes some
-# twelve.
+# Largest number of turns between samples. The solver divides a step into at most 2,000 parts, and a
+# turn needs some twelve.
 MOST_BETWEEN = 100
 
 
 class Drift(Family):
-    """Errors that add up."""
+    """Accumulation of errors over many turns."""
 
     name = "drift"
     about = "crank-rockers over 1,000 turns in one sweep of all the samples, up to 1e6"
@@ -38,7 +38,7 @@ class Drift(Family):
     several = False
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
-        """The closed form knows nothing of the turns before."""
+        """Return a crank-rocker over many turns; its closed form ignores earlier turns."""
         plane, points, way = any_plane(rng), crank_rocker(rng), str(rng.choice(JOINTS_OF_A_LOOP))
         turns = min(TURNS, MOST_BETWEEN * (samples - 1))
         return Specimen(
@@ -54,26 +54,29 @@ class Drift(Family):
 
 
 class Rates(Family):
-    """Drivers that creep or fly."""
+    """Very slow and very fast drivers."""
 
     name = "rates"
     about = "four-bars and slider-cranks driven at 1e-9 to 1e9 rad/s either way"
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
-        """Accelerations go with the square of the rate."""
+        """Return a linkage at a random rate; accelerations grow with the square of the rate."""
         rate = power(rng, -9.0, 9.0) * float(rng.choice([-1.0, 1.0]))
         found = linkage(rng, any_plane(rng), samples, rate=rate)
         return replace(found, name=f"{found.name} at {rate:.3g} rad/s", facts=(("rate", rate),))
 
 
 class Tolerances(Family):
-    """Digits that doubles do not have."""
+    """Tolerances beyond the digits of doubles."""
 
     name = "tolerances"
     about = "four-bars and slider-cranks with residuals asked for of 1e-15 to 1e-300"
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
-        """To be solved as well as can be, or refused by naming the residual that was reached."""
+        """Return a linkage with a tiny tolerance.
+
+        Right outcomes are the best possible solution, or a refusal with the reached residual.
+        """
         tol = power(rng, -300.0, -15.0) if rng.random() < 0.2 else power(rng, -20.0, -15.0)
         found = linkage(rng, any_plane(rng), samples)
         return replace(

@@ -1,9 +1,9 @@
-"""Random closed loops of every joint type. They close by construction: joints are placed at the
-design position of both bodies.
+"""Random closed loops of every joint type. They close by construction: both bodies of a joint are
+at the design position.
 
-A random tree of bodies is closed by random joints, each taken only if all its rows are independent
-of those there are (found on a basis of the motions that are left), until as few freedoms are left
-as are driven. The truth is followed from the design.
+Random joints close a random tree of bodies, until the remaining freedoms are as few as the drivers.
+A joint is taken only if all its rows are independent of the rows so far; a basis of the remaining
+motions shows this. The reference is followed from the design.
 """
 
 from __future__ import annotations
@@ -26,18 +26,18 @@ from ..truth.evaluation import Evaluator, Poses
 from .base import Family, Rng, Specimen, as_case, bodies, direction, triple
 
 LARGEST = 30
-# Types that carry a body, and those that close: what leaves five freedoms carries nothing.
+# Joint types for the tree, and for the closures. Types with five freedoms carry no body.
 CARRIERS = (
     "revolute", "spherical", "universal", "translational", "cylindrical", "screw",
     "constant_velocity", "planar", "fixed", "inline", "orientation_lock", "revolute_spherical",
 )  # fmt: skip
 CLOSERS = (*CARRIERS, "distance", "distance", "in_plane", "parallel_axes", "perpendicular_axes")
-# A singular value below this is not counted on: the joint is left out, the driver is not taken.
+# Smallest trusted singular value. A joint or driver below it is not taken.
 SOUND = 0.02
 
 
 class Loops(Family):
-    """Whatever can be built."""
+    """Any buildable mechanism."""
 
     name = "loops"
     about = (
@@ -47,7 +47,7 @@ class Loops(Family):
     samples = 81
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
-        """Far enough that every second one comes to a dead centre."""
+        """Return a loop, driven far enough to meet a dead centre in every second specimen."""
         while True:
             count = bodies(rng, LARGEST)
             found = Builder(rng, count).built()
@@ -64,11 +64,11 @@ class Loops(Family):
 
 
 class Builder:
-    """Builds one mechanism at random.
+    """Builder of one random mechanism.
 
     Args:
-        count: of bodies.
-        most: of drivers.
+        count: number of bodies.
+        most: largest number of drivers.
     """
 
     def __init__(self, rng: Rng, count: int, most: int = 2) -> None:
@@ -80,7 +80,7 @@ class Builder:
         self.motions: Array = np.eye(6 * count)
 
     def built(self) -> tuple[Mechanism, float] | None:
-        """The mechanism, and how far it is driven; None where it cannot be closed."""
+        """Return the mechanism and the reach of its drivers; None if it cannot be closed."""
         for body in self.bodies:
             parent = str(self.rng.choice(list(self.places)))
             self.places[body.name] = self.places[parent] + self.rng.uniform(0.3, 0.6) * direction(
@@ -109,7 +109,7 @@ class Builder:
 
     @property
     def freedoms(self) -> int:
-        """How many are left."""
+        """Number of remaining freedoms."""
         return self.motions.shape[1]
 
     def _mechanism(
@@ -118,7 +118,7 @@ class Builder:
         drivers: Sequence[Driver] = (),
         couplers: Sequence[Coupler] = (),
     ) -> Mechanism:
-        """With the same points whatever the joints, so that the unknowns are the same."""
+        """Return a mechanism with the same points for any joints, so the unknowns stay the same."""
         points = [
             Point(f"p_{name}", name, triple(self.places[name]))
             for name in self.places
@@ -127,15 +127,16 @@ class Builder:
         return Mechanism("loop", self.bodies, joints, points, drivers, couplers)
 
     def _rows(self, mechanism: Mechanism, drop: int = 0) -> Array:
-        """Of length one, by shifts in metres; the first of them left out."""
+        """Return rows of unit length, shifts in metres, without the first `drop` rows."""
         rows = Evaluator(conditions(mechanism))
         found = rows.jacobian(Poses.design(len(self.bodies), 1))[0][drop:]
         found[:, np.arange(found.shape[1]) % 6 < 3] /= rows.stated.unit
         return found / np.linalg.norm(found, axis=1, keepdims=True)
 
     def _take(self, rows: Array, leave: int) -> bool:
-        """Take rows off the motions that are left, if all are independent there and enough motions
-        stay.
+        """Remove rows from the remaining motions; return whether they were taken.
+
+        All rows must be independent, and at least `leave` motions must remain.
         """
         if self.freedoms - len(rows) < leave:
             return False
@@ -181,7 +182,7 @@ class Builder:
             return None
 
     def _couple(self, leave: int) -> bool:
-        """A gear or a rack between two coordinates of joints."""
+        """Add a gear or a rack between two coordinates of joints; return whether one was added."""
         axial = [
             (joint, freedom)
             for joint in self.joints
@@ -209,8 +210,9 @@ class Builder:
         return True
 
     def _driven(self, count: int) -> tuple[Mechanism, float] | None:
-        """Drivers that move what is left, and the reach that turns or shifts something by a third
-        to one.
+        """Return the mechanism with drivers of its remaining freedoms, and their reach.
+
+        The rates at design turn or shift something by 0.3 to 1 over the reach [rad or m].
         """
         drivers: list[Driver] = []
         for joint in self.joints:

@@ -14,8 +14,8 @@ from .planar import Plan, Plane, coupled
 def beside(
     single: Mechanism, plane: Plane, b: Plan, d: Plan, c: Plan, way: str, label: str
 ) -> Mechanism:
-    """A four-bar with a second coupler and rocker on its crank, of points of their own and named by
-    the label.
+    """Return a four-bar with a second coupler and rocker on its crank, at other points; the label
+    begins their names.
     """
     rocker = f"{label}rocker"
     bodies, joints = coupled(way, plane, ("crank", rocker, f"{label}coupler"), (b, c), label)
@@ -31,8 +31,8 @@ def beside(
 
 
 def beside_motion(first: Motion, second: Motion, label: str) -> Motion:
-    """Its closed form, from those of both four-bars; they know nothing of each other but the
-    crank.
+    """Return the closed form of both loops, from those of the two four-bars; only the crank joins
+    the loops.
     """
 
     def motion(drives: Real) -> Mapping[str, tuple[Real, Real, Real]]:

@@ -1,6 +1,4 @@
-"""Linkages in a plane with closed forms: what the families of sizes, offsets, rates and reaches are
-made of.
-"""
+"""Linkages in a plane with closed forms, for the families of sizes, offsets, rates and reaches."""
 
 from __future__ import annotations
 
@@ -24,14 +22,14 @@ Plan = tuple[float, float]
 
 @dataclass(frozen=True, eq=False)
 class Plane:
-    """Where the plane is: its origin and axes, global [m]."""
+    """The plane of a linkage: its origin and axes, global [m]."""
 
     origin: Array
     e1: Array
     e2: Array
 
     def point(self, at: Plan) -> tuple[float, float, float]:
-        """A point of the plane in space, rounded once."""
+        """Return the global position of a point of the plane, rounded once."""
         return triple(
             np.asarray(
                 extended(self.origin) + self.lift(extended(at)[:, None])[:, 0], dtype=np.float64
@@ -39,27 +37,27 @@ class Plane:
         )
 
     def lift(self, shift: Real) -> Real:
-        """Shifts in the plane in space, shape (3, n)."""
+        """Return global shifts from shifts in the plane, shape (3, n)."""
         e1, e2 = map(extended, (self.e1, self.e2))
         return e1[:, None] * shift[0] + e2[:, None] * shift[1]
 
     @property
     def normal(self) -> tuple[float, float, float]:
-        """The normal of the plane, global; turns go by the right hand about it."""
+        """Return the normal of the plane, global; turns are right-handed about it."""
         return triple(np.cross(self.e1, self.e2))
 
     def along(self, at: Plan) -> tuple[float, float, float]:
-        """A direction of the plane in space."""
+        """Return the global direction of a direction in the plane."""
         return triple(at[0] * self.e1 + at[1] * self.e2)
 
     def turned(self, angle: Real) -> Real:
-        """The quaternion of a turn, shape (4, n)."""
+        """Return the quaternion of a turn in the plane, shape (4, n)."""
         h = unit(extended(np.cross(extended(self.e1), extended(self.e2))))
         return np.concatenate([np.cos(angle / 2)[None], h[:, None] * np.sin(angle / 2)])
 
 
 def any_plane(rng: Rng, origin: Array | None = None) -> Plane:
-    """Return a plane of any direction through a point, which is near the origin unless given."""
+    """Return a plane of any direction through a point; by default the point is near the origin."""
     e3, e1 = direction(rng), direction(rng)
     e1 = np.cross(e3, e1)
     e1 = e1 / np.linalg.norm(e1)
@@ -68,8 +66,8 @@ def any_plane(rng: Rng, origin: Array | None = None) -> Plane:
 
 
 def flat_plane(rng: Rng, origin: Array) -> Plane:
-    """Along two of the global axes: coordinates of points are sums of plain numbers, exact where
-    these are.
+    """Return a plane along two of the global axes: global coordinates are sums of two numbers,
+    exact for suitable numbers.
     """
     first = int(rng.integers(3))
     e1, e2 = np.eye(3)[first], np.eye(3)[(first + 1) % 3]
@@ -77,20 +75,20 @@ def flat_plane(rng: Rng, origin: Array) -> Plane:
 
 
 def spin(angle: Real, at: Plan | Real) -> Real:
-    """A point of the plane turned about the origin, shape (2, n)."""
+    """Return a point of the plane turned about the origin, shape (2, n)."""
     x, y = (extended(each) for each in at)
     c, s = np.cos(angle), np.sin(angle)
     return np.stack([c * x - s * y, s * x + c * y])
 
 
 def heading(a: Real) -> Real:
-    """The angle of vectors of shape (2, n)."""
+    """Return the angle of vectors of shape (2, n)."""
     return np.arctan2(a[1], a[0])
 
 
 def meet(first: Real, p: Real, second: Real, q: Real, side: float) -> Real:
-    """Where circles of squared radii p and q about two points meet, on that side of the line
-    between; NaN where they do not.
+    """Return the intersection of circles of squared radii p and q about two points, on one side of
+    the line between; NaN if there is none.
     """
     d = second - first
     e = (d * d).sum(axis=0)
@@ -101,14 +99,14 @@ def meet(first: Real, p: Real, second: Real, q: Real, side: float) -> Real:
 
 
 JOINTS_OF_A_LOOP = ("revolutes", "balls", "rod", "cylinders")
-"""How the coupler of a loop hangs on its neighbours: with three redundant rows, or none."""
+"""Ways to join the coupler of a loop to its neighbours, with three redundant rows or none."""
 
 
 def coupled(
     way: str, plane: Plane, names: tuple[str, str, str], at: tuple[Plan, Plan], label: str = ""
 ) -> tuple[list[Body], list[Joint]]:
-    """The coupler, or the rod in its place, between two bodies at their points: bodies and joints
-    of it.
+    """Return bodies and joints of the coupler between two bodies at their points, or of a rod in
+    its place.
     """
     first, second, coupler = names
     start, end = map(plane.point, at)
@@ -142,8 +140,8 @@ def coupled(
 def four_bar(
     plane: Plane, b: Plan, d: Plan, c: Plan, way: str = "revolutes", turn: str = "turn"
 ) -> Mechanism:
-    """A crank from the origin of the plane to B, a coupler to C, a rocker to D; the crank is
-    driven.
+    """Return a four-bar: a driven crank from the plane's origin to B, a coupler from B to C, a
+    rocker from C to D.
     """
     bodies, joints = coupled(way, plane, ("crank", "rocker", "coupler"), (b, c))
     return Mechanism(
@@ -160,8 +158,8 @@ def four_bar(
 
 
 def four_bar_motion(plane: Plane, b: Plan, d: Plan, c: Plan, parallel: bool = False) -> Motion:
-    """Its closed form, on the side of the design up to where the crank must turn back; or of the
-    parallelogram, which goes on.
+    """Return the closed form of a four-bar, on the side of the design, between the crank's
+    turning points; a parallelogram passes them.
     """
     B, C, D = (extended(each)[:, None] for each in (b, c, d))
     p, q = ((C - B) ** 2).sum(axis=0), ((C - D) ** 2).sum(axis=0)
@@ -188,12 +186,11 @@ def four_bar_motion(plane: Plane, b: Plan, d: Plan, c: Plan, parallel: bool = Fa
 
 
 def turning_range(b: Real, d: Real, p: Real, q: Real) -> tuple[float, float]:
-    """How far a crank at b may turn either way from there, coupler and rocker having squared
-    lengths p and q; the pivot is at d.
+    """Return the range of turns of a crank at b, from there, in both directions.
 
-    The coupler and the rocker are stretched out or folded where the law of cosines gives the
-    crank's angle from the ground a cosine within -1 and 1; without such an angle the crank passes
-    there.
+    The coupler and the rocker have squared lengths p and q; the rocker's pivot is at d. The law of
+    cosines gives the cosines of the crank's angle from the ground with coupler and rocker folded or
+    stretched out. A cosine between -1 and 1 is a turning point; other cosines limit nothing.
     """
     r2, g2 = (b * b).sum(axis=0)[0], (d * d).sum(axis=0)[0]
     folded, stretched = ((np.sqrt(p[0]) + sign * np.sqrt(q[0])) ** 2 for sign in (-1.0, 1.0))
@@ -201,7 +198,7 @@ def turning_range(b: Real, d: Real, p: Real, q: Real) -> tuple[float, float]:
     at = heading(b)[0] - heading(d)[0]
     at = np.arctan2(np.sin(at), np.cos(at))
     low, high = (float(np.arccos(x)) if -1.0 < x < 1.0 else None for x in (nearest, farthest))
-    # all angles at which it must stop, on the circle and once around it
+    # all angles of turning points, on the circle and one circle to either side
     stops = [
         k * 2.0 * np.pi + sign * stop
         for stop in (low, high)
@@ -217,8 +214,8 @@ def turning_range(b: Real, d: Real, p: Real, q: Real) -> tuple[float, float]:
 
 
 def flats(b: Plan, d: Plan) -> list[float]:
-    """Turns of a crank at b by which it lies along the ground, toward the pivot at d or away from
-    it, within two turns of there.
+    """Return the turns of a crank at b into the line of the ground, within two turns from b. The
+    crank points to the pivot at d, or away from it.
     """
     at = float(heading(extended(b)) - heading(extended(d)))
     return [k * math.pi - at for k in range(-4, 5)]
@@ -227,8 +224,8 @@ def flats(b: Plan, d: Plan) -> list[float]:
 def slider_crank(
     plane: Plane, b: Plan, c: Plan, way: str, drive: str, guide: Plan = (1.0, 0.0)
 ) -> Mechanism:
-    """A crank from the origin of the plane to B, a coupler to C on a slider along the guide; "turn"
-    or "slide" is driven.
+    """Return a slider-crank: a crank from the plane's origin to B, a coupler from B to C on a
+    slider along the guide; "turn" or "slide" is driven.
     """
     bodies, joints = coupled(way, plane, ("crank", "slider", "coupler"), (b, c))
     driver = JointAngle("turn", "pivot") if drive == "turn" else JointDisplacement("slide", "guide")
@@ -248,8 +245,8 @@ def slider_crank(
 def slider_crank_motion(
     plane: Plane, b: Plan, c: Plan, drive: str, guide: Plan = (1.0, 0.0)
 ) -> Motion:
-    """Its closed form, the guide of length one: the slider by a quadratic, or the crank by two
-    circles.
+    """Return the closed form of a slider-crank, the guide of length one: a quadratic gives the
+    slider, or two circles give the crank.
     """
     B, C, g = (extended(each)[:, None] for each in (b, c, guide))
     r2, l2 = (B * B).sum(axis=0), ((C - B) ** 2).sum(axis=0)
@@ -266,7 +263,7 @@ def slider_crank_motion(
                 s = -back + ahead * np.sqrt(back * back - ((C - now_b) ** 2).sum(axis=0) + l2)
             turn, now_c = value, C + s * g
         else:
-            # behind the pivot it could be assembled again, but not reached
+            # behind the pivot the linkage can be assembled again, but no motion leads there
             value = np.where(((C + value * g) * g).sum(axis=0) * (C * g).sum() > 0.0, value, np.nan)
             now_c = C + value * g
             now_b = meet(0.0 * now_c, r2 + 0.0 * value, now_c, l2 + 0.0 * value, side)

@@ -1,4 +1,4 @@
-"""Redundant geometry that contradicts itself: which contradiction is accepted, and is it told?"""
+"""Redundant, contradictory geometry: is it accepted, and is the contradiction reported?"""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .base import TOL, Family, Rng, Specimen, as_case, direction, power, triple
 from .dimensions import crank_rocker
 from .planar import any_plane, four_bar, four_bar_motion
 
-# Directions are given to 1e-16, and what redundant rows make of that is no contradiction.
+# Directions are given to 1e-16; a smaller tilt than this is rounding, no contradiction.
 ROUNDED = 1e-14
 
 CONTRADICTIONS = frozenset(
@@ -29,7 +29,7 @@ CONTRADICTIONS = frozenset(
         FailureKind.OVERDRIVEN,
     }
 )
-"""Right refusals of a loop whose hinges are not parallel."""
+"""Right refusals of a loop with hinges that are not parallel."""
 
 
 class Redundant(Family):
@@ -39,8 +39,10 @@ class Redundant(Family):
     about = "four-bars of four hinges, one of them off by 1e-12 to 1e-3 rad, or by nothing"
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
-        """To be solved as well as the geometry allows, telling what is left over, or refused by
-        naming it.
+        """Return a four-bar with one tilted hinge.
+
+        Right outcomes are the best possible solution with its residual, or a refusal with the
+        contradiction.
         """
         tilt = 0.0 if rng.random() < 0.15 else power(rng, -12.0, -3.0)
         plane, points = any_plane(rng), crank_rocker(rng)
@@ -63,11 +65,10 @@ class Redundant(Family):
 
 
 def _tilted(case: Case, sound: Mechanism, motion: Motion, tilt: float) -> Truth:
-    """The truth of the sound mechanism, and how far one may be from it by meeting other rows than
-    are met here.
+    """Return the truth of the sound mechanism, with the bounds of another choice of rows.
 
-    Rows off by the tilt move the pose by K times as much; another choice of rows has an inverse of
-    its own, K times larger at most.
+    Rows with an error of the tilt move the pose by K times the tilt. The inverse of another choice
+    of rows is at most K times larger.
     """
     found = closed(replace(case, mechanism=sound), motion)
     system = System(case)
@@ -80,7 +81,7 @@ def _tilted(case: Case, sound: Mechanism, motion: Motion, tilt: float) -> Truth:
         at = system.solved(poses, drives, system.path.times[sample], system.rows.angles(poses))
         violated[sample] = np.abs(system.rows.residual(at.poses, drives[0], at.angles)).max(axis=0)
     slack = found.condition * (1.0 + found.condition) * tilt * size
-    # rates follow from poses that are off, by rows that do not agree: nothing is held against them
+    # rates follow from inexact poses and contradictory rows: they have no bounds
     bounds = {
         name: np.stack(
             [bound[0] + slack, *(bound[1:] if tilt <= ROUNDED else np.full_like(bound[1:], np.inf))]

@@ -1,5 +1,5 @@
-"""Near-singular geometry: change points, dead centres, platforms and overconstrained loops that
-barely move.
+"""Near-singular geometry: change points, dead centres, platforms, and overconstrained loops with
+little mobility.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from .dimensions import nearly_kite, nearly_parallel
 from .planar import JOINTS_OF_A_LOOP, any_plane, flats, four_bar, four_bar_motion
 
 TURN = 0.97 * np.pi
-# A platform that is off by less may be told to have a freedom more: its smallest singular value is
-# a tenth of that or less, and ranks are told at 1e-9.
+# A platform with a smaller error may be refused for a freedom too many: its smallest singular value
+# is a tenth of the error or less, and the rank tolerance is 1e-9.
 UNTOLD = 3e-8
 
 
 class Singular(Family):
-    """What is nearly something else."""
+    """Mechanisms close to a singular shape."""
 
     name = "singular"
     about = (
@@ -38,16 +38,18 @@ class Singular(Family):
     samples = 61
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
-        """One of them."""
+        """Return a parallelogram, kite, Bennett loop, Bricard loop or platform."""
         return (_parallelogram, _kite, _bennett, _bricard, _platform)[int(rng.integers(5))](
             rng, samples
         )
 
 
 def _parallelogram(rng: Rng, samples: int) -> Specimen:
-    """Folds flat twice a turn. Exact, it is answered by the parallelogram or refused, never by what
-    crosses it there; off one way it turns into the antiparallel linkage within the root of that,
-    off the other way it cannot pass.
+    """Return a parallelogram; it folds flat twice a turn.
+
+    An exact one is answered by the parallelogram or refused, never by the motion crossing it there.
+    With an error of one sign it becomes the antiparallel linkage, within the root of the error.
+    With an error of the other sign it cannot pass.
     """
     plane, way = any_plane(rng), str(rng.choice(JOINTS_OF_A_LOOP))
     b, d, c, off = nearly_parallel(rng)
@@ -62,7 +64,7 @@ def _parallelogram(rng: Rng, samples: int) -> Specimen:
 
 
 def _kite(rng: Rng, samples: int) -> Specimen:
-    """The crank is as long as the ground, but for a little, and passes the rocker's pivot."""
+    """Return a kite. Its crank is nearly as long as the ground and passes the rocker's pivot."""
     plane, way = any_plane(rng), str(rng.choice(JOINTS_OF_A_LOOP))
     b, d, c, off = nearly_kite(rng)
     return Specimen(
@@ -74,7 +76,7 @@ def _kite(rng: Rng, samples: int) -> Specimen:
 
 
 def _bennett(rng: Rng, samples: int) -> Specimen:
-    """Four skew hinges that move because sin(alpha) / a = sin(beta) / b, all the way round."""
+    """Return four skew hinges; they turn fully because sin(alpha) / a = sin(beta) / b."""
     alpha, beta = float(rng.uniform(0.4, 1.2)), float(rng.uniform(1.3, 2.2))
     a = float(rng.uniform(0.3, 0.6))
     b = a * np.sin(beta) / np.sin(alpha)
@@ -101,7 +103,7 @@ def _bennett(rng: Rng, samples: int) -> Specimen:
 
 
 def _screwed(turn: float, length: float, twist: float) -> Array:
-    """The frame of the next hinge: turned about z, then along and about x."""
+    """Return the frame of the next hinge: turned about z, then along and about x."""
     c, s, k, m = np.cos(turn), np.sin(turn), np.cos(twist), np.sin(twist)
     return np.array(
         [
@@ -114,8 +116,8 @@ def _screwed(turn: float, length: float, twist: float) -> Array:
 
 
 def _ring(name: str, hinges: list[tuple[Array, Array]]) -> Mechanism:
-    """Bodies around a ring of hinges, the ground between the first and the last; the first is
-    driven.
+    """Return bodies around a ring of hinges, the ground between the last hinge and the first; the
+    first is driven.
     """
     bodies = [Body(f"link_{k}") for k in range(1, len(hinges))]
     around = [GROUND, *(body.name for body in bodies), GROUND]
@@ -128,8 +130,8 @@ def _ring(name: str, hinges: list[tuple[Array, Array]]) -> Mechanism:
 
 
 def _bricard(rng: Rng, samples: int) -> Specimen:
-    """Six hinges along edges of a cube: no freedom by count, one by geometry; its dead centre is 30
-    degrees from the cube.
+    """Return six hinges along edges of a cube: no freedom by count, one by geometry. The dead
+    centre is 30 degrees from the cube.
     """
     x, y, z = np.eye(3)
     hinges = [
@@ -142,14 +144,14 @@ def _bricard(rng: Rng, samples: int) -> Specimen:
     ]
     size, turn = power(rng, -2.0, 2.0), -1.0 if rng.random() < 0.5 else 1.0
     ring = _ring("bricard", [(size * point, axis) for point, axis in [*hinges[1:], hinges[0]]])
-    # about the first hinge the way is free on one side and ends after thirty degrees on the other
+    # the first hinge turns freely to one side; to the other side the motion ends after 30 degrees
     values = np.linspace(-0.9, 0.9, samples) if turn > 0 else np.linspace(0.9, -0.9, samples)
     return Specimen(f"bricard of {size:.3g} m", partial(as_case, ring, "turn", values))
 
 
 def _platform(rng: Rng, samples: int) -> Specimen:
-    """On five rods and a driven leg; similar hexagons on base and platform give a freedom too
-    many.
+    """Return a platform on five rods and a driven leg. Similar hexagons on base and platform would
+    give one freedom too many.
     """
     off = power(rng, -8.0, -1.0)
     angles = np.sort(np.linspace(0.0, 2.0 * np.pi, 6, endpoint=False) + rng.uniform(-0.3, 0.3, 6))

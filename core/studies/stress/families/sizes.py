@@ -1,4 +1,4 @@
-"""Sizes: units, places far from the origin, and links of very different lengths."""
+"""Sizes: very small and large mechanisms, distant origins, and links of very different lengths."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from .planar import (
 )
 
 TURN = np.pi
-"""Of a crank to either side of the design [rad]: a whole turn in all."""
+"""Turn of a crank to either side of the design [rad]: one full turn in all."""
 
 
 def linkage(
@@ -35,7 +35,7 @@ def linkage(
     grid: float = 0.0,
     rate: float = 1.0,
 ) -> Specimen:
-    """A four-bar or a slider-crank whose crank makes a whole turn."""
+    """Return a four-bar or a slider-crank, its crank turning once fully."""
     way, turn = str(rng.choice(JOINTS_OF_A_LOOP)), np.linspace(-TURN, TURN, samples)
     if rng.random() < 0.5:
         points = crank_rocker(rng, scale, grid)
@@ -56,19 +56,19 @@ def _times(scale: float, at: Plan) -> Plan:
 
 
 class Units(Family):
-    """A mechanism of one micrometre and of one kilometre."""
+    """Mechanisms from one micrometre to one kilometre."""
 
     name = "units"
     about = "four-bars and slider-cranks of 1e-6 to 1e3 m, anyhow in space, one turn"
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
-        """At a size of its own, the plane's origin as far away as the mechanism is large."""
+        """Return a linkage of random size; its plane's origin is about this size away."""
         scale, plane = power(rng, -6.0, 3.0), any_plane(rng)
         return linkage(rng, Plane(scale * plane.origin, plane.e1, plane.e2), samples, scale=scale)
 
 
 class Offset(Family):
-    """A mechanism far from the origin of its coordinates."""
+    """Mechanisms far from the origin of their coordinates."""
 
     name = "offset"
     about = (
@@ -78,22 +78,23 @@ class Offset(Family):
     GRID: ClassVar[float] = 2.0**-20
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
-        """In a plane along the global axes: 24 bits of the offset and 20 of the grid fit into a
-        double.
+        """Return a linkage in a plane along the global axes.
+
+        A double holds the 24 bits of the offset and the 20 bits of the grid.
         """
         origin = np.round(rng.uniform(-1.0, 1.0, 3) * power(rng, 0.0, 7.0) / self.GRID) * self.GRID
         return linkage(rng, flat_plane(rng, np.array(triple(origin))), samples, grid=self.GRID)
 
 
 class Ratios(Family):
-    """Links of a millionth of the others' length."""
+    """Links down to a millionth of the other lengths."""
 
     name = "ratios"
     about = "cranks, and cranks with rockers, of 1e-6 to 1 of the other links' lengths, one turn"
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
-        """A short crank on a slider-crank; two short bars facing each other, or one short crank in
-        a four-bar.
+        """Return a slider-crank with a short crank, or a four-bar with two opposite short bars or
+        one short crank.
         """
         plane, way, turn = (
             any_plane(rng),
@@ -112,8 +113,8 @@ class Ratios(Family):
             )
         else:
             d: Plan = (1.0, 0.0)
-            # the rocker is 1.3 / 0.3 times the crank and stands across, or as long as the other
-            # links
+            # the rocker is 1.3 / 0.3 times the crank and perpendicular to the ground, or about as
+            # long as the other links
             c = (
                 (1.0, 1.3 * ratio)
                 if kind == 1

@@ -1,5 +1,5 @@
-"""Absolute drivers whose motions pass the design values at time zero: exactly, or up to rounding
-or typed digits.
+"""Absolute drivers on motions through the design values at time zero: exactly, or up to rounding or
+typed digits.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from .loops import Builder
 from .planar import any_plane, flat_plane
 
 LARGEST, DRIVERS = 5, 3
-# The drivers move by about this part of the reach in a second, so that few motions reach a fold.
+# Excursion of the drivers in a second, in parts of the reach: few motions meet a fold.
 EXCURSION = 0.3
-# Below this slope at the design [-], the excursion grows with the square of time.
+# Below this slope of the sine at the design [-], the excursion grows with the square of time.
 TURNING = 0.1
 
 DIGITS = ("exact", "rounded", "typed")
-"""Ways to pass the design value: to the last bit, up to rounding, with numbers of six digits."""
+"""Ways to meet the design value: to the last bit, up to rounding, or with numbers of six digits."""
 
 
 class Starts(Family):
-    """The start of a motion must not be decided by the last bits of its numbers."""
+    """Starts of motions: the last bits of their numbers must not decide the result."""
 
     name = "starts"
     about = (
@@ -55,7 +55,7 @@ class Starts(Family):
 
 
 def _closed(rng: Rng, digits: str) -> tuple[Mechanism, dict[str, Motion]]:
-    """Return a random closed mechanism whose drivers swing by a part of its reach."""
+    """Return a random closed mechanism; its drivers swing by a part of its reach."""
     while True:
         found = Builder(rng, int(rng.integers(1, LARGEST + 1)), DRIVERS).built()
         if found is not None:
@@ -71,10 +71,10 @@ def _closed(rng: Rng, digits: str) -> tuple[Mechanism, dict[str, Motion]]:
 
 
 def _arm(rng: Rng, digits: str) -> tuple[Mechanism, dict[str, Motion]]:
-    """Return two links whose tip goes round the base once in a second.
+    """Return two links and their motion; the tip circles the base once a second.
 
-    A straight way of the drivers from the design to a later sample passes near the base: it ends in
-    the other assembly, in another turn, or nowhere.
+    A straight path of the drivers from the design to a later sample passes near the base. Such a
+    path ends in the other assembly, in another turn, or at no pose.
     """
     origin, exact = np.zeros(3), digits == "exact"
     plane = flat_plane(rng, origin) if exact else any_plane(rng, origin)
@@ -110,9 +110,7 @@ def _arm(rng: Rng, digits: str) -> tuple[Mechanism, dict[str, Motion]]:
 
 
 def _sine(rng: Rng, design: float, excursion: float, digits: str) -> Motion:
-    """Return a sine that is at the design value at time zero, and moves by about the excursion in
-    a second.
-    """
+    """Return a sine with the design value at time zero; it moves about the excursion in a second."""
     if not design:
         turns = 0 if digits == "exact" else int(rng.integers(-2, 3))
         phase, amplitude = np.pi * turns, excursion

@@ -1,5 +1,5 @@
-"""Two loops on one crank: singular at the same poses, where the determinant of all rows changes its
-sign twice, and keeps it.
+"""Two loops on one crank, singular at the same poses: the determinant of all rows changes its sign
+twice there, and keeps it.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ TURN, TWIN = 0.97 * np.pi, "twin "
 
 
 def _rockers(rng: Rng) -> tuple[Plan, Plan, Plan, float]:
-    """Nothing about them is nearly anything else."""
+    """Return the points of a four-bar; its shape is not near any singular one."""
     return *rockers(rng), 1.0
 
 
@@ -26,7 +26,7 @@ SHAPES = {"parallelograms": nearly_parallel, "kites": nearly_kite, "rockers": _r
 
 
 class Twins(Family):
-    """What is singular twice at once."""
+    """Two simultaneous singularities."""
 
     name = "twins"
     about = (
@@ -38,7 +38,7 @@ class Twins(Family):
     samples = 61
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
-        """One of them."""
+        """Return two equal loops on one crank."""
         plane, (first, second) = any_plane(rng), rng.choice(JOINTS_OF_A_LOOP, 2).tolist()
         kind = tuple(SHAPES)[int(rng.integers(len(SHAPES)))]
         b, d, c, off = SHAPES[kind](rng)
