@@ -52,6 +52,10 @@ PLAIN = (
     "core/studies/engine_check",
     "core/studies/joint_check",
     "core/studies/paper",
+    "core/studies/stress",
+    "core/studies/stress/*.py",
+    "core/studies/stress/families",
+    "core/studies/stress/truth",
 )
 """Folders in plain English; the others are to follow, and none may drop out."""
 

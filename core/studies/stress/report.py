@@ -25,7 +25,7 @@ SHORT = {
     Verdict.UNSUPPORTED: "unsupported",
 }
 OF_FORCES = (Verdict.WRONG_FORCE, Verdict.UNDETERMINED_FORCE, Verdict.MISSING_FORCE)
-"""Verdicts with a column only where there are any."""
+"""Verdicts with a column only if there are any."""
 ERRORS = (*QUANTITIES, "force")
 NOTES = (
     (

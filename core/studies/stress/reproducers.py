@@ -41,9 +41,7 @@ def judge(
 
 
 def judge_as(specimen: Specimen, case: Case, engine: Engine) -> Judgement:
-    """Judge a case in place of a specimen's own, by the reference and the
-    excuses of the specimen.
-    """
+    """Judge a case in place of a specimen's own, by the specimen's reference and excuses."""
     (answer,) = solve_all([Pair(case, engine, specimen.tol)])
     return judged(specimen, case, specimen.truth(case) if specimen.truth else None, answer)
 

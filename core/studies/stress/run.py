@@ -25,10 +25,11 @@ from .truth.proofs import distance_from_proof
 from .truth.reference_motion import Reach, Truth
 from .verdicts import BAD, Judgement, Verdict, described_wrong, judged
 
-# Smallest number of specimens of a small share, and samples of each.
+# Smallest number of specimens of a small share, and smallest number of samples of each.
 FEWEST_SPECIMENS, FEWEST_SAMPLES = 4, 3
 COARSEST = 5
-# A proof takes ms, its equations 100 times as long: every other small mechanism is proved.
+# A proof takes milliseconds, and its equations take 100 times as long. Every other mechanism with
+# at most this many bodies is proved.
 LARGEST_PROVED = 6
 
 
@@ -76,8 +77,8 @@ def stress(
 ) -> tuple[Stress, list[Example]]:
     """Run all families; return the results and the smallest example of each bad engine and outcome.
 
-    `prove` proves a share of the followed samples and needs python-flint. `tell` gets what is done
-    next and the finished part. A KincheckError is raised if this machine has no extended precision.
+    `prove` proves a share of the followed samples and needs python-flint. `tell` gets the next
+    task and the finished part. A KincheckError is raised if this machine has no extended precision.
     """
     require_extended()
     found, seconds = _Results(), {"truth": 0.0, "proofs": 0.0, "engines": 0.0}
@@ -149,9 +150,7 @@ def specimens(family: Family, seed: int, share: int) -> list[Made]:
 
 
 def specimen(family: Family, seed: int, number: int, most: int) -> Made:
-    """Return specimen `number` of a family; its mechanism does not depend on
-    the rest of the run.
-    """
+    """Return specimen `number` of a family; the rest of the run does not affect its mechanism."""
     rng = np.random.default_rng([seed, zlib.crc32(family.name.encode()), number])
     # a coarse sweep is harder to solve, a fine one has more samples to judge
     fineness = float(rng.random()) ** 0.5

@@ -16,7 +16,7 @@ from ...kinematics import require_driven
 from ...mechanism.mechanism import Mechanism
 
 Bad = Callable[[Case], bool]
-"""Whether a case still has the outcome; a case that cannot be judged has not."""
+"""Function to tell whether a case still has the outcome; False if it cannot be judged."""
 
 # Judging a candidate takes 0.1 s to a few seconds: a minute in all.
 TRIES = 150

@@ -17,10 +17,10 @@ from ...harness.provenance import plain
 from ...harness.record import Outcome
 from ...harness.resource_limits import Limits
 
-# A simulator hangs if a sweep of this size takes longer [s].
+# Time limit of a sweep of this size; a slower simulator hangs [s].
 PATIENCE = 60.0
 MEMORY = 4.0
-# Up to this number of bodies numpy is not slower than compilation; the search around singular poses
+# Up to this number of bodies numpy is not slower than compilation. The search around singular poses
 # makes larger mechanisms slow.
 LARGEST_INTERPRETED = 4
 MOST_INTERPRETED = 2000
@@ -28,8 +28,8 @@ MOST_INTERPRETED = 2000
 
 
 def suited(engine: Engine, case: Case, number: int) -> Engine:
-    """Return the native engine, interpreted for every other small mechanism so that both executors
-    are tested; return simulators unchanged.
+    """Return the native engine, interpreted for every other small mechanism: this tests both
+    executors. Return simulators unchanged.
     """
     small = (
         len(case.mechanism.moving) <= LARGEST_INTERPRETED
@@ -41,8 +41,8 @@ def suited(engine: Engine, case: Case, number: int) -> Engine:
 
 
 def interpreted(engine: NativeEngine) -> NativeEngine:
-    """Return the native engine with its programs run by numpy: a mechanism that is solved once is
-    not compiled.
+    """Return the native engine with its programs run by numpy: compilation does not pay for a
+    single solution.
     """
     return replace(engine, solver=replace(engine.solver, compiled=False))
 

@@ -41,11 +41,11 @@ SILENT = (Verdict.SILENTLY_WRONG, Verdict.WRONG_FORCE, Verdict.UNDETERMINED_FORC
 BAD = (*SILENT, Verdict.REFUSED_WRONGLY, Verdict.MISSING_FORCE)
 """The bad verdicts, the worst first."""
 
-# A larger error, relative to the mechanism's size, is another assembly or none, not a lack of
+# A larger error, relative to the mechanism's size, means another assembly or none, not a lack of
 # digits.
 ELSEWHERE = 1e-3
-# The residual of contradictory geometry may be spread over the rows or lie in one; the factor of
-# ten makes both equal.
+# The residual of contradictory geometry may be spread over the rows or lie in one; this factor
+# accepts both.
 SPREAD = 10.0
 
 
@@ -158,7 +158,7 @@ def judged(
 def _judged_forces(
     case: Case, truth: Truth, result: Answer, known: NDArray[np.bool_], ratios: Array
 ) -> dict[Verdict, NDArray[np.bool_]]:
-    """Return where forces are wrong, by verdict, the worst first.
+    """Return masks of the samples with wrong forces, by verdict, the worst first.
 
     Args:
         known: samples with the right motion.

@@ -110,7 +110,10 @@ def _arm(rng: Rng, digits: str) -> tuple[Mechanism, dict[str, Motion]]:
 
 
 def _sine(rng: Rng, design: float, excursion: float, digits: str) -> Motion:
-    """Return a sine with the design value at time zero; it moves about the excursion in a second."""
+    """Return a sine with the design value at time zero.
+
+    It moves by about the excursion in the first second.
+    """
     if not design:
         turns = 0 if digits == "exact" else int(rng.integers(-2, 3))
         phase, amplitude = np.pi * turns, excursion

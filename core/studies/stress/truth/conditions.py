@@ -1,18 +1,18 @@
 """The conditions of a mechanism, written independently of the solver: full products of vectors, in
 extended precision, without simplification.
 
-Nothing is shared with the tested primitives, rows or programs except the meaning of a joint's
-fields. Every joint is a few rows, each a sum of terms of four kinds (a, b: directions fixed in body
-i and j; d: from a point of body i to one of body j; all carried by the bodies)
+They share only the meaning of a joint's fields with the tested primitives, rows and programs. Every
+joint is a few rows. A row is a sum of terms of four kinds, less a constant: the value at design, or
+zero. Here a and b are directions fixed in body i and j, and d leads from a point of body i to one
+of body j; the bodies carry them all.
 
     dot     a . b
     slide   a . d
     rod     (d . d - L^2) / 2 L
     turn    the angle from i to j about h
 
-less a constant: the value at design, or zero. A row has the size of its violation, because lengths
-are measured in a unit near the mechanism's size. A turn is the arc tangent plus the whole turns
-that bring it nearest to a given angle.
+Lengths are measured in a unit near the mechanism's size, so a row is about as large as its
+violation. A turn is the arc tangent plus whole turns, as near as possible to a given angle.
 """
 
 from __future__ import annotations

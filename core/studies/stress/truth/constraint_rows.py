@@ -1,4 +1,4 @@
-"""What the conditions of a mechanism are, and what writes them, term by term; see `conditions`."""
+"""The rows of a mechanism's conditions, and their writer, term by term; see `conditions`."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from .long_double import Real, extended, triad
 
 @dataclass(frozen=True, eq=False)
 class Term:
-    """One term: its bodies (0 is the ground), its vectors at design, and the row it is added to
-    with a weight.
+    """One term: its bodies (0 is the ground), its vectors at design, its row, and its weight in the
+    row.
     """
 
     i: int
@@ -32,17 +32,16 @@ class Conditions:
     """All rows of a mechanism; drivers are the last ones.
 
     Attributes:
-        unit: of length [m].
+        unit: unit of length [m].
         bodies: names of the moving bodies; body k of a term is bodies[k - 1].
         centres: reference point of each moving body, from the global origin [units], shape (bodies,
             3).
-        origin: what global positions are measured from before they are scaled [m]; takes out a far
-            offset.
+        origin: origin of the global positions before scaling [m]; it removes a far offset.
         dots, slides, rods, turns: the terms; see `Writer` for their vectors.
-        constants: what is taken off each row.
+        constants: constant subtracted from each row.
         driven: the row of each driver, in order, and the size of one unit of its value there.
         turning: the joint of each turn.
-        owners: what each row belongs to.
+        owners: joint, coupler or driver of each row.
     """
 
     unit: float
@@ -66,7 +65,7 @@ class Conditions:
 
 @dataclass(eq=False)
 class Writer:
-    """Writes rows, term by term."""
+    """Writer of rows, term by term."""
 
     mechanism: Mechanism
     owners: list[str] = field(default_factory=list[str])
@@ -101,11 +100,11 @@ class Writer:
         ]
 
     def index(self, body: str) -> int:
-        """Zero for whatever does not move."""
+        """Return the number of a body in the terms; zero for a fixed body."""
         return 0 if self.mechanism.is_fixed(body) else self.names.index(body) + 1
 
     def ends(self, joint: Joint) -> tuple[int, int]:
-        """The bodies of a joint."""
+        """Return the bodies of a joint by number."""
         return self.index(joint.i), self.index(joint.j)
 
     def place(self, position: Sequence[float]) -> Real:
@@ -124,7 +123,7 @@ class Writer:
     def dot(
         self, row: int, i: int, j: int, a: Real, b: Real, weight: float = 1.0, *, held: bool = False
     ) -> None:
-        """a on i, b on j; held at its design value, or else zero."""
+        """Add a . b, with a on i and b on j; subtract its design value if held."""
         self.terms["dots"].append(Term(i, j, (a, b), row, weight))
         if held:
             self.constants[row] = self.constants[row] + weight * (a @ b)
@@ -141,7 +140,10 @@ class Writer:
         *,
         held: bool = False,
     ) -> None:
-        """a on i; d from the first point, on i, to the second, on j."""
+        """Add a . d, with a on i and d from the first point, on i, to the second, on j.
+
+        Subtract its design value if held.
+        """
         d0 = (extended(second) - extended(first)) / extended(self.unit)
         self.terms["slides"].append(
             Term(i, j, (a, self.arm(i, first), self.arm(j, second), d0), row, weight)
@@ -150,8 +152,8 @@ class Writer:
             self.constants[row] = self.constants[row] + weight * (a @ d0)
 
     def rod(self, row: int, i: int, j: int, first: Any, second: Any, length: float | None) -> None:
-        """d from the first point, on i, to the second, on j, as long as at design unless a length
-        [m] is given.
+        """Add a rod along d from the first point, on i, to the second, on j, with a length [m]; by
+        default with the length at design.
         """
         d0 = (extended(second) - extended(first)) / extended(self.unit)
         size = np.sqrt(d0 @ d0) if length is None else extended(length) / extended(self.unit)
@@ -160,7 +162,7 @@ class Writer:
         )
 
     def coordinate(self, row: int, joint: Joint, freedom: str, weight: float) -> None:
-        """A coordinate of an axial joint: that of its second body relative to its first."""
+        """Add a coordinate of an axial joint: of its second body relative to the first."""
         i, j = self.ends(joint)
         found: Any = joint
         f, g, h = triad(found.axis)

@@ -1,9 +1,9 @@
 """Evaluation of the conditions at poses of many samples at once: residuals, Jacobian, and the part
 of the second derivative beyond J times the accelerations.
 
-Bodies turn by quaternions since the design; the unknowns of a body are its shift and its turn
-in global axes (dA = w x A). With s an arm, r = w x (w x s) and a' = w x a, first derivative
-and part beyond:
+Quaternions give the rotations of bodies since the design. The unknowns of a body are its shift and
+its turn in global axes (dA = w x A). Let s be an arm, r = w x (w x s) and a' = w x a. The first
+derivatives and the parts beyond are
 
     dot     (a . b)'   = w_i . (a x b) + w_j . (b x a)
                        beyond: a'' . b + 2 a' . b' + a . b''
@@ -74,8 +74,7 @@ class Poses:
         u, q = self.u.copy(), self.q.copy()
         u[1:] += step[:, :3]
         q[1:] += 0.5 * spun(step[:, 3:], q[1:])
-        # the tangent step and the projection onto the sphere turn by 2 atan(|w| / 2): |w| to third
-        # order
+        # tangent step and projection onto the sphere turn by 2 atan(|w| / 2): |w| up to third order
         return Poses(u, q / np.sqrt((q * q).sum(axis=1, keepdims=True)))
 
 

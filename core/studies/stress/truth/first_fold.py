@@ -1,6 +1,6 @@
-"""Where a motion first turns round: its curve is followed by arclength, which passes a fold easily.
+"""The first fold of a motion. Its curve is followed by arclength, which passes a fold easily.
 
-Samples are placed by it. They are judged by the truth, which does not use it.
+The study places samples by the fold. It judges them by the truth, and the truth does not use it.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from .newton_kantorovich import System
 
 Spot = tuple[Poses, float, Real]
 """A pose on the curve, its time [s], and the angles of the turns there [rad]."""
-# Of the unknowns [units, rad]. A fold within a step is found by secants on the rate of time.
+# Step of the unknowns [units, rad]. Secants on the rate of time find a fold within a step.
 STEP, SECANTS = 0.05, 4
 MOST_STEPS, CORRECTIONS, CLOSED = 400, 6, 1e-9
 
@@ -38,7 +38,9 @@ def turning(case: Case, stop: float) -> float | None:
 
 
 def _fold(system: System, at: Spot, way: Array, ahead: Array) -> float | None:
-    """Return where time stands still on the curve, between a pose and a step ahead of it [s].
+    """Return the time of the fold on the curve, between a pose and a step ahead of it [s].
+
+    Time stands still at a fold.
 
     Args:
         way, ahead: tangents at both ends of the step.
@@ -68,13 +70,15 @@ def _slopes(system: System, at: Spot) -> Array:
 
 
 def _tangent(system: System, at: Spot, before: Array | None) -> Array:
-    """Return the unit tangent of the curve, the way of the tangent before, or of growing time."""
+    """Return the unit tangent of the curve, in the direction of the tangent before or, without
+    one, of growing time.
+    """
     found = np.linalg.svd(_slopes(system, at))[2][-1]
     return found * np.sign(found[-1] if before is None else found @ before)
 
 
 def _next(system: System, at: Spot, way: Array, length: float) -> Spot | None:
-    """Return the pose on the curve that is so far along a tangent; None where none is found."""
+    """Return the pose on the curve at a distance along a tangent; None if none is found."""
     step, (poses, time, near) = length * way, at
     for _ in range(CORRECTIONS):
         poses, time = poses.moved(extended(step[:-1]).reshape(-1, 6, 1)), time + float(step[-1])

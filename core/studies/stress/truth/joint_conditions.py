@@ -1,4 +1,4 @@
-"""What each joint type means: its rows, as `conditions` writes them (formulation section 6)."""
+"""Rows of each joint type, as `conditions` writes them (formulation section 6)."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from .long_double import GROUND_AXES, Real, extended, triad, unit
 
 
 def _meet(w: Writer, joint: Any) -> None:
-    """The point of both bodies stays one."""
+    """Keep the point of both bodies together."""
     i, j = w.ends(joint)
-    # a fixed joint may do without one: any serves
+    # a fixed joint may have no point: any point serves
     point = joint.point if joint.point is not None else w.origin
     for axis in GROUND_AXES:
         w.slide(w.row(joint.name), 0, j, axis, point, point)
@@ -24,45 +24,45 @@ def _meet(w: Writer, joint: Any) -> None:
 
 
 def _parallel(w: Writer, joint: Any) -> None:
-    """The axis keeps its direction in both bodies."""
+    """Keep the direction of the axis in both bodies."""
     f, g, h = triad(joint.axis)
     for a in (f, g):
         w.dot(w.row(joint.name), *w.ends(joint), a, h)
 
 
 def _alike(w: Writer, joint: Any) -> None:
-    """Both bodies turn alike."""
+    """Keep the relative orientation of the bodies."""
     f, g, h = triad(getattr(joint, "axis", (0.0, 0.0, 1.0)))
     for a, b in ((g, h), (h, f), (f, g)):
         w.dot(w.row(joint.name), *w.ends(joint), a, b)
 
 
 def _line(w: Writer, joint: Any) -> None:
-    """The point of j stays on the line of i."""
+    """Keep the point of j on the line of i."""
     for a in triad(joint.axis)[:2]:
         w.slide(w.row(joint.name), *w.ends(joint), a, joint.point, joint.point)
 
 
 def _plane(w: Writer, joint: Any) -> None:
-    """The point of j stays in the plane of i, or as far from it as it was."""
+    """Keep the point of j in the plane of i, or at its distance from the plane at design."""
     first, second = getattr(joint, "points", None) or (joint.point, joint.point)
     w.slide(w.row(joint.name), *w.ends(joint), triad(joint.axis)[2], first, second, held=True)
 
 
 def _angle(w: Writer, joint: Any) -> None:
-    """The axes keep their angle."""
+    """Keep the angle between the axes."""
     a, b = (unit(extended(axis)) for axis in joint.axes)
     w.dot(w.row(joint.name), *w.ends(joint), a, b, held=True)
 
 
 def _length(w: Writer, joint: Any) -> None:
-    """The points keep their distance."""
+    """Keep the distance between the points."""
     first, second = joint.points
     w.rod(w.row(joint.name), *w.ends(joint), first, second, getattr(joint, "length", None))
 
 
 def _twistless(w: Writer, joint: Any) -> None:
-    """f_i . g_j = g_i . f_j; shaft j's axes are shaft i's, carried over by the shortest
+    """Write f_i . g_j = g_i . f_j. The axes of shaft j are those of shaft i, turned by the shortest
     rotation.
     """
     f, g, h = triad(joint.axes[0])
@@ -79,7 +79,7 @@ def _twistless(w: Writer, joint: Any) -> None:
 
 
 def _thread(w: Writer, joint: Screw) -> None:
-    """The displacement is the lead times the turns."""
+    """Set the displacement to the lead times the turns."""
     pitch = joint.lead / (2.0 * math.pi)
     row = w.row(joint.name)
     w.coordinate(row, joint, "translation", 1.0)
@@ -112,4 +112,4 @@ JOINTS: Mapping[str, Callable[[Writer, Any], None]] = {
     "revolute_spherical": _all(_length, _plane),
     "constant_velocity": _all(_meet, _twistless),
 }
-"""Joint type -> what writes its rows."""
+"""Joint type -> writer of its rows."""

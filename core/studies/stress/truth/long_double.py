@@ -1,4 +1,4 @@
-"""Extended precision: what the truth is computed in."""
+"""Extended precision, used to compute the truth."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from ....errors import KincheckError
 
 Real: TypeAlias = NDArray[Any]
-"""Of longdoubles, which numpy's types lose wherever a plain number is near. On x86 they have 64
-bits of mantissa: a two-thousandth of the round-off of what is judged by them."""
+"""Array of longdoubles; numpy's types lose them beside a plain number. On x86 they have 64 bits of
+mantissa: a two-thousandth of the round-off of the judged doubles."""
 
 
 def extended(values: Any) -> Real:
-    """Doubles as extended numbers, exactly; a text with all its digits."""
+    """Return doubles as extended numbers, exactly, or a text with all its digits."""
     return np.asarray(values, dtype=np.longdouble)
 
 
@@ -25,7 +25,7 @@ PI = extended("3.14159265358979323846264338327950288")
 
 
 def require_extended() -> None:
-    """Raise KincheckError where the machine has nothing between double precision and software."""
+    """Raise KincheckError if this machine has no extended precision in hardware."""
     if np.finfo(np.longdouble).eps > 1e-18:
         raise KincheckError(
             "kincheck stress: numpy's longdouble is no wider than a double on this machine, so"
@@ -34,12 +34,12 @@ def require_extended() -> None:
 
 
 def unit(a: Real) -> Real:
-    """The direction of a."""
+    """Return the direction of a."""
     return a / np.sqrt(a @ a)
 
 
 def triad(axis: Sequence[float]) -> tuple[Real, Real, Real]:
-    """f, g, h: orthonormal and right-handed, h along the axis."""
+    """Return f, g, h: orthonormal and right-handed, h along the axis."""
     h = unit(extended(axis))
     across: Real = np.cross(h, GROUND_AXES[int(np.abs(h).argmin())])
     f = unit(across)

@@ -1,13 +1,14 @@
 """A case as equations in extended precision: its samples polished, its rates, its condition, and
-its way from the design.
+its path from the design.
 
-The way is followed here, by nobody else's predictor. A step dx from one knot to the next is taken
-where J0^-1 J1 - I is less than a half in the norm of row sums: the simplified iteration from the
-knot then contracts all along the step, so that its solution is the one that continues the motion
-(Newton-Kantorovich). Near a singular pose that asks for steps as small as the smallest singular
-value; there it is enough that (J0^-1 J1 - I) dx is less than a half of dx, seen from both ends, and
-that det(J0^-1 J1) is positive: on the other side of a gap between two solutions it is negative.
-Samples between two knots are interpolated, polished, and held to the same from the nearer knot.
+The path is followed here, without the predictor of any engine. A step dx from one knot to the next
+is accepted if the norm of row sums of J0^-1 J1 - I is less than a half. The simplified iteration
+from the knot then contracts all along the step, so its solution continues the motion
+(Newton-Kantorovich). Near a singular pose this would need steps as small as the smallest singular
+value. A small step is therefore accepted under two weaker conditions. (J0^-1 J1 - I) dx must be
+less than a half of dx, seen from both ends. And det(J0^-1 J1) must be positive: beyond a gap
+between two solutions it is negative. Samples between two knots are interpolated, polished, and
+tested under the same conditions from the nearer knot.
 """
 
 from __future__ import annotations
@@ -25,21 +26,20 @@ from .evaluation import Evaluator, Poses, spun
 from .long_double import Real, extended
 from .solutions import POLISHED, Solved, changes, condition, inverted
 
-# Largest change of J between neighbours. At 1 the simplified iteration may fail; a half leaves as
-# much again for what J does between the two.
+# Largest change of J between neighbours. At 1 the simplified iteration may fail; a half leaves
+# an equal margin for the change of J between the two.
 LARGEST_CHANGE = 0.5
-# Below this part of the way steps are judged by where they go, no longer in all directions.
+# Steps below this part of the path are tested along their direction only, not in all directions.
 SMALL_PART = 2.0**-6
-# A step is at most this part of the way: a sweep of one or two turns is seen at sixteen places or
-# more.
+# Largest step, as a part of the path: a sweep of one or two turns has at least sixteen steps.
 FIRST_PART = 1.0 / 16.0
-# Below this part of the way it is a singular pose and no coarse step: there the solution changes as
-# the root of what is left.
+# A refused step below this part of the path shows a singular pose, not a coarse step: beside the
+# pose, the solution changes as the root of the remaining time.
 SMALLEST_PART = 2.0**-30
-# The law of the root is asked over so many knots. It holds to 5 % there beside 30 random folds; two
-# bifurcations missed it by a factor of 46 and more.
+# Number of knots for the test of the root law. Beside 30 random folds the law holds to 5 % over
+# them; two bifurcations missed it by a factor of 46 and more.
 ROOT_KNOTS = 7
-# Samples at a time: keeps the arrays of the largest mechanisms in the cache.
+# Number of samples solved at once: the arrays of the largest mechanisms stay in the cache.
 LANES = 256
 MOST_STEPS = 8
 
@@ -70,11 +70,10 @@ class System:
         return found
 
     def solved(self, poses: Poses, drives: Real, times: Array, near: Real) -> Solved:
-        """Newton's iteration from poses near to solutions, and the rates there.
+        """Return solutions and their rates by Newton's iteration from nearby poses.
 
         Args:
-            near: angles of the turns nearby [rad], shape (turns, n); those that are driven are
-                known.
+            near: nearby angles of the turns [rad], shape (turns, n); driven angles replace them.
         """
         near = self._known(near, drives)
         jacobian = self.rows.jacobian(poses)
@@ -84,7 +83,7 @@ class System:
             residual = self.rows.residual(poses, drives[0], near)
             step = -np.matmul(inverse, residual.T[..., None].astype(np.float64))[..., 0]
             size = np.abs(step).max(axis=1)
-            # a step that turns a body over is no correction of a nearby pose
+            # a step turning a body over is no correction of a nearby pose
             good = np.isfinite(size) & (size < 1.0)
             step[~good] = 0.0
             last = np.where(good, size / condition(inverse), np.inf)
@@ -92,7 +91,7 @@ class System:
             if (last[good] <= 1e-3 * POLISHED).all() or not good.any():
                 break
             before, largest = largest, float(size[good].max())
-            # else the old J gains three digits or more
+            # else the old J still gains three digits or more a step
             if largest > 1e-5 or largest > 1e-3 * before:
                 jacobian = self.rows.jacobian(poses)
                 inverse = inverted(jacobian)
@@ -127,8 +126,8 @@ class System:
         )
 
     def knots(self, stop: float) -> tuple[list[Solved], float | None]:
-        """The way from the design to a time, as far as it goes, and the time at which it folds
-        back, where that ends it.
+        """Return the knots from the design to a time, as far as the path goes, and the time of the
+        fold [s] if the path ends there.
         """
         found, h = [self.design()], stop * FIRST_PART
         if not found[0].step[0] <= POLISHED:
@@ -154,8 +153,8 @@ class System:
         return found, None
 
     def between(self, knots: Sequence[Solved], samples: NDArray[np.intp]) -> Solved:
-        """Samples of the sweep on the way through the knots; steps are infinite where J changes too
-        much from the nearer knot.
+        """Return samples of the sweep on the path through the knots; the step is infinite if J
+        changes too much from the nearer knot.
         """
         times = self.path.times[samples]
         at = np.array([knot.times[0] for knot in knots])
@@ -182,17 +181,17 @@ class System:
 
 
 def _fold(knots: Sequence[Solved], stop: float) -> float | None:
-    """Return the time at which the motion turns back [s]; None if the rates do not show a fold.
+    """Return the time of the motion's turning back [s]; None if the rates show no fold.
 
-    Beside a fold the unknowns follow the root of the time left, tau, so v / 2a = tau, and v times
-    the root of tau is constant. Rates that stay finite belong to a singular pose that the motion
-    passes, such as a bifurcation.
+    Beside a fold the unknowns follow the root of the remaining time tau. So v / 2a = tau, and v
+    times the root of tau is constant. At other singular poses, such as a bifurcation, the rates
+    stay finite and the motion passes.
     """
     at, earlier = knots[-1], knots[max(0, len(knots) - 1 - ROOT_KNOTS)]
     k = int(np.abs(at.a).argmax())
     v, a = float(at.v.ravel()[k]), float(at.a.ravel()[k])
     left = v / (2.0 * a) if a else np.inf
-    # the last step was refused, being too long a part of what is left
+    # the last step was refused, because it was too long a part of the remaining time
     if not 0.0 < left * np.sign(stop) <= 64.0 * SMALLEST_PART * abs(stop):
         return None
     fold = float(at.times[0]) + left
@@ -201,7 +200,7 @@ def _fold(knots: Sequence[Solved], stop: float) -> float | None:
 
 
 def _bodies(x: Array) -> Real:
-    """Unknowns of samples, shape (n, unknowns, 1), by body, shape (bodies, 6, n)."""
+    """Return unknowns of samples, shape (n, unknowns, 1), by body, shape (bodies, 6, n)."""
     return extended(x[..., 0].T.reshape(-1, 6, len(x)))
 
 
@@ -217,7 +216,7 @@ def _spin(knot: Solved) -> Real:
 def _hermite(
     x: Sequence[Real], rates: Sequence[Real], left: NDArray[np.intp], s: Real, span: Array
 ) -> Real:
-    """The cubic through values and rates of the knots on both sides, shape (bodies, 3 or 4, n)."""
+    """Return the cubic through values and rates of both knots, shape (bodies, 3 or 4, n)."""
     values, slopes = np.stack(x, axis=-1), np.stack(rates, axis=-1)
     s2, s3 = s * s, s * s * s
     return (

@@ -1,5 +1,5 @@
-"""Proving the truth itself: a share of its samples is shown to lie near exactly one solution of the
-engine's equations.
+"""Proof of the truth itself: a share of its samples is proved to lie near exactly one solution of
+the engine's equations.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ BITS = 160
 
 
 def distance_from_proof(truth: Truth, sample: int) -> float:
-    """How far the truth is from the proved solution near it, over what is round-off of an engine.
+    """Return the largest error of the truth from the proved solution, over the round-off bound.
 
     Raises:
-        UnprovedError: there is no proof: the pose is singular.
+        UnprovedError: there is no proof, because the pose is singular.
         KincheckError: python-flint is not installed, or the engine's rows cannot be selected.
     """
     part, k = next(
@@ -49,13 +49,13 @@ def distance_from_proof(truth: Truth, sample: int) -> float:
 
 
 def _exact(x: Any) -> Fraction:
-    """An extended number, exactly: as two doubles."""
+    """Return an extended number exactly, as the sum of two doubles."""
     high = float(x)
     return Fraction(high) + Fraction(float(x - np.longdouble(high)))
 
 
 def _state(truth: Truth, at: Solved, state: PoseState) -> Array:
-    """The scalars that fix the configuration, as the proof has them."""
+    """Return the scalars of the configuration, as in the proof."""
     stated, metres, origins = truth.system.rows.stated, state.unit, state.origins
     found: list[float] = []
     for name in state.names:
@@ -75,12 +75,12 @@ def _state(truth: Truth, at: Solved, state: PoseState) -> Array:
 
 
 def _coordinate(truth: Truth, at: Solved, name: str, metres: float) -> float:
-    """A joint's turn [rad] or displacement [units]."""
+    """Return a joint's turn [rad] or displacement [units]."""
     joint, freedom = name.rsplit(".", 1)
     stated = truth.system.rows.stated
     if freedom == "rotation":
         return float(at.angles[stated.turning.index(joint), 0])
-    # the way from the joint's point on the first body to that on the second, along the axis of the
+    # from the joint's point on the first body to its point on the second, along the axis of the
     # first
     axial: Any = truth.system.mechanism.joint(joint)
     place = (extended(axial.point) - stated.origin) / stated.unit

@@ -1,14 +1,15 @@
 """The reference forces of a case: multipliers of the full rows, and their round-off bounds.
 
-Nothing is shared with the tested equations of forces but the meaning of a description. The unknowns
-of a body are the shift of its centre and its turn, so the generalised forces are those that its
-motion demands there, and J^T lambda is their balance. A joint's wrench are its own rows; a driver's
-row is its coordinate, so that the multiplier is its effort.
+They share only the meaning of a description with the tested equations of forces. The unknowns of a
+body are the shift of its centre and its turn. Its motion therefore demands generalised forces about
+the centre; J^T lambda balances them. A joint's rows give its wrench. A driver's row is its
+coordinate, so the multiplier is its effort.
 
-A force is right up to 1e-14 (1 + K)^3 S: K of the multipliers, K^2 of the accelerations, S the
-largest force that masses and loads demand, a moment up to L times that. With P the projector onto
-the multipliers that balance each other, a component w is undetermined where w B P is not zero. It
-is not judged where this is too near to zero to tell.
+The error of a right force is at most 1e-14 (1 + K)^3 S, of a right moment L times as much. The
+multipliers give one factor 1 + K and the accelerations two; S is the largest force demanded by
+masses and loads. Let B map the multipliers to a joint's force or moment, and let P project onto the
+self-balancing multipliers. A component along w is undetermined if w B P is not zero. The component
+is not judged if this is too near to zero for a decision.
 """
 
 from __future__ import annotations
@@ -30,16 +31,21 @@ from .newton_kantorovich import System
 from .reference_motion import ROUND_OFF, Truth
 from .solutions import Solved
 
-# Parts of a unit multiplier: below the first it is round-off, above the second it is real.
+# Parts of a unit multiplier: smaller ones than the first are round-off, larger ones than the second
+# are real.
 ZERO, REAL = 1e-10, 1e-6
-# An angle beyond it may be one of another turn [rad].
+# A larger angle may belong to another turn [rad].
 SAME_TURN = 3.0
 
 
 @dataclass(frozen=True, eq=False)
 class KnownForce:
-    """A force output: its values, NaN where they are not known; largest errors that are round-off;
-    and where it is determined and undetermined, each of shape (n,). Neither: not to be told.
+    """A force output at n samples; a sample neither determined nor undetermined is not judged.
+
+    Attributes:
+        values: NaN if unknown, shape (n,).
+        bounds: largest errors due to round-off, shape (n,).
+        determined, undetermined: whether the force is so for certain, shape (n,).
     """
 
     values: Array
@@ -75,9 +81,9 @@ class _Loaded:
     """Solved samples with their loads.
 
     Attributes:
-        force, torque: that motion and loads demand of joints and drivers, about the centre of each
+        force, torque: demand of motion and loads on joints and drivers, about the centre of each
             body [N, N m], shape (bodies + 1, 3, n); body 0 is the ground.
-        largest: the largest force among them, and of springs over the size [N], shape (n,).
+        largest: largest of these forces and of spring forces over the size [N], shape (n,).
     """
 
     def __init__(self, system: System, solved: Solved, drives: Real) -> None:
@@ -102,12 +108,12 @@ class _Loaded:
         inverse = solved.inverse
         flat = demand.reshape(-1, n).T.astype(np.float64)
         self.multipliers: Array = np.einsum("nur,nu->nr", inverse, flat)
-        # rows less those that the unknowns reach: what balances itself
+        # combinations of multipliers beyond the reach of the unknowns: they balance themselves
         self.balanced = np.eye(solved.jacobian.shape[1]) - solved.jacobian @ inverse
 
     def output(self, output: ForceMeasure) -> tuple[Array, Array, Array]:
-        """Return an output's values, how far they are undetermined, and the size of its errors,
-        each of shape (n,).
+        """Return an output's values, their undetermined part, and the size of its errors, each of
+        shape (n,).
         """
         if isinstance(output, ElementForce):
             values = self.amounts[output.force].astype(np.float64)
@@ -132,8 +138,9 @@ class _Loaded:
         return self.largest * (self.size if turns else 1.0)
 
     def _wrench(self, name: str) -> tuple[Array, Array]:
-        """Return force and moment on a joint's second body by the multipliers, shape (n, 3, rows):
-        the moment about the joint's point, as carried by that body.
+        """Return force and moment on a joint's second body per unit multiplier, shape (n, 3, rows).
+
+        The moment is about the joint's point, carried by this body.
         """
         joint = self.mechanism.joint(name)
         i, j = (self._index(body) for body in joint.bodies)
@@ -153,7 +160,7 @@ class _Loaded:
         return 0 if self.mechanism.is_fixed(body) else self.stated.bodies.index(body) + 1
 
     def _turned(self, body: int, vector: Any) -> Real:
-        """Return a vector that turns with a body, shape (3, n)."""
+        """Return a vector fixed in a body, in its current direction, shape (3, n)."""
         a = extended(vector)
         return a[:, None] + np.einsum("abn,b->an", self.poses.turned[body], a)
 
@@ -177,7 +184,7 @@ class _Loaded:
     # Loads
 
     def _push(self, body: int, force: Real, at: Real) -> None:
-        """Let a force act on a body at the end of an arm: it takes from the demand."""
+        """Let a force act on a body at the end of an arm; it reduces the demand."""
         self.force[body] -= force
         self.torque[body] -= _cross(at, force)
         self._grow(force)
@@ -248,7 +255,7 @@ class _Loaded:
         return amount
 
     def _angle(self, name: str, i: int, j: int) -> Real:
-        """Return the angle of a joint: that of its driver, or within a turn; else NaN."""
+        """Return the angle of a joint: its driver's, or one within a turn; else NaN."""
         if name in self.system.driving:
             return self.drives[0, self.system.driving[name]]
         joint: Any = self.mechanism.joint(name)

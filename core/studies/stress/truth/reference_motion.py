@@ -1,15 +1,15 @@
 """The reference motion of a case: its points at every reachable sample, and their round-off bounds.
 
-An error is right up to 1e-14 of size times condition. This is 90 half units in the last place: a
-row is a sum of up to forty products of carried vectors, each with a rounding or two.
+An error up to 1e-14 of size times condition is round-off. This is 90 half units in the last place:
+a row is a sum of up to forty products of carried vectors, each with a rounding or two.
 
     position        1e-14 (K_x L + |x|)       K_x: move of the point per unit error of each row
     velocity        1e-14 K_x (1 + K) V L     V: the fastest unknown
     acceleration    1e-14 K_x (1 + K)^2 A L   A: the largest second rate, or V^2
 
-L is the mechanism's size, K the condition of all unknowns. J of J v = c_t has the error of the pose
-(one K); J a = ... has the error of v. |x| is the rounding far from the origin. Where two solutions
-meet, errors are roots of the rows' errors: no position may be off by more than sqrt(1e-14) L.
+L is the mechanism's size, K the condition of all unknowns. In J v = c_t, J has the error of the
+pose (one K); J a = ... also has the error of v. |x| is the rounding far from the origin. If two
+solutions meet, errors are roots of the rows' errors: no position error may exceed sqrt(1e-14) L.
 """
 
 from __future__ import annotations
@@ -32,15 +32,17 @@ from .solutions import POLISHED, Solved, condition, inverted
 
 ROUND_OFF = 1e-14
 AT_A_FOLD = ROUND_OFF**0.5
-# From here on a residual of 1e-12 (a run's tolerance), times the condition squared, exceeds 1e-9 of
-# the rates (the outputs' default tolerance): an engine may refuse, with the reason.
+# Above this condition, a residual of 1e-12 (tolerance of a run), times the condition squared,
+# exceeds 1e-9 of the rates (default tolerance of outputs): an engine may refuse, with the reason.
 SINGULAR = (1e-9 / 1e-12) ** 0.5
-# From here on a closed form beats Newton, which is limited by the mechanism's rounding (1e-16).
+# Above this condition a closed form beats Newton, limited by the mechanism's rounding (1e-16).
 UNPOLISHED = 1e6
 
 
 class Reach(IntEnum):
-    """A solution that continues the design is known (REACHED), none exists (BEYOND), or neither."""
+    """Whether a solution continuing the design is known (REACHED), does not exist (BEYOND), or may
+    exist (UNKNOWN).
+    """
 
     REACHED = 0
     BEYOND = 1
@@ -55,7 +57,7 @@ class Truth:
         reach: knowledge of each sample, shape (n,): see `Reach`.
         singular: whether an engine may refuse the sample because of a pose before it, shape (n,).
         points: position [m], velocity and acceleration by point, each (n, 3); NaN if not reached.
-        bounds: largest errors that are round-off, by point, shape (3, n).
+        bounds: largest errors due to round-off, by point, shape (3, n).
         condition: condition of all unknowns, shape (n,).
         how: source of the motion.
         system, parts: the equations, and the solved samples by their numbers in the sweep.
@@ -116,19 +118,18 @@ def _follow(system: System, found: _Gathered, side: NDArray[np.intp]) -> None:
     past = side[away > at[-1]]
     found.singular[past] = True
     if fold is not None:
-        # samples so near to the fold that they may lie on either side stay unknown
+        # samples too near to the fold to tell their side stay unknown
         found.reach[past[np.abs(system.path.times[past]) > abs(fold) + abs(abs(fold) - at[-1])]] = (
             Reach.BEYOND
         )
 
 
 def closed(case: Case, motion: Motion, nearest: Sequence[float] = ()) -> Truth:
-    """Return the reference of a closed form, polished to the last digit of the
-    mechanism as described.
+    """Return the reference of a closed form, polished to the last digit of the described mechanism.
 
     Args:
-        nearest: swept values, from the design, at poses nearest to singular; an engine may refuse
-            samples behind one that doubles cannot tell from singular.
+        nearest: swept values, from the design, at poses nearest to singular. An engine may refuse
+            samples behind such a pose if doubles cannot distinguish it from singular.
 
     Raises:
         DefectError: the closed form is not a solution of the case.
@@ -164,7 +165,7 @@ def closed(case: Case, motion: Motion, nearest: Sequence[float] = ()) -> Truth:
         if not condition(inverted(system.rows.jacobian(poses)))[0] < UNPOLISHED:
             found.singular |= system.path.times * time > time * time
     for side in outwards(system.path.times, 0.0):
-        # a formula may have values again behind a gap, but no motion leads there
+        # a formula may have values again beyond a gap, but no motion leads there
         gone = np.logical_or.accumulate(found.reach[side] == Reach.BEYOND)
         found.reach[side] = np.where(gone, Reach.BEYOND, found.reach[side])
         found.singular[side] = np.logical_or.accumulate(found.singular[side] | gone)

@@ -14,27 +14,27 @@ from ....trajectory import Array
 from .evaluation import Poses, cross
 from .long_double import Real
 
-# Singular values below this part of the largest are those of redundant rows: as
+# Singular values below this part of the largest belong to redundant rows, as in
 # `redundancy.RANK_TOLERANCE`.
 RANK = 1e-9
 
 
-# A polished sample is right to this part of its condition: a hundredth of what an engine is
-# allowed.
+# Largest error of a polished sample, as a part of its condition: a hundredth of the error allowed
+# to an engine.
 POLISHED = 1e-16
 
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """Samples that satisfy the equations.
+    """Samples on solutions of the equations.
 
     Attributes:
         times: [s], shape (n,).
-        angles: of the turns, whole turns included [rad], shape (turns, n).
-        inverse: of the Jacobian, or its pseudo-inverse, shape (n, unknowns, rows).
+        angles: angles of the turns, whole turns included [rad], shape (turns, n).
+        inverse: inverse or pseudo-inverse of the Jacobian, shape (n, unknowns, rows).
         jacobian: shape (n, rows, unknowns).
         v, a: rates and accelerations of the unknowns, shape (bodies, 6, n).
-        step: Newton's last, over the condition; more than `POLISHED` is no solution.
+        step: Newton's last step over the condition; above `POLISHED` there is no solution.
     """
 
     times: Array
@@ -48,7 +48,7 @@ class Solved:
 
     @property
     def condition(self) -> Array:
-        """The condition of the inverse, shape (n,)."""
+        """Return the condition of the inverse, shape (n,)."""
         return condition(self.inverse)
 
     def at(self, k: int) -> Solved:
@@ -88,9 +88,7 @@ def condition(inverse: Array) -> Array:
 
 
 def inverted(jacobian: Array) -> Array:
-    """The inverses, or the pseudo-inverses where there are redundant rows; NaN where there is
-    none.
-    """
+    """Return the inverses, or the pseudo-inverses for redundant rows; NaN if there is none."""
     finite = np.isfinite(jacobian).all(axis=(1, 2), keepdims=True)
     sound = np.where(finite, jacobian, 0.0)
     try:
@@ -99,13 +97,13 @@ def inverted(jacobian: Array) -> Array:
         else:  # of full column rank: five times faster than by singular values
             q, r = np.linalg.qr(sound)
             found = np.linalg.inv(r) @ np.moveaxis(q, 1, 2)
-    except np.linalg.LinAlgError:  # one of them; the others have theirs
+    except np.linalg.LinAlgError:  # one matrix is singular; the others have an inverse
         found = np.linalg.pinv(sound, rcond=RANK)
     return np.where(finite, found, np.nan)
 
 
 def changes(knots: Sequence[Solved], nearest: NDArray[np.intp], new: Solved) -> tuple[Array, Array]:
-    """How J has changed from knots to other samples, in all directions and along the way there;
+    """Return the change of J from knots to other samples, in all directions and along the step;
     infinite beyond a gap.
     """
     inverse, jacobian = (
@@ -135,5 +133,5 @@ def _way(knots: Sequence[Solved], nearest: NDArray[np.intp], new: Solved) -> Arr
 
 
 def _vector(q: Real, p: Real) -> Real:
-    """The vector part of q p*, shape (bodies, 3, n): half of a small turn from p to q."""
+    """Return the vector part of q p*, shape (bodies, 3, n): half of a small turn from p to q."""
     return p[:, :1] * q[:, 1:] - q[:, :1] * p[:, 1:] - cross(q[:, 1:], p[:, 1:])
