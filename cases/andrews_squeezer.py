@@ -16,7 +16,7 @@ from .dynamics import Three, effort
 from .jet import Jet, Lanes, Motion, cos, sin
 from .vectors import Vec, fixed, meet_in_plane
 
-# with the misprint x = +0.03635 of some sources for B, the loops do not close
+# with the misprint x = +0.03635 for B, the loops do not close
 A, B = (-0.06934, -0.00227, 0.0), (-0.03635, 0.03273, 0.0)
 # OF, FE, BE, EG, AG, EH, AH [m]
 RR, D_, SS, E_, ZT, ZF, U = 0.007, 0.028, 0.035, 0.02, 0.04, 0.02, 0.04
@@ -25,7 +25,7 @@ START = -0.0617138900142764496358948458001  # published crank angle beta at the 
 
 
 def motion(turn: Jet) -> Motion:
-    """Points of the mechanism with the crank turned from the published start by `turn` [rad]."""
+    """Return points of the mechanism, the crank turned from the published start by `turn` [rad]."""
     beta = START + turn
     a, b = fixed(A, turn), fixed(B, turn)
     F = RR * Vec(cos(beta), sin(beta), a.z)

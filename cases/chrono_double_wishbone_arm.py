@@ -14,5 +14,5 @@ UPRIGHT = Upright((-0.279, 0.479, -0.026), (-0.22, 0.898, -0.026), (-0.04, 1.1, 
 
 
 def motion(turn: Jet) -> Motion:
-    """Points of the suspension with the lower arm turned from the design by `turn` [rad]."""
+    """Return points of the suspension with the lower arm turned from the design by `turn` [rad]."""
     return double_wishbone(LOWER, UPPER, UPRIGHT, turn)

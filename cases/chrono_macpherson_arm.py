@@ -18,5 +18,5 @@ UPRIGHT = Upright(
 
 
 def motion(turn: Jet) -> Motion:
-    """Points of the suspension with the arm turned from the design by `turn` [rad]."""
+    """Return points of the suspension with the arm turned from the design by `turn` [rad]."""
     return macpherson(ARM, TOP, CLAMP, UPRIGHT, turn, constant(0.0, turn))

@@ -14,5 +14,5 @@ UPRIGHT = Upright((-0.2, 0.42, -0.12), (-0.15, 0.77, -0.12), (0.0, 0.7979, -0.11
 
 
 def motion(turn: Jet) -> Motion:
-    """Points of the suspension with the lower arm turned from the design by `turn` [rad]."""
+    """Return points of the suspension with the lower arm turned from the design by `turn` [rad]."""
     return double_wishbone(LOWER, UPPER, UPRIGHT, turn)

@@ -35,7 +35,7 @@ ACROSS = (C[0] * (TIP[1] - CRANK) - (C[1] - CRANK) * TIP[0]) / COUPLER_SQUARED
 
 
 def motion(turn: Jet) -> Motion:
-    """Points of the mechanism with the crank turned from the design by `turn` [rad]."""
+    """Return points of the mechanism with the crank turned from the design by `turn` [rad]."""
     crank_pin, coupler_pin = pins(turn)
     d = coupler_pin - crank_pin
     tip = crank_pin + ALONG * d + ACROSS * Vec(-d.y, d.x, d.z)

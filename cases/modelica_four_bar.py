@@ -19,7 +19,7 @@ PIN = 0.2  # the slider's pin above the slide [m]
 
 
 def motion(turn: Jet) -> Motion:
-    """Points of the mechanism with the crank turned from the design by `turn` [rad]."""
+    """Return points of the mechanism with the crank turned from the design by `turn` [rad]."""
     c, s = cos(turn), sin(turn)
     y, z = 0.5 * c - 0.1 * s, 0.5 * s + 0.1 * c
     x = sqrt(ROD_SQUARED - (y - PIN) * (y - PIN) - z * z)

@@ -24,7 +24,7 @@ SQRT5 = 5.0**0.5
 
 
 def motion(turn: Jet) -> Motion:
-    """Points of the mechanism with the crank turned from the design by `turn` [rad]."""
+    """Return points of the mechanism with the crank turned from the design by `turn` [rad]."""
     zero = constant(0.0, turn)
     by, bz = AY - CRANK * sin(turn), AZ + CRANK * cos(turn)
     rr = by * by + bz * bz

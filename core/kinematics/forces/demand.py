@@ -93,7 +93,8 @@ def acceleration_of_center(body: Body, at: BodyStates) -> Vec3:
 def spin_change(body: Body, at: BodyStates) -> Vec3:
     """Return the change of a body's angular momentum about its centre of mass [N m].
 
-    The inertia at design has global axes. It is therefore constant in the body's own axes.
+    The body's own axes are global at design. The inertia, given at design in global axes, is
+    therefore constant in them.
     """
     I = inertia_of(body)  # noqa: E741 - the field's letter
     if I is None:

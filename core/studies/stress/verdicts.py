@@ -44,8 +44,8 @@ BAD = (*SILENT, Verdict.REFUSED_WRONGLY, Verdict.MISSING_FORCE)
 # A larger error, relative to the mechanism's size, means another assembly or none, not a lack of
 # digits.
 ELSEWHERE = 1e-3
-# The residual of contradictory geometry may be spread over the rows or lie in one; this factor
-# accepts both.
+# The residual of contradictory geometry may be spread over the rows or lie in one. Within this
+# factor of ten, both count as the same residual.
 SPREAD = 10.0
 
 
