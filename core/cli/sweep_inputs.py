@@ -6,7 +6,7 @@ import argparse
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from ..case.variation.sampling import Sampling
+from ..case.variation.modes import Sampling
 from ..errors import unknown
 from ..report.progress import complain
 

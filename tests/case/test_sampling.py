@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from kincheck.core import CaseError
 from kincheck.core.case.variation.distributions import Law
-from kincheck.core.case.variation.sampling import DRAWN, Sampling
+from kincheck.core.case.variation.modes import Sampling
+from kincheck.core.case.variation.sampling import DRAWN
 from kincheck.core.case.variation.variation_file import read_variation
 from kincheck.core.errors import KincheckError
 from scipy import stats

@@ -209,7 +209,7 @@ def test_mistakes_are_caught(mistake, monkeypatch):
     monkeypatch.setattr(checking, "SPECIMENS", 1)
     monkeypatch.setattr(checking, "STARTS", 10)
     if not check.startswith("loop"):
-        monkeypatch.setattr(checking, "loops", lambda tested, engines: [])
+        monkeypatch.setattr(checking, "loops", lambda tested, engines, failing=(): [])
     if check != "spurious branches":
         monkeypatch.setattr(checking, "branches", lambda one, starts: [])
     report = check_joint(make(), samples=8)

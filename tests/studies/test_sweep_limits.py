@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from kincheck.core.case.variation.limits import Limit
-from kincheck.core.case.variation.sampling import Sampling
+from kincheck.core.case.variation.modes import Sampling
 from kincheck.core.cli.main import main
 from kincheck.core.errors import KincheckError
 from kincheck.core.studies.tolerance.histograms import sparkline
@@ -77,7 +77,7 @@ def test_the_histogram_counts_every_variant(found):
 def test_the_page_has_limits_histograms_and_legends(found):
     text = page(found)
     assert "Specification limits" in text
-    assert text.count("Histogram of y") == 1
+    assert text.count('tabindex="0" aria-label="Histogram of y') == 1
     for words in ("nominal", "median", "5 to 95 %", "least and most", "limits", "variants at"):
         assert f"</svg> {words}" in text
     assert "Sobol" not in text

@@ -160,7 +160,8 @@ def read_text(file: Path, limit: int, why_limit: str, *, of_spreadsheet: bool = 
             with suppress(UnicodeDecodeError):
                 return data.decode("cp1252")
         problem = f"byte {error.start} is not UTF-{16 if marked else 8}; save the file as UTF-8"
-        if not marked and binary(data):
+        utf_16 = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+        if binary(data) and not utf_16:
             problem = "found a binary file, expected text; give what the program exports as text"
         raise fault(file, "", problem) from None
 

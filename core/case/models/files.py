@@ -46,7 +46,6 @@ UNREAD = {
             ".usdz",
             ".mo",
             ".slx",
-            ".mat",
             ".sldasm",
             ".iam",
             ".catproduct",
@@ -57,8 +56,6 @@ UNREAD = {
         (".step", ".stp", ".stl", ".obj", ".dae", ".iges", ".igs", ".fbx", ".glb", ".gltf", ".wrl"),
         "holds shapes, which say nothing of joints; give the model that names it",
     ),
-    **dict.fromkeys((".xls", ".xlsx", ".ods"), "is a workbook; save its table as CSV"),
-    **dict.fromkeys((".zip", ".gz", ".tar", ".7z"), "is an archive; unpack it and give the model"),
 }
 """Files that people have beside their models, and what to do, by suffix."""
 _OF_HARDPOINTS = (

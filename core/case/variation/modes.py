@@ -11,3 +11,11 @@ class Mode(StrEnum):
     MONTE_CARLO = "monte_carlo"
     GRID = "grid"
     ONE_AT_A_TIME = "one_at_a_time"
+
+
+class Sampling(StrEnum):
+    """Choice of the points of a Monte Carlo study."""
+
+    RANDOM = "random"
+    LATIN = "latin"
+    SOBOL = "sobol"

@@ -8,7 +8,7 @@ coordinate.
 
 from __future__ import annotations
 
-from enum import IntEnum, StrEnum
+from enum import IntEnum
 from functools import lru_cache
 from threading import Lock
 from typing import Any
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ...caches import keep_last
 from ...errors import KincheckError
 from ...trajectory import Array
+from .modes import Sampling
 
 DRAWN = 256
 """Number of variants drawn together. It is part of the meaning of a seed, and therefore no setting.
@@ -30,14 +31,6 @@ LATIN_BYTES = 1_000_000_000
 # The middle of the cell of a number with 52 binary digits: no point is 0 or 1, where a normal
 # distribution has no quantile.
 MIDDLE = 2.0**-53
-
-
-class Sampling(StrEnum):
-    """Choice of the points of a Monte Carlo study."""
-
-    RANDOM = "random"
-    LATIN = "latin"
-    SOBOL = "sobol"
 
 
 class Stream(IntEnum):

@@ -22,8 +22,8 @@ from .correlations import Correlation
 from .distributions import Law, normal_quantile, normal_share, quantile
 from .file_units import SI, FileUnits
 from .limits import Limit
-from .modes import Mode
-from .sampling import DRAWN, Sampling, Stream, check_count, generator, points
+from .modes import Mode, Sampling
+from .sampling import DRAWN, Stream, check_count, generator, points
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,7 @@ from time import perf_counter, process_time
 from typing import Any, Protocol
 
 from ...case.case import Case
-from ...case.variation.modes import Mode
-from ...case.variation.sampling import Sampling
+from ...case.variation.modes import Mode, Sampling
 from ...case.variation.variation import Variation
 from ...errors import KincheckError
 from ...harness.engine import Engine

@@ -27,6 +27,7 @@ def print_sweep(results: SweepResults, file: TextIO) -> None:
     console.print(_extremes(results))
     if any(each.histogram for each in results.outputs.values()):
         console.print()
+        print_signs(results.run, console)
         console.print(_distributions(results))
     if results.limits:
         _print_limits(results, console)
