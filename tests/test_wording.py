@@ -49,6 +49,7 @@ PLAIN = (
     "core/studies/engine_check",
     "core/studies/joint_check",
     "core/studies/paper",
+    "core/studies/tolerance",
 )
 """Folders in plain English; the others are to follow, and none may drop out."""
 
