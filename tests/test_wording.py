@@ -23,6 +23,7 @@ PLAIN = (
     "adapters/writers",
     "core/*.py",
     "core/case",
+    "core/case/io",
     "core/case/measures",
     "core/cli",
     "core/harness",
