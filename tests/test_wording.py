@@ -25,6 +25,8 @@ PLAIN = (
     "core/case",
     "core/case/io",
     "core/case/measures",
+    "core/case/models/hardpoints",
+    "core/case/models/hardpoints/templates",
     "core/cli",
     "core/harness",
     "core/history",
