@@ -27,6 +27,7 @@ PLAIN = (
     "core/case/measures",
     "core/case/models/hardpoints",
     "core/case/models/hardpoints/templates",
+    "core/case/variation",
     "core/cli",
     "core/harness",
     "core/history",
