@@ -30,6 +30,7 @@ PLAIN = (
     "core/case/variation",
     "core/cli",
     "core/harness",
+    "core/harness/*.py",
     "core/history",
     "core/joints",
     "core/kincheck",
