@@ -87,7 +87,7 @@ def output_series(
 
 
 def _force_series(output: ForceMeasure, trajectory: Trajectory) -> Series:
-    """Return a force over the samples, NaN where it is missing or undetermined."""
+    """Return a force over the samples, NaN if it is missing or undetermined."""
     given = trajectory.forces
     # a simulator may solve a joint by its equivalent; it then gives no reaction of the joint
     if given is None or not {*given.joints, *given.drivers, *given.elements}.issuperset(

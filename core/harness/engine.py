@@ -22,7 +22,7 @@ class Engine(Protocol):
             share a ranking. Name and mode together identify an engine: the recommended simulate
             mode has the simulator's name, its variants have names of their own.
         loop: place of the loop over samples and iterations: "python", "simulator" or "compiled".
-        settings: printed by the report, so that a reader can repeat the run.
+        settings: the engine's settings, for the report; with them a reader can repeat the run.
 
     Two attributes are optional, and False by default. `in_process`: the engine loads no foreign
     code. `bounds_error`: the engine itself bounds the error of each pose.

@@ -23,7 +23,7 @@ from .record import Outcome, Seconds
 from .resource_limits import memory_limit
 from .scheduler_delay import waited
 
-# Enough solves for a median that one interruption cannot move. Slow engines stop after the budget
+# Enough solves for a median unmoved by one interruption. Slow engines stop after the budget
 # [s], except between two solves whose times differ by UNLIKE: the slow one included a compilation.
 WARM_SOLVES = 5
 WARM_BUDGET = 0.5
@@ -128,7 +128,7 @@ Solver: TypeAlias = Callable[[Sequence[Pair]], Attempts]
 def here(pairs: Sequence[Pair]) -> Attempts:
     """Solve the pairs in this process, one after the other.
 
-    An engine that crashes or hangs takes the whole run with it.
+    If an engine crashes or hangs, the whole run does.
     """
     for index, pair in enumerate(pairs):
         yield index, attempt(pair)

@@ -39,7 +39,7 @@ class Interrupts:
         self._holding = False
 
     def hold(self) -> None:
-        """Note the next interrupt, and raise none: results are being written."""
+        """Only note the next interrupt, as results are being written."""
         self._holding = True
 
     @contextmanager
@@ -68,7 +68,7 @@ _current = Interrupts()
 
 
 def hold() -> None:
-    """Note the next interrupt, and act on it after the results are written."""
+    """Only note the next interrupt, and act on it after the results are written."""
     _current.hold()
 
 

@@ -249,7 +249,7 @@ def readable(text: str) -> str:
 
 
 def truth_of(case: Case) -> Truth:
-    """Return the kind of a case's reference; consensus without one, for any claim of the case."""
+    """Return the kind of a case's reference; consensus_only without one, as in `Record.truth`."""
     return case.truth if case.reference else Truth.CONSENSUS_ONLY
 
 

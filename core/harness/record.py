@@ -89,7 +89,7 @@ class Deviation(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Deviations(msgspec.Struct, frozen=True, kw_only=True):
-    """Deviations of one output. A quantity that was not compared is null, and `reason` explains it.
+    """Deviations of one output. An uncompared quantity is null, and `reason` explains it.
 
     Attributes:
         lost: number of values missing at samples with a value in the standard, although all samples
@@ -138,15 +138,15 @@ class Seconds(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Record(RecordTable, msgspec.Struct, frozen=True, kw_only=True):
-    """The result of one (case, engine) pair. A number that was not computed is null, never zero;
+    """The result of one (case, engine) pair. An uncomputed number is null, never zero;
     `reasons` and `message` explain it.
 
     Attributes:
-        truth: kind of the case's reference; consensus_only without a reference, for any claim of
-            the case.
+        truth: kind of the case's reference; consensus_only without a reference, even if the case
+            claims another kind.
         driver: values at the samples by driver: first the swept driver [m, rad or s], then every
             further moving driver.
-        errors: one entry for every output of the case, for any outcome.
+        errors: one entry for every output of the case, with every outcome.
         residual_max: the engine's own largest constraint residual over the solved samples [m or -].
         rank: rank of the rows solved by the engine, at the design. Native: the joints' rows,
             Cartesian and without drivers (unknowns less rank is dof). A simulator: the rows of its

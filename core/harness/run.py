@@ -69,8 +69,8 @@ def run(
     `unjudged`, and so is the native engine itself on a case without a reference. An engine fails if
     it has values at samples reached by neither the reference nor the native engine.
 
-    The records are in the order of cases and engines, the native engine first, for any order of
-    the solver.
+    The records are in the order of cases and engines, the native engine first; the solver may
+    finish them in another order.
 
     Args:
         tol: largest accepted constraint residual, as for `Engine.solve`.

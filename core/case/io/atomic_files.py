@@ -131,7 +131,9 @@ def _is_standard_output(path: Path) -> bool:
 
 
 def to_standard_output(encoded: bytes) -> None:
-    """Write a JSON document to standard output in UTF-8, for any encoding of the terminal."""
+    """Write a JSON document to standard output in UTF-8, also if its texts have another
+    encoding.
+    """
     sys.stdout.flush()
     binary: BinaryIO | None = getattr(sys.stdout, "buffer", None)
     if binary is None:  # a caller has replaced standard output by a text stream

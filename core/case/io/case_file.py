@@ -38,8 +38,8 @@ _PARTS = ("bodies", "joints", "couplers", "points", "drivers", "forces", "output
 
 
 def load_case(path: str | Path, closure: float | None = None) -> Case:
-    """Read a case from a file, in SI units. Without a [reference] it is consensus_only, for any
-    truth in the file.
+    """Read a case from a file, in SI units. Without a [reference] it is consensus_only, even if the
+    file states another truth.
 
     Args:
         closure: tolerance of rows redundant but for the digits of the file [m]; None for the
@@ -113,7 +113,7 @@ def load_case(path: str | Path, closure: float | None = None) -> Case:
 
 
 def _within_digits(case: Case, keys: ClosureKeys, closure: float | None) -> Case:
-    """Return the case without rows that are redundant within its tolerance, if it has one."""
+    """Return the case without rows redundant within its tolerance, if it has a tolerance."""
     case, why = replace(case, assembly=keys.notes), "--closure"
     if closure is None and keys.tolerance is not None:
         closure, why = LENGTHS[case.length_unit](keys.tolerance), "[closure] tolerance"

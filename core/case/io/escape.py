@@ -26,7 +26,7 @@ def visible(text: str, also: str = "") -> str:
 
 
 def file_name(text: str) -> str:
-    """Return a plain file name for any text, even a path: it leads to no other folder."""
+    """Return a file name for any text, even a path; the name leads to no other folder."""
     return "".join(letter if letter.isalnum() or letter in "-_. ()'" else "_" for letter in text)
 
 

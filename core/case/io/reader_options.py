@@ -1,4 +1,4 @@
-"""Options of readers: user input that the file does not contain."""
+"""Options of readers: user input beyond the content of the file."""
 
 from __future__ import annotations
 

@@ -77,7 +77,7 @@ class Reference(msgspec.Struct, frozen=True, kw_only=True):
         bits: working precision.
         rows: the solved equations, as "joint: primitive".
         redundant: the omitted equations.
-        driver: values at the samples [m, rad or s], the swept coordinate first.
+        driver: values at the samples by driver, the swept one first [m, rad or s].
         samples: one proof for each value.
         seconds: time of the proofs [s].
     """

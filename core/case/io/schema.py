@@ -46,8 +46,8 @@ left out. `kincheck list --joints` prints all types with their keys.
                          the times must cover the sweep
     [sweep]              (driver), start, stop, steps: samples with both ends, 1 if they are equal;
                          (rate) = 1, in driver units per second
-                         driver: its samples from start to stop; it moves at the rate, has its
-                         design value at time zero, and the sign of the rate gives the direction
+                         driver: its samples from start to stop; it has its design value at time
+                         zero, and moves at the rate; the sign of the rate gives the direction
                          at = "reference", in place of start, stop and steps: the samples of the
                          reference
                          no driver, or "time": start and stop are times [s], there is no rate, and
@@ -60,7 +60,7 @@ left out. `kincheck list --joints` prints all types with their keys.
     [closure]            (tolerance) [length]: points and axes have few digits; rows redundant
                          within the tolerance are left out, with a note; strict without it;
                          --closure of the command line overrides it
-                         (notes) = [...]: remarks of the writer of this file on the closed start
+                         (notes) = [...]: on the closure of the start before the file was written
     [outputs.NAME]       (type) = "coordinate": point, component = "x", "y" or "z", or direction
                          type = "distance": points = [A, B]
                          type = "joint_angle" or "joint_displacement": joint
@@ -101,8 +101,8 @@ left out. `kincheck list --joints` prints all types with their keys.
                          outputs of one wheel may then have (side)
     [reference]          true values: file, the name of a CSV file beside the case file, or rows,
                          with (columns)
-                         beside: in its folder or below, also after links, so a foreign case file
-                         opens no other file
+                         beside: in its folder or below, also after following links; a foreign case
+                         file opens no other file
                          first column: swept values; others: OUTPUT, OUTPUT.velocity,
                          OUTPUT.acceleration; interpolated unless its rows are at samples of the
                          sweep; errors of interpolation and printed digits enter the tolerance

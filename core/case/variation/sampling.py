@@ -2,7 +2,7 @@
 
 Random points and points of a Sobol sequence do not depend on their number: a longer series begins
 with the same points. The points of a Latin hypercube do depend on it: each coordinate has one point
-in every interval of length 1 / count. The memory holds the order of its intervals, four bytes for
+in every interval of length 1 / count. The order of its intervals is kept in memory: four bytes for
 each point and coordinate.
 """
 
@@ -60,7 +60,7 @@ def points(sampling: Sampling, seed: int, block: int, coordinates: int, count: i
     """Return all points of a block in the unit cube, shape (coordinates, DRAWN).
 
     Args:
-        count: number of all points of a Latin hypercube; a block's points beyond have no meaning.
+        count: number of all points of a Latin hypercube; later points of a block have no meaning.
     """
     if sampling is Sampling.SOBOL:
         found = _sobol(seed, coordinates).block(block)

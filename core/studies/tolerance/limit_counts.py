@@ -1,4 +1,4 @@
-"""Counts of variants that keep specification limits, chunk by chunk."""
+"""Counts of variants by specification limits, chunk by chunk."""
 
 from __future__ import annotations
 

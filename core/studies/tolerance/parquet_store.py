@@ -17,8 +17,7 @@ from .study import Study
 
 
 class ParquetStore:
-    """Write the values of all variants chunk by chunk: a row for each variant, a row group for each
-    chunk.
+    """Writer of the values of all variants: a row for each variant, a row group for each chunk.
 
     Columns: variant, the offset of each coordinate [SI], and each output as a list over the
     samples, NaN if missing. If a coordinate has the name of an output, such as W.x, its column is

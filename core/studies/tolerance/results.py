@@ -205,7 +205,7 @@ class SweepResults(Tabular, msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def deviating(self) -> list[Checked]:
-        """The checked variants without a pass."""
+        """The checked variants with a bad outcome."""
         return [each for each in self.checked if each.outcome.bad]
 
     @property

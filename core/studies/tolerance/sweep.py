@@ -96,7 +96,7 @@ def sweep_designs(
     Args:
         case: the case; its reference is not used.
         variation: the varied coordinates, from `read_variation`.
-        samples: number of variants to draw; None where the variation lists them.
+        samples: number of variants to draw; None if the variation lists them.
         seed: seed of the draws; equal seeds give equal variants on any machine with any `jobs`.
         sampling: choice of the drawn points.
         order: highest time derivative of the outputs to reduce: 0, 1 or 2.
@@ -227,7 +227,7 @@ def how_many(variation: Variation, samples: int | None) -> int:
     """Return the number of variants.
 
     Args:
-        samples: number of draws; None where the variants are listed.
+        samples: number of draws; None if the variants are listed.
 
     Raises:
         KincheckError: the number is missing, superfluous or too large.

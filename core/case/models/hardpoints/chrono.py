@@ -23,8 +23,8 @@ TOE, CAMBER = "Toe Angle (deg)", "Camber Angle (deg)"
 """Angles of the wheel at design; positive: toe-in, top outboard. ChDoubleWishbone.cpp turns the
 spindle by them about z, then about x."""
 
-# What is open goes on to the end of the line or file: were it no match, every quote and every /*
-# would be searched from anew.
+# An unclosed text or comment matches to the end of the line or file. Without a match, the search
+# would start anew at every quote and every /*.
 _STRING_OR_COMMENT = re.compile(r'"(?:\\.|[^"\\\n])*+"?|//[^\n]*|/\*.*?(?:\*/|\Z)', re.DOTALL)
 
 

@@ -52,8 +52,8 @@ class Template:
     Attributes:
         also: other names of the template in files.
         joints: function from places by role to joints; the joints name the bodies.
-        watched: roles of non-collinear points of the knuckle; their compared motion is the
-            knuckle's.
+        watched: roles of non-collinear points of the knuckle; outputs compare their motion, and
+            with it the knuckle's.
         above, ahead: pairs of roles, to detect wrong axes; in any car the first is above the
             second, or in front of it.
         sample: places by role for a sample table [m], invented.
