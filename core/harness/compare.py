@@ -1,25 +1,24 @@
 """Comparison: outputs of a trajectory, and their deviations from a reference or another engine.
 
-Deviations are taken at the same samples, without interpolation, and of outputs only: generalized
-coordinates may differ between correct engines. A deviation is accepted up to atol + rtol * range,
-with the range of the reference over the compared samples. Rounded or interpolated references are
-known within an interval only; its half-width at each sample is accepted too.
+Only outputs are compared, since generalized coordinates may differ between correct engines. The
+samples are the same, so nothing is interpolated. A deviation is accepted up to atol + rtol * range,
+with the range of the reference over the compared samples. A rounded or interpolated reference is
+known within an interval only; its half-width at each sample is added to the tolerance.
 
 An output's atol applies to positions. A wrong pose propagates: the velocities of a mechanism are
 its driver's rate times functions of the pose. Moving the pose by d, small against the size D of the
 mechanism, changes a velocity by about d * rate / D and an acceleration by d * (rate / D)^2. Hence
-velocities are held to atol * pace and accelerations to atol * pace^2, with pace = rate / D [1/s]. D
-is a radian for a rotational driver and the mechanism's size for a translational one. A driver with
-a motion adds d * s / D to an acceleration, s being its own acceleration: the pace is then sqrt(s /
-D) if this is larger. The rate is the driver's fastest; both are maxima over the samples, and the
-driver with the largest pace counts. The same relative accuracy is thus required of all three
-quantities, at any scale and any rate. Example: with atol = 1e-9 m, a mechanism of 1 m and a drive
-of 1 m/s, a relative error of 1e-6 in an acceleration of 1 m/s^2 is a thousand times out of
-tolerance.
+the atol of velocities is atol * pace, and of accelerations atol * pace^2, with pace = rate / D
+[1/s]. D is a radian for a rotational driver and the mechanism's size for a translational one. A
+driver with a motion adds d * s / D to an acceleration; s is its own acceleration. The pace is then
+sqrt(s / D), if this is larger. Rate and s are maxima over the samples, and the driver with the
+largest pace counts. All three quantities thus need the same relative accuracy, at any scale and any
+rate. Example: with atol = 1e-9 m, a mechanism of 1 m and a drive of 1 m/s, a relative error of 1e-6
+in an acceleration of 1 m/s^2 is a thousand times out of tolerance.
 
 The same holds for outputs in other units, such as angles: they too are functions of the pose. The
-derivative of an output by wheel travel has an atol of its own, the output's atol over D; its rate
-is held to this atol times the pace.
+derivative of an output by wheel travel has its own atol, the output's atol divided by D; the atol
+of its rate is this atol times the pace.
 """
 
 from __future__ import annotations
@@ -43,7 +42,7 @@ from ..unit_text import motion_word, value_text
 from .record import Deviation, Deviations, OutputSeries
 
 NO_VALUE = "has no value at"
-"""Phrase in the reason of a standard without values at some samples, which are not judged."""
+"""Phrase in the reason of a standard without values at some samples; these are not judged."""
 
 
 def output_series(
@@ -52,8 +51,8 @@ def output_series(
     """Return an output over the samples of a trajectory.
 
     Args:
-        held: the same poses with other velocities, for outputs that are derivatives by some drivers
-            while others are held; without it they have no value.
+        held: the same poses with velocities by some drivers alone, all others held; outputs defined
+            as such derivatives have no value without it.
 
     Values are NaN at unsolved samples. A quantity is None if the engine does not give it.
     """
@@ -88,9 +87,9 @@ def output_series(
 
 
 def _force_series(output: ForceMeasure, trajectory: Trajectory) -> Series:
-    """Return a force over the samples, NaN where it is missing or undetermined."""
+    """Return a force over the samples, NaN if it is missing or undetermined."""
     given = trajectory.forces
-    # a simulator that solves a joint by its equivalent has no reaction of it
+    # a simulator may solve a joint by its equivalent; it then gives no reaction of the joint
     if given is None or not {*given.joints, *given.drivers, *given.elements}.issuperset(
         output.forces
     ):
@@ -100,7 +99,7 @@ def _force_series(output: ForceMeasure, trajectory: Trajectory) -> Series:
 
 
 def _moving(motion: PointMotion) -> Vec3:
-    """Return a point's position as jets, with NaN for derivatives that the engine does not give."""
+    """Return a point's position as jets, with NaN for derivatives missing from the engine."""
     given = (motion.position, motion.velocity, motion.acceleration)
     x, v, a = (
         (
@@ -153,12 +152,12 @@ def deviations(
 
     Args:
         found: the engine's output.
-        standards: possible standards, (name, series), best first; each quantity takes the first one
-            that has it.
-        complete: every sample was solved: a missing value is then out of tolerance if the standard
-            has one.
-        refused: samples out of reach of the standard's solver, shape (n,); a value there
-            contradicts it.
+        standards: possible standards, (name, series), best first; each quantity takes the first
+            standard with this quantity.
+        complete: whether every sample was solved; a missing value is then out of tolerance if the
+            standard has one.
+        refused: samples out of reach of the standard's solver, shape (n,); a value at such a sample
+            contradicts the solver.
     """
     beat, force = pace(case), isinstance(output, ForceMeasure)
     compared: dict[str, Deviation | None] = {}
@@ -227,14 +226,14 @@ def deviation(
     against: str,
     uncertainty: Array | None = None,
 ) -> Deviation | None:
-    """Return the deviation of values from a reference over the samples known to both; None if there
-    are none.
+    """Return the deviation of values from a reference over the samples known to both; None without
+    such samples.
 
     Args:
         values, reference: shape (n,), NaN at unknown samples.
-        uncertainty: half-width of the interval around each reference value, which adds to the
-            tolerance there, shape (n,); None for exact ones. The deviation is then that of the
-            sample with the most tolerances.
+        uncertainty: half-width of the interval around each reference value, added to the tolerance
+            at its sample, shape (n,); None for an exact reference. With it, the result is the
+            deviation at the sample with the largest ratio to its tolerance.
 
     Raises:
         CaseError: the shapes differ.
@@ -279,7 +278,7 @@ def describe(
     """Return one line with the deviation and its sample, or the note that values are missing.
 
     Args:
-        unit: of the output.
+        unit: unit of the output.
     """
     word = motion_word(quantity, unit)
     if worst.max_abs <= worst.tolerance:

@@ -1,5 +1,5 @@
-"""The engine protocol. Every engine enters by it, the native one included; the harness knows
-nothing else of them.
+"""The engine protocol. Every engine implements it, the native one too; the harness knows nothing
+else about engines.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ class Engine(Protocol):
             share a ranking. Name and mode together identify an engine: the recommended simulate
             mode has the simulator's name, its variants have names of their own.
         loop: place of the loop over samples and iterations: "python", "simulator" or "compiled".
-        settings: printed by the report, so that a reader can repeat the run.
+        settings: the engine's settings, for the report; with them a reader can repeat the run.
 
-    Two attributes are optional, and False unless given: `in_process` states that the engine loads
-    no foreign code; `bounds_error` states that it bounds the error of each pose by itself.
+    Two attributes are optional, and False by default. `in_process`: the engine loads no foreign
+    code. `bounds_error`: the engine itself bounds the error of each pose.
     """
 
     @property
@@ -56,7 +56,7 @@ class Engine(Protocol):
             model: the result of `build`; may be used for several solves.
             tol: largest accepted constraint residual, relative to the mechanism's size. A pair
                 fails if a solved sample has a larger one. In simulate mode the simulator's own
-                settings decide what is accepted, and the residual shows the result.
+                settings decide on acceptance, and the residual shows the result.
 
         Returns:
             A trajectory of case.points. Samples out of reach are NaN with an explanation, never
@@ -66,15 +66,15 @@ class Engine(Protocol):
 
 
 def may_run_here(engine: Engine) -> bool:
-    """Return whether an engine may run in this process, by its attribute `in_process`; all others
-    run in processes of their own.
+    """Return whether an engine may run in this process, by its attribute `in_process`. All other
+    engines run in separate processes.
     """
     return bool(getattr(engine, "in_process", False))
 
 
 def bounds_error(engine: Engine) -> bool:
-    """Return whether an engine bounds the error of each pose by itself, by its attribute
-    `bounds_error`; the residuals of all others are held against the tolerance.
+    """Return whether an engine itself bounds the error of each pose, by its attribute
+    `bounds_error`. All other engines must keep their residuals within the tolerance.
     """
     return bool(getattr(engine, "bounds_error", False))
 
@@ -106,7 +106,7 @@ class Measurable(Engine, Protocol):
         ...
 
     def floor(self, case: Case) -> Floor | None:
-        """Return the time of its compiled code alone; None if the loop is compiled and its time is
-        the floor.
+        """Return the time of the compiled code alone; None for a compiled loop: its time is the
+        floor.
         """
         ...

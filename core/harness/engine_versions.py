@@ -1,5 +1,5 @@
-"""Versions of engines, each queried in a process of its own: a broken library ends, blocks or kills
-the process that loads it.
+"""Versions of engines, each queried in a separate process: a broken library may end, block or crash
+its process.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from functools import partial
 
 from .engine import Engine, may_run_here
 
-# A library may also print, and end its process with status 0: this marker precedes the version.
+# This marker precedes the version: a library may also print, and may end its process with status 0.
 TOLD = "its version is "
 COMMAND = f"""
 import pickle, sys
@@ -51,7 +51,7 @@ def _version(engine: Engine, patience: float) -> str | None:
         pickle.PicklingError,
         AttributeError,
         TypeError,
-    ):  # its pairs cannot be sent either, and their records say so
+    ):  # the engine's pairs cannot be sent either, and their records say so
         return None
     _, told, version = ended.stdout.decode("utf-8", "replace").rpartition(TOLD)
     return version.strip() or None if told else None

@@ -1,4 +1,4 @@
-"""Evidence on the reference of a case: its origin, its digest, and whether it is suspected."""
+"""Evidence on the reference of a case: its origin, its digest, and a suspicion, if any."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ IDENTICAL = (
     "the reference is identical to native's own result in every bit, which no data of others is: no"
     " pass is called validated; give the data of their source"
 )
-# Straight series prove nothing: rounding alone reproduces them, and a driven coordinate is one.
+# Straight series prove nothing: their rounded values are equal in every bit from any source. The
+# series of a driven coordinate is straight.
 FEWEST, STRAIGHT = 3, 1e-9
 
 
@@ -25,15 +26,16 @@ class Evidence(msgspec.Struct, frozen=True, kw_only=True):
     """The reference used to judge a record.
 
     Attributes:
-        citation: its source; empty if none is given.
-        sha256: digest of its content.
-        of: the content: the name of a file, digested by its bytes, or "values", as in `digest`.
-        own: claimed as data of others, but equal to native's own result in every bit.
-        units, signs: units of its columns by name, and convention of signs; empty in results of
+        citation: source of the reference; empty if none is given.
+        sha256: digest of the content.
+        of: the digested content: the name of a file, for its bytes, or "values", as in `digest`.
+        own: whether the reference claims to be others' data, but equals native's own result in
+            every bit.
+        units, signs: units of the columns by name, and convention of signs; empty in results of
             older versions.
-        grid: where it has values; empty if at every sample.
-        limits: by output, the known errors of its values, which enter the tolerance; none for exact
-            ones.
+        grid: samples with a value, in words; empty for all samples.
+        limits: by output, the known errors of the values, added to the tolerance; absent for exact
+            values.
     """
 
     citation: str
@@ -47,8 +49,8 @@ class Evidence(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def sound(self) -> bool:
-        """Whether agreement with the reference can validate: its source is cited, and is not
-        kincheck itself.
+        """Whether agreement with the reference can validate: its source is cited, and is outside
+        kincheck.
         """
         return bool(self.citation and self.sha256) and not self.own
 
@@ -57,7 +59,7 @@ def evidence(case: Case, native: Mapping[str, Series]) -> Evidence | None:
     """Return the evidence on the reference of a case; None without a reference.
 
     Args:
-        native: outputs of the native engine, as far as they are known.
+        native: known outputs of the native engine.
     """
     if not case.reference:
         return None
@@ -75,8 +77,8 @@ def evidence(case: Case, native: Mapping[str, Series]) -> Evidence | None:
 
 
 def _identical(case: Case, native: Mapping[str, Series]) -> bool:
-    """Return whether every reference value equals native's in every bit, in at least one series
-    that is not straight.
+    """Return whether every reference value equals native's in every bit, with at least one curved
+    series.
     """
     telling = False
     for name, series in case.reference.items():
@@ -119,7 +121,8 @@ def digest(reference: Mapping[str, Series]) -> str:
 
 
 class Explanation(msgspec.Struct, frozen=True, kw_only=True):
-    """A change of the reference that brings these quantities of these outputs within tolerance.
+    """A change of the reference, after which these quantities of these outputs are within
+    tolerance.
 
     Attributes:
         change: in words, after "the reference"; alternatives are joined with "or".
@@ -136,15 +139,15 @@ class Explanation(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Suspect(msgspec.Struct, frozen=True, kw_only=True):
-    """A case whose engines agree with each other and not with its reference.
+    """A case with engines in agreement with each other and not with the reference.
 
     Attributes:
-        agreement: largest difference between engines in the output and quantity named [unit].
+        agreement: largest difference between engines in `output` and `quantity` [unit].
         output, quantity, sample: place of the reference's largest deviation, in tolerances.
-        difference, tolerance: the deviation there, and its tolerance [unit].
-        explanations: simple changes that make the reference fit.
+        difference, tolerance: the deviation at this place, and its tolerance [unit].
+        explanations: simple changes to make the reference fit.
         unexplained: outputs and quantities without such a change.
-        message: all of it in one sentence.
+        message: all of these in one sentence.
     """
 
     engines: list[str]

@@ -1,5 +1,5 @@
-"""Execution of one pair: an engine's answer to a case, as plain data that processes can exchange.
-The verdict follows elsewhere.
+"""Execution of one pair: an engine's answer to a case, as plain data to send between processes.
+`verdict` judges it.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from .record import Outcome, Seconds
 from .resource_limits import memory_limit
 from .scheduler_delay import waited
 
-# Enough solves for a median that one interruption cannot move. Slow engines stop after the budget
+# Enough solves for a median unmoved by one interruption. Slow engines stop after the budget
 # [s], except between two solves whose times differ by UNLIKE: the slow one included a compilation.
 WARM_SOLVES = 5
 WARM_BUDGET = 0.5
@@ -66,10 +66,10 @@ class Answer:
     """An engine's answer to a case.
 
     Attributes:
-        outputs: by name, NaN at unsolved samples.
+        outputs: outputs by name, NaN at unsolved samples.
         solved: number of solved samples.
         iterations: sum over the solved samples.
-        residual, message, details, failures: as of the trajectory.
+        residual, message, details, failures: see `Trajectory`.
     """
 
     outputs: Mapping[str, Series]
@@ -86,7 +86,7 @@ class Failure:
     """The reason for a missing answer, and the end of the engine's printed output.
 
     Attributes:
-        kind: of the error that the engine raised, if it is known.
+        kind: type of the engine's error, if known.
     """
 
     outcome: Outcome
@@ -96,7 +96,7 @@ class Failure:
 
     @staticmethod
     def of(error: BaseException) -> Failure:
-        """Return the failure of an error that the engine raised."""
+        """Return the failure of an error of the engine."""
         kind = error.kind if isinstance(error, KincheckError) else None
         return Failure(Outcome.ERROR, said(error), kind=kind)
 
@@ -111,8 +111,8 @@ class Attempt:
     """The result of one pair.
 
     Attributes:
-        facts: of the engine; None if it ended before it could report them.
-        seconds: of the completed phases.
+        facts: facts of the engine; None if it ended before it could report them.
+        seconds: times of the completed phases.
     """
 
     facts: Facts | None
@@ -128,7 +128,7 @@ Solver: TypeAlias = Callable[[Sequence[Pair]], Attempts]
 def here(pairs: Sequence[Pair]) -> Attempts:
     """Solve the pairs in this process, one after the other.
 
-    An engine that crashes or hangs takes the whole run with it.
+    If an engine crashes or hangs, the whole run does.
     """
     for index, pair in enumerate(pairs):
         yield index, attempt(pair)
@@ -138,7 +138,7 @@ def attempt(pair: Pair, tell: Callable[[Facts], object] = lambda facts: None) ->
     """Solve a pair. Everything the engine raises becomes a failure, KeyboardInterrupt excepted.
 
     Args:
-        tell: receives the engine's facts before any step that may end the process.
+        tell: receives the engine's facts before any step able to end the process.
     """
     case, engine = pair.case, pair.engine
     seconds = dict[str, float]()
@@ -268,7 +268,7 @@ def _check_shape(what: str, values: Any, expected: tuple[int, ...]) -> None:
 
 
 def said(error: BaseException) -> str:
-    """Return an exception as text, whatever it carries."""
+    """Return any exception as text."""
     try:
         text = str(error)
     except Exception as another:  # __str__ is code of the engine too
@@ -280,7 +280,7 @@ def said(error: BaseException) -> str:
 
 
 def bounded(text: Any) -> str:
-    """Return text of any origin as a record has it: readable, and of bounded length."""
+    """Return text of any origin for a record: readable, and of bounded length."""
     whole = text if isinstance(text, str) else str(text)
     if len(whole) > LONGEST_MESSAGE:
         half = LONGEST_MESSAGE // 2

@@ -1,4 +1,4 @@
-"""Velocities by some drivers while all others are held, for outputs that are such derivatives."""
+"""Velocities by some drivers with all others held, for outputs defined as such derivatives."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from ..case.case import HELD_BUT, Case, size
 from ..case.held import held_case
 from ..trajectory import Trajectory
 
-# Largest difference of a pose that was reached on two paths, over the mechanism's size: more than
-# tolerances leave, less than the distance of two assemblies.
+# Largest difference of a pose reached on two paths, over the mechanism's size: larger than any
+# tolerance, smaller than the distance of two assemblies.
 SAME_POSE = 1e-6
 
 
 def held_trajectory(
     case: Case, mode: str, found: Trajectory, solve: Callable[[Case], Trajectory]
 ) -> tuple[Trajectory | None, str]:
-    """Return the poses of a trajectory with velocities by some drivers while others are held, and
-    why samples of it are missing.
+    """Return the poses of a trajectory with velocities by some drivers, all others held, and the
+    reason for missing samples.
 
-    It is None if no output needs it, or if the engine runs through time, where velocities are those
-    of the path that it ran.
+    The trajectory is None if no output needs it, or if the engine runs through time: its velocities
+    then belong to its own path.
 
     Args:
-        mode: of the engine.
+        mode: mode of the engine.
         solve: solves another case with the engine.
     """
     by = next((output.facts[HELD_BUT] for output in case.outputs if HELD_BUT in output.facts), None)

@@ -27,7 +27,7 @@ def words_of(interrupt: KeyboardInterrupt) -> str:
 class Interrupts:
     """The response of a command to Ctrl-C and SIGTERM.
 
-    The first signal raises KeyboardInterrupt. The second is only noted, so that results are
+    The first signal raises KeyboardInterrupt. The second is only noted, so the results are
     written; the third raises again.
 
     Attributes:
@@ -39,12 +39,12 @@ class Interrupts:
         self._holding = False
 
     def hold(self) -> None:
-        """Note the first interrupt from now on: results are being written."""
+        """Only note the next interrupt, as results are being written."""
         self._holding = True
 
     @contextmanager
     def deferred(self) -> Generator[None]:
-        """Raise an interrupt that comes meanwhile only at the end."""
+        """Complete the work inside, and raise an interrupt only at its end."""
         holding, self._holding = self._holding, True
         try:
             yield
@@ -68,7 +68,7 @@ _current = Interrupts()
 
 
 def hold() -> None:
-    """Note the first interrupt from now on, and act on it after the results are written."""
+    """Only note the next interrupt, and act on it after the results are written."""
     _current.hold()
 
 

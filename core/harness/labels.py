@@ -29,8 +29,8 @@ def engine_name(record: Record) -> str:
 
 
 def product(engine: str, mode: str) -> str:
-    """Return the engine's name, with the mode unless it is projection: each mode is a product of
-    its own.
+    """Return the engine's name, with the mode unless it is projection: each mode is a separate
+    product.
     """
     return engine if mode == "projection" else f"{engine} · {mode}"
 
@@ -68,7 +68,9 @@ def suspects(results: Results) -> list[tuple[str, str]]:
 
 
 def unsound(record: Record) -> str:
-    """Return why the reference cannot validate although its kind could; empty if it can."""
+    """Return the reason why the reference cannot validate although its kind could; empty if it
+    can.
+    """
     if not Truth(record.truth).validates or record.evidence is None or record.evidence.sound:
         return ""
     return "kincheck's own" if record.evidence.own else "uncited"

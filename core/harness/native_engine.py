@@ -1,4 +1,4 @@
-"""The native engine: the solver of kincheck, entering by the same door as the simulators."""
+"""The native engine: kincheck's own solver, behind the same protocol as the simulators."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ class NativeEngine:
     llvmlite; see `Engine`.
 
     Attributes:
-        solver: how it solves; with a `last_iteration` above the default, the rest that the last
-            iteration leaves is accepted.
-        every_body: the motion of every moving body is solved too, and not of the compared points
-            only.
-        every_force: the reactions of all joints, the efforts of all drivers and all force elements
-            are solved, and not those of outputs only.
+        solver: the solver and its settings; with a `last_iteration` above the default, the residual
+            after the last iteration is accepted.
+        every_body: whether to solve the motion of every moving body, not only of the compared
+            points.
+        every_force: whether to solve the reactions of all joints, the efforts of all drivers and
+            all force elements, not only the forces of outputs.
     """
 
     solver: NativeSolver = field(default_factory=NativeSolver)
@@ -39,16 +39,12 @@ class NativeEngine:
 
     @property
     def loop(self) -> str:
-        """Newton's iteration over the samples runs in machine code where there is a compiler for
-        it.
-        """
+        """Place of Newton's loop over the samples: machine code, if a compiler is available."""
         return "compiled" if self.solver.compiled and available() else "python"
 
     @property
     def settings(self) -> Mapping[str, Any]:
-        """Formulation, executor and how the loop ends; and how much is solved, where that is not
-        the standard.
-        """
+        """Formulation, executor and end of the loop; and additional solved quantities, if any."""
         solver = self.solver
         executor = (
             "llvm, vectors of lanes"
@@ -71,15 +67,15 @@ class NativeEngine:
         return VERSION
 
     def unsupported(self, case: Case) -> str | None:
-        """Return None always: a joint is supported by being composed of primitives."""
+        """Return None always: every joint is composed of supported primitives."""
         return None
 
     def bodies(self, case: Case) -> tuple[str, ...]:
-        """Return the names of the bodies whose motion is solved."""
+        """Return the names of the bodies with a solved motion."""
         return tuple(body.name for body in case.mechanism.moving) if self.every_body else ()
 
     def build(self, case: Case) -> Solver:
-        """Select the rows, trace the programs for the points that the outputs read, and lay out the
+        """Select the rows, trace the programs for the points of the outputs, and prepare the
         samples.
         """
         path, bodies, forces = case.sweep.path, self.bodies(case), self._forces(case)
@@ -91,5 +87,5 @@ class NativeEngine:
         return tuple(each.name for each in every) if self.every_force else case.forces
 
     def solve(self, model: Solver, case: Case, tol: float) -> Trajectory:
-        """March all samples; tol is relative to the mechanism's size."""
+        """Solve all samples in order; tol is relative to the mechanism's size."""
         return model(tol if self.solver.last_iteration <= LAST_ITERATION else math.inf)

@@ -42,9 +42,9 @@ def results(
     """Return the results of a run: its records, circumstances and references.
 
     Args:
-        facts: further circumstances, from the process in which the run began. They replace those
-            found here.
-        plan: the planned pairs of a run that does not have them all.
+        facts: further circumstances, from the process at the start of the run. They replace
+            circumstances found here.
+        plan: the planned pairs of an incomplete run.
     """
     known = {**circumstances(cases, started=started, tol=tol, command=command), **(facts or {})}
     known["cases"] = _with_identical(
@@ -64,7 +64,7 @@ def results(
 def _with_identical(
     cases: Mapping[str, Any], records: Sequence[Record], of_others: Sequence[str]
 ) -> dict[str, Any]:
-    """Return the facts of the cases, with a note on each whose reference is native's own result."""
+    """Return the facts of the cases, with a note on a case if its reference is native's result."""
     own = {
         record.case
         for record in records
@@ -81,7 +81,7 @@ def _with_identical(
 def circumstances(
     cases: Sequence[Case], *, started: datetime, tol: float, command: str
 ) -> dict[str, Any]:
-    """Return the circumstances known before a run begins, as JSON has them."""
+    """Return the circumstances known before a run begins, as plain data for JSON."""
     return plain(
         {
             "kincheck": VERSION,
@@ -106,7 +106,7 @@ def versions(records: Sequence[Record]) -> dict[str, str | None]:
     """
     found: dict[str, list[str]] = {record.engine: [] for record in records}
     for record in records:
-        # an engine that crashed may not have reported it
+        # a crashed engine may not have reported its version
         if record.version is not None and record.version not in found[record.engine]:
             found[record.engine].append(record.version)
     return {engine: " and ".join(each) or None for engine, each in found.items()}
@@ -120,7 +120,7 @@ def missing(plan: Sequence[tuple[str, str, str]], records: Sequence[Record]) -> 
 
 
 def references(cases: Sequence[Case]) -> dict[str, dict[str, OutputSeries]]:
-    """Return the reference values of each case that has any, by case and output."""
+    """Return the reference values of each case with a reference, by case and output."""
     return {
         case.name: {
             output.name: as_numbers(case.reference[output.name], output)
@@ -136,7 +136,7 @@ def git_state(folder: Path) -> dict[str, Any] | None:
     """Return the commit, the branch (null if none is checked out), and whether files differ from
     the commit.
 
-    Changed files add a digest of the difference. None if there is no repository.
+    For changed files, add a digest of the difference. Return None without a repository.
     """
 
     def git(*arguments: str) -> str | None:
@@ -151,7 +151,7 @@ def git_state(folder: Path) -> dict[str, Any] | None:
         except (
             OSError,
             subprocess.TimeoutExpired,
-        ):  # no git, or a drive that does not answer
+        ):  # git is missing, or a drive does not answer
             return None
         return done.stdout.strip() if done.returncode == 0 else None
 
@@ -173,7 +173,7 @@ def git_state(folder: Path) -> dict[str, Any] | None:
 
 
 def conditions() -> dict[str, Any]:
-    """Return the facts that later runs are compared by: state of files, speed of the machine."""
+    """Return the facts for the comparison of later runs: state of files, speed of the machine."""
     return {"git": git_state(Path.cwd()), "calibration_seconds": calibration()}
 
 
@@ -232,7 +232,7 @@ def _motion(motion: Motion) -> dict[str, Any]:
 
 
 def plain(facts: Mapping[str, Any]) -> dict[str, Any]:
-    """Return facts of any origin as JSON has them: the values read equal the values written.
+    """Return facts of any origin as plain data for JSON; it reads as the same values.
 
     A value without a counterpart in JSON becomes its text.
     """
@@ -244,12 +244,12 @@ def plain(facts: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def readable(text: str) -> str:
-    """Return text that UTF-8 can hold: file names and messages may contain undecodable bytes."""
+    """Return text fit for UTF-8: file names and messages may contain undecodable bytes."""
     return text.encode("utf-8", "replace").decode("utf-8")
 
 
 def truth_of(case: Case) -> Truth:
-    """Return the kind of a case's reference; consensus without one, whatever the case claims."""
+    """Return the kind of a case's reference; consensus_only without one, as in `Record.truth`."""
     return case.truth if case.reference else Truth.CONSENSUS_ONLY
 
 

@@ -50,7 +50,7 @@ class Outcome(StrEnum):
 
     @property
     def shown(self) -> str:
-        """The outcome as every table, page and message prints it."""
+        """The text of the outcome in every table, page and message."""
         return "not judged" if self is Outcome.UNJUDGED else self.value
 
 
@@ -74,9 +74,9 @@ class Deviation(msgspec.Struct, frozen=True, kw_only=True):
     """The deviation of an output from its standard, over the samples known to both.
 
     Attributes:
-        max_abs, tolerance: the largest deviation, and what is accepted there. If the reference is
-            known to different accuracies, those of the sample with the most tolerances.
-        worst_step: index of that sample.
+        max_abs, tolerance: the largest deviation, and the tolerance at its sample. If the reference
+            has an uncertainty, both are of the sample with the largest ratio of the two.
+        worst_step: index of the sample.
         against: kind of the reference, or the name of the engine compared with.
     """
 
@@ -89,14 +89,13 @@ class Deviation(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Deviations(msgspec.Struct, frozen=True, kw_only=True):
-    """Deviations of one output. A quantity that was not compared is null, and `reason` explains it.
+    """Deviations of one output. An uncompared quantity is null, and `reason` explains it.
 
     Attributes:
         lost: number of values missing at samples with a value in the standard, although all samples
-            are solved; absent if there are none. If all values are missing, the deviation is null
-            too.
-        contradicted: number of samples with a value that the standard's solver cannot reach; absent
-            if there are none.
+            are solved; absent if zero. If all values are missing, the deviation is null too.
+        contradicted: number of samples with a value, but out of reach of the standard's solver;
+            absent if zero.
     """
 
     position: Deviation | None
@@ -125,11 +124,10 @@ class Deviations(msgspec.Struct, frozen=True, kw_only=True):
 class Seconds(msgspec.Struct, frozen=True, kw_only=True):
     """Wall-clock seconds of the phases of a pair: build, first solve, warm solve, comparison.
 
-    `warm` is the median of several solves after the first. A phase that was not reached is null,
-    and so are the later ones.
+    `warm` is the median of several solves after the first. A phase is null if it was not reached.
 
     Attributes:
-        waited: the part of `warm` in which other processes had the processor.
+        waited: the part of `warm` during which other processes had the processor.
     """
 
     build: float | None = None
@@ -140,15 +138,15 @@ class Seconds(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Record(RecordTable, msgspec.Struct, frozen=True, kw_only=True):
-    """The result of one (case, engine) pair. A number that was not computed is null, never zero;
+    """The result of one (case, engine) pair. An uncomputed number is null, never zero;
     `reasons` and `message` explain it.
 
     Attributes:
-        truth: kind of the case's reference; consensus_only without a reference, whatever the case
-            claims.
-        driver: values at the samples by driver: first the swept one [m, rad or s], then every
-            further moving one.
-        errors: one entry for every output of the case, whatever the outcome.
+        truth: kind of the case's reference; consensus_only without a reference, even if the case
+            claims another kind.
+        driver: values at the samples by driver: first the swept driver [m, rad or s], then every
+            further moving driver.
+        errors: one entry for every output of the case, with every outcome.
         residual_max: the engine's own largest constraint residual over the solved samples [m or -].
         rank: rank of the rows solved by the engine, at the design. Native: the joints' rows,
             Cartesian and without drivers (unknowns less rank is dof). A simulator: the rows of its
@@ -157,11 +155,11 @@ class Record(RecordTable, msgspec.Struct, frozen=True, kw_only=True):
         dof: degrees of freedom without drivers; the same in all engines.
         iterations: Newton iterations, sum over the solved samples.
         solved, samples: number of samples reached, and number of samples.
-        us_per_step: time of the warm solve per sample [us], with the forces that outputs read; null
-            unless all samples were reached.
-        evidence: of the reference used for the verdict; null without a reference, and in records of
-            older versions.
-        reasons: why a number is null, by its key: residual_max, rank, dof, iterations, us_per_step.
+        us_per_step: time of the warm solve per sample [us], with the forces of outputs; null unless
+            all samples were reached.
+        evidence: evidence on the reference used for the verdict; null without a reference, and in
+            records of older versions.
+        reasons: reasons for null numbers, by key: residual_max, rank, dof, iterations, us_per_step.
             Empty in records of older versions.
     """
 
@@ -214,12 +212,13 @@ class Results(ResultsTable, msgspec.Struct, frozen=True, kw_only=True):
     """The results of a run.
 
     Attributes:
-        run: its circumstances: versions, machine, settings and facts of the cases; if the run ended
-            early, also the missing pairs.
+        run: circumstances of the run: versions, machine, settings and facts of the cases; if the
+            run ended early, also the missing pairs.
         records: one per (case, engine) pair.
-        references: the reference values of each case that has any, by case and output.
+        references: the reference values of each case with a reference, by case and output.
         scenes: the mechanism of each case, by case; empty in a run without scenes.
-        suspects: cases whose engines agree with each other and not with the reference, by name.
+        suspects: by name, cases with engines in agreement with each other and not with the
+            reference.
     """
 
     schema: Literal["kincheck-results/1"] = "kincheck-results/1"
@@ -230,8 +229,8 @@ class Results(ResultsTable, msgspec.Struct, frozen=True, kw_only=True):
     suspects: dict[str, Suspect] = {}
 
     def blames_reference(self, record: Record) -> bool:
-        """Return whether the suspected reference of the case explains a failure, so that its own
-        message is not needed.
+        """Return whether the suspected reference of the case explains a failure. The record's own
+        message is then not needed.
         """
         whole = record.solved == record.samples and not any(
             each.lost for each in record.errors.values()
@@ -240,14 +239,14 @@ class Results(ResultsTable, msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def missing(self) -> list[tuple[str, str, str]]:
-        """Case, engine and mode of the requested pairs without a record: the run ended first, or
-        see `unread`.
+        """Case, engine and mode of the requested pairs without a record: the run ended before, or
+        the case is in `unread`.
         """
         return [(case, engine, mode) for case, engine, mode in self.run.get("missing", [])]
 
     @property
     def unread(self) -> dict[str, str]:
-        """Requested cases that could not be read, by their names as given, and the reason."""
+        """The reason for each unreadable case, by its requested name."""
         return self.run.get("unread", {})
 
 
@@ -269,7 +268,7 @@ def settled(record: Record) -> Record:
 
 
 def from_json(text: bytes) -> Results:
-    """Return the results that this or an older version of `to_json` wrote.
+    """Return the results in a text of this or an older version of `to_json`.
 
     Raises:
         msgspec.ValidationError: not the schema kincheck-results/1; the message names the key.

@@ -62,8 +62,8 @@ class ResultsTable(Tabular):
         return ", ".join([f"{len(cases)} cases", f"{len(engines)} engines", *outcomes])
 
     def dataset(self) -> Dataset:
-        """Return outcome, errors and time of every record. An error is the largest one of all
-        outputs over its tolerance.
+        """Return outcome, errors and time of every record. An error is the largest ratio of an
+        output's error to its tolerance.
         """
         records = self.records
         coords = {
@@ -93,7 +93,9 @@ class ResultsTable(Tabular):
 
 
 def _share(record: Any, quantity: str) -> float:
-    """Return the largest error of a quantity over its tolerance; NaN if nothing was compared."""
+    """Return the largest ratio of a quantity's error to its tolerance; NaN if nothing was
+    compared.
+    """
     found = [getattr(each, quantity) for each in record.errors.values()]
     shares = [each.max_abs / each.tolerance for each in found if each is not None]
     return max(shares, default=np.nan)

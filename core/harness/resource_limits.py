@@ -11,9 +11,9 @@ from dataclasses import dataclass
 # within the hour.
 TIMEOUT = 300.0
 
-# Memory of a process [GB]. A simulator that has solved all built-in cases can write to 0.15 to 0.25
-# GB, by the data limit's count. Sixteen times as much is a leak or a wrong size, and most machines
-# have it to spare.
+# Memory of a process [GB]. After all built-in cases, a simulator holds 0.15 to 0.25 GB, by the data
+# limit's count. Sixteen times as much is a leak or a wrong size, and most machines have it to
+# spare.
 MEMORY = 4.0
 
 # Largest value of either: bytes are counted to 9.2e18, and a thread waits for at most 9.2e9 s.
@@ -39,8 +39,8 @@ class Limits:
 def default_jobs() -> int:
     """Return half the number of processors usable by this process.
 
-    Two of them often share a core, and the parent judges and writes while a worker solves. Measured
-    times are thus those of a quiet machine.
+    Two processors often share a core, and the parent process judges and writes while a worker
+    solves. So the times are measured on a quiet machine.
     """
     usable = (
         len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -1,5 +1,5 @@
-"""Results files, kincheck-results/1, checked on reading so that no later step can fail: a file may
-be cut, edited or invented.
+"""Reader of results files, kincheck-results/1. A file may be cut, edited or invented, so all of it
+is checked here, and no later step can fail.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ from .record import Outcome, OutputSeries, Record, Results, from_json
 from .scene_record import Scene
 
 LARGEST_FILE = 512_000_000
-# Numbers are shown in thousandths and degrees, and subtracted: up to this bound nothing overflows.
+# Reports convert numbers to thousandths and degrees, and subtract them; within this bound nothing
+# overflows.
 LARGEST = 1e300
 _ADVICE = "make it anew with kincheck run --json"
 

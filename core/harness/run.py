@@ -29,7 +29,7 @@ UNTOLD = {
     "iterations": "no sample was solved",
     "us_per_step": "known only where all samples are solved, and solved again for the time",
 }
-"""Why a number of a record is null, by its key, if the engine has answered."""
+"""Reasons for null numbers of a record, by key, if the engine has answered."""
 
 Progress = Callable[[Record, int, int], None]
 """Called with each new record, the number of records so far, and their final number."""
@@ -41,7 +41,7 @@ class _Judging:
 
     Attributes:
         standard: None until the native engine has finished.
-        waiting: pairs that wait for the standard.
+        waiting: pairs waiting for the standard.
     """
 
     standard: Standard | None
@@ -65,12 +65,12 @@ def run(
     """Solve every case with every engine and judge each answer.
 
     An output is judged against the case's reference. An output, velocity or acceleration missing
-    there is compared with the native engine's. A pair with nothing to compare is `unjudged`, and so
-    is the native engine itself on a case without a reference. An engine fails if it has values at
-    samples that neither the reference nor the native engine reaches.
+    in the reference is compared with the native engine's. A pair with nothing to compare is
+    `unjudged`, and so is the native engine itself on a case without a reference. An engine fails if
+    it has values at samples reached by neither the reference nor the native engine.
 
-    The records are in the order of cases and engines, the native engine first, in whatever order
-    the solver finishes them.
+    The records are in the order of cases and engines, the native engine first; the solver may
+    finish them in another order.
 
     Args:
         tol: largest accepted constraint residual, as for `Engine.solve`.
@@ -81,13 +81,13 @@ def run(
         made: records of an earlier run of the same cases and engines; their pairs are not solved
             again.
         facts: further circumstances, kept with the results; they replace the present ones.
-        unread: names of requested cases that could not be read; their pairs count as missing.
+        unread: names of unreadable requested cases; their pairs count as missing.
         residuals: fail an engine in projection mode if a solved sample has a residual above `tol`.
             False for efforts with an intentional residual.
 
     Raises:
-        CaseError: two cases have the same name, or two engines the same name and mode; records go
-            by names.
+        CaseError: two cases have the same name, or two engines the same name and mode; names
+            identify records.
     """
     started = datetime.now(UTC)
     _distinct("cases", [case.name for case in cases])
@@ -205,7 +205,7 @@ def _record(pair: Pair, attempt: Attempt, native: Standard, *, residuals: bool) 
             return _answered(
                 case, engine, facts, result, attempt.seconds or Seconds(), verdict, own
             )
-        except Exception as error:  # for example a reference that does not fit
+        except Exception as error:  # for example, an unsuitable reference
             result = Failure(Outcome.ERROR, said(error))
     nothing = Deviations(
         position=None,
@@ -239,7 +239,7 @@ def _answered(
     """Return the record of an answer."""
     solved, samples = answer.solved, len(case.sweep.values)
     details = dict(answer.details)
-    # a correct answer that passed a singular pose says so
+    # a correct answer may have notes too, for example of a singular pose on its way
     messages = [*verdict.messages, *details.pop("notes", [])]
     numbers = {
         "residual_max": answer.residual if solved else None,

@@ -1,4 +1,4 @@
-"""Scenes: the mechanism of each case as drawn, at a few samples of its sweep."""
+"""Scenes: the mechanism of each case for drawing, at a few samples of its sweep."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ def with_scenes(results: Results, cases: Sequence[Case]) -> Results:
     """Return the results with a scene of every case of at most `LARGEST` moving bodies.
 
     Poses over the sweep are solved here only if these results hold an answer of the native engine.
-    The native engine may have solved them in a process of its own; a case that it has solved can
-    neither hang nor end this process.
+    It may have solved them in a separate process. A case solved there can neither hang nor end this
+    process.
     """
     answered = {record.case for record in results.records if _answers(record)}
     asked = any(record.engine == STANDARD for record in results.records)
@@ -58,7 +58,7 @@ def scene(case: Case, *, poses: bool = True, asked: bool = True) -> Scene:
     Args:
         poses: solve for the bodies' poses over the sweep; otherwise the scene is the design
             position.
-        asked: without poses: whether the native engine was run and had no answer.
+        asked: if `poses` is false, whether the native engine was run and had no answer.
     """
     mechanism = case.mechanism
     frames, motions = list[int](), dict[str, BodyMotion]()
@@ -115,7 +115,7 @@ def scene(case: Case, *, poses: bool = True, asked: bool = True) -> Scene:
 
 
 def _wheels(case: Case) -> list[SceneWheel]:
-    """Return the wheels of suspension outputs; without a radius there is nothing to draw."""
+    """Return the wheels of suspension outputs with a known radius, as others cannot be drawn."""
     outputs = [each for each in case.outputs if isinstance(each, SuspensionOutput)]
     found: dict[str, SceneWheel] = {}
     for vehicle in (vehicle for output in outputs for vehicle in output.vehicles):
@@ -132,7 +132,7 @@ def _wheels(case: Case) -> list[SceneWheel]:
 
 
 def _forces(case: Case) -> list[SceneForce]:
-    """Return the outputs of forces that act at a point along a fixed direction."""
+    """Return the outputs of forces at a point along a fixed direction."""
     found: list[SceneForce] = []
     for output in case.outputs:
         if isinstance(output, JointForce):

@@ -1,4 +1,4 @@
-"""The mechanism of a case as results keep it for drawing."""
+"""The mechanism of a case in results, for drawing."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ import msgspec
 
 
 class SceneBody(msgspec.Struct, frozen=True, kw_only=True):
-    """A body as drawn: its frame at the design, and in every frame of the scene.
+    """A body for drawing: its axes at the design, and in every frame of the scene.
 
     Attributes:
         origin, euler_parameters: at the design, global [m, -].
         r: origins, global [m], shape (frames, 3); empty if only the design is known, or the body is
             fixed.
-        p: Euler parameters e0..e3, body -> global [-], shape (frames, 4); empty as r.
+        p: Euler parameters e0..e3, body -> global [-], shape (frames, 4); empty if r is.
     """
 
     name: str
@@ -70,13 +70,13 @@ class SceneWheel(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class SceneForce(msgspec.Struct, frozen=True, kw_only=True):
-    """A force that an output measures along one direction.
+    """A force measured by an output along one direction.
 
     Attributes:
-        output: the output with its values [N].
+        output: the output with the values of the force [N].
         name: the joint or driver.
-        body: the body that it acts on.
-        position: the point of that body where it acts, global at the design [m].
+        body: the body under the force.
+        position: the force's point of this body, global at the design [m].
         direction: global unit vector [-].
     """
 
@@ -88,13 +88,13 @@ class SceneForce(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Scene(msgspec.Struct, frozen=True, kw_only=True):
-    """A case's mechanism as drawn. Poses are rounded for the screen, and never compared.
+    """A case's mechanism for drawing. Poses are rounded for the screen, and never compared.
 
     Attributes:
-        wheels: those of suspension outputs whose radius is known.
+        wheels: wheels of suspension outputs with a known radius.
         forces: outputs of joints' forces and of the efforts of driven points.
         frames: indices of the samples with poses; empty if only the design position is known.
-        message: empty, or the reason why samples have no pose.
+        message: empty, or the reason for samples without a pose.
     """
 
     bodies: list[SceneBody]

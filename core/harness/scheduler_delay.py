@@ -10,8 +10,8 @@ _ACCOUNT = Path("/proc/thread-self/schedstat")
 def waited() -> float:
     """Return the seconds this thread was ready and waited for a processor; 0 except on Linux.
 
-    Processor time is no substitute for wall-clock time: a solve that sleeps, or waits for a disk or
-    a lock, would count for nothing.
+    Processor time is no substitute for wall-clock time: it does not count the time of a solve that
+    sleeps, or waits for a disk or a lock.
     """
     try:
         # fields: nanoseconds run, nanoseconds waited, time slices (Linux,

@@ -2,8 +2,8 @@
 samples, exchanged columns.
 
 A slip is reported only if its correction brings the reference within the tolerance and is
-significant. A series of zeros fits with either sign, a constant one fits after any offset, and two
-samples prove nothing.
+significant. Insignificant are: a sign of a series of zeros, an offset of a constant series, and any
+change of two samples.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from ..unit_text import value_text
 from .compare import deviation
 from .record import Deviation
 
-# Fewest samples: two are fitted by too many changes.
+# Fewest samples: too many changes fit two samples.
 FEWEST = 3
-# Smallest size of a series' values, or of their changes, in tolerances: a smaller one is fitted by
-# too many changes, too.
+# Smallest size of a series' values, or of their changes, in tolerances: too many changes fit a
+# smaller one, too.
 MEANINGFUL = 10.0
 OTHER_SIGN = "with the other sign"
 FACTORS: Mapping[str, float] = {
@@ -75,13 +75,13 @@ class Uncertain:
         return Uncertain(change(self.values), np.where(np.isfinite(half), half, 0.0))
 
     def off(self, held: Held, against: str = "") -> Deviation | None:
-        """Return the deviation of values from it."""
+        """Return the deviation of the held values from the reference."""
         return deviation(held.values, self.values, held.atol, held.rtol, against, self.half)
 
 
 @dataclass(frozen=True)
 class Slip:
-    """A change that makes the reference fit.
+    """A change to make the reference fit.
 
     Attributes:
         change: in words, after "the reference".
@@ -109,11 +109,11 @@ def slips(
     *,
     offsets: bool = True,
 ) -> list[Slip]:
-    """Return all single changes that make the reference fit; if there are none, all pairs of them.
+    """Return all single changes to make the reference fit; if there are none, all pairs of changes.
 
     Args:
-        held: the values that the engines agree on.
-        reference: of the same output, out of tolerance, shape (n,).
+        held: the agreed values of the engines.
+        reference: reference of the same output, out of tolerance, shape (n,).
         others: values of the other outputs, by name, possibly confused with this one.
         offsets: whether a constant may be added; False for derivatives.
     """
@@ -200,7 +200,7 @@ def _fitting(
 
 
 def _exchanged(reference: Uncertain, others: Mapping[str, Held], before: str) -> Iterator[Slip]:
-    """Yield the other outputs that the reference fits, if it varies."""
+    """Yield the other outputs in agreement with the reference, if it varies."""
     for name, other in others.items():
         yield from _fitting(
             other, reference, [(f"{before}taken as that of output {name}", lambda x: x)], ""

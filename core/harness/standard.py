@@ -12,11 +12,11 @@ from ..case.case import Case, Series
 from .record import OutputSeries, Record
 
 STANDARD = "native"
-"""Name of the engine that is the standard without a reference: the one place that names it."""
+"""Name of the standard engine for a case without a reference; no other place names it."""
 
 
 UNCERTAIN = "uncertain_samples"
-"""Key of a record's details: samples that were reached, and refused as uncertain."""
+"""Key of a record's details: reached samples, refused as uncertain."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,12 +24,12 @@ class Standard:
     """The native engine's answer to a case.
 
     Attributes:
-        outputs: by name; empty if there are none.
-        absent: why there are none, as the end of a sentence on the missing reference.
-        refused: samples out of the native engine's reach, shape (n,); None if there are none.
-            Samples that it reaches and refuses, because the pose or its rates are uncertain near a
-            singular pose, are not included: other engines' values there are not contradicted.
-        why: its own message.
+        outputs: outputs by name; empty without an answer.
+        absent: the reason for a missing answer, as the end of a sentence on the missing reference.
+        refused: samples out of the native engine's reach, shape (n,); None without such samples.
+            Samples near a singular pose, reached but refused for an uncertain pose or rate, are not
+            included: they contradict no other engine.
+        why: the native engine's own message.
     """
 
     outputs: Mapping[str, Series]

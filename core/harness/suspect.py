@@ -27,7 +27,7 @@ UNEXPLAINED = (
 
 @dataclass(frozen=True, eq=False)
 class _Off:
-    """A quantity of an output that is out of tolerance."""
+    """A quantity of an output out of tolerance."""
 
     output: str
     order: int
@@ -45,7 +45,7 @@ def suspect(case: Case, records: Sequence[Record]) -> Suspect | None:
     """Return the suspicion of a reference; None unless the engines agree within tolerance and it
     does not fit.
 
-    A single engine agrees with no other: then a slip must explain all deviations.
+    A single engine has no other to agree with; a slip must then explain all deviations.
     """
     mine = [record for record in records if record.case == case.name and record.solved]
     whole = [record for record in mine if record.solved == record.samples]

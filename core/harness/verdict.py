@@ -21,7 +21,7 @@ from .standard import STANDARD, Standard, known
 
 ROUNDED = 2.0
 """Factor on the residual tolerance: engines measure in a unit near the mechanism's size, a power of
-two that may be larger.
+two, possibly larger than the size.
 """
 
 
@@ -35,7 +35,7 @@ class Verdict:
 
     Attributes:
         outcome: pass, fail or unjudged.
-        messages: why it fails, or which part of it could not be judged.
+        messages: reasons for a failure, or the parts not judged.
         errors: deviations of every output.
         seconds: time of the comparison.
     """
@@ -51,7 +51,7 @@ def judged(case: Case, answer: Answer, native: Standard, tol: float) -> Verdict:
 
     Args:
         native: the native engine's answer, for everything missing in the case's reference.
-        tol: the largest residual of the samples that the engine calls solved, relative to the size.
+        tol: the largest residual promised for solved samples, relative to the size.
     """
     begin = perf_counter()
     solved, samples = answer.solved, len(case.sweep.values)
@@ -67,7 +67,7 @@ def judged(case: Case, answer: Answer, native: Standard, tol: float) -> Verdict:
             f"{solved} of {samples} samples solved: {why}{_reached_elsewhere(case, answer, native)}"
         )
     faults += filter(None, (_contradiction(case, answer, native), _worst(case, errors)))
-    # an output without any value has no deviation and thus none out of tolerance
+    # an output without any value has no deviation, and so no deviation out of tolerance
     faults += [
         f"{name}: {each.reason}" for name, each in errors.items() if each.lost and each.within
     ]
@@ -139,7 +139,7 @@ def _contradiction(case: Case, answer: Answer, native: Standard) -> str:
 
 
 def _reached_elsewhere(case: Case, answer: Answer, native: Standard) -> str:
-    """Return how many of the unsolved samples have a value in a standard; empty if none has."""
+    """Return the number of unsolved samples with a value in a standard, in words; empty if zero."""
     samples = len(case.sweep.values)
     unsolved = ~known(answer.outputs.values(), samples)
     for name, series in (
@@ -154,15 +154,15 @@ def _reached_elsewhere(case: Case, answer: Answer, native: Standard) -> str:
 def promised(engine: Engine, tol: float) -> float:
     """Return the largest residual promised for solved samples, relative to the size.
 
-    Infinite for two kinds of engines, whose outputs alone are judged: a simulation accepts by its
-    own settings, and an engine that bounds the error of a pose needs no bound of the residual.
+    Infinite for two kinds of engines, judged by their outputs alone: a simulation accepts by its
+    own settings, and an engine with its own bound of the pose error needs no bound of the residual.
     """
     return tol if engine.mode == "projection" and not bounds_error(engine) else math.inf
 
 
 def excess(case: Case, residual: float, tol: float) -> str:
-    """Return the excess of the solved samples' residual over the tolerance, in words; empty if
-    there is none.
+    """Return the excess of the solved samples' residual over the tolerance, in words; empty without
+    an excess.
 
     The tolerance is relative to the mechanism's size for lengths, and absolute for residuals
     without a unit.
@@ -178,7 +178,9 @@ def excess(case: Case, residual: float, tol: float) -> str:
 
 
 def _not_judged(case: Case, errors: Mapping[str, Deviations]) -> list[str]:
-    """Return the outputs, quantities or samples not compared, and why; equal reasons are merged."""
+    """Return the uncompared outputs, quantities or samples, with the reasons; equal reasons are
+    merged.
+    """
     reasons: dict[str, list[str]] = {}
     for output in case.outputs:
         each = errors[output.name]

@@ -1,4 +1,4 @@
-"""Files written whole or not at all. Write errors are reported, if possible before the work."""
+"""Write files whole or not at all, and report write errors, if possible before the work."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from uuid import uuid4
 from ...errors import KincheckError
 
 Named: TypeAlias = tuple[str, Path | str | None]
-"""An option and the file that it names, "-" for standard output; None where it was not given."""
+"""An option and its file, "-" for standard output; None without the option."""
 
 Content: TypeAlias = bytes | Callable[[Path], object]
 """Content of a file, or a function that writes it to a given path."""
@@ -38,10 +38,10 @@ def write_all(contents: Iterable[tuple[Path, Content]]) -> list[str]:
 
 
 def write(option: str, path: Path, content: Content) -> Any:
-    """Write the file that an option names, and give what writing it gives.
+    """Write the file of an option, and return the result of the write.
 
     Raises:
-        KincheckError: it cannot be written.
+        KincheckError: the file cannot be written.
     """
     try:
         return _put(path, content)
@@ -60,12 +60,13 @@ def _put(path: Path, content: Content) -> Any:
 
 @contextmanager
 def _whole(path: Path) -> Generator[Path]:
-    """A path to write to, which becomes the file when all is written; until then, and if it fails,
-    what stood there stays.
+    """Yield a temporary path, and rename it to the file at the end.
+
+    An earlier file stays until then, and also if the write fails.
     """
-    # what a link leads to; a pipe without a name is nowhere
+    # follow links; an unnamed pipe resolves to no file
     there, file = path.exists(), path.resolve()
-    # a pipe, a device, or in a folder of others
+    # a pipe, a device, or a file in a read-only folder: write to it directly
     if there and not (path.is_file() and os.access(file.parent, os.W_OK)):
         yield path
         return
@@ -80,10 +81,10 @@ def _whole(path: Path) -> Generator[Path]:
 
 
 def unwritable(files: Iterable[Named], history: Path | None = None) -> list[str]:
-    """Return the files of options that cannot be written, or would overwrite one another.
+    """Return messages about unwritable files of options, and files named by several options.
 
     Args:
-        history: file of the history, which is none of these.
+        history: file of the history; no option may name it.
     """
     found = list[str]()
     seen = {} if history is None else {history.resolve(): "--history"}
@@ -110,7 +111,7 @@ def unwritable(files: Iterable[Named], history: Path | None = None) -> list[str]
                 " own; give another"
             )
         elif path.exists() and not path.is_file():
-            continue  # a pipe or a device takes what several have to say
+            continue  # several options may write to one pipe or device
         elif (other := seen.setdefault(path.resolve(), option)) != option:
             found.append(
                 f"{option} {path}: found the file of {other}, expected one of its own; give another"
@@ -119,20 +120,23 @@ def unwritable(files: Iterable[Named], history: Path | None = None) -> list[str]
 
 
 def _is_standard_output(path: Path) -> bool:
-    """Whether it is the file that standard output is sent to, under any name: one would take the
-    other's place.
+    """Return whether the file, under any name, receives standard output.
+
+    If so, each would overwrite the other.
     """
     try:
         return path.is_file() and os.path.samestat(path.stat(), os.fstat(1))
-    except OSError:  # closed
+    except OSError:  # standard output is closed
         return False
 
 
 def to_standard_output(encoded: bytes) -> None:
-    """Write a JSON document to standard output in UTF-8, whatever the encoding of texts there."""
+    """Write a JSON document to standard output in UTF-8, also if its texts have another
+    encoding.
+    """
     sys.stdout.flush()
     binary: BinaryIO | None = getattr(sys.stdout, "buffer", None)
-    if binary is None:  # a caller has put something in its place that takes texts alone
+    if binary is None:  # a caller has replaced standard output by a text stream
         sys.stdout.write(encoded.decode())
     else:
         binary.write(encoded)

@@ -38,12 +38,12 @@ _PARTS = ("bodies", "joints", "couplers", "points", "drivers", "forces", "output
 
 
 def load_case(path: str | Path, closure: float | None = None) -> Case:
-    """Read a case from a file, in SI units. Without a [reference] it is consensus_only, whatever
-    its truth.
+    """Read a case from a file, in SI units. Without a [reference] it is consensus_only, even if the
+    file states another truth.
 
     Args:
-        closure: tolerance of rows that are redundant but for digits [m]; that of the file, or none,
-            unless given.
+        closure: tolerance of rows redundant but for the digits of the file [m]; None for the
+            file's tolerance, if any.
 
     Raises:
         CaseError: the file or its reference is unreadable or inconsistent; the message names file,
@@ -113,13 +113,13 @@ def load_case(path: str | Path, closure: float | None = None) -> Case:
 
 
 def _within_digits(case: Case, keys: ClosureKeys, closure: float | None) -> Case:
-    """Return the case without rows that are redundant within its tolerance, if it has one."""
+    """Return the case without rows redundant within its tolerance, if it has a tolerance."""
     case, why = replace(case, assembly=keys.notes), "--closure"
     if closure is None and keys.tolerance is not None:
         closure, why = LENGTHS[case.length_unit](keys.tolerance), "[closure] tolerance"
     if closure is None:
         return case
-    from ..closing import within_digits  # with the solver, and few cases need it
+    from ..closing import within_digits  # it imports the solver, and few cases need it
 
     return within_digits(case, closure, why)
 
@@ -159,7 +159,7 @@ def _mechanism(file: Path, keys: CaseKeys, length: Unit, angle: Unit) -> Mechani
 def _with_outputs(
     file: Path, keys: CaseKeys, case: Case, length: Unit, units: Mapping[str, Convert]
 ) -> Case:
-    """Return the case with its outputs, and with the points they need beyond those of the file."""
+    """Return the case with its outputs and the additional points they need."""
     mechanism = case.mechanism
     if not (keys.points or keys.outputs):
         raise fault(
@@ -173,7 +173,7 @@ def _with_outputs(
         if not outputs:
             return with_all_coordinates(case)
         return replace(case, mechanism=with_markers(mechanism, outputs), outputs=outputs)
-    from . import suspension  # many classes, and few cases have a wheel
+    from . import suspension  # it has many classes, and few cases have a wheel
     from .suspension_table import read_suspension
 
     table = read_suspension(file, keys.suspension, case, length, units["rad"])

@@ -1,5 +1,5 @@
-"""Case files, written: a `Case` as TOML of the schema kincheck-case/1, in SI units, every number
-with all its digits.
+"""Writer of case files: a `Case` as TOML of the schema kincheck-case/1, in SI units, with all
+digits of every number.
 """
 
 from __future__ import annotations
@@ -26,18 +26,18 @@ from .reference_writer import reason_against, reference_table
 from .schema import SCHEMA
 from .suspension_writer import suspension_output, suspension_tables
 
-# What a body has unless the file says otherwise.
+# Defaults of a body.
 PLAIN = Body("plain")
 
 
 def case_text(case: Case, comments: Sequence[str] = ()) -> str:
-    """Return the text of a case file that reads as the same case; samples agree to the last place.
+    """Return the text of a case file. It reads as the same case; samples agree to the last digit.
 
-    Values of a joint's driver are relative to the design, whatever they are in the case. A
-    reference that rows cannot hold is left out, and a comment says why.
+    The text gives the values of a joint's driver relative to the design, also if the case does not.
+    If rows cannot hold the reference, the text omits it, and a comment gives the reason.
 
     Args:
-        comments: lines at the top.
+        comments: comment lines at the top.
 
     Raises:
         CaseError: no case file can express the case: samples on no even grid, outputs of several
@@ -68,7 +68,7 @@ def case_text(case: Case, comments: Sequence[str] = ()) -> str:
         what = {"joints": joint.joints} if isinstance(joint, Coupler) else {"bodies": joint.bodies}
         lines += _table("joints", joint.name, {"type": joint.type, **what, **_own(joint)})
     for point in mechanism.points:
-        if not point.name.startswith(MARKER):  # these are made anew when the file is read
+        if not point.name.startswith(MARKER):  # the reader of the file creates markers anew
             lines += _table("points", point.name, {"body": point.body, "position": point.position})
     for driver in mechanism.drivers:
         lines += _table("drivers", driver.name, {"type": driver.type, **_own(driver)})
@@ -87,7 +87,7 @@ def case_text(case: Case, comments: Sequence[str] = ()) -> str:
     for name, keys in suspension_tables(case).items():
         lines += ["", f"[{name}]", *_keys(keys)]
     for output in case.outputs:
-        if isinstance(output, PerTravel):  # follows from the output before it
+        if isinstance(output, PerTravel):  # the reader derives it from the output before it
             continue
         lines += _table("outputs", output.name, dict(_output(case, output)))
     if reference:
@@ -96,10 +96,11 @@ def case_text(case: Case, comments: Sequence[str] = ()) -> str:
 
 
 def _from_design(motion: Motion, design: float) -> Motion:
-    """Return a motion as a case file has it: of values whose design value is the given one.
+    """Return a motion with the given design value, as a case file needs it.
 
     Raises:
-        CaseError: it has another one, and is no table, whose values can be shifted.
+        CaseError: the motion has another design value, and is no table; only the values of a table
+            can be shifted.
     """
     if not isinstance(motion, Absolute):
         return motion
@@ -114,12 +115,12 @@ def _from_design(motion: Motion, design: float) -> Motion:
 
 
 def _short(text: str) -> str:
-    """Return a text within the limit of a case file, marked where it is cut."""
+    """Return a text within the limit of a case file, with a mark at a cut end."""
     return text if len(text) <= LONGEST_TEXT else f"{text[: LONGEST_TEXT - 6]} [...]"
 
 
 def _values(case: Case) -> Array:
-    """Return the swept values as a case file has them, shape (n,)."""
+    """Return the swept values in the form of a case file, shape (n,)."""
     sweep = case.sweep
     if sweep.driver == TIME:
         return sweep.values
@@ -130,11 +131,11 @@ def _sweep(case: Case, values: Array, *, own_grid: bool) -> Mapping[str, Any]:
     """Return the keys of [sweep].
 
     Args:
-        own_grid: there is a reference, whose samples an uneven grid can be.
+        own_grid: the case has a reference; an uneven grid can then be the reference's samples.
     """
     sweep, start, stop = case.sweep, float(values[0]), float(values[-1])
     rate = {} if sweep.driver == TIME else {"rate": sweep.rate}
-    # of start + k * step, once in the file's units and once here
+    # round-off of start + k * step, once in the file's units and once here
     rounding = 4.0 * np.spacing(np.abs([*sweep.values, *values]).max())
     if (np.abs(np.linspace(start, stop, len(values)) - values) <= rounding).all():
         return {"driver": sweep.driver, "start": start, "stop": stop, "steps": len(values), **rate}
@@ -170,7 +171,7 @@ def _output(case: Case, output: Any) -> Iterator[tuple[str, Any]]:
 
 
 def _own(item: Any) -> Mapping[str, Any]:
-    """Return the fields that a file gives, without omitted optional ones."""
+    """Return the fields for a file, without optional fields at their defaults."""
     described: Any = type(item)  # pyright: ignore[reportUnknownVariableType]
     return {
         f.name: value for f in own_fields(described) if (value := getattr(item, f.name)) is not None
@@ -186,7 +187,7 @@ def _keys(values: Mapping[str, Any]) -> list[str]:
 
 
 def _key(name: str) -> str:
-    """Return a name as a key, bare where TOML allows it."""
+    """Return a name as a key, without quotes if TOML allows it."""
     if not (name and name.isprintable() and len(name) <= LONGEST_NAME):
         raise CaseError(
             f"name {brief(name)!r}: found {len(name)} characters, expected 1 to {LONGEST_NAME}"
@@ -208,5 +209,5 @@ def _value(value: Any) -> str:
         return f"[{', '.join(map(_value, cast('Sequence[Any]', value)))}]"
     if isinstance(value, int):
         return repr(value)
-    # a file holds no smaller numbers, which are the rounding of zeros
+    # the reader refuses smaller numbers; they are the round-off of zeros
     return repr(float(value) if abs(value) >= SMALLEST else 0.0)

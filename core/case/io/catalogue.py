@@ -18,9 +18,8 @@ from ..suspension import SuspensionOutput, own_keys
 from .class_keys import Described, kind_of, own_fields
 from .driving import DRIVERS
 
-# Geometry that suits any joint. The two directions make a right angle up to the rounding of a
-# table, as a cross wants it, and point the same way on, as the shafts of a constant-velocity joint
-# do.
+# Geometry for any joint. A universal joint needs two perpendicular directions; these are, up to the
+# rounding of a table. A constant-velocity joint needs shafts in the same sense.
 _EXAMPLES: Mapping[Kind | None, Any] = {
     Kind.POSITION: (0.0, 0.0, 0.0),
     Kind.DIRECTION: (1.0, 0.0, 0.0),
@@ -32,13 +31,13 @@ _EXAMPLES: Mapping[Kind | None, Any] = {
 
 
 _SENTENCES = re.compile(r"(?<=[^.]\.) (?=[A-Z])")
-"""Between two sentences."""
+"""The end of a sentence."""
 
 Rows: TypeAlias = list[tuple[str, ...]]
 
 
 def catalogue() -> Iterator[str]:
-    """Yield lines to print: joints, couplers, drivers, motions and force elements, a type each."""
+    """Yield lines to print, one for each type of joint, coupler, driver, motion and force."""
     yield (
         "points and directions are [x, y, z], global, at the design; of points and axes there is"
         " one on each body"
@@ -109,8 +108,8 @@ def output_tables() -> dict[str, Rows]:
 
 
 def rows_of(cls: type[Joint]) -> int | None:
-    """Number of constraint equations of a joint type; None where the example geometry is none for
-    it.
+    """Return the number of constraint equations of a joint type; None if the example geometry does
+    not suit it.
     """
     given = {each.name: _EXAMPLES[kind_of(each)] for each in own_fields(cls)}
     try:
@@ -120,7 +119,7 @@ def rows_of(cls: type[Joint]) -> int | None:
 
 
 def _counts(cls: type[Joint]) -> tuple[str, str]:
-    """Return the rows a joint takes, and the number and names of the freedoms it leaves."""
+    """Return a joint's number of rows, and the number and names of its freedoms."""
     rows = rows_of(cls)
     count, left = ("?", "?") if rows is None else (str(rows), str(6 - rows))
     names = f": {', '.join(cls.freedoms)}" if cls.freedoms else ""
@@ -128,8 +127,8 @@ def _counts(cls: type[Joint]) -> tuple[str, str]:
 
 
 def _keys(cls: type[Described]) -> str:
-    """Return the keys of a type; optional ones in brackets, those of motions and forces with the
-    unit.
+    """Return the keys of a type. Optional keys are in brackets; keys of motions and forces have
+    units.
     """
     names: list[str] = []
     for each in own_fields(cls):
@@ -147,8 +146,8 @@ def _measure_keys(cls: type[Measure]) -> Iterator[str]:
 
 
 def _meaning(cls: type[Described] | type[Measure]) -> str:
-    """Return the first sentence of a class's docstring; a dataclass without one has its signature
-    there.
+    """Return the first sentence of a class's docstring. For a dataclass without a docstring,
+    Python gives the signature.
     """
     paragraph = " ".join((cls.__doc__ or "").strip().partition("\n\n")[0].split())
     return "" if paragraph.startswith(f"{cls.__name__}(") else _SENTENCES.split(paragraph)[0]

@@ -39,7 +39,7 @@ _LISTS: Mapping[Any, Any] = {
         Meta(description='two of "rotation", "translation", of the first and second joint'),
     ],
 }
-"""Fields of a coupler that hold several values, by what they are annotated with."""
+"""Shape of a coupler's field with several values, by its annotation."""
 
 Described: TypeAlias = Joint | Coupler | Driver | Motion | ForceElement
 _Keys = list[tuple[str, Any] | tuple[str, Any, Any]]
@@ -48,7 +48,7 @@ _INHERITED = {each.name for base in (Joint, Coupler, Driver, Motion) for each in
 
 @cache
 def joint_keys(cls: type[Joint] | type[Coupler]) -> type[msgspec.Struct]:
-    """Return the keys of a joint class: type, the bodies or joints it joins, and its geometry."""
+    """Return the keys of a joint class: type, its two bodies or joints, and its geometry."""
     keys: _Keys = [
         ("type", Text),
         ("joints", Joints) if issubclass(cls, Coupler) else ("bodies", Bodies),
@@ -71,7 +71,7 @@ def motion_keys(cls: type[Motion]) -> type[msgspec.Struct]:
 
 
 def own_fields(cls: type[Described]) -> list[Field[Any]]:
-    """Return the fields of a class beyond those of its kind, which case files give."""
+    """Return the fields of a class itself, without the fields of its kind; case files give them."""
     return [each for each in fields(cls) if each.name not in _INHERITED]
 
 
@@ -93,7 +93,7 @@ def _keys_of_fields(
 
 
 def shape_of(each: Field[Any]) -> Any:
-    """Return the shape of a field with geometry, or of a plain number."""
+    """Return the shape of a geometric field, or of a plain number."""
     kind = kind_of(each)
     if kind is None:
         return _LISTS.get(each.type, Number)
@@ -101,5 +101,5 @@ def shape_of(each: Field[Any]) -> Any:
 
 
 def key_of(each: Field[Any], shape: Any) -> tuple[str, Any] | tuple[str, Any, Any]:
-    """Return the key of a field: name, shape, and the default if there is one."""
+    """Return the key of a field: name, shape, and the default, if any."""
     return (each.name, shape) if each.default is MISSING else (each.name, shape, each.default)

@@ -1,4 +1,4 @@
-"""Outputs that are compared by default: coordinates of points, and of models all that moves."""
+"""Default outputs: the coordinates of points; for models, the motion of every body and joint."""
 
 from __future__ import annotations
 
@@ -15,8 +15,10 @@ AXES: Mapping[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (
 
 
 def with_all_coordinates(case: Case, points: Iterable[str] | None = None) -> Case:
-    """Return the case with outputs POINT.x, .y and .z of all or the named points, with default
-    tolerances.
+    """Return the case with outputs POINT.x, .y and .z and default tolerances.
+
+    Args:
+        points: names of points; None for all.
     """
     given, names = (
         default(size(case)),
@@ -31,8 +33,10 @@ def with_all_coordinates(case: Case, points: Iterable[str] | None = None) -> Cas
 
 
 def with_all_motions(case: Case) -> Case:
-    """Return the case with the coordinates of all points, the coordinate of every joint that has
-    one, and the Euler parameters of every moving body as outputs, with default tolerances.
+    """Return the case with the motion of every part as outputs, with default tolerances.
+
+    The outputs are the coordinates of all points, the angle or displacement of every joint with
+    such a freedom, and the Euler parameters of every moving body.
     """
     mechanism, extent = case.mechanism, size(case)
     outputs: list[Quantity] = [*with_all_coordinates(case).outputs]

@@ -1,8 +1,7 @@
-"""The decimal sign of a table of numbers, which spreadsheets write by their country: point or
-comma.
+"""The decimal sign of a table of numbers: a point or a comma, by the country of the spreadsheet.
 
-A comma before three digits may also group thousands, and so may a point beside semicolons or tabs:
-other numbers of the table decide, and a table in which none decides is refused.
+A comma before three digits may also group thousands. So may a point if semicolons or tabs separate
+the fields. Other numbers of the table then decide; if none decides, the table is refused.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ def find_decimal_sign(file: Path, cells: Sequence[tuple[str, str]], possible: st
 
     Args:
         cells: place and text of each number.
-        possible: signs that may also group thousands in this table.
+        possible: signs able to group thousands in this table.
 
     Raises:
         CaseError: the numbers have both signs, group thousands, or leave the sign open.
@@ -56,8 +55,8 @@ def find_decimal_sign(file: Path, cells: Sequence[tuple[str, str]], possible: st
             f"found {shown(text)}, and {shown(other)} above, expected one decimal sign in the"
             " table; write all numbers alike",
         )
-    # With three decimals in every number the unit tells: the other reading is a thousand times as
-    # large, which no suspension is.
+    # If every number has three decimals, the size decides: read as thousands, the numbers are a
+    # thousand times as large, too large for any suspension.
     if open_cell and plain and not decided:
         where, text = open_cell
         digits = _SIGNS.sub("", text)

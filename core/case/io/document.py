@@ -24,16 +24,15 @@ from ..units import METRE, Unit
 from .escape import visible
 from .foreign import binary, foreign
 
-# Numbers are squared and multiplied later; within these bounds this neither overflows nor
-# underflows.
+# Squares and products of numbers within these bounds neither overflow nor underflow.
 LARGEST, SMALLEST = 1e100, 1e-100
 # Tables of a case are three levels deep, rows of numbers two more. Deeper nesting only obscures a
 # message.
 DEEPEST = 16
-# Texts say where numbers come from; what is longer hides the rest of a message.
+# Texts give the sources of numbers; a longer text hides the rest of a message.
 LONGEST_TEXT = 10_000
 LONGEST_MESSAGE = 3_000
-# Python limits decimal integers to 4300 digits, because longer ones could take hours to convert.
+# Python limits decimal integers to 4300 digits: the conversion of longer ones could take hours.
 _TOO_MANY_DIGITS = "Exceeds the limit"
 # Time and memory of tomllib grow with the square of a dotted key's length: gigabytes for a key of a
 # hundred kilobytes.
@@ -49,8 +48,9 @@ _short.maxlevel = 3
 
 
 def fault(file: Path, key: str, problem: str) -> CaseError:
-    """Return the error 'FILE: KEY: PROBLEM', or 'FILE: PROBLEM' without a key; a long one keeps
-    both ends.
+    """Return the error 'FILE: KEY: PROBLEM', or 'FILE: PROBLEM' without a key.
+
+    A long message loses its middle.
     """
     whole = visible(": ".join(filter(None, (str(file), key, problem))))
     half = LONGEST_MESSAGE // 2
@@ -63,12 +63,12 @@ def fault(file: Path, key: str, problem: str) -> CaseError:
 def explained(
     file: Path, key: str = "", length: Unit = METRE, given: object = None
 ) -> Generator[None]:
-    """Turn a MechanismError into an error of the file, at the key it names, or else at the given
-    one.
+    """Turn a MechanismError into an error of the file, at the error's key, or else at the given
+    key.
 
     Args:
-        length: the file's unit; lengths in the message are given in it, as in the file.
-        given: table of the file with the numbers that the message may quote.
+        length: the file's unit of length, also for lengths in the message.
+        given: table of the file with the numbers for the message.
     """
     try:
         yield
@@ -109,7 +109,7 @@ def decimal(text: str) -> float:
     """Return the number of a text, in notation common to all languages.
 
     Raises:
-        ValueError: not a number, or digits that only Python takes: 1_0 is ten there, and a typing
+        ValueError: not a number, or a number for Python alone: 1_0 is ten in Python, and a typing
             error anywhere else.
     """
     if "_" in text or not text.isascii():
@@ -121,7 +121,7 @@ def read_bytes(file: Path, limit: int, why_limit: str) -> bytes:
     """Return the content of a file of at most `limit` bytes.
 
     Raises:
-        CaseError: not there, not a regular file, not readable, or too large.
+        CaseError: the file is missing, not regular, not readable, or too large.
     """
     try:
         if not file.exists():
@@ -142,12 +142,12 @@ def read_text(file: Path, limit: int, why_limit: str, *, of_spreadsheet: bool = 
     """Return the text of a file of at most `limit` bytes.
 
     Args:
-        of_spreadsheet: accept what spreadsheets write: UTF-16 with its mark, and Windows-1252,
-            whose digits and signs are those of UTF-8.
+        of_spreadsheet: accept the encodings of spreadsheets: UTF-16 with a byte order mark, and
+            Windows-1252, with the same digits and signs as UTF-8.
 
     Raises:
-        CaseError: not there, not a regular file, not readable, too large, of another program, or
-            in another encoding.
+        CaseError: the file is missing, not regular, not readable, too large, of another program,
+            or in another encoding.
     """
     data = read_bytes(file, limit, why_limit)
     if problem := foreign(data):
@@ -172,8 +172,10 @@ def sha256(file: Path) -> str:
 
 
 def parse(file: Path, text: str) -> dict[str, Any]:
-    """Return the tables of a TOML or JSON text. It is JSON if the suffix says so, or if the suffix
-    is neither and the text starts with a brace.
+    """Return the tables of a TOML or JSON text.
+
+    The text is JSON if the suffix is .json. With a suffix of neither format, it is JSON if it
+    starts with a brace.
 
     Raises:
         CaseError: the syntax is wrong, a key is given twice, or a number or text is unusable.
@@ -210,7 +212,7 @@ def parse(file: Path, text: str) -> dict[str, Any]:
 
 
 def _blank(found: re.Match[str]) -> str:
-    """Return underscores for a text and blanks for a comment; lines and columns are kept."""
+    """Return underscores for a text, and blanks for a comment, of equal length and lines."""
     part = found.group()
     return re.sub(r"[^\n]", " " if part.startswith("#") else "_", part)
 
@@ -227,8 +229,8 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 _Path: TypeAlias = "tuple[_Path, str | int] | None"
-"""Path to a value: that of its container, and its name or index there; written out only for an
-error.
+"""Path to a value: the path of its container, and its name or index there. It becomes text only for
+an error.
 """
 
 
@@ -244,9 +246,7 @@ def _written(path: _Path) -> str:
 
 
 def _check_values(file: Path, tables: Mapping[str, Any]) -> None:
-    """Refuse unusable numbers, deep nesting and unprintable text, which would reach terminals and
-    reports.
-    """
+    """Refuse unusable numbers, deep nesting, and text unprintable on terminals and in reports."""
     # a stack: nesting may be deeper than Python recurses
     waiting: list[tuple[_Path, Any, int]] = [(None, tables, 0)]
     while waiting:
@@ -283,7 +283,7 @@ def _check_values(file: Path, tables: Mapping[str, Any]) -> None:
                 )
                 raise fault(file, _written(path), problem)
         elif isinstance(value, int | float) and not usable(value):
-            # the digits of a huge integer are not shown: Python refuses to print them
+            # omit the digits of a huge integer: Python refuses to print them
             found = "a huge integer" if isinstance(value, int) else repr(value)
             problem = (
                 f"found {found}, expected 0 or a finite number of {SMALLEST:g} to {LARGEST:g};"
@@ -293,7 +293,7 @@ def _check_values(file: Path, tables: Mapping[str, Any]) -> None:
 
 
 def usable(number: float) -> bool:
-    """Return whether a number is finite, and zero or of a size that can be squared."""
+    """Return whether a number is finite, and zero or small and large enough to be squared."""
     return number == 0 or (
         abs(number) <= LARGEST and abs(number) >= SMALLEST and math.isfinite(number)
     )

@@ -32,11 +32,13 @@ _EVEN: Mapping[str, str] = {
     "stop": "a number",
     "steps": f"a whole number of samples, 1 to {MOST_SAMPLES}",
 }
-"""Keys of an even grid of samples, and what is expected of them."""
+"""Keys of an even grid of samples, and their expected values."""
 
 
 def read_drivers(file: Path, tables: Mapping[str, Any]) -> list[Driver]:
-    """Read the drivers of [drivers]; `read_sweep` reads their motions, which depend on it."""
+    """Read the drivers of [drivers]. `read_sweep` reads their motions, since they depend on the
+    sweep.
+    """
     if not tables:
         raise fault(
             file, "drivers", "found no driver, expected at least one that moves; add [drivers.NAME]"
@@ -81,8 +83,11 @@ def read_sweep(
     angle: Unit,
     reference: ReferenceKeys | None = None,
 ) -> tuple[Sweep, Unit, bool]:
-    """Read the sweep, with the motions of all other drivers, the unit of the swept values, and
-    whether its samples are those of the reference.
+    """Read the sweep, with the motions of all other drivers.
+
+    Returns:
+        The sweep, the unit of the swept values, and whether the sweep has the samples of the
+        reference.
     """
     sweep = typed(file, "sweep", keys.sweep, SweepKeys)
     moved = {
@@ -110,7 +115,7 @@ def read_sweep(
 def _samples(
     file: Path, sweep: SweepKeys, written: Mapping[str, Any], reference: ReferenceKeys | None
 ) -> Sequence[float]:
-    """Return the samples in the file's unit: an even grid, or those of the reference."""
+    """Return the samples in the file's unit: an even grid, or the reference's samples."""
     if sweep.at is None:
         for key, expected in _EVEN.items():
             if written.get(key) is None:
@@ -144,7 +149,7 @@ def _check(
     drivers: Mapping[str, Any],
     moved: Mapping[str, Any],
 ) -> None:
-    """Refuse a sweep that contradicts itself or the motions."""
+    """Refuse a sweep in contradiction to itself or the motions."""
     if sweep.driver == TIME:
         if not moved:
             found = f"found {shown(TIME)}" if "driver" in written else "missing"
@@ -181,7 +186,7 @@ def _check(
 
 
 def _check_even(file: Path, sweep: SweepKeys, written: Mapping[str, Any]) -> None:
-    """Refuse a number of samples that contradicts their ends."""
+    """Refuse a number of samples in contradiction to their ends."""
     if sweep.start == sweep.stop and (sweep.steps or 1) > 1:
         problem = (
             f"found the start {written['start']!r} again with {sweep.steps} steps, expected another"
@@ -220,7 +225,7 @@ def _scaled(value: float | tuple[float, ...], convert: Convert) -> float | tuple
 
 
 def _check_motion(file: Path, key: str, motion: Motion, times: Array) -> None:
-    """Refuse a motion that does not define its driver's value at every sample."""
+    """Refuse a motion unless it defines its driver's value at every sample."""
     (first, last), low, high = motion.span, float(times.min()), float(times.max())
     slack = ROUNDED_TIME * max(abs(low), abs(high))
     if low < first - slack or high > last + slack:

@@ -1,13 +1,13 @@
-"""Text that came from files or simulators, on its way to people: control characters are shown, and
-do nothing.
+"""Escape text from files and simulators for people: control characters become visible, and have no
+effect.
 """
 
 from __future__ import annotations
 
 
 def visible(text: str, also: str = "") -> str:
-    r"""Return the text with all unprintable characters as escapes: \x1b, \u202e, \udcff; spaces and
-    letters are kept.
+    r"""Return the text with all unprintable characters as escapes: \x1b, \u202e, \udcff. Spaces and
+    letters stay.
 
     A terminal obeys escape sequences, direction marks change the order of reading, and lone
     surrogates cannot be written.
@@ -26,13 +26,14 @@ def visible(text: str, also: str = "") -> str:
 
 
 def file_name(text: str) -> str:
-    """Return a file name in its own folder from any text, even a path."""
+    """Return a file name for any text, even a path; the name leads to no other folder."""
     return "".join(letter if letter.isalnum() or letter in "-_. ()'" else "_" for letter in text)
 
 
 def cell(value: object) -> object:
-    """A value for a cell of a CSV file: a text that a spreadsheet would take for a formula, and
-    compute, gets an apostrophe.
+    """Return a value for a cell of a CSV file.
+
+    A text gets an apostrophe if a spreadsheet would compute it as a formula.
     """
     if not isinstance(value, str):
         return value

@@ -1,5 +1,5 @@
-"""Files of other programs that people give for a text: recognised by their first bytes, each with
-its name and a remedy.
+"""Recognise files of other programs, given in place of a text, by their first bytes. Each kind has
+a name and a remedy.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ _SIGNATURES: Sequence[tuple[bytes, str, str]] = (
         "save it as .xlsx without a password, or as CSV",
     ),
 )
-# A web page begins so; models in XML have other first elements.
+# Start of a web page; models in XML have other first elements.
 _HTML = re.compile(rb"\s*(?:<!doctype\s+html|<html|<table|<meta)\b", re.IGNORECASE)
 _MEMBERS: Sequence[tuple[Callable[[str], bool], str, str]] = (
     (
@@ -74,20 +74,20 @@ _CONTROL = re.compile(rb"[\x00-\x08\x0b\x0e-\x1a\x1c-\x1f]")
 
 
 def foreign(data: bytes) -> str:
-    """Return what a file is if it is known to be no text, and what to do: "found a PDF document,
-    expected text; export ..."; empty for any other.
+    """Return the kind of a file of another program, and a remedy: "found a PDF document, expected
+    text; export ..."; empty if the file may be a text.
     """
     what, advice = recognised(data)
     return f"found {what}, expected text; {advice}" if what else ""
 
 
 def binary(data: bytes) -> bool:
-    """Return whether data has control characters, which texts do not have."""
+    """Return whether data has control characters; texts have none."""
     return _CONTROL.search(data) is not None
 
 
 def recognised(data: bytes) -> tuple[str, str]:
-    """Return what a file is, and what to do; empty texts if it may be a text."""
+    """Return the kind of a file and the remedy; two empty texts if it may be a text."""
     if data.startswith(_ZIP):
         return _archive(data)
     for start, what, advice in _SIGNATURES:
@@ -99,7 +99,9 @@ def recognised(data: bytes) -> tuple[str, str]:
 
 
 def _archive(data: bytes) -> tuple[str, str]:
-    """Return what an archive is by the names inside it; a damaged one is an archive."""
+    """Return the kind of an archive by the names inside it, and the remedy; if damaged, the kind is
+    "archive".
+    """
     with suppress(zipfile.BadZipFile, ValueError, NotImplementedError, OSError):
         names = zipfile.ZipFile(io.BytesIO(data)).namelist()
         for known, what, advice in _MEMBERS:

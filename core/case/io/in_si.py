@@ -1,4 +1,4 @@
-"""Numbers of a case file in SI."""
+"""Conversion of the numbers of a case file to SI."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ from ..units import Unit
 
 
 def geometry_in_si(kind: Kind | None, value: Any, length: Unit) -> Any:
-    """Return geometry in SI. Directions and plain numbers have no unit; an omitted field is
-    None.
+    """Return geometry in SI; None for an omitted field.
+
+    Directions and plain numbers have no unit.
     """
     if value is None:
         return None
@@ -27,7 +28,7 @@ def geometry_in_si(kind: Kind | None, value: Any, length: Unit) -> Any:
 
 
 def load_in_si(dimension: Dimension, value: Any, length: Unit, angle: Unit) -> Any:
-    """Return a number, or a tuple of numbers, of a dimension in SI; an omitted field is None."""
+    """Return a number, or a tuple of numbers, of a dimension in SI; None for an omitted field."""
     if value is None:
         return None
     if isinstance(value, tuple):

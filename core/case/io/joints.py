@@ -22,7 +22,7 @@ def read_joints(
     """Return the joints and couplers of a file, in SI units.
 
     Raises:
-        CaseError: an unknown type or key, a name in both tables, or values that make no joint.
+        CaseError: an unknown type or key, a name in both tables, or invalid values of a joint.
     """
     joints, couplers = list[Joint](), list[Coupler]()
     for name, value in keys.joints.items():
@@ -58,7 +58,7 @@ def _polynomial(
     length: Unit,
     angle: Unit,
 ) -> Polynomial:
-    """Return a polynomial between the freedoms that its joints have, in SI units."""
+    """Return a polynomial between freedoms of its joints, in SI units."""
     if "freedoms" not in given:
         first, second = ((*freedoms.get(name, ()), "rotation")[0] for name in coupler.joints)
         coupler = replace(coupler, freedoms=(first, second))

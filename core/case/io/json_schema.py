@@ -1,4 +1,4 @@
-"""JSON Schemas of the files that kincheck reads and writes, made from the types that read them."""
+"""JSON Schemas of kincheck's files, made from the types of their readers."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ from .suspension_table import SuspensionKeys
 
 Keys: TypeAlias = type[msgspec.Struct]
 Tables: TypeAlias = Mapping[str, Keys | Mapping[str, Keys]]
-"""By the name of a table of tables: the keys of each, or these by the value of `type`."""
+"""Keys of a table in a table of tables, by the name of the outer table; or keys by `type`."""
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 TEMPLATE = "#/$defs/{name}"
 
 
 def case_schema() -> dict[str, Any]:
-    """Return the schema of case files, with all joint types that are registered now."""
+    """Return the schema of case files, with all joint types registered so far."""
     joints: Mapping[str, type[Joint | Coupler]] = {**Joint.registry, **Coupler.registry}
     measures = {name: measure_keys(cls) for name, cls in Measure.registry.items()}
     outputs = {name: output_keys(cls) for name, cls in SuspensionOutput.registry.items()}
@@ -78,11 +78,11 @@ def document_schema(
     """Return the schema of a file of tables.
 
     Args:
-        name: name of the schema, which the key `schema` of the file repeats.
+        name: name of the schema, as in the key `schema` of the file.
         keys: the keys at the top of the file.
         tables: the keys of each table in a table of tables.
         single: the keys of a table.
-        further: definitions that other definitions will refer to.
+        further: definitions used by other definitions.
     """
     structs = {"": keys, **single}
     for table, each in {**tables, **(further or {})}.items():
@@ -99,7 +99,7 @@ def document_schema(
 
 
 def any_of(labels: list[str]) -> dict[str, Any]:
-    """Return the schema of a value that fits one of the definitions."""
+    """Return the schema of a value of any of the definitions."""
     refs = [{"$ref": TEMPLATE.format(name=label)} for label in labels]
     return refs[0] if len(refs) == 1 else {"anyOf": refs}
 
@@ -114,7 +114,7 @@ def _definition(label: str, struct: Keys) -> dict[str, Any]:
 
 
 def struct_schema(struct: Keys) -> dict[str, Any]:
-    """Return the schema of a struct, with what it refers to written out."""
+    """Return the schema of a struct, with all references replaced by their definitions."""
     (ref,), parts = msgspec.json.schema_components([struct], ref_template=TEMPLATE)
 
     def written_out(value: Any) -> Any:

@@ -1,22 +1,21 @@
 """Masses and loads of a case file: their keys, and their numbers in SI.
 
-Reference. All keys may be left out: a case without masses and loads has no forces, and its motion
-does not depend on them. Mass is in kg, time in s and force in N, whatever [units] says. All else
-follows the file's units of length and angle. With length = "mm" and angle = "deg", as in Adams:
-lengths in mm, torque in N mm, stiffness in N/mm, damping in N s/mm, torsional stiffness in
-N mm/deg, torsional damping in N mm s/deg, inertia in kg mm^2, gravity in mm/s^2, which is
--9806.65 on Earth. Points and vectors are global, at the design position. Results always are in SI.
+Reference. All keys may be left out. A case without masses and loads has no forces. The motion does
+not depend on masses and loads. Mass is in kg, time in s and force in N, for any [units]. All other
+numbers follow the file's units of length and angle. With length = "mm" and angle = "deg", as in
+Adams: lengths in mm, torque in N mm, stiffness in N/mm, damping in N s/mm, torsional stiffness in
+N mm/deg, torsional damping in N mm s/deg, inertia in kg mm^2, gravity in mm/s^2 (-9806.65 on
+Earth). Points and vectors are global, at the design position. Results are always in SI.
 
     (gravity) = [0, 0, 0]   acceleration of free fall, global axes [length/s^2]
     [bodies.NAME]        (mass) = 0 [kg]
                          (center_of_mass), global: the body's origin unless given
                          (inertia) = [Ixx, Iyy, Izz, Ixy, Iyz, Ixz], entries of the matrix about the
-                         centre of mass, global axes at design [kg length^2]: the products have the
-                         sign of the matrix entry, Ixy = -sum of m x y; zero unless given, a point
-                         mass
+                         centre of mass, global axes at design [kg length^2]; the products have the
+                         sign of the matrix entry, Ixy = -sum of m x y; default: zero, a point mass
     [forces.NAME]        type = "spring_damper": bodies = [first, second], points = [on first, on
                          second], stiffness [N/length], (damping) = 0 [N s/length],
-                         (free_length), that at design unless given; tension is positive
+                         (free_length), default: the length at design; tension is positive
                          type = "torsion_spring_damper": joint with a rotation, stiffness
                          [N length/angle], (damping) = 0 [N length s/angle], (free_angle) = 0: the
                          joint's angle is zero at design
@@ -60,7 +59,7 @@ def inertia_in_si(body: str, inertia: Inertia | None, length: Unit) -> Inertia |
     """Return an inertia of a file in kg m^2.
 
     Raises:
-        MechanismError: no rigid body has it; the message gives it in the file's unit.
+        MechanismError: no rigid body can have this inertia; the message is in the file's unit.
     """
     if inertia is None:
         return None

@@ -1,4 +1,4 @@
-"""Measures of a case file: typed [outputs.NAME] without a suspension, read to `case.measures`."""
+"""Reader of measures: typed [outputs.NAME] of a case file without a suspension."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def read_measure(
     """Read a measure of the given class.
 
     Args:
-        case: the case as read so far.
+        case: the case read so far.
         units: conversions from the file's units, by SI unit.
 
     Raises:
@@ -104,8 +104,8 @@ def read_measure(
 def _largest_load(mechanism: Mechanism, size: float, pace: float) -> float:
     """Return an estimate of the largest force of a mechanism [N], the scale of errors.
 
-    The weights, the inertia of the masses at a pace [1/s], springs stretched by their own length,
-    and applied forces.
+    It counts the weights, the inertia forces at a pace [1/s], springs stretched by their own
+    length, and applied forces.
     """
     masses = sum(body.mass for body in mechanism.moving)
     total = masses * (math.hypot(*mechanism.gravity) + size * pace**2)

@@ -21,8 +21,8 @@ from ..case import Case
 # round-off of its coordinates.
 TOL = 1e-12
 
-# Samples of the way, more where the bodies turn too far between them to count the turns of the
-# joints.
+# Samples of the way. More samples follow if a body turns so far between two samples that the turns
+# of joints cannot be counted.
 SAMPLES = (33, 513, 8193)
 LARGEST_TURN = math.pi / 3.0
 
@@ -33,29 +33,29 @@ class Writer(Protocol):
     def __call__(
         self, mechanism: Mechanism, way: Mapping[str, BodyMotion], start: Mapping[str, float]
     ) -> Mapping[str, str]:
-        """The texts of the files, by their endings.
+        """Return the texts of the files, by their endings.
 
         Args:
-            way: poses of the moving bodies from the design position to where the model shall start;
-                between two samples no body turns by more than 60 degrees, so that no joint turns by
+            way: poses of the moving bodies from the design position to the start of the model;
+                between two samples no body turns by more than 60 degrees, so no joint turns by
                 half a turn.
-            start: values of the drivers at its end, for the reader to see [m or rad].
+            start: values of the drivers at the end of the way, as information [m or rad].
 
         Raises:
-            KincheckError: something cannot be expressed in the format; the message names it.
+            KincheckError: the format cannot express a part; the message names the part.
         """
         ...
 
 
 def written(case: Case, write: Writer, at: float | None = None) -> Mapping[str, str]:
-    """A case's mechanism in a writer's format, starting at a value of its sweep, or at the design
-    position.
+    """Return a case's mechanism in a writer's format, starting at a value of its sweep, or at the
+    design position.
 
     Args:
-        at: of the swept driver, or time, as the sweep's values are [m, rad or s].
+        at: value of the swept driver, or time, in the unit of the sweep [m, rad or s].
 
     Raises:
-        KincheckError: the start cannot be reached, or the format cannot express something.
+        KincheckError: the start cannot be reached, or the format cannot express a part.
     """
     # all writers know the built-in types
     built_in = {getattr(joints, name) for name in joints.__all__}
@@ -71,11 +71,11 @@ def written(case: Case, write: Writer, at: float | None = None) -> Mapping[str, 
 
 
 def way_to(case: Case, stop: float) -> Mapping[str, BodyMotion]:
-    """The poses of the moving bodies from the design position to a value of the sweep; see
+    """Return the poses of the moving bodies from the design position to a value of the sweep; see
     `Writer`.
 
     Raises:
-        SolveError: it cannot be reached.
+        SolveError: the value cannot be reached.
     """
     if not math.isfinite(stop):
         raise SolveError(
@@ -86,7 +86,7 @@ def way_to(case: Case, stop: float) -> Mapping[str, BodyMotion]:
     solver, begin = NativeSolver(order=0), start_of(case.mechanism, path)
     first = case.sweep.design + case.sweep.rate * begin.time
     for samples in (1,) if stop == first and begin.lead is None else SAMPLES:
-        # its first is exact, also where it is the only one
+        # the end at `stop` is exact, also for a single sample
         values: Array = np.linspace(stop, first, samples)[::-1]
         ways = [replace(case.sweep, values=values).path]
         if begin.lead:
@@ -118,6 +118,6 @@ def _joined(parts: Sequence[BodyMotion]) -> BodyMotion:
 
 
 def _turn(motion: BodyMotion) -> float:
-    """The largest turn of a body between two samples [rad]."""
+    """Return the largest turn of a body between two samples [rad]."""
     cosines = np.abs((motion.p[:-1] * motion.p[1:]).sum(axis=1))
     return 2.0 * math.acos(min(1.0, float(cosines.min(initial=1.0))))

@@ -1,4 +1,4 @@
-"""Options of readers: user input that the file does not contain."""
+"""Options of readers: user input beyond the content of the file."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ class Supplied:
         axes: directions of x, y and z in a file of hardpoints: "forward,left,up", ...
         travel: wheel travel of a suspension, up and down: "METRES", "METRES:SAMPLES" or
             "START:STOP:SAMPLES".
-        rack: travel of the rack that goes with it, to the left: "METRES" or "START:STOP".
-        sheet: of a workbook with several tables.
+        rack: simultaneous travel of the rack to the left: "METRES" or "START:STOP".
+        sheet: sheet of a workbook with several tables.
         names: file of the user's own names of hardpoints, by role of the template.
         wheel_radius: loaded radius of the wheel of hardpoints [m].
-        wheelbase: of the vehicle of hardpoints [m].
+        wheelbase: wheelbase of the vehicle of hardpoints [m].
         axle: motion of both wheels of hardpoints: "heave", "roll" or "steer".
         position: axle of hardpoints, "front" or "rear", for anti-values.
-        cg_height: of the vehicle of hardpoints above the road [m].
-        brake_share, drive_share: parts of the forces at the axle of hardpoints [-].
+        cg_height: height of the centre of gravity of the vehicle of hardpoints above the road [m].
+        brake_share, drive_share: shares of the vehicle's forces at the axle of hardpoints [-].
         drive: driven joints of a model: "JOINT:START:STOP" or "JOINT:START:STOP:SAMPLES", in their
             coordinates [rad, m].
-        hold: joints or free bodies of a model that are held in place.
-        hold_rest: whether joints of a model are held as far as needed.
-        start: where a model starts: "keyframe:NAME", "JOINT=VALUE" [rad, m].
-        closure: tolerance of rows that are redundant but for the digits of a file [m].
+        hold: joints or free bodies of a model to hold in place.
+        hold_rest: whether to hold further joints of a model as needed.
+        start: start of a model: "keyframe:NAME", "JOINT=VALUE" [rad, m].
+        closure: tolerance of rows redundant but for the digits of a file [m].
     """
 
     template: str | None = None
@@ -64,4 +64,4 @@ class Supplied:
 NOTHING = Supplied()
 
 LEFT_OUT = "; left out: "
-"""Separator in the source of a case, before the content of its file that the case omits."""
+"""Separator in the source of a case, before the list of omitted content of its file."""

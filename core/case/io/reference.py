@@ -1,14 +1,14 @@
 """Reference of a case: samples of its outputs from a table (CSV or .xlsx) beside the case file,
 from rows inside it, or proved ones.
 
-The first column holds driver values. Where they are not those of the sweep, the reference is
+The first column holds driver values. If they differ from the sweep's values, the reference is
 interpolated, or compared at its own samples only: see `reference_grid`. Further columns are OUTPUT,
-OUTPUT.velocity and OUTPUT.acceleration, in the units of the case file. Outputs without a column
-have no reference, and the comparison says so. A file ending in .json is a proved reference
+OUTPUT.velocity and OUTPUT.acceleration, in the units of the case file. An output without a column
+has no reference, and the comparison says so. A file ending in .json is a proved reference
 (`reference_file`), in SI units, on the grid of the sweep.
 
 A file with columns of suspension outputs names their sign convention in a comment, for example "#
-signs: iso8855". So it is readable by itself, and not mistaken for one with other signs.
+signs: iso8855". So people can read the file alone, and nobody takes it for one with other signs.
 """
 
 from __future__ import annotations
@@ -50,7 +50,8 @@ def is_derivative(name: str) -> bool:
 
 
 def read_grid(case_file: Path, keys: ReferenceKeys) -> Sequence[float]:
-    """Return the driver values of a reference in the units of the case file; of a proved one, SI.
+    """Return the driver values of a reference in the units of the case file, or in SI for a proved
+    reference.
 
     Raises:
         CaseError: the file is unreadable or lies elsewhere.
@@ -59,7 +60,7 @@ def read_grid(case_file: Path, keys: ReferenceKeys) -> Sequence[float]:
         proved = read(only_beside(case_file, keys)).driver
         return [value for values in [*proved.values()][:1] for value in values]
     if keys.file is None and keys.rows is not None and keys.columns is None:
-        # their columns are those of the outputs, which checks them when they are read
+        # the columns are the outputs, and `read_reference` checks them
         return [row[0] for row in keys.rows if row]
     samples = inline(case_file, keys, ()) if keys.file is None else from_table(case_file, keys)
     return [row[0] for _, row in samples.rows]
@@ -83,12 +84,12 @@ def read_reference(
         units: conversions from the file's units, by SI unit: m, rad and 1.
         values: grid of the sweep [m or rad], shape (n,).
         outputs: outputs of the case.
-        convention: sign convention of the outputs that have one.
-        own_grid: the samples of the sweep are those of the reference.
+        convention: sign convention of suspension outputs.
+        own_grid: whether the sweep has the samples of the reference.
 
     Raises:
         CaseError: the file is unreadable or lies elsewhere, a column is unknown, the sweep has no
-            sample within the grid, or the signs differ from those of the case.
+            sample within the grid, or the signs differ from the case's signs.
     """
     by_name = {output.name: output for output in outputs}
     if keys.file is not None and keys.file.endswith(PROVED):
@@ -137,7 +138,7 @@ def read_reference(
 
 
 def _origin(case_file: Path, keys: ReferenceKeys) -> Origin:
-    """Return the source of the true values of a reference after it was read.
+    """Return the source of the true values of a finished reference.
 
     Raises:
         CaseError: the digest of the file differs from the given one, or a digest is given without a
@@ -178,7 +179,7 @@ def unit_of(unit: str, units: Mapping[str, Convert]) -> tuple[str, Convert]:
 
 
 def _check_signs(samples: Samples, convention: str) -> None:
-    """Refuse a table of outputs with a sign convention if it names none or another one."""
+    """Refuse a table of suspension outputs if it names no sign convention, or another one."""
     if convention not in ("", samples.signs):
         found = f"found {shown(samples.signs)}" if samples.signs else "found no convention"
         problem = (

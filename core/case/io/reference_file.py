@@ -17,22 +17,21 @@ from ..case import Case, Origin, Quantity, Series, Truth
 from .document import fault, read_text, sha256, shown
 
 LARGEST_FILE = 256_000_000
-# Twelve digits of a driver value, as for reference tables: what is off by less moves no output by
-# as much as a tolerance.
+# Twelve digits of a driver value, as for reference tables: a smaller error moves no output by as
+# much as a tolerance.
 SAME_GRID = 1e-12
-# Not all that Python takes for a number: not 1_0, not nan.
+# Fewer forms than Python's numbers: no 1_0, no nan.
 _DECIMAL = re.compile(r"[-+]?\d++(?:\.\d*+)?(?:[eE][-+]?\d++)?", re.ASCII)
 
 
 class ProvedSeries(msgspec.Struct, frozen=True, kw_only=True):
-    """One output, SI, as decimals; null if a sample is not proved or the output is not known
-    there.
+    """One output, SI, as decimals; null if a sample is not proved, or has no value of the output.
 
     Attributes:
-        signs: the convention of signs and axes; empty for the case's own axes alone.
+        signs: the convention of signs and axes; empty for the case's own axes.
         radius: proved bounds of |printed - true| for position, velocity and acceleration, the
             largest over the samples.
-        reason: why there are no numbers; null otherwise.
+        reason: the reason for missing numbers; null if there are numbers.
     """
 
     position: list[str | None]
@@ -45,14 +44,14 @@ class ProvedSeries(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Sample(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """Proof of a sample, or the reason why there is none.
+    """Proof of a sample, or the reason for a missing proof.
 
     Attributes:
         alone: radius of the box around the native pose with exactly one solution [lengths: units of
             the mechanism's size].
         contraction: of Krawczyk's operator in this box, below one.
-        branch: lower bound of all branch tests; none if the equations have no spurious zero.
-        redundant: upper bound of the omitted rows at the solution; none without any.
+        branch: lower bound of all branch tests; absent if the equations have no spurious zero.
+        redundant: upper bound of the omitted rows at the solution; absent without omitted rows.
         contradicted: number of omitted rows proved nonzero: the rounded geometry closes only
             without them.
         left_out: omitted rows, if they differ from `Reference.redundant`.
@@ -72,14 +71,15 @@ class Reference(msgspec.Struct, frozen=True, kw_only=True):
     """A proved reference.
 
     Attributes:
-        numbers: how the numbers of the case are understood: "double" or "decimal".
+        numbers: meaning of the numbers of the case: "double" or "decimal".
         note: the proved statement.
-        digits: all printed numbers are within 10^-digits of the true ones.
+        digits: all printed numbers are within 10^-digits of the true numbers.
         bits: working precision.
-        rows: the equations solved, as "joint: primitive"; redundant: those left out.
-        driver: values at the samples [m, rad or s], of the coordinate swept first.
-        samples: one for each value.
-        seconds: that the proofs took.
+        rows: the solved equations, as "joint: primitive".
+        redundant: the omitted equations.
+        driver: values at the samples by driver, the swept one first [m, rad or s].
+        samples: one proof for each value.
+        seconds: time of the proofs [s].
     """
 
     schema: Literal["kincheck-reference/1"] = "kincheck-reference/1"
@@ -130,7 +130,7 @@ def series(
         outputs: outputs of the case.
 
     Raises:
-        CaseError: the grid, the outputs or their signs differ from those of the case.
+        CaseError: the grid, the outputs or their signs differ from the case's.
     """
     grid = np.array(next(iter(found.driver.values())) if found.driver else [])
     if grid.shape != values.shape or not np.allclose(
@@ -195,15 +195,15 @@ def _numbers(file: Path, key: str, column: Sequence[str | None], count: int) -> 
 def judged_by(
     cases: Sequence[Case], files: Sequence[Path], unused: list[str] | None = None
 ) -> list[Case]:
-    """The cases with the proved references in these files as their truth, which makes it an
+    """Return the cases with the proved references in these files. Their truth becomes
     in_house_oracle.
 
     Args:
-        unused: takes a message on each file that is for a case that is not among these; without, it
-            is an error.
+        unused: called with a message for each file of a case not among these; None makes such a
+            file an error.
 
     Raises:
-        CaseError: a file cannot be used, or is for a case that is not among these.
+        CaseError: a file cannot be used, or belongs to a case not among these.
     """
     found = {case.name: case for case in cases}
     for file in files:

@@ -1,11 +1,11 @@
 """Grid of a reference: its rows at the samples of the sweep.
 
-A row belongs to the sample with its driver value. If every row belongs to one, the reference is
-compared at its own samples, which may be fewer than those of the sweep. Otherwise it is
-interpolated at the samples within its range.
+A row belongs to the sample with its driver value. If every row belongs to a sample, the reference
+is compared at these samples, possibly fewer than the sweep's. Otherwise it is interpolated at the
+samples within its range.
 
-Three errors of the values are known, and enter the tolerance: the rounding of the numbers to their
-printed digits, that of the driver values times the slope, and the estimated error of the
+Three known errors of the values enter the tolerance: the rounding of the numbers to their printed
+digits, the rounding of the driver values times the slope, and the estimated error of the
 interpolation.
 """
 
@@ -33,7 +33,7 @@ class Column:
     """A column of a reference at the samples.
 
     Attributes:
-        values, uncertainty: SI, shape (n,); NaN where there is none.
+        values, uncertainty: SI, shape (n,); NaN at a sample without a value.
         reasons: parts of the uncertainty, each with its largest value [SI].
     """
 
@@ -48,11 +48,11 @@ class Grid:
     Args:
         driver: unit of the driver values in the file.
         values: samples of the sweep [SI].
-        own: the samples are those of the reference.
+        own: whether the sweep has the samples of the reference.
 
     Raises:
-        CaseError: no sample is within the rows, or there are too few rows, or two at one driver
-            value, to interpolate.
+        CaseError: no sample is within the range of the rows, or an interpolation has too few rows
+            or two rows at one driver value.
     """
 
     def __init__(self, samples: Samples, driver: Unit, values: Array, *, own: bool) -> None:
@@ -63,7 +63,7 @@ class Grid:
         self._index = np.arange(len(rows)) if own else matched(rows, values, allowed)
         half = samples.printed[0].half(self._written) * driver(1.0)
         if (self._index is not None and not own) or even(self._written):
-            half = np.zeros_like(half)  # they are meant as they are
+            half = np.zeros_like(half)  # the driver values are exact as printed
         self._order = np.argsort(rows, kind="stable")
         self._x, self._half = rows[self._order], float(half.max())
         slack = max(allowed, self._half)
@@ -72,7 +72,7 @@ class Grid:
             self._check(driver, values)
 
     def _check(self, driver: Unit, values: Array) -> None:
-        """Refuse rows that cannot be interpolated."""
+        """Refuse rows unfit for interpolation."""
         samples, at = self._samples, 'or take its samples: [sweep] at = "reference"'
         if not self._within.any():
             low, high = (driver.written(float(x)) for x in (self._x[0], self._x[-1]))
@@ -101,7 +101,7 @@ class Grid:
 
     @property
     def words(self) -> str:
-        """Where the reference has values, in words; empty if at every sample."""
+        """The samples with a reference value, in words; empty for all samples."""
         rows, samples = len(self._x), len(self._at)
         if self._index is None:
             where = f"interpolated at {int(self._within.sum())} of {samples} samples"

@@ -1,4 +1,4 @@
-"""Samples of a reference table, and the keys that say where it is; from rows in the case file."""
+"""Samples of a reference table, the keys of its place, and the reader of rows in a case file."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ class ReferenceKeys(msgspec.Struct, forbid_unknown_fields=True):
 
     Attributes:
         citation: source of the true values; without it, agreement with them validates nothing.
-        digest: digest of the file; a file of other content is refused.
-        sheet: of a workbook with several tables.
+        digest: digest of the file; a file with another digest is refused.
+        sheet: sheet of a workbook with several tables.
     """
 
     file: (
@@ -75,7 +75,7 @@ class Samples:
     Attributes:
         key: key of all rows.
         signs: sign convention named in a comment.
-        lines: lines of a file of its own, for messages.
+        lines: lines of a separate file, for messages.
         printed: digits of the numbers, by column.
     """
 
@@ -93,7 +93,7 @@ class Samples:
         where, row = self.rows[k]
         line = self.lines[int(where.removeprefix("line ")) - 1] if self.lines else ""
         cell = line.partition(",")[0].strip().strip('"').strip()
-        with suppress(ValueError):  # inline, or of several lines
+        with suppress(ValueError):  # rows in the case file, or a row of several lines
             if decimal(cell) == row[0]:
                 return cell
         return repr(row[0])
@@ -125,7 +125,7 @@ def inline(file: Path, keys: ReferenceKeys, outputs: Sequence[Quantity]) -> Samp
 
 
 def only_beside(case_file: Path, keys: ReferenceKeys) -> Path:
-    """Return the path of the file, which must be the only source."""
+    """Return the path of the file; it must be the only source."""
     if keys.rows is not None or keys.columns is not None:
         raise fault(
             case_file,
@@ -136,7 +136,7 @@ def only_beside(case_file: Path, keys: ReferenceKeys) -> Path:
 
 
 def beside(case_file: Path, name: str) -> Path:
-    """Return the path of a file in or below the case file's folder; no other is ever opened."""
+    """Return the path of a file in or below the case file's folder; any other path is refused."""
     folder = case_file.parent.resolve()
     try:
         file = (folder / name).resolve()
@@ -151,7 +151,7 @@ def beside(case_file: Path, name: str) -> Path:
             f"found {shown(name)}, expected a file in the folder of the case file or below; put it"
             " there and give its name",
         )
-    with suppress(OSError):  # an inaccessible file is reported when it is read
+    with suppress(OSError):  # the reader reports an inaccessible file
         if not file.exists():
             raise fault(
                 case_file,
@@ -162,7 +162,7 @@ def beside(case_file: Path, name: str) -> Path:
 
 
 def check_width(samples: Samples, where: str, found: int) -> None:
-    """Refuse a row that has not a number for each column."""
+    """Refuse a row without a number for each column."""
     if found != len(samples.columns):
         expected = f"{len(samples.columns)} ({', '.join(samples.columns)})"
         raise fault(

@@ -1,8 +1,8 @@
-"""Samples of a reference from a table beside the case file: CSV as spreadsheets write it, or a
-sheet of a workbook.
+"""Samples of a reference from a table beside the case file: a CSV file of a spreadsheet, or a sheet
+of a workbook.
 
-Between the fields are commas, semicolons or tabs; beside the latter two the decimal sign may be a
-comma. Titles above the head are passed over, and so are comments: `# signs: iso8855`.
+Commas, semicolons or tabs separate the fields. With semicolons or tabs the decimal sign may be a
+comma. The reader skips titles above the head, and comments, such as `# signs: iso8855`.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from .reference_samples import ROWS, ReferenceKeys, Samples, check_width, only_b
 from .workbook import WORKBOOKS, Cell, Row, one_sheet, read_sheets
 
 LARGEST_FILE = 64_000_000
-# A line for each sample of the largest sweep, and as many lines between them.
+# A line for each sample of the largest sweep, and as many other lines.
 MOST_LINES = 2_000_000
 _SIGNS = re.compile(r"\"?\s*#\s*signs:\s*(\w+)")
 _SEPARATOR = re.compile(r"\"?sep=([;\t,])\"?", re.IGNORECASE)
@@ -50,8 +50,7 @@ def from_table(case_file: Path, keys: ReferenceKeys) -> Samples:
             " samples",
         )
     signs = next((found[1] for line in lines if (found := _SIGNS.match(line))), "")
-    # comment lines are blanked, not dropped, so that the reader's line numbers are those of the
-    # file
+    # blank comment lines, not drop them: the reader's line numbers are then the file's
     lines = ["" if line.lstrip('" \t').startswith("#") else line for line in lines]
     delimiter = _delimiter(lines)
     reader = csv.reader(lines, delimiter=delimiter, skipinitialspace=True, strict=True)
@@ -68,7 +67,7 @@ def from_table(case_file: Path, keys: ReferenceKeys) -> Samples:
 
 
 def _of_sheet(file: Path, wanted: str | None) -> Samples:
-    """Read the samples of the wanted sheet of a workbook, or of its only one with cells."""
+    """Read the samples of the wanted sheet of a workbook, or of its only sheet with cells."""
     sheet = one_sheet(file, read_sheets(file, wanted, MOST_LINES), 'sheet = "NAME" in [reference]')
     comments = [str(cells[0]) for _, cells in sheet.rows]
     signs = next((found[1] for text in comments if (found := _SIGNS.match(text))), "")
@@ -82,14 +81,14 @@ def _of_sheet(file: Path, wanted: str | None) -> Samples:
 
 
 def _delimiter(lines: list[str]) -> str:
-    """Return the sign between fields; a line `sep=;` is blanked."""
+    """Return the separator of fields, and blank a line `sep=;`."""
     k = next((k for k, line in enumerate(lines) if line.strip()), None)
     if k is None:
         return ","
     if found := _SEPARATOR.fullmatch(lines[k].strip(" ")):
         lines[k] = ""
         return found[1]
-    for line in lines[k:]:  # above the head may be titles
+    for line in lines[k:]:  # titles may stand above the head
         counts = {sign: line.count(sign) for sign in ";\t,"}
         if any(counts.values()):
             return max(counts, key=lambda sign: counts[sign])
@@ -97,7 +96,9 @@ def _delimiter(lines: list[str]) -> str:
 
 
 def _below_titles(rows: Sequence[Row]) -> Sequence[Row]:
-    """Return the rows from the head on, the first with several cells; all if there is none."""
+    """Return the rows from the head on, the first row with several cells; all rows without a
+    head.
+    """
     first = next((k for k, (_, cells) in enumerate(rows) if _filled(cells) > 1), 0)
     return rows[first:]
 
@@ -107,7 +108,7 @@ def _filled(cells: Sequence[Cell]) -> int:
 
 
 def _trimmed(cells: Sequence[str]) -> list[Cell]:
-    """Return cells without blanks around them, and without the empty ones at the end."""
+    """Return cells without surrounding blanks, and without empty cells at the end."""
     found = [cell.strip() for cell in cells]
     while found and not found[-1]:
         found.pop()
@@ -132,7 +133,7 @@ def _samples(
     """Return the samples of a head and rows of numbers.
 
     Args:
-        lines: of a file with commas, for messages.
+        lines: lines of a CSV file, for messages.
         sign: decimal sign of texts.
     """
     samples: Samples | None = None
@@ -150,7 +151,7 @@ def _samples(
             )
             continue
         check_width(samples, where, len(cells))
-        # numbers at once: the cells of a large file as texts would take many times its size
+        # convert at once: the cells of a large file as texts would take many times its size
         found = array(
             "d",
             (
@@ -183,4 +184,4 @@ def _number(file: Path, where: str, column: str, cell: Cell, sign: str) -> float
             f"{where}, column {column}",
             f"found {shown(cell)}, {expected}; correct it or leave the column out",
         )
-    return number if abs(number) >= SMALLEST else 0.0  # no tolerance is so small
+    return number if abs(number) >= SMALLEST else 0.0  # far below any tolerance

@@ -1,4 +1,4 @@
-"""The [reference] table of a case file, written: rows of numbers at the samples of the sweep."""
+"""Writer of the [reference] table of a case file: rows of numbers at the samples of the sweep."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from .reference import DERIVATIVES
 
 
 def reference_table(case: Case, driver_values: Array) -> Mapping[str, Any]:
-    """Return the keys of [reference]; empty without one, or if rows cannot hold it.
+    """Return the keys of [reference]; empty without a reference, or if rows cannot hold it.
 
     Args:
-        driver_values: swept values as the file has them, shape (n,).
+        driver_values: swept values in the form of the file, shape (n,).
     """
     if reason_against(case):
         return {}
@@ -30,7 +30,7 @@ def reference_table(case: Case, driver_values: Array) -> Mapping[str, Any]:
 
 
 def reason_against(case: Case) -> str:
-    """Return why rows cannot hold the reference of a case; empty if they can."""
+    """Return the reason why rows cannot hold the reference of a case; empty if they can."""
     if not case.reference:
         return "there is none"
     if any(series.uncertainty for series in case.reference.values()):

@@ -1,11 +1,11 @@
 """The keys of a case file, schema kincheck-case/1: their values and defaults.
 
-The keys of a joint's geometry, of a driver and of a motion are the fields of its class: a new type
-needs nothing here.
+The keys of a joint's geometry, of a driver and of a motion are the fields of its class. A new type
+needs no change here.
 
 Reference. A case file is TOML, or JSON with the same keys. Points and directions are global, at the
 design position, as in a table of hardpoints; directions have any length but zero. Numbers are in SI
-units and radians unless [units] states others; results always are in SI. Keys in brackets may be
+units and radians unless [units] states others; results are always in SI. Keys in brackets may be
 left out. `kincheck list --joints` prints all types with their keys.
 
     schema = "kincheck-case/1"
@@ -26,42 +26,41 @@ left out. `kincheck list --joints` prints all types with their keys.
                          (ratio), rack_pinion (radius)
     [couplers.NAME]      the same couplers; polynomial: joints = [driven, driving], coefficients =
                          [c0, c1, c2, c3, c4], driven = c0 + c1 driving + c2 driving^2 + ...
-                         [units of driven by powers of units of driving]; (freedoms), where a joint
+                         [units of driven by powers of units of driving]; (freedoms), if a joint
                          has several: ["rotation", "translation"], of driven and driving
-                         a joint's rotation and displacement are those of its second body relative
-                         to its first, about and along its axis by the right-hand rule, zero at
-                         design
+                         a joint's rotation and displacement: its second body relative to its
+                         first, about and along its axis by the right-hand rule, zero at design
     [points.NAME]        body, position: a point to compare or to drive
     [drivers.NAME]       type = "point_coordinate": point, direction, (relative) = true
                          type = "joint_angle" or "joint_displacement": joint, (relative) = true;
                          for joints with a rotation or a translation: revolute, cylindrical,
                          screw, planar (its turn), translational
-                         values are relative to the design position; relative = false: absolute,
-                         which is the same for joints
+                         values are relative to the design position; relative = false: absolute;
+                         for joints both are the same
     [drivers.NAME.motion]   motion over time; without it, the driver holds its design value unless
                          it is swept
                          type = "ramp": rate, per second
                          type = "sine": amplitude, frequency [Hz], (phase) = 0:
                          amplitude sin(2 pi frequency t + phase)
-                         type = "table": times [s], values: the natural cubic spline through them,
-                         which must cover the sweep
+                         type = "table": times [s], values: the natural cubic spline through them;
+                         the times must cover the sweep
     [sweep]              (driver), start, stop, steps: samples with both ends, 1 if they are equal;
                          (rate) = 1, in driver units per second
-                         driver: its samples from start to stop; it moves at the rate, whose sign
-                         gives the direction, and has its design value at time zero
+                         driver: its samples from start to stop; it has its design value at time
+                         zero, and moves at the rate; the sign of the rate gives the direction
                          at = "reference", in place of start, stop and steps: the samples of the
                          reference
                          no driver, or "time": start and stop are times [s], there is no rate, and
                          the motions move everything
-                         both are followed from the design position, in both directions: from time
-                         zero, or from a sample with the values of the design to six digits;
-                         without either, all drivers go straight from the design to their values at
-                         time zero if the sweep has it, else at the first sample, and the result
-                         says so
-    [closure]            (tolerance) [length]: rows that are redundant within it, because points and
-                         axes have few digits, are left out, with a note; strict without it;
-                         --closure of the command line stands above it
-                         (notes) = [...]: on how the start was closed before this file was written
+                         the solver follows both kinds from the design position, in both directions:
+                         from time zero, or from a sample with the design values to six digits;
+                         without such a start, all drivers go straight from the design to their
+                         values at time zero if it is in the sweep, else at the first sample, and
+                         the result says so
+    [closure]            (tolerance) [length]: points and axes have few digits; rows redundant
+                         within the tolerance are left out, with a note; strict without it;
+                         --closure of the command line overrides it
+                         (notes) = [...]: on the closure of the start before the file was written
     [outputs.NAME]       (type) = "coordinate": point, component = "x", "y" or "z", or direction
                          type = "distance": points = [A, B]
                          type = "joint_angle" or "joint_displacement": joint
@@ -72,8 +71,8 @@ left out. `kincheck list --joints` prints all types with their keys.
                          type = "toe", "camber", ...: of the wheel in [suspension]; `kincheck list
                          --outputs` prints them with their keys, signs and needs; each has its
                          derivative by wheel travel, NAME.per_travel
-                         (relative) = false: measured from the design; not for quotients of
-                         velocities, such as motion_ratio, nor for measures that are zero there
+                         (relative) = false; true: measured from the design; not for quotients of
+                         velocities, such as motion_ratio, nor for measures of zero at design
                          (atol), in the output's unit, (rtol), of the range of the true values:
                          with either, (why), the reason
                          no outputs: x, y and z of every point
@@ -86,33 +85,33 @@ left out. `kincheck list --joints` prints all types with their keys.
                          (static_toe) = 0, toe-in, and (static_camber) = 0, top outboard: angles of
                          the wheel at design
                          (kingpin) = ["lower", "upper"], names of points; or (kingpin_links), of
-                         four rods: [["on the body", "on the wheel carrier"], ...], all but the one
-                         that steers; (wheel_radius), loaded, to the contact centre
+                         four rods: [["on the body", "on the wheel carrier"], ...], all but the
+                         steering rod; (wheel_radius), loaded, to the contact centre
                          (axle) = "front" or "rear"; (wheelbase), (cg_height), above the road
-                         (brakes) = "outboard", (drive) = "inboard": support of the torque, wheel
-                         carrier or vehicle body
+                         (brakes) = "outboard", (drive) = "inboard": support of the torque; outboard
+                         on the wheel carrier, inboard on the vehicle body
                          (brake_share), (drive_share): parts of the vehicle's force at this axle,
                          0 to 1
                          (per_travel) = true: derivatives by travel, upward motion of the wheel
                          centre
-                         (travel), name of its driver, if that is not the one of the wheel centre:
-                         where other drivers move too, they are held for derivatives by travel
+                         (travel), name of the travel's driver; default: the driver of the wheel
+                         centre; derivatives by travel hold all other drivers
     [suspension.other]   the axle's other wheel: wheel_center, (kingpin) or (kingpin_links),
                          (static_toe), (static_camber), (travel); the rest is as in [suspension];
-                         outputs of one wheel then may have (side)
+                         outputs of one wheel may then have (side)
     [reference]          true values: file, the name of a CSV file beside the case file, or rows,
                          with (columns)
-                         beside is in its folder or below, links followed: a case file from
-                         elsewhere opens no other file
+                         beside: in its folder or below, also after following links; a foreign case
+                         file opens no other file
                          first column: swept values; others: OUTPUT, OUTPUT.velocity,
-                         OUTPUT.acceleration; interpolated where its rows are not at samples of the
+                         OUTPUT.acceleration; interpolated unless its rows are at samples of the
                          sweep; errors of interpolation and printed digits enter the tolerance
                          a CSV file of suspension outputs names their convention in a comment:
                          # signs: iso8855
                          (citation), source of the true values: author, title, page or address;
-                         without it, agreement is not called validated, whatever the truth
-                         (digest) = "sha256:...", of the file, as sha256sum prints it: a file of
-                         other content is refused
+                         without it, agreement is never called validated
+                         (digest) = "sha256:...", of the file, as sha256sum prints it: a file with
+                         another digest is refused
 """
 
 from __future__ import annotations
@@ -129,7 +128,7 @@ from ..case import TIME, Truth
 SCHEMA = "kincheck-case/1"
 MOST_SAMPLES = 1_000_000
 COORDINATE = "coordinate"
-"""The type of an output that names none."""
+"""The default type of an output."""
 
 Text = Annotated[str, Meta(min_length=1, description="a text that is not empty")]
 Flag = Annotated[bool, Meta(description="true or false")]
@@ -148,7 +147,7 @@ Truths = Annotated[Truth, Meta(description=f"one of {', '.join(Truth)}")]
 
 
 class UnitsKeys(msgspec.Struct, forbid_unknown_fields=True):
-    """[units] of everything in the file."""
+    """[units] of all numbers in the file."""
 
     length: Annotated[Literal["m", "mm"], Meta(description='"m" or "mm"')] = "m"
     angle: Annotated[Literal["rad", "deg"], Meta(description='"rad" or "deg"')] = "rad"
@@ -216,7 +215,7 @@ class SweepKeys(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
 
 
 class ClosureKeys(msgspec.Struct, forbid_unknown_fields=True):
-    """[closure]; gaps and angles at the mechanism's size that the digits of the file leave."""
+    """[closure]; tolerance of gaps, and of angles times the mechanism's size, due to few digits."""
 
     tolerance: Annotated[float, Meta(gt=0.0, description="a length greater than zero")] | None = (
         None

@@ -1,4 +1,4 @@
-"""Suspension outputs of a case file: typed [outputs.NAME], read to `case.suspension`."""
+"""Reader of the suspension outputs of a case file, typed [outputs.NAME]."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from .typed_tables import typed
 
 @cache
 def output_keys(cls: type[SuspensionOutput]) -> type[msgspec.Struct]:
-    """Return the keys of a suspension output class: type, side of a wheel, fields, tolerance and
+    """Return the keys of a suspension output class: type, side of the wheel, fields, tolerance and
     its reason.
     """
     hints = get_type_hints(cls)
@@ -61,12 +61,11 @@ def read_output(
     """Read an output of the given class.
 
     Args:
-        case: the case as read so far.
+        case: the case read so far.
         units: conversions from the file's units, by SI unit.
 
     Raises:
-        CaseError: an unknown key, a missing input of the type, or a type that this wheel does not
-            have.
+        CaseError: an unknown key, a missing input of the type, or a type undefined for this wheel.
     """
     if table is None:
         raise fault(
@@ -129,8 +128,8 @@ def with_slopes(outputs: Sequence[Quantity], size: float) -> tuple[Quantity, ...
     """Return the outputs, each output of a wheel followed by its derivative by travel.
 
     Args:
-        size: size of the mechanism [m]. A pose error changes a slope by about 1 / size times its
-            change of the output.
+        size: size of the mechanism [m]. If a pose error changes an output by d, it changes the
+            slope by about d / size.
     """
     both: list[Quantity] = []
     for output in outputs:

@@ -23,7 +23,8 @@ from .schema import Flag, Number, Numbers3, Text
 from .travel_driver import travel_driver
 from .typed_tables import typed
 
-# Axes written to nine digits are perpendicular to about 1e-9; a wrong sign or digit gives far more.
+# Axes with nine digits are perpendicular to about 1e-9; a wrong sign or digit gives a far larger
+# error.
 SQUARE = 1e-8
 
 
@@ -72,7 +73,7 @@ class SuspensionKeys(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
 
 
 class OtherWheelKeys(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
-    """[suspension.other]: the axle's other wheel; what is left out is that of the first."""
+    """[suspension.other]: the axle's other wheel; omitted keys are equal to the first wheel's."""
 
     wheel_center: Text
     static_toe: Number | None = None
@@ -91,7 +92,7 @@ class SuspensionTable:
     """The [suspension] table.
 
     Attributes:
-        vehicle: with the wheel of the table.
+        vehicle: the vehicle with the wheel of the table.
         per_travel: whether outputs get their derivatives by travel.
         other: the vehicle with the axle's other wheel, if the table has it.
     """
@@ -107,7 +108,7 @@ def read_suspension(
     """Read the table, in SI.
 
     Args:
-        case: the case as read so far.
+        case: the case read so far.
 
     Raises:
         CaseError: invalid axes, unknown points or drivers, or a wheel on the wrong side.
@@ -188,16 +189,14 @@ def _direction(file: Path, key: str, found: Vector) -> Vector:
 
 
 def check_point(file: Path, key: str, name: str, mechanism: Mechanism) -> None:
-    """Refuse a name that no point has."""
+    """Refuse a name without a point."""
     known = [point.name for point in mechanism.points]
     if name not in known:
         raise fault(file, key, f"found {shown(name)}, expected a point; {remedy(name, known)}")
 
 
 def _check_side(file: Path, key: str, vehicle: Vehicle, mechanism: Mechanism, length: Unit) -> None:
-    """Refuse the most common mistake: hardpoints of one side or of mirrored axes, declared as the
-    other side.
-    """
+    """Refuse the most common mistake: hardpoints of the other side, or in mirrored axes."""
     point = mechanism.point(vehicle.wheel_center)
     if mechanism.is_fixed(point.body):
         problem = (

@@ -1,4 +1,4 @@
-"""The [suspension] table and the suspension outputs of a case file, written."""
+"""Writer of the [suspension] table and the suspension outputs of a case file."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from ..case import Case
 from ..suspension import AxleOutput, PerTravel, SuspensionOutput, Vehicle, own_keys
 
 _OWN = ("wheel_center", "kingpin", "static_toe", "static_camber")
-"""Attributes of a vehicle that each wheel of an axle has of its own, beside its side."""
+"""Attributes of a vehicle with a value for each wheel of an axle, in addition to the side."""
 
 
 def suspension_tables(case: Case) -> Mapping[str, Mapping[str, Any]]:
-    """Return the keys of [suspension] and [suspension.other], in SI, by the names of the tables;
-    empty without suspension outputs.
+    """Return the keys of [suspension] and [suspension.other], in SI, by table name; empty without
+    suspension outputs.
 
     Raises:
-        CaseError: the outputs are of wheels of several axles.
+        CaseError: the outputs belong to wheels of several axles.
     """
     wheels = _wheels(case)
     if not wheels:
@@ -51,17 +51,17 @@ def suspension_output(case: Case, output: SuspensionOutput) -> Iterator[tuple[st
 
 
 def _wheels(case: Case) -> list[Vehicle]:
-    """Return the wheels of the outputs; the first one is that of [suspension]."""
+    """Return the wheels of the outputs; the first belongs in [suspension]."""
     outputs = [each for each in case.outputs if isinstance(each, SuspensionOutput)]
     first = [each.vehicle for each in outputs if isinstance(each, AxleOutput)]
     return [*dict.fromkeys([*first, *(wheel for each in outputs for wheel in each.vehicles)])]
 
 
 def _keys(wheel: Vehicle, place: int) -> dict[str, Any]:
-    """Return the keys of a vehicle that are not their defaults.
+    """Return the keys of a vehicle unequal to their defaults.
 
     Args:
-        place: of its own driver of travel among those of the axle.
+        place: index of the wheel's driver of travel among the axle's drivers of travel.
     """
     keys = {
         _key(each.name, value): value

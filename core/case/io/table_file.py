@@ -1,4 +1,4 @@
-"""Tables for other programs: CSV, or Parquet where pyarrow is installed, written chunk by chunk."""
+"""Writer of tables for other programs, chunk by chunk: CSV, or Parquet if pyarrow is installed."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def write_parquet(path: Path, columns: Mapping[str, Kind], chunks: Iterable[Rows
 
 
 def no_parquet(named: str, remedy: str) -> str:
-    """Return the message that Parquet needs pyarrow, if it is not installed; else an empty one."""
+    """Return a message if pyarrow is not installed, as Parquet needs it; else an empty text."""
     try:
         for name in ("pyarrow", "pyarrow.parquet"):
             library("Parquet", name, "parquet")

@@ -12,10 +12,10 @@ from .schema import ToleranceKeys
 # Hardpoints are measured to about a micrometre; double precision rounds coordinates of metre-sized
 # mechanisms at 1e-16 m.
 DEFAULT_ATOL = 1e-9
-# Near a dead centre outputs and their errors change thousands of times as fast as the driver, whose
-# pace scales `atol`. Example: a loop of a revolute, a cylindrical joint and a pin in a slot has
-# 1,855 m/s^2 at a pace of 0.5 /s. Engines are proved to be within 3e-10 m/s^2, which 1e-9 m at that
-# pace does not allow.
+# The driver's pace scales `atol`. Near a dead centre, outputs and their errors change thousands of
+# times as fast as the driver. Example: a loop of a revolute, a cylindrical joint and a pin in a
+# slot has 1,855 m/s^2 at a pace of 0.5 /s. Engines are proved to be within 3e-10 m/s^2; 1e-9 m at
+# this pace allows less.
 DEFAULT_RTOL = 1e-9
 _OF_RANGE = "; and of values whose range is larger, as much of the range"
 # For mechanisms below a millimetre: some are as small as a nanometre.
@@ -51,7 +51,7 @@ def default(size: float, unit: str = "m") -> tuple[float, float, str]:
     """Return the default atol [unit], rtol [-] and their reason.
 
     Args:
-        size: of the mechanism [m]; for a force or torque, the loads [unit].
+        size: size of the mechanism [m]; for a force or torque, the loads [unit].
     """
     least = {"m": min(DEFAULT_ATOL, PART_OF_SIZE * size)}
     return (
@@ -68,7 +68,7 @@ def tolerance(
 
     Args:
         convert: conversion from the file's unit of the output to SI.
-        size: as for `default`.
+        size: see `default`.
 
     Raises:
         CaseError: a tolerance without a reason, or a reason without a tolerance.

@@ -11,19 +11,19 @@ from ..case import Case
 from ..suspension import Rate, SuspensionOutput, Vehicle
 from .document import fault, join, shown
 
-# A direction this near to a right angle with the vertical is no travel.
+# A driver's direction so nearly horizontal is no travel.
 LEVEL = 1e-8
 
 
 def travel_driver(
     file: Path, key: str, named: str | None, vehicle: Vehicle, case: Case
 ) -> str | None:
-    """Return the driver of the wheel's travel; None if there is none.
+    """Return the driver of the wheel's travel; None without such a driver.
 
     Args:
-        key: of the table of the wheel.
-        named: its name in the file; None for the driver of the wheel centre.
-        case: the case as read so far.
+        key: key of the wheel's table.
+        named: the driver's name in the file; None for the driver of the wheel centre.
+        case: the case read so far.
 
     Raises:
         CaseError: there is no driver of this name.
@@ -48,11 +48,10 @@ def travel_driver(
 
 
 def require_travel(file: Path, key: str, output: SuspensionOutput, case: Case) -> None:
-    """Refuse a derivative by travel of a wheel without a driver of its travel, if several drivers
-    move.
+    """Require a driver of the wheel's travel for a derivative by travel, if several drivers move.
 
     Raises:
-        CaseError: the output is such a derivative.
+        CaseError: the output is such a derivative, and the driver is missing.
     """
     moving = list(case.sweep.path.motions)
     if isinstance(output, Rate) and len(moving) > 1 and not output.vehicle.travel:

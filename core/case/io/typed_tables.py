@@ -53,8 +53,10 @@ def class_of(file: Path, key: str, what: str, value: object, known: Mapping[str,
 
 
 def typed(file: Path, key: str, value: object, struct: type[_Struct]) -> _Struct:
-    """Return a table as a struct, which declares its keys; the `msgspec.Meta` descriptions of the
-    fields are the expectations in messages.
+    """Return a table as a struct.
+
+    Args:
+        struct: declares the keys; messages quote the `msgspec.Meta` descriptions of its fields.
 
     Raises:
         CaseError: not a table, an unknown key, a missing key, or a value of another type or shape
@@ -91,7 +93,7 @@ def typed(file: Path, key: str, value: object, struct: type[_Struct]) -> _Struct
 
 @cache
 def _fields(struct: type[msgspec.Struct]) -> Mapping[str, msgspec.structs.FieldInfo]:
-    """Return the fields of a struct by key, cached because a file may have ten thousand bodies."""
+    """Return the fields of a struct by key; cached, as a file may have ten thousand bodies."""
     return {field.encode_name: field for field in msgspec.structs.fields(struct)}
 
 

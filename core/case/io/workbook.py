@@ -1,5 +1,5 @@
-"""Sheets of spreadsheet files (.xlsx, .xlsm), read by openpyxl: values as the spreadsheet program
-computed them, not formulas.
+"""Sheets of spreadsheet files (.xlsx, .xlsm), read by openpyxl: the values computed by the
+spreadsheet program, not the formulas.
 """
 
 from __future__ import annotations
@@ -19,23 +19,23 @@ from .foreign import ARCHIVE, EXCEL, binary, recognised
 
 WORKBOOKS = (".xlsx", ".xlsm")
 Cell: TypeAlias = str | float
-"""A text, empty for an empty cell, or a number of a spreadsheet."""
+"""A cell of a spreadsheet: a number or a text, empty for an empty cell."""
 Row: TypeAlias = tuple[str, Sequence[Cell]]
 """Place of a row for messages, and its cells."""
 
 LARGEST_FILE = 64_000_000
-# A sheet is compressed about ten times; far more is made to fill memory.
+# A sheet is compressed about ten times; a far larger ratio is an attack on the memory.
 MOST_BYTES = 512_000_000
-# A sheet can have 16384 columns; a table of so many is none of points or of curves.
+# A sheet can have 16384 columns; a table of points or curves has far fewer.
 MOST_COLUMNS = 1000
 
 
 @dataclass(frozen=True)
 class Sheet:
-    """The rows of a sheet that are not blank.
+    """The rows of a sheet with any text or number.
 
     Attributes:
-        name: its name, for messages and to choose it.
+        name: name of the sheet, for messages and to choose it.
     """
 
     name: str
@@ -43,11 +43,11 @@ class Sheet:
 
 
 def read_sheets(file: Path, wanted: str | None, most_rows: int) -> list[Sheet]:
-    """Return the sheets of a workbook that have cells, or the wanted one alone.
+    """Return the sheets of a workbook with filled cells, or the wanted one alone.
 
     Args:
         wanted: name of a sheet.
-        most_rows: rows of a sheet at most.
+        most_rows: largest number of rows of a sheet.
 
     Raises:
         CaseError: openpyxl is missing, the file is no workbook, has no such sheet, or is too large.
@@ -60,7 +60,7 @@ def read_sheets(file: Path, wanted: str | None, most_rows: int) -> list[Sheet]:
     _require_workbook(file, data)
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of styles and extensions that no value needs
+            warnings.simplefilter("ignore")  # about styles and extensions; values need neither
             written = openpyxl.load_workbook(io.BytesIO(data), read_only=True)
             names = [sheet.title for sheet in written.worksheets]
             if wanted is not None and wanted not in names:
@@ -85,7 +85,7 @@ def read_sheets(file: Path, wanted: str | None, most_rows: int) -> list[Sheet]:
             return sheets
     except KincheckError:
         raise
-    except Exception as error:  # whatever a damaged file makes of zip, XML and openpyxl
+    except Exception as error:  # zip, XML and openpyxl raise many errors for a damaged file
         what = brief(f"{type(error).__name__}: {error}".strip().replace("\n", " "))
         raise fault(
             file, "", f"is no readable workbook ({what}); save it anew as .xlsx, or as CSV"
@@ -93,13 +93,13 @@ def read_sheets(file: Path, wanted: str | None, most_rows: int) -> list[Sheet]:
 
 
 def one_sheet(file: Path, sheets: Sequence[Sheet], option: str) -> Sheet:
-    """Return the only one of some sheets.
+    """Return the only sheet.
 
     Args:
-        option: what chooses a sheet, for the message.
+        option: the option to choose a sheet, for the message.
 
     Raises:
-        CaseError: there are several, or none.
+        CaseError: there are several sheets, or none.
     """
     if not sheets:
         raise fault(file, "", "found no sheet with cells, expected a table; save the workbook anew")
@@ -112,7 +112,7 @@ def one_sheet(file: Path, sheets: Sequence[Sheet], option: str) -> Sheet:
 
 
 def _require_workbook(file: Path, data: bytes) -> None:
-    """Refuse a file that is no zip archive, or one that unpacks to an unreasonable size."""
+    """Refuse a file unless it is a zip archive of reasonable unpacked size."""
     what, advice = recognised(data)
     if not data:
         raise fault(file, "", "is empty, expected a workbook (.xlsx); save the workbook anew")
@@ -136,10 +136,10 @@ def _require_workbook(file: Path, data: bytes) -> None:
 
 
 def _rows(file: Path, sheet: Any, most: int) -> tuple[list[Row], bool]:
-    """Return the rows that are not blank, and whether any cell is a formula."""
+    """Return the rows with filled cells, and whether any cell is a formula."""
     rows: list[Row] = []
     formulas = False
-    sheet.reset_dimensions()  # programs that write workbooks often state wrong ones
+    sheet.reset_dimensions()  # the dimensions in a workbook are often wrong
     for k, cells in enumerate(sheet.iter_rows(), 1):
         if all(cell.value is None for cell in cells):
             continue
@@ -157,7 +157,7 @@ def _rows(file: Path, sheet: Any, most: int) -> tuple[list[Row], bool]:
 
 
 def _computed(rows: Sequence[Row], values: Sequence[Row]) -> list[Row]:
-    """Return rows with the values of formulas; a formula without a value stays as it is."""
+    """Return rows with the values of formulas; a formula without a value stays a formula."""
     known = dict(values)
     return [
         (
@@ -179,16 +179,14 @@ def _filled(cells: Sequence[Cell], count: int) -> Iterator[Cell]:
 
 
 def _trimmed(cells: list[Cell]) -> list[Cell]:
-    """Return cells without the empty ones at the end."""
+    """Return cells without empty cells at the end."""
     while cells and cells[-1] == "":
         cells.pop()
     return cells
 
 
 def _cell(value: Any) -> Cell:
-    """Return a number or a text. Dates and truth values are texts, so that none counts as a
-    number.
-    """
+    """Return a number or a text. Dates and truth values become texts: they are no numbers."""
     if value is None:
         return ""
     if isinstance(value, int | float) and not isinstance(value, bool):

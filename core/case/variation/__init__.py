@@ -1,1 +1,1 @@
-"""Variations of a design: places of its geometry, laws of their variation, and the file format."""
+"""Variations of a design: varied places of its geometry, distributions, and the file format."""

@@ -15,7 +15,7 @@ from .modes import Mode
 from .variation import Coordinate
 from .variation_schema import HardpointKeys
 
-# A normal offset is beyond so many standard deviations once in a thousand million draws.
+# A normal offset exceeds this number of standard deviations about once in a thousand million draws.
 FARTHEST = 6.0
 
 _BOTH = frozenset(("sigma", "half_width"))
@@ -39,9 +39,9 @@ class CoordinateReader:
     """Reads the coordinates of a hardpoint.
 
     Attributes:
-        key: of the hardpoint in the file.
-        name: of the hardpoint.
-        unit, scale: SI unit of the offsets, and the size of the file's unit in it.
+        key: key of the hardpoint in the file.
+        name: name of the hardpoint.
+        unit, scale: SI unit of the offsets, and the file's unit in this unit.
     """
 
     file: Path
@@ -52,10 +52,10 @@ class CoordinateReader:
     scale: float
 
     def read(self, keys: HardpointKeys, count: int) -> list[tuple[int, Coordinate]]:
-        """Return the coordinates that vary, with their numbers.
+        """Return the varied coordinates, each with its index in the hardpoint.
 
         Args:
-            count: of coordinates: one, or three of a position or direction.
+            count: number of coordinates: one, or three for a position or direction.
 
         Raises:
             CaseError: keys are missing or superfluous, or a value makes no sense.
@@ -91,7 +91,7 @@ class CoordinateReader:
         """Raise CaseError if a mass or another size of a load may become negative.
 
         Args:
-            value: at the nominal design [SI].
+            value: value at the nominal design [SI].
         """
         if each.law is Law.VALUES:
             lowest = min(each.values)
@@ -131,7 +131,7 @@ class CoordinateReader:
         raise self._fault(f"found {there}, expected for {what}: {choices}; correct the keys")
 
     def _sizes(self, given: float | list[float] | None, count: int) -> list[float]:
-        """Return a size of each coordinate; none unless given."""
+        """Return the size of the offsets of each coordinate; empty if the file gives none."""
         if given is None:
             return []
         if not isinstance(given, list):
@@ -143,7 +143,10 @@ class CoordinateReader:
         return given
 
     def _listed(self, row: int, axis: str, values: Sequence[float]) -> list[tuple[int, Coordinate]]:
-        """Return the coordinate with its values; one at a time without zero, the nominal design."""
+        """Return the coordinate with its values.
+
+        One at a time, the values omit zero: it is the nominal design.
+        """
         if self.mode is Mode.ONE_AT_A_TIME:
             values = [value for value in values if value]
         if not any(values):
@@ -152,7 +155,7 @@ class CoordinateReader:
         return [(row, Coordinate(self.name, axis, self.unit, Law.VALUES, largest, tuple(values)))]
 
     def _lists(self, given: list[float | list[float]], count: int) -> list[list[float]]:
-        """Return the offsets of each coordinate: the same for all, or a list each."""
+        """Return the offsets of each coordinate: one list for all, or a list for each."""
         key = join(self.key, "values")
         flat: list[float] = [each for each in given if not isinstance(each, list)]
         lists = [each for each in given if isinstance(each, list)]

@@ -21,11 +21,11 @@ def read_correlations(
     """Return the correlations of the file.
 
     Args:
-        coordinates: names of those that vary.
+        coordinates: names of the varied coordinates.
 
     Raises:
         CaseError: nothing is drawn, a coordinate does not vary or is named twice, or a matrix is
-            not one of correlations.
+            no correlation matrix.
     """
     if keys.correlations and keys.mode is not Mode.MONTE_CARLO:
         raise fault(

@@ -1,9 +1,9 @@
 """Correlated coordinates: a Gaussian copula.
 
-Each coordinate is a function of a standard normal number: its quantile at the number's share. These
-numbers are correlated by the matrix. So coordinates that are normal have exactly these
-correlations, and others nearly: of two uniform ones it is 6/pi asin(r/2) instead of r, which is off
-by 0.018 at most.
+Each coordinate is a function of a standard normal number z: its quantile at the share of z, the
+probability of a smaller number. The matrix correlates the numbers z. So normal coordinates have
+exactly these correlations. Others have nearly the same: for two uniform coordinates the correlation
+is 6/pi asin(r/2) instead of r, a difference of 0.018 at most.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 
 from ...trajectory import Array
 
-# Matrices in files have some rounded digits: eigenvalues may be below zero by this much.
+# Matrices in files have rounded digits: this is the largest accepted negative eigenvalue.
 DIGITS = 1e-9
 
 
@@ -25,7 +25,7 @@ class Correlation:
     """Correlation of some coordinates, by a matrix.
 
     Attributes:
-        rows: numbers of the coordinates, each once.
+        rows: indices of the coordinates, each once.
         matrix: symmetric, positive semidefinite, ones on the diagonal, shape (rows, rows).
     """
 
@@ -34,8 +34,8 @@ class Correlation:
 
     @cached_property
     def factor(self) -> Array:
-        """The lower triangle L of the matrix L L^T; a column is zero where a coordinate follows
-        from those before it.
+        """The lower triangle L of the matrix L L^T; a column is zero if its coordinate depends on
+        earlier coordinates alone.
         """
         size = len(self.matrix)
         found = np.zeros((size, size))
@@ -48,8 +48,8 @@ class Correlation:
     def mixed(self, independent: Array) -> Array:
         """Return correlated standard normal numbers from independent ones, shape (rows, V).
 
-        The sum is computed term by term: the rounding of a matrix product may depend on the number
-        of columns and on the machine.
+        The sum is computed term by term, as the rounding of a matrix product may depend on the
+        number of columns and on the machine.
         """
         found = np.zeros_like(independent)
         for row, column in np.argwhere(self.factor).tolist():
@@ -58,8 +58,8 @@ class Correlation:
 
 
 def problem_of(matrix: Sequence[Sequence[float]], names: Sequence[str]) -> str:
-    """Return what keeps a matrix from being one of correlations of named coordinates, and what is
-    expected; empty if nothing does.
+    """Return the reason why a matrix is no correlation matrix of the named coordinates, and the
+    expectation; empty if it is one.
     """
     size = len(names)
     lengths = [len(row) for row in matrix]

@@ -21,12 +21,12 @@ class Law(StrEnum):
 
 
 def quantile(law: Law, probability: Array, scale: float, half_width: float) -> Array:
-    """Return the offsets below which a distribution has these shares, shape of probability.
+    """Return the quantiles of a distribution at these probabilities, in the same shape.
 
     Args:
         probability: between 0 and 1, both excluded.
         scale: standard deviation of a normal distribution, before truncation [unit].
-        half_width: largest offset of all others [unit].
+        half_width: largest offset of the other distributions [unit].
     """
     match law:
         case Law.NORMAL:
@@ -55,7 +55,7 @@ def normal_share(value: Array) -> Array:
 
 
 def _special() -> Any:
-    """Return the module, which few studies need."""
+    """Return the module; few studies need its import."""
     import scipy.special  # pyright: ignore[reportMissingTypeStubs]
 
     return scipy.special

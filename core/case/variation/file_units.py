@@ -1,4 +1,4 @@
-"""Units of a variation file: of offsets, and of the outputs of its study."""
+"""Units of a variation file, for offsets and for the outputs of its study."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from .variation_schema import VaryUnits
 
 @dataclass(frozen=True)
 class FileUnits:
-    """Names of the units in which a study's outputs are shown and limited."""
+    """Names of the units of a study's outputs, for their display and limits."""
 
     length: str = "m"
     angle: str = "rad"
 
     @classmethod
     def of(cls, units: VaryUnits, case: Case) -> FileUnits:
-        """Return those of a variation file, or of its case where it names none."""
+        """Return the units of a variation file; for an omitted unit, the unit of the case."""
         return cls(units.length or case.length_unit, units.angle or case.angle_unit)
 
 
@@ -32,7 +32,7 @@ SI = FileUnits()
 def unit_of_offsets(
     file: Path, key: str, units: VaryUnits, kind: Kind, dimension: Dimension | None
 ) -> tuple[str, float]:
-    """Return the SI unit of the offsets of a place, and the size of the file's unit in it.
+    """Return the SI unit of the offsets of a place, and the file's unit in this unit.
 
     Raises:
         CaseError: the file names no unit of length, and needs one.

@@ -22,11 +22,11 @@ _EXPECTED = "expected OUTPUT:LOW:HIGH, one number of which may be missing, such 
 
 @dataclass(frozen=True)
 class Limit:
-    """Limits of an output, or of a derivative of it by time, at every sample.
+    """Limits of an output, or of its derivative by time, at every sample.
 
     Attributes:
-        output: name of the output; with that of the derivative, as camber.velocity.
-        low, high: least and largest value [SI unit of the output]; infinite where there is none.
+        output: name of the output; with the suffix of a derivative, as in camber.velocity.
+        low, high: smallest and largest value [SI unit of the output]; infinite without a limit.
     """
 
     output: str
@@ -57,7 +57,8 @@ def limits_of_texts(texts: Iterable[str], case: Case, units: FileUnits) -> tuple
     """Return the limits in texts OUTPUT:LOW:HIGH, in the units of a variation file.
 
     Raises:
-        KincheckError: a text is none, there is no such output, or the limits make no sense.
+        KincheckError: a text has another form, there is no such output, or the limits make no
+            sense.
     """
     found: list[Limit] = []
     for text in texts:
@@ -102,7 +103,7 @@ def limit_of(
 
 
 def _found(case: Case, name: str) -> tuple[Quantity, int]:
-    """Return the output of a name, and the derivative by time that it names."""
+    """Return the output and the order of the time derivative of a name."""
     known = {output.name: output for output in case.outputs}
     base, _, quantity = name.rpartition(".")
     derivative = QUANTITIES.index(quantity) if quantity in QUANTITIES[1:] else 0

@@ -1,4 +1,4 @@
-"""Modes of a study: how its variants are chosen."""
+"""Modes of a study: the choice of its variants."""
 
 from __future__ import annotations
 

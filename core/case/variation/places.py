@@ -12,13 +12,13 @@ from ...mechanism.dimension import Dimension
 from ...mechanism.mechanism import Mechanism
 from ..case import MARKER
 
-# Positions closer than this are one hardpoint [m]: tables are measured to a micrometre at best.
+# Closer positions are one hardpoint [m]: hardpoints are measured to a micrometre at best.
 SAME = 1e-6
 _BODIES, _LOADS = "bodies.", ("bodies.", "forces.")
 
 
 class PlaceError(ValueError):
-    """Error for a name of no place, or of several; the message states the remedy."""
+    """Error for a name without a place, or with several; the message states the remedy."""
 
 
 class Geometry:
@@ -27,7 +27,7 @@ class Geometry:
     Attributes:
         values: value of each place [SI], markers included.
         kinds: kind of each place: a position, direction or length, or a number of a load.
-        dimensions: of the numbers of loads.
+        dimensions: dimensions of the numbers of loads.
     """
 
     def __init__(self, mechanism: Mechanism) -> None:
@@ -42,15 +42,17 @@ class Geometry:
 
     @property
     def named(self) -> list[str]:
-        """Places known to the user: all except those of markers."""
+        """Places known to the user: all except the places of markers."""
         return [place for place in self.values if not place.startswith(f"points.{MARKER}")]
 
     def find(self, name: str) -> str:
-        """Return the place of a name, or the only position of the joint or point of that name, or
-        else of the body or force element.
+        """Return the place of a name.
+
+        The name of a joint or point stands for its only position. If there is no such name, it may
+        be the name of a body or force element.
 
         Raises:
-            PlaceError: no place matches, or several do.
+            PlaceError: no place matches, or several places match.
         """
         if name in self.named:
             return name
@@ -73,7 +75,7 @@ class Geometry:
         return found[0]
 
     def together(self, place: str) -> tuple[str, ...]:
-        """Return the place and, if a position, every other position at this point at design.
+        """Return the place and, if it is a position, all other positions at this point at design.
 
         A centre of mass moves alone.
         """
@@ -89,7 +91,7 @@ class Geometry:
         )
 
     def with_markers(self, moved: Iterable[str]) -> tuple[str, ...]:
-        """Return places, and those of the markers beside points among them."""
+        """Return places, with the places of the markers beside any points among them."""
         found = [*moved]
         for place in self.values:
             if place.startswith(f"points.{MARKER}"):

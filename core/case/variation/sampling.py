@@ -1,9 +1,9 @@
 """Samplings of a Monte Carlo study: points of the unit cube, by seed and block.
 
-Random points and those of a Sobol sequence do not depend on how many there are: more of them begin
-with the same ones. A Latin hypercube does, because each coordinate has one point in every interval
-of length 1 / count. Its orders of intervals are held in memory, four bytes for each point and
-coordinate.
+Random points and points of a Sobol sequence do not depend on their number: a longer series begins
+with the same points. The points of a Latin hypercube do depend on it: each coordinate has one point
+in every interval of length 1 / count. The order of its intervals is kept in memory: four bytes for
+each point and coordinate.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from ...trajectory import Array
 from .modes import Sampling
 
 DRAWN = 256
-"""Number of variants drawn together. It is part of the meaning of a seed, and therefore no setting.
+"""Number of variants drawn together. It is no setting: another number gives a seed other variants.
 """
-# Binary digits of a Sobol point: the most that scipy can skip ahead with.
+# Binary digits of a Sobol point: the largest number with which scipy can skip points.
 BITS = 32
 # Largest table of a Latin hypercube [bytes].
 LATIN_BYTES = 1_000_000_000
-# The middle of the cell of a number with 52 binary digits: no point is 0 or 1, where a normal
-# distribution has no quantile.
+# Half a step of numbers with 52 binary digits: no point is 0 or 1, as a normal distribution has no
+# quantiles there.
 MIDDLE = 2.0**-53
 
 
@@ -50,11 +50,10 @@ def generator(seed: int, place: int, stream: Stream) -> np.random.Generator:
 
 
 def points(sampling: Sampling, seed: int, block: int, coordinates: int, count: int) -> Array:
-    """Return the points of a block in the unit cube, shape (coordinates, DRAWN); the whole block,
-    even if only part of it is needed.
+    """Return all points of a block in the unit cube, shape (coordinates, DRAWN).
 
     Args:
-        count: number of all points of a Latin hypercube; what a block has beyond is of no use.
+        count: number of all points of a Latin hypercube; later points of a block have no meaning.
     """
     if sampling is Sampling.SOBOL:
         found = _sobol(seed, coordinates).block(block)
@@ -85,7 +84,7 @@ def check_count(sampling: Sampling, coordinates: int, count: int) -> None:
 
 
 class _Sobol:
-    """A scrambled Sobol sequence, which goes on from where it stands; of one thread."""
+    """A scrambled Sobol sequence with a current position, for one thread."""
 
     def __init__(self, seed: int, coordinates: int) -> None:
         from scipy.stats import qmc  # pyright: ignore[reportMissingTypeStubs]
@@ -121,8 +120,8 @@ def _orders(seed: int, coordinates: int, count: int) -> NDArray[np.uint32]:
 def _orders_of(seed: int, coordinates: int, count: int) -> NDArray[np.uint32]:
     """Return the interval of each point, shape (coordinates, count): a permutation of each row.
 
-    As `scipy.stats.qmc.LatinHypercube`, which holds all points at once and takes twenty times as
-    long.
+    `scipy.stats.qmc.LatinHypercube` does the same, but holds all points at once, and takes twenty
+    times as long.
     """
     found = np.empty((coordinates, count), dtype=np.uint32)
     for row, each in enumerate(found):

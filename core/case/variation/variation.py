@@ -1,8 +1,8 @@
 """Variation of a design: independent coordinates, their effect on the geometry, and the offsets of
 each variant by index.
 
-Seed and index define a variant. Each block of `DRAWN` variants has its own generator, seeded by the
-study's seed sequence spawned by the number of the block. So any machine can compute any variants,
+Seed and index define a variant. Each block of `DRAWN` variants has its own generator; its seed is a
+child of the study's seed sequence, by the block's number. So any machine can compute any variants,
 and a single variant can be reproduced.
 """
 
@@ -28,17 +28,17 @@ from .sampling import DRAWN, Stream, check_count, generator, points
 
 @dataclass(frozen=True)
 class Coordinate:
-    """One number that varies independently: a coordinate of a hardpoint, a component of a
-    direction, a length.
+    """One independently varied number: a coordinate of a hardpoint, a component of a direction, a
+    length, or a number of a load.
 
     Attributes:
-        hardpoint: its name in the file.
+        hardpoint: name of the hardpoint in the file.
         axis: x, y or z; empty for a length.
         unit: m, or rad for components of a direction.
         law: distribution of the offsets from the nominal value.
         scale: standard deviation, half width, or largest offset [unit].
         values: offsets in a grid or one at a time [unit]; empty if drawn.
-        bound: largest offset of a truncated normal distribution [unit]; zero of all others.
+        bound: largest offset of a truncated normal distribution [unit]; zero for other laws.
     """
 
     hardpoint: str
@@ -51,24 +51,24 @@ class Coordinate:
 
     @property
     def name(self) -> str:
-        """Name in results."""
+        """The name in results."""
         return f"{self.hardpoint}.{self.axis}" if self.axis else self.hardpoint
 
 
 @dataclass(frozen=True, eq=False)
 class Variation:
-    """The coordinates that vary, and their linear effect on geometry: nominal + moves @ offsets.
+    """The varied coordinates, and their linear effect on geometry: nominal + moves @ offsets.
 
     Attributes:
-        places: names of the varied places (see `kinematics.formulation.parameters.places`), with
-            the count of numbers of each.
+        places: names of the varied places (see `kinematics.formulation.parameters.places`), each
+            with its count of numbers.
         nominal: numbers of the varied places at the nominal design [m or -], shape (numbers,).
         moves: changes of these numbers per unit offset, shape (numbers, coordinates).
-        correlations: of coordinates that are drawn, each in one of them at most.
-        sampling: choice of the points that are drawn.
-        drawn: number of variants that are drawn; a Latin hypercube depends on it.
+        correlations: correlations of drawn coordinates, each coordinate in one of them at most.
+        sampling: choice of the drawn points.
+        drawn: number of drawn variants; a Latin hypercube depends on it.
         limits: specification limits of outputs.
-        units: of the file, in which outputs are shown.
+        units: units of the file, for the display of outputs.
     """
 
     mode: Mode
@@ -84,7 +84,7 @@ class Variation:
 
     @property
     def count(self) -> int | None:
-        """Number of variants; None for a Monte Carlo study, which has any number."""
+        """The number of variants; None for a Monte Carlo study of any number."""
         sizes = [len(each.values) for each in self.coordinates]
         if self.mode is Mode.MONTE_CARLO:
             return None
@@ -96,7 +96,7 @@ class Variation:
         return count
 
     def sampled(self, sampling: Sampling, count: int) -> Variation:
-        """Return the variation with another choice of the points that are drawn.
+        """Return the variation with another choice of the drawn points.
 
         Args:
             count: number of variants.
@@ -110,7 +110,7 @@ class Variation:
                 ' "monte_carlo"'
             )
         check_count(sampling, len(self.coordinates), count)
-        # what does not depend on the number is the same for any number
+        # only a Latin hypercube depends on the number; other samplings keep none
         drawn = count if sampling is Sampling.LATIN else 0
         return replace(self, sampling=sampling, drawn=drawn)
 
@@ -118,8 +118,8 @@ class Variation:
         """Return numbers of the varied places, shape (numbers, V), from offsets, shape
         (coordinates, V).
 
-        The sum is computed term by term: the rounding of a matrix product may depend on the number
-        of columns and on the machine.
+        The sum is computed term by term, as the rounding of a matrix product may depend on the
+        number of columns and on the machine.
         """
         found = np.repeat(self.nominal[:, None], offsets.shape[1], axis=1)
         for number, coordinate in np.argwhere(self.moves).tolist():
@@ -150,8 +150,8 @@ class Variation:
         return found[:, skipped : skipped + count]
 
     def _draw(self, seed: int, block: int) -> Array:
-        """Draw a whole block, even if only part of it is needed: a variant must not depend on the
-        number of variants.
+        """Draw a whole block, even if only part of it is needed, so a variant does not depend on
+        the number of variants.
         """
         laws = {each.law for each in self.coordinates}
         plain = self.sampling is Sampling.RANDOM and laws <= {Law.NORMAL, Law.UNIFORM}
@@ -174,7 +174,7 @@ class Variation:
     def _independent(self, random: np.random.Generator) -> Array:
         """Draw normal and uniform coordinates directly."""
         rows = list[Array]()
-        # one call for all coordinates of one law, without Python's lock
+        # one call for all coordinates of a law, without Python's lock
         for law, some in groupby(self.coordinates, lambda each: each.law):
             scale = np.array([each.scale for each in some])[:, None]
             shape = len(scale), DRAWN
@@ -203,7 +203,7 @@ class Variation:
 
     @cached_property
     def _steps(self) -> tuple[NDArray[np.int64], Array]:
-        """Coordinate and offset of each one-at-a-time variant except the first."""
+        """Return the coordinate and the offset of each one-at-a-time variant except the first."""
         pairs = [(row, value) for row, each in enumerate(self.coordinates) for value in each.values]
         return np.array([row for row, _ in pairs], dtype=np.int64), np.array(
             [value for _, value in pairs]

@@ -24,7 +24,8 @@ from .variation import Coordinate, Variation
 from .variation_schema import SCHEMA, HardpointKeys, LineKeys, VaryKeys, VaryUnits
 
 LARGEST_FILE = 1_000_000
-# Case files give directions to about five digits; a line with a larger error is another one.
+# Case files give directions to about five digits; with a larger error, the direction is not along
+# the line.
 ALONG = 1e-4
 
 
@@ -49,7 +50,7 @@ def read_variation(path: str | Path, case: Case) -> Variation:
 
 @dataclass(frozen=True, eq=False)
 class _Block:
-    """Coordinates of one hardpoint, and the places that follow its offsets, a factor each."""
+    """Coordinates of one hardpoint, and the places moved by its offsets, each with a factor."""
 
     places: Mapping[str, float]
     coordinates: list[tuple[int, Coordinate]]
@@ -176,7 +177,7 @@ class _Reader:
             moves[axis] = math.copysign(float(np.linalg.norm(direction)) / long, cosine) * follows
 
     def _check_drivers(self, moves: Mapping[str, Array]) -> None:
-        """Refuse a driver by the absolute position of a varied point: drivers start at each
+        """Refuse a driver by the absolute position of a varied point, as drivers start at each
         variant's design.
         """
         for name in self.case.sweep.path.motions:

@@ -13,34 +13,33 @@ Reference. Keys in brackets may be left out.
     [hardpoints.NAME]    at: a position, direction or length of the case:
                          "joints.tie_rod.points.0", "joints.hinge.axis", "joints.rod.length",
                          "points.wheel_center.position"; or the name of a joint or point with
-                         one position only: "ball". Every place of the case at the same point at
-                         design moves along, so a ball and the rod or spring that ends in it stay
-                         together; markers of a wheel's rotation move with its centre.
-                         Or a number of its masses and loads: "bodies.knuckle.mass",
+                         one position only: "ball". Every position of the case at the same point at
+                         design moves along, so a ball stays at the end of its rod or spring;
+                         markers of a wheel's rotation move with its centre.
+                         Or a number of the masses and loads: "bodies.knuckle.mass",
                          "forces.spring.stiffness", damping, free_length or free_angle; or
                          "bodies.knuckle.center_of_mass", which moves alone
                          (only) = ["joints.ball.point", ...]: just these of them
                          sigma, or half_width, or values: a number for all three coordinates or
                          three numbers; 0 does not vary
                          monte_carlo: sigma (normal) or half_width (uniform); or distribution =
-                         "truncated_normal" with sigma and half_width, beyond which there is
-                         nothing, or "triangular" with half_width, most frequent at the nominal
-                         value
+                         "truncated_normal" with sigma, and half_width as the largest offset, or
+                         "triangular" with half_width, most frequent at the nominal value
                          grid: values = [-1, 0, 1], offsets for each coordinate, or three such
                          lists; or half_width and steps, the number of values from -half_width
                          to half_width
                          one_at_a_time: values, or half_width (both ends; with steps, as in a
                          grid), or sigma (both sides)
-                         offsets are along the case's axes; those of a direction, taken at
+                         offsets are along the case's axes; the offsets of a direction, scaled to
                          length one, are angles. Masses are in kg; stiffness and damping in N and s
                          with the units of length and angle, as in a case file
     [lines.NAME]         axis = "joints.strut_slide.axis", through = ["strut_foot", "strut_top"]:
                          a direction through two positions as they vary; named like `at`. Other
                          directions do not change.
     [limits.OUTPUT]      low, high: the specification limits of an output, one or both, in the
-                         file's units of length and angle (those of the case where the file names
-                         none), N and s: the study counts the variants that keep them at every
-                         sample. OUTPUT may be a rate: [limits."camber.velocity"]
+                         file's units of length and angle (default: the case's units), N and s; the
+                         study counts the variants inside the limits at every sample. OUTPUT may be
+                         a rate: [limits."camber.velocity"]
     [correlations.NAME]  monte_carlo: coordinates = ["ball.x", "ball.y"], of [hardpoints.ball];
                          matrix = [[1, 0.8], [0.8, 1]]: their correlations, by a Gaussian copula.
                          A coordinate is in one table at most
@@ -60,8 +59,7 @@ MOST_STEPS = 10_000
 
 Text = Annotated[str, Meta(min_length=1, description="a text that is not empty")]
 Size = Annotated[float, Meta(ge=0.0)]
-# a list, not a tuple: converting to a number or a tuple of constrained numbers, msgspec 0.22
-# crashes
+# a list, not a tuple: msgspec 0.22 crashes on a number or a tuple of constrained numbers
 Sizes = Annotated[
     Size | Annotated[list[Size], Meta(min_length=3, max_length=3)],
     Meta(description="a number that is not negative, or three [x, y, z]"),

@@ -1,4 +1,4 @@
-"""What one chunk of a study's variants gives. Plain data, sent anywhere."""
+"""The result of one chunk of a study's variants: plain data, picklable."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .reduce import Summary
 
 @dataclass(frozen=True)
 class Unsolved:
-    """A variant that has no solution at some samples, and why."""
+    """A variant without a solution at some samples, and the reason."""
 
     variant: int
     samples: int
@@ -23,19 +23,20 @@ class Unsolved:
 
 @dataclass(frozen=True, eq=False)
 class Chunk:
-    """What became of a chunk of variants.
+    """The result of a chunk of variants.
 
     Attributes:
-        count: of variants.
-        kept: values of the random subset, shape (rows, n, some).
+        count: number of variants.
+        kept: values of the random subset, shape (rows, n, subset size).
         picked: values of picked variants, by variant, shape (rows, n).
-        unsolved: the first of the variants without a solution somewhere.
-        failures: how many those are.
-        retried: variants that were solved again alone, with divided steps.
-        limited: counts of the variants that keep the limits, see `limit_counts`.
-        effects: one at a time only: the largest change of each row over the samples, signed, shape
-            (rows, count).
-        values, offsets: where all are wanted: shape (rows, n, count) and (coordinates, count).
+        unsolved: the first variants without a solution at some samples.
+        failures: number of all such variants.
+        retried: number of variants solved again alone, with divided steps.
+        limited: counts of variants by specification limit, see `limit_counts`.
+        effects: the largest change of each row over the samples, signed, shape (rows, count); None
+            unless the mode varies one coordinate at a time.
+        values: values of all variants, shape (rows, n, count); None unless the study stores them.
+        offsets: their offsets, shape (coordinates, count); None unless the study stores them.
     """
 
     index: int

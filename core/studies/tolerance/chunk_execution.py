@@ -1,4 +1,4 @@
-"""Execution of a study's chunks, in threads or on a cluster: in order, a few at a time."""
+"""Execution of a study's chunks in threads or on a cluster: in order, a few at a time."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from .study import Ready, Study
 
 Chunks: TypeAlias = Generator[Chunk]
 Source: TypeAlias = Callable[[Study, int], Chunks]
-"""Solves the chunks of a study from an index on, and yields each once, in order."""
+"""Solves the chunks of a study from an index on, and yields each chunk once, in order."""
 
-# Chunks in progress for each thread: one is solved, others wait for their turn in the order.
+# Chunks in progress for each thread: the thread solves one, the others wait for their turn.
 AHEAD = 3
 
 
 def on_threads(ready: Ready, jobs: int) -> Source:
-    """Return the source in this process: the programs run without Python's lock."""
+    """Return the source in threads of this process; the programs run without Python's lock."""
 
     def solve(study: Study, first: int = 0) -> Chunks:
         if jobs == 1:
@@ -51,8 +51,9 @@ def on_threads(ready: Ready, jobs: int) -> Source:
 
 
 def on_cluster(address: str) -> Source:
-    """Return the source on the workers of a dask.distributed scheduler. Other workers repeat the
-    tasks of a lost one.
+    """Return the source on the workers of a dask.distributed scheduler.
+
+    If a worker is lost, other workers repeat its tasks.
 
     Raises:
         ClusterError: dask.distributed is not installed, the scheduler does not answer or
@@ -62,7 +63,7 @@ def on_cluster(address: str) -> Source:
     def solve(study: Study, first: int = 0) -> Chunks:
         distributed = loaded()
         packed = pack(study)
-        # the scheduler treats tasks with equal names as one task
+        # the scheduler takes tasks with equal names for one task
         name = f"kincheck-sweep-{uuid4().hex}"
         with connected(distributed, address) as client, _explained(distributed, address):
             waiting = deque[Any]()
@@ -104,7 +105,7 @@ _lock = Lock()
 
 
 def solve_there(packed: bytes, index: int, version: str) -> Chunk:
-    """Solve a chunk in a cluster's worker, which keeps the compiled model for the next ones.
+    """Solve a chunk in a worker of a cluster. The worker keeps the compiled model for later chunks.
 
     Raises:
         ClusterError: the worker has another version of kincheck.
@@ -115,7 +116,7 @@ def solve_there(packed: bytes, index: int, version: str) -> Chunk:
             " install the same there"
         )
     key = hashlib.sha256(packed).digest()
-    with _lock:  # threads of a worker share the model; two studies at a time are enough
+    with _lock:  # a worker's threads share the model; a worker keeps the models of two studies
         if key not in _ready:
             _ready[key] = Ready.of(pickle.loads(packed))
             if len(_ready) > 2:

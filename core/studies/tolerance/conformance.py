@@ -1,18 +1,18 @@
 """Variants inside and outside of specification limits, and capability indices.
 
-A variant keeps the limits of an output if it does so at every sample. The yield is the share of
-variants that do, of those that are known: a variant with missing samples counts only where one of
-its others is outside.
+A variant is inside the limits of an output if it is inside at every sample. It is outside if it is
+outside at any sample. A variant with missing samples is unknown unless another sample is outside.
+The yield is the share of inside variants among the known variants.
 
     Cp  = (high - low) / (6 s)
     Cpk = min(high - m, m - low) / (3 s)
 
-with the mean m and the standard deviation s of the variants at one sample; both suppose a normal
-distribution. By quantiles, without this supposition (ISO 22514-2, percentile method):
+Here m is the mean and s the standard deviation of the variants at one sample. Both indices assume a
+normal distribution. The index by quantiles does not (ISO 22514-2, percentile method):
 
     min((high - x50) / (x99.865 - x50), (x50 - low) / (x50 - x0.135))
 
-Of each index the least over the samples counts.
+The result is the smallest value of each index over the samples.
 """
 
 from __future__ import annotations
@@ -32,28 +32,28 @@ from .reduce import Summary
 from .study import Study
 
 CONFIDENCE = 0.95
-# Shares of a normal distribution below and above three standard deviations.
+# Share of a normal distribution below -3 standard deviations, and above +3.
 TAIL = 0.00135
-# A spread below this part of the limits or of the mean is round-off: all variants are the same.
+# A spread below this share of the limits or of the mean is round-off: all variants are equal.
 NO_SPREAD = 1e-12
 
 
 class Capability(msgspec.Struct, frozen=True, kw_only=True):
-    """How an output keeps its limits over all variants [SI].
+    """Conformance of an output to its limits, over all variants [SI].
 
     Attributes:
-        output: its name; empty for all limits together.
-        low, high: the limits; null where there is none.
-        known: variants that are inside or outside.
-        below, above: variants below and above somewhere; a variant may be both.
-        outside: variants outside somewhere.
-        unknown: variants with missing samples that are not outside elsewhere.
+        output: name of the output; empty for all limits together.
+        low, high: the limits; null without a limit.
+        known: number of variants inside or outside.
+        below, above: number of variants below or above at some sample; a variant may be both.
+        outside: number of variants outside at some sample.
+        unknown: number of variants with missing samples and no sample outside.
         share: the yield, (known - outside) / known.
         interval: 95 % confidence interval of the yield, by Clopper and Pearson; null unless
-            variants are drawn.
-        cp, cpk, by_quantiles: least index over the samples; null where the spread is zero, no
-            distribution is drawn or, by quantiles, where variants are too few.
-        sample: where Cpk is least.
+            the variants are drawn.
+        cp, cpk, by_quantiles: smallest index over the samples; null if the spread is zero or no
+            distribution is drawn; by_quantiles also if the variants are too few.
+        sample: index of the sample with the smallest Cpk.
     """
 
     output: str
@@ -75,7 +75,7 @@ class Capability(msgspec.Struct, frozen=True, kw_only=True):
 
 @dataclass(frozen=True)
 class _Least:
-    """The least of an index over the samples, and where it is."""
+    """The smallest value of an index over the samples, and its sample."""
 
     value: float | None
     sample: int | None
@@ -92,11 +92,11 @@ class _Least:
 def capabilities(
     study: Study, counts: NDArray[np.int64], whole: Summary, kept: Sequence[Sequence[Array]]
 ) -> list[Capability]:
-    """Return how every limited output keeps its limits, then all of them together.
+    """Return the conformance of every limited output, then of all limits together.
 
     Args:
-        counts: as of a chunk, summed over all.
-        kept: values of the random subset by row, parts of shape (n, some).
+        counts: `Chunk.limited`, summed over all chunks.
+        kept: values of the random subset by row, in parts of shape (n, V).
     """
     if not study.limits:
         return []
@@ -164,7 +164,7 @@ def _with_indices(
 
 
 def _by_quantiles(values: Array, low: float, high: float) -> float | None:
-    """Return the least index by quantiles of variants, shape (n, V); None of too few."""
+    """Return the smallest index by quantiles of values of shape (n, V); None if V is too small."""
     if values.shape[1] * TAIL < 1.0 or not np.isfinite(values).any():
         return None
     known = values[np.isfinite(values).any(axis=1)]

@@ -1,6 +1,4 @@
-"""Cross-check: some variants are rebuilt as cases, solved by another engine and compared
-with the sweep.
-"""
+"""Cross-check of a sweep: another engine solves some variants as cases of their own."""
 
 from __future__ import annotations
 
@@ -32,7 +30,7 @@ class Checked(msgspec.Struct, frozen=True, kw_only=True):
     Attributes:
         message: the deviation, the reason for no answer, or the rows without values of the engine;
             empty if all rows pass.
-        ratio: the largest deviation by its tolerance; null where nothing was compared.
+        ratio: the largest deviation divided by its tolerance; null if nothing was compared.
     """
 
     variant: int
@@ -53,7 +51,7 @@ def chosen(samples: int, share: float, seed: int) -> frozenset[int]:
 
 @dataclass(frozen=True, eq=False)
 class _Pairs(Sequence[Pair]):
-    """Pairs of variants with an engine; cases are built on demand, so thousands need no memory."""
+    """Pairs of a variant and an engine; each case is built on demand, to save memory."""
 
     study: Study
     engine: Engine
@@ -74,7 +72,7 @@ class _Pairs(Sequence[Pair]):
 
 
 def require_able(study: Study, engine: Engine, solver: Solver, tol: float) -> None:
-    """Solve the nominal design with the engine, to check its ability.
+    """Require the engine to solve the nominal design.
 
     Raises:
         KincheckError: the engine is not installed, or cannot express the case.
@@ -116,9 +114,9 @@ def check(
 def judged(
     study: Study, variant: int, attempt: Attempt, ours: Array, tol: float = math.inf
 ) -> Checked:
-    """Compare an engine's answer with the sweep's values: every row within its output's tolerance,
-    at all samples with both values.
+    """Compare an engine's answer with the sweep's values.
 
+    A variant passes if every row is within its output's tolerance at all samples with both values.
     A variant without any common value is not judged. A variant fails if only one of engine and
     sweep has a solution.
 
@@ -144,7 +142,7 @@ def judged(
         if theirs is None or not (row.derivative or series.possible):
             absent.append(row.name)
             continue
-        # without a value of the sweep nothing is lost: the variant already counts as unsolved
+        # the sweep has no value here, and already counts the variant as unsolved
         if count := int((np.isfinite(values) & ~np.isfinite(theirs)).sum()):
             lost = (
                 f"{row.name}: {count} samples without a value where the sweep has one:"
@@ -187,11 +185,10 @@ def judged(
 
 
 def _contradicted(study: Study, case: Case, answer: Answer, ours: Array) -> str:
-    """Return a message if an engine has values at samples that native cannot reach, with native's
-    reason; else an empty text.
+    """Return a message if an engine has values at samples native cannot reach; else an empty text.
 
-    A batch of variants is refused near singular poses that a single variant passes, so native
-    solves the variant again alone.
+    The message gives native's reason. Near singular poses, native refuses a batch of variants
+    but may solve a single variant. So native solves the variant again alone.
     """
     values = np.logical_or.reduce(
         [np.isfinite(series.position) for series in answer.outputs.values()]
@@ -200,7 +197,7 @@ def _contradicted(study: Study, case: Case, answer: Answer, ours: Array) -> str:
         return ""
     try:
         alone = NativeSolver().prepare(case.mechanism, case.sweep.path, case.points)(study.tol)
-    except SolveError:  # without an answer there is no standard
+    except SolveError:  # without native's answer there is nothing to contradict
         return ""
     refused = values & ~alone.solved
     refused[alone.details.get(UNCERTAIN, [])] = False

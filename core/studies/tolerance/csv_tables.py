@@ -1,4 +1,4 @@
-"""The results of a study as CSV, in the units of its file; empty where there is no value."""
+"""The results of a study as CSV, in the units of its file. A missing value is an empty field."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _STATISTICS = ("nominal", "count", "min", "max", "mean", "standard_deviation")
 
 
 def envelope_csv(results: SweepResults) -> str:
-    """Return a line for each output and sample. A column says of how many variants a part is."""
+    """Return a line for each output and sample."""
     swept = next(iter(results.driver))
     probabilities = list(next(iter(results.outputs.values())).quantiles)
     errors = any(each.standard_errors for each in results.outputs.values())
@@ -61,7 +61,7 @@ def gradient_csv(results: SweepResults) -> str:
 
 
 def limits_csv(results: SweepResults) -> str:
-    """Return a line for each limited output, and one for all of them together."""
+    """Return a line for each limited output, and one for all limits together."""
     columns = ["output", "unit", "low", "high", "known", "below", "above", "outside", "unknown"]
     columns += ["yield", "yield_from", "yield_to", "cp", "cpk", "cpk_by_quantiles", "sample"]
     rows: list[Sequence[Any]] = []
@@ -77,7 +77,7 @@ def limits_csv(results: SweepResults) -> str:
 
 
 def scaled(scale: float, values: Iterable[float | None]) -> list[float | None]:
-    """Return numbers times a factor; None where there is none."""
+    """Return numbers times a factor; None stays None."""
     return [None if value is None else scale * value for value in values]
 
 

@@ -1,4 +1,4 @@
-"""Results of a study's chunks so far."""
+"""Results of the finished chunks of a study."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LISTED = 50
 
 
 class Gathered:
-    """Results of the chunks so far."""
+    """Results of the finished chunks."""
 
     def __init__(self, study: Study) -> None:
         self.summary = nothing(len(study.rows), len(study.case.sweep.values))

@@ -1,14 +1,13 @@
-"""Gradients of outputs by the coordinates of a variation, at the nominal design: central
-differences of solved variants.
+"""Gradients of outputs by the coordinates of a variation at the nominal design.
 
-A coordinate moves by h and h/2 in both directions. The error of the difference over h is f''' h^2 /
-6 + f''''' h^4 / 120. Richardson's combination, four times the difference over h/2 minus the one
-over h, by three, has errors of h^4 only. A third of the distance between the two differences is the
-error of the one over h/2, and bounds the error of the result wherever the series converges.
+They are central differences of solved variants. A coordinate moves by h and h/2 in both directions.
+The error of the difference D(h) is f''' h^2 / 6 + f''''' h^4 / 120. Richardson's combination
+(4 D(h/2) - D(h)) / 3 has an error of order h^4. The error of D(h/2) is |D(h/2) - D(h)| / 3. It
+bounds the error of the result if the series converges.
 
-With h/size = 2e-4 the share of the second term is about (h/size)^2 / 6 = 7e-9, of the third 1e-17.
-Round-off of 1e-15 of the size in an output is 5e-12 of a gradient of one: enough room for outputs
-that bend a hundred times as much as the mechanism is large.
+With h/size = 2e-4 the relative size of the h^2 term is about (h/size)^2 / 6 = 7e-9, of the h^4
+term 1e-17. Round-off of 1e-15 of the size in an output is 5e-12 of a gradient of one. So an output
+may curve a hundred times as strongly as one of the mechanism's size.
 """
 
 from __future__ import annotations
@@ -27,8 +26,8 @@ STEP = 2e-4
 # Required accuracy: error relative to the output's largest gradient by a coordinate of the
 # same unit.
 ACCURATE = 1e-6
-# Round-off of differences of an output without first-order change: this part of its size, or the
-# mechanism's, over the step; a thousand times that of a number.
+# Round-off of the gradient of an output without first-order change: this share of the output's
+# size, or of the mechanism's, divided by the step. It is a thousand times a number's round-off.
 ROUND_OFF = 1e-13
 MOVES = np.array([1.0, -1.0, 0.5, -0.5])
 
@@ -39,14 +38,14 @@ class Gradients:
 
     Attributes:
         along: over the samples [unit of row / unit of coordinate], shape (coordinates, rows, n);
-            NaN where a neighbour of the nominal design has no value.
-        design: at the design position, shape (coordinates, rows); None where the case does not
+            NaN if a neighbour of the nominal design has no value.
+        design: at the design position, shape (coordinates, rows); None if the case does not
             pass through it.
         error: bound of the error over the samples and at design, from the two steps,
             shape (coordinates, rows).
         accurate: whether the error is at most `ACCURATE` of the row's largest gradient, or
             round-off, shape (coordinates, rows).
-        messages: by coordinate, why neighbours have no solution.
+        messages: by coordinate, the reason why a neighbour has no solution.
     """
 
     along: Array
@@ -62,7 +61,7 @@ def gradients(ready: Ready) -> Gradients:
     n, count = len(path.times), len(study.variation.coordinates)
     start = ready.designs.start
     from_design = start.stands
-    if from_design:  # one sample more, at the design itself
+    if from_design:  # one sample more, at the design position
         ready = ready.along(Path(path.motions, np.append(path.times, start.time), path.design))
     steps = np.array([STEP * _size(study, k) for k in range(count)])
     found = np.empty((count, len(study.rows), n + from_design))
@@ -90,7 +89,7 @@ def gradients(ready: Ready) -> Gradients:
 
 
 def _size(study: Study, coordinate: int) -> float:
-    """Return the size of what a coordinate changes: of the mechanism, a radian, or of a load."""
+    """Return a coordinate's size: the mechanism's size, one radian, or the size of the load."""
     variation = study.variation
     each = variation.coordinates[coordinate]
     if each.unit in ("m", "rad"):

@@ -1,4 +1,4 @@
-"""The figure of a histogram of variants."""
+"""Figure of a histogram of variants."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ LIMIT: Figure = {"width": 1.5, "color": "#CC79A7", "dash": "8px,3px,2px,3px"}
 def histogram_figure(
     name: str, unit: str, scale: float, found: Histogram, limits: Mapping[str, float]
 ) -> Figure:
-    """Return bars of the counts of variants by an output's value at one sample, and the limits.
+    """Return bars of the counts of variants by output value at one sample, with the limits.
 
     Args:
         scale: factor from SI to the unit.
-        limits: by name [unit].
+        limits: the limits by name [unit].
     """
     pairs = [*pairwise(scale * edge for edge in found.edges)]
     bars: Figure = {

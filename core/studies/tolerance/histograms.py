@@ -1,4 +1,4 @@
-"""Histograms of an output over the variants, at one sample."""
+"""Histograms of an output over the variants at one sample."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from .conformance import NO_SPREAD, Capability
 from .reduce import Summary
 from .study import Study
 
-# As many bins as the root of the number of variants, within these.
+# The number of bins is the square root of the number of variants, within these bounds.
 FEWEST, MOST = 5, 30
 
 
 class Histogram(msgspec.Struct, frozen=True, kw_only=True):
-    """How often an output has which values at a sample.
+    """Counts of the variants by the value of an output at one sample.
 
     Attributes:
-        sample: where the output's capability is least or, without limits, where it spreads most.
-        edges: of the bins, one more than counts [SI].
-        counts: variants in each bin, of those that the quantiles are of.
+        sample: the sample of the smallest Cpk or, without limits, of the largest spread.
+        edges: edges of the bins [SI], one more than `counts`.
+        counts: number of variants in each bin, from the random subset of the quantiles.
     """
 
     sample: int
@@ -34,7 +34,7 @@ class Histogram(msgspec.Struct, frozen=True, kw_only=True):
 def worst_sample(
     study: Study, limits: Sequence[Capability], whole: Summary, row: int
 ) -> int | None:
-    """Return the sample of a row's histogram; None where the row has no spread."""
+    """Return the sample of a row's histogram; None if the row has no spread."""
     name = study.rows[row].name
     named = [each.sample for each in limits if each.output == name and each.sample is not None]
     spread = whole.deviation[row]
@@ -44,7 +44,7 @@ def worst_sample(
 
 
 def histogram(parts: Sequence[Array], sample: int | None) -> Histogram | None:
-    """Return the histogram of variants at a sample; None where they are all the same.
+    """Return the histogram of variants at a sample; None if all are equal.
 
     Args:
         parts: values, shape (n, V) each.

@@ -1,4 +1,4 @@
-"""Counts of variants that keep specification limits, chunk by chunk."""
+"""Counts of variants by specification limits, chunk by chunk."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from ...trajectory import Array
 
 COUNTS = 5
-"""Numbers of a count: variants, those below, above and outside of the limits somewhere, and those
-with missing samples that are not outside elsewhere.
+"""Counts of a limit, five numbers of variants: all; with a sample below; with a sample above; with
+a sample outside; with missing samples and none outside.
 """
 
 
 @dataclass(frozen=True)
 class RowLimit:
-    """Limits of a row of a study [SI]; infinite where there is none."""
+    """Limits of a row of a study [SI]; infinite without a limit."""
 
     row: int
     low: float
@@ -27,7 +27,7 @@ class RowLimit:
 
     @property
     def size(self) -> float:
-        """The largest of the limits in size."""
+        """The largest absolute value of the finite limits."""
         return max(abs(each) for each in (self.low, self.high) if math.isfinite(each))
 
 
@@ -35,7 +35,7 @@ def limit_counts(values: Array, limits: Sequence[RowLimit]) -> NDArray[np.int64]
     """Return the counts of each limit, then of all together, shape (limits + 1, COUNTS).
 
     Args:
-        values: of variants, NaN where there is none, shape (rows, n, V).
+        values: values of variants, NaN if missing, shape (rows, n, V).
     """
     found = np.zeros((len(limits) + 1, COUNTS), dtype=np.int64)
     if not limits:

@@ -7,7 +7,7 @@ from .results import SweepResults
 
 
 def limit_notes(results: SweepResults) -> list[str]:
-    """Return what the table of limits supposes, a line each."""
+    """Return the assumptions of the table of limits, a line each."""
     lines = ["A variant counts as inside if it is inside the limits at every sample."]
     if any(each.cpk is not None for each in results.limits):
         lines.append(
@@ -28,12 +28,12 @@ def limit_notes(results: SweepResults) -> list[str]:
 
 
 def percent(share: float | None) -> str:
-    """Return a share in percent, all digits of a count of ten thousand; a dash without one."""
+    """Return a share in percent, to a ten-thousandth; a dash for None."""
     return "–" if share is None else f"{100.0 * share:.2f} %"
 
 
 def interval(each: Capability) -> str:
-    """Return the confidence interval of a yield; a dash without one."""
+    """Return the confidence interval of a yield as text; a dash for None."""
     if each.interval is None:
         return "–"
     low, high = each.interval

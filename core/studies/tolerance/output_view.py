@@ -1,4 +1,4 @@
-"""An output of a study as its page has it."""
+"""An output of a study as its page shows it."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from .conformance import Capability
 from .results import Envelope, Gradient
 
 DIGITS = 7
-"""Digits of a drawn number: one more than is told where a curve is pointed at."""
+"""Digits of a drawn number: one more than the page shows when the reader points at a curve."""
 
 
 @dataclass(frozen=True)
 class OutputView:
-    """An output as the page has it, in display units: its figures by name, and its gradients, the
-    largest effect first.
+    """An output as the page shows it, in display units: its figures by name, and its gradients,
+    the largest effect first.
     """
 
     name: str
@@ -36,7 +36,7 @@ class OutputView:
 
     @property
     def limits(self) -> dict[str, float]:
-        """The limits in display units, by their names."""
+        """The limits in display units, by name."""
         ends = (None, None) if self.limit is None else (self.limit.low, self.limit.high)
         return {
             name: float(f"{self.scale * value:.{DIGITS}g}")
@@ -58,5 +58,5 @@ class OutputView:
 
 
 def scaled_number(scale: float, value: float | None) -> str:
-    """Return a number times a factor, to three digits; a dash if there is none."""
+    """Return a number times a factor, to three digits; a dash for None."""
     return number(None if value is None else scale * value)

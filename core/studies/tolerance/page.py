@@ -1,6 +1,4 @@
-"""The page of a study: one HTML file in the look of a run's report, with its style sheet and
-script.
-"""
+"""The page of a study: one HTML file with the style sheet and script of a run's report."""
 
 from __future__ import annotations
 
@@ -22,12 +20,12 @@ from .results import Gradient, Numbers, SweepResults
 
 _HERE = Path(__file__).parent
 
-# Bars of a tornado diagram: what is left out is smaller than all of these.
+# Bars of a tornado diagram: the largest effects.
 MOST_BARS = 15
 
 
 def page(results: SweepResults) -> str:
-    """The page as HTML text."""
+    """Return the page as HTML text."""
     axis = _axis(results)
     figures: dict[str, Figure] = {}
     outputs: list[OutputView] = []
@@ -84,7 +82,7 @@ def page(results: SweepResults) -> str:
 
 
 def headline(results: SweepResults) -> str:
-    """The study in one sentence."""
+    """Return one sentence about the study."""
     said = f"{results.partial or results.samples} variants of {results.case}"
     said += ", partial: the sweep was stopped" if results.partial else ""
     said += (
@@ -101,7 +99,7 @@ def headline(results: SweepResults) -> str:
 
 
 def slopes(results: SweepResults, view: OutputView, each: Gradient) -> dict[str, str]:
-    """Return the numbers of a gradient and their unit, in units of the file."""
+    """Return the numbers of a gradient, and their unit, in units of the file."""
     its, factor = results.shown_unit(results.unit_of(each.coordinate))
     names = ("at_design", "largest", "error")
     found = {name: scaled_number(view.scale / factor, getattr(each, name)) for name in names}
@@ -109,12 +107,12 @@ def slopes(results: SweepResults, view: OutputView, each: Gradient) -> dict[str,
 
 
 def in_file_unit(results: SweepResults, unit: str, value: float | None) -> str:
-    """Return a number of an SI unit in the unit of the file."""
+    """Return a number of an SI unit as text in the unit of the file."""
     return scaled_number(results.shown_unit(unit)[1], value)
 
 
 def effect(gradient: Gradient) -> float:
-    """The size of a bar: the largest gradient times what its coordinate varies by [unit of the
+    """Return the size of a bar: the largest gradient times its coordinate's scale [unit of the
     output].
     """
     return abs(gradient.largest or 0.0) * gradient.scale
@@ -141,8 +139,10 @@ def _axis(results: SweepResults) -> Axis:
 
 
 def envelope_figure(view: OutputView, axis: Axis, *, about_nominal: bool) -> Figure:
-    """Bands between quantiles, the least and the most, and the nominal design, against the driver;
-    or how far they are from it.
+    """Return the quantile bands, minimum, maximum and nominal design against the driver.
+
+    Args:
+        about_nominal: show the differences from the nominal design.
     """
     envelope = view.envelope
     traces: list[Figure] = []
@@ -218,8 +218,10 @@ def envelope_figure(view: OutputView, axis: Axis, *, about_nominal: bool) -> Fig
 
 
 def tornado_figure(view: OutputView) -> Figure:
-    """Bars by coordinate, the largest on top: what its standard deviation, half width or largest
-    offset does to the output.
+    """Return a bar for each coordinate, the largest on top.
+
+    A bar is the output's change by the coordinate's standard deviation, half width or largest
+    offset.
     """
     bars = view.gradients[:MOST_BARS][::-1]
     lengths = [float(f"{view.scale * effect(each):.{DIGITS}g}") for each in bars]

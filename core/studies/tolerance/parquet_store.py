@@ -1,4 +1,4 @@
-"""Store of the values of all variants, as Parquet."""
+"""Parquet file of the values of all variants."""
 
 from __future__ import annotations
 
@@ -17,14 +17,13 @@ from .study import Study
 
 
 class ParquetStore:
-    """Writes the values of all variants as they come: a row for each variant, a row group for each
-    chunk.
+    """Writer of the values of all variants: a row for each variant, a row group for each chunk.
 
     Columns: variant, the offset of each coordinate [SI], and each output as a list over the
-    samples, NaN where there is no value. A coordinate that is named like an output, W.x say, has
-    the column W.x.offset. The file's metadata under the key "kincheck" says case, seed, mode,
-    units, signs and the driver's values, as JSON; where not all variants are there,
-    "kincheck.partial" says how many of how many.
+    samples, NaN if missing. If a coordinate has the name of an output, such as W.x, its column is
+    W.x.offset. The file's metadata has the key "kincheck": case, seed, mode, units, signs and the
+    driver's values, as JSON. In the file of a stopped sweep, the key "kincheck.partial" gives the
+    numbers of stored and of all variants.
 
     Raises:
         KincheckError: pyarrow is not installed, or the file cannot be written.
@@ -75,7 +74,7 @@ class ParquetStore:
         self._writer.close()
 
     def write(self, chunk: Chunk) -> None:
-        """Take a chunk; see `Store`."""
+        """Write a chunk; see `Store`."""
         assert chunk.values is not None
         assert chunk.offsets is not None
         arrow = self._arrow
@@ -94,7 +93,7 @@ class ParquetStore:
 
 
 def _offset_columns(study: Study) -> dict[str, Coordinate]:
-    """The coordinates by the names of their columns."""
+    """Return the coordinates by column name."""
     taken = {"variant", *(row.name for row in study.rows)}
     return {
         f"{each.name}.offset" if each.name in taken else each.name: each

@@ -1,7 +1,8 @@
-"""File of a study's finished chunks, written as they are solved, from which the study resumes.
+"""File of a study's finished chunks. A stopped study resumes from it.
 
-The file holds an identity and the chunks in order, each after its length and SHA-256; a truncated
-chunk is ignored. Numbers are kept bit by bit, so a resumed study equals one that was never stopped.
+The file holds an identity, then the chunks in order. Each chunk follows its length and SHA-256;
+the reader ignores a truncated chunk. The file keeps every bit of a number, so a resumed study
+equals one without a stop.
 """
 
 from __future__ import annotations
@@ -34,12 +35,12 @@ class Part:
     """
 
     def __init__(self, path: Path, facts: Mapping[str, Any], *, resume: bool) -> None:
-        """Begin a file, or take up an existing one.
+        """Begin a new file, or continue an existing one.
 
         Args:
-            facts: dependencies of the chunks besides the study: versions, the machine, modules
-                of joint types.
-            resume: take up the chunks in the file.
+            facts: everything the chunks depend on besides the study: versions, the machine,
+                modules of joint types.
+            resume: use the chunks in the file.
         """
         self.path, self.problems = path, list[str]()
         self._facts, self._resume = facts, resume
@@ -53,7 +54,7 @@ class Part:
             self._file.close()
 
     def finished(self, study: Study) -> Iterator[Chunk]:
-        """Yield the study's chunks in the file; from then on `add` appends to them.
+        """Yield the study's chunks in the file; `add` then appends to them.
 
         Raises:
             KincheckError: the file is of another study.
@@ -109,7 +110,7 @@ class Part:
 
 
 def _next(file: BinaryIO) -> Chunk | None:
-    """Return the next chunk of a file; None at its end, or where the rest is incomplete."""
+    """Return the next chunk of a file; None at its end, or if the rest is incomplete."""
     head = file.read(LENGTH + HASH)
     packed = (
         file.read(int.from_bytes(head[:LENGTH], "little")) if len(head) == LENGTH + HASH else b""

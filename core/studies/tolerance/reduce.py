@@ -1,6 +1,6 @@
 """Reduction of many variants: running extremes, mean and spread, and quantiles of kept values.
 
-Summaries are merged in the order of the chunks, so that sums are rounded the same way every time.
+Summaries are merged in the order of the chunks, so sums have the same round-off every time.
 """
 
 from __future__ import annotations
@@ -18,15 +18,14 @@ QUANTILES = (0.01, 0.05, 0.5, 0.95, 0.99)
 
 @dataclass(frozen=True, eq=False)
 class Summary:
-    """Statistics of quantities over variants. Shape (quantities, n): one number for each
-    quantity and sample.
+    """Statistics of quantities over variants, for each quantity and sample: shape (quantities, n).
 
     Attributes:
-        count: variants with a value.
-        least, most, mean: NaN without any.
+        count: number of variants with a value.
+        least, most, mean: minimum, maximum and mean; NaN without a value.
         squares: sum of the squared distances from the mean.
-        extremes: of each quantity, the variants with the least and the most of all samples, shape
-            (quantities, 2); -1 without any.
+        extremes: for each quantity, the variants with the minimum and the maximum over all
+            samples, shape (quantities, 2); -1 without a value.
     """
 
     count: NDArray[np.int64]
@@ -51,11 +50,11 @@ def nothing(quantities: int, n: int) -> Summary:
 
 
 def merged(a: Summary, b: Summary) -> Summary:
-    """Return the summary of the variants of both; b's come after a's.
+    """Return the summary of the variants of both; b's variants come after a's.
 
     Mean and squares by Chan, Golub and LeVeque: Updating formulae and a pairwise algorithm
-    for computing sample variances (1979), which lose no digits where the mean is large
-    against the spread.
+    for computing sample variances (1979). Their formulae lose no digits if the mean is much larger
+    than the spread.
     """
     count = a.count + b.count
     with np.errstate(all="ignore"):
@@ -64,7 +63,7 @@ def merged(a: Summary, b: Summary) -> Summary:
         mean = np.where(a.count == 0, b.mean, np.where(b.count == 0, a.mean, a.mean + step * share))
         both = np.where((a.count == 0) | (b.count == 0), 0.0, step * step * a.count * share)
         least, most = np.fmin(a.least, b.least), np.fmax(a.most, b.most)
-        # b's only if it is further out or a has none: the first of equals stays
+        # take b's variant only if it is further out, or a has none: of equal ones the first stays
         none = a.extremes[:, 0] < 0
         below = none | (np.fmin.reduce(b.least, axis=1) < np.fmin.reduce(a.least, axis=1))
         above = none | (np.fmax.reduce(b.most, axis=1) > np.fmax.reduce(a.most, axis=1))
@@ -77,11 +76,11 @@ class Quantiles:
     """Quantiles of one quantity over variants.
 
     Attributes:
-        values: by linear interpolation between neighbours in order, shape (len(QUANTILES), n).
-        errors: standard errors: half the distance between the quantiles at p - s and p + s, with s
-            = sqrt(p (1 - p) / m), the standard error of the share of m variants below a value;
-            shape of the values, None where these are exact.
-        kept: number of variants behind the quantiles.
+        values: linear interpolation between sorted neighbours, shape (len(QUANTILES), n).
+        errors: standard errors, of the same shape; None if the quantiles are exact. An error is
+            half the distance between the quantiles at p - s and p + s. Here s =
+            sqrt(p (1 - p) / m) is the standard error of the share of m variants below a value.
+        kept: number of variants used for the quantiles.
     """
 
     values: Array
@@ -90,11 +89,11 @@ class Quantiles:
 
 
 def quantiles(kept: Sequence[Array], *, exact: bool) -> Quantiles:
-    """Return the quantiles of variants, NaN where there is no value.
+    """Return the quantiles of variants; NaN at a sample without a value.
 
     Args:
         kept: values, shape (n, V) each.
-        exact: whether these are all variants, rather than a sample of them.
+        exact: whether these are all variants, not a random subset.
     """
     values = np.concatenate(kept, axis=1)
     count = values.shape[1]
@@ -108,7 +107,7 @@ def quantiles(kept: Sequence[Array], *, exact: bool) -> Quantiles:
         some = ~np.isnan(values).all(axis=1)
         found[:, some] = np.nanquantile(values[some], wanted, axis=1)
     else:
-        # vectorized: half the time of a search for each quantile
+        # vectorized, in half the time of a search for each quantile
         values.sort(axis=1)
         found = np.quantile(values, wanted, axis=1, overwrite_input=True)
     if exact:

@@ -1,4 +1,4 @@
-"""Tables of the results of a study, from what its chunks and gradients give."""
+"""Tables of the results of a study, from its chunks and gradients."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .study import Study
 
 
 def numbers(values: Array) -> Numbers:
-    """Numbers, null for NaN."""
+    """Return numbers, None for NaN."""
     return [value if math.isfinite(value) else None for value in values.tolist()]
 
 
@@ -27,7 +27,7 @@ def envelopes(
     nominal: Array,
     histograms: Sequence[Histogram | None],
 ) -> dict[str, Envelope]:
-    """The envelope of every row, by name."""
+    """Return the envelope of every row, by name."""
     spread = whole.deviation
     result: dict[str, Envelope] = {}
     for k, (row, quantiles) in enumerate(zip(study.rows, found, strict=True)):
@@ -55,7 +55,7 @@ def _by_probability(values: Array) -> dict[str, Numbers]:
 
 
 def gradient_table(study: Study, found: Gradients) -> list[Gradient]:
-    """Every gradient, by output and coordinate."""
+    """Return every gradient, by output and coordinate."""
     table: list[Gradient] = []
     for r, row in enumerate(study.rows):
         for c, coordinate in enumerate(study.variation.coordinates):
@@ -82,7 +82,11 @@ def gradient_table(study: Study, found: Gradients) -> list[Gradient]:
 
 
 def effect_table(study: Study, effects: Mapping[int, Array]) -> list[Effect]:
-    """What each variant of one at a time changes; effects by variant, shape (rows,)."""
+    """Return the effects of a study of one coordinate at a time.
+
+    Args:
+        effects: the largest changes by variant, shape (rows,).
+    """
     table: list[Effect] = []
     for variant, changes in effects.items():
         offsets = study.variation.of_variant(study.seed, variant)
@@ -100,7 +104,7 @@ def effect_table(study: Study, effects: Mapping[int, Array]) -> list[Effect]:
 
 
 def coordinates(study: Study) -> list[VariedCoordinate]:
-    """The coordinates that vary."""
+    """Return the varied coordinates."""
     return [
         VariedCoordinate(
             name=each.name,
@@ -116,7 +120,7 @@ def coordinates(study: Study) -> list[VariedCoordinate]:
 
 
 def correlations(study: Study) -> list[Correlated]:
-    """The correlations of coordinates."""
+    """Return the correlations of coordinates."""
     names = [each.name for each in study.variation.coordinates]
     return [
         Correlated(coordinates=[names[row] for row in each.rows], matrix=each.matrix.tolist())

@@ -1,5 +1,6 @@
-"""The results of a study as data: the JSON schema kincheck-sweep/1. SI units; what was not computed
-is null.
+"""The results of a study as data: the JSON schema kincheck-sweep/1.
+
+Numbers are in SI units. A number is null if it was not computed.
 """
 
 from __future__ import annotations
@@ -22,13 +23,13 @@ Numbers = list[float | None]
 
 
 class VariedCoordinate(msgspec.Struct, frozen=True, kw_only=True):
-    """A coordinate that varies.
+    """A varied coordinate.
 
     Attributes:
         law: normal, truncated_normal, uniform, triangular, or values.
         scale: standard deviation, half width, or the largest offset [unit].
-        values: the offsets [unit] where they are listed.
-        bound: largest offset of a truncated normal distribution [unit]; zero of all others.
+        values: the offsets [unit], if they are listed.
+        bound: largest offset of a truncated normal distribution [unit]; zero for other laws.
     """
 
     name: str
@@ -41,23 +42,22 @@ class VariedCoordinate(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Correlated(msgspec.Struct, frozen=True, kw_only=True):
-    """Coordinates that are drawn with a matrix of correlations, by a Gaussian copula."""
+    """Coordinates drawn with a correlation matrix, by a Gaussian copula."""
 
     coordinates: list[str]
     matrix: list[list[float]]
 
 
 class Envelope(msgspec.Struct, frozen=True, kw_only=True):
-    """One output, or a derivative of it, over all variants; lists have a number for each sample
-    [unit].
+    """One output, or its derivative, over all variants; lists have a number for each sample [unit].
 
     Attributes:
-        nominal: at the nominal design.
-        count: variants that have a value.
-        quantiles: by probability; `quantiles_of` says of how many variants.
-        standard_errors: of the quantiles, by probability; null where they are exact.
-        min_variant, max_variant: the variants with the least and the most of all samples.
-        histogram: at the sample of the least capability or, without limits, of the largest spread.
+        nominal: values at the nominal design.
+        count: number of variants with a value.
+        quantiles: quantiles by probability, of `quantiles_of` variants.
+        standard_errors: standard errors of the quantiles, by probability; null if they are exact.
+        min_variant, max_variant: the variants with the minimum and the maximum over all samples.
+        histogram: at the sample of the smallest Cpk or, without limits, of the largest spread.
     """
 
     unit: str
@@ -80,14 +80,14 @@ class Gradient(msgspec.Struct, frozen=True, kw_only=True):
     coordinate].
 
     Attributes:
-        at_design: at the design position; null where the case does not pass through it.
-        along: at the samples.
-        largest: that of the largest size over the samples, with its sign.
-        sample: where that is.
-        error: what it is off by at most, from two step sizes.
-        accurate: whether that is at most 1e-6 of the output's largest gradient by any coordinate of
-            that unit.
-        scale: of the coordinate; times `largest` it is the bar of a tornado diagram.
+        at_design: value at the design position; null if the case does not pass through it.
+        along: values at the samples.
+        largest: the value of largest size over the samples, with its sign.
+        sample: the sample of `largest`.
+        error: bound of the error, from two step sizes.
+        accurate: whether `error` is at most 1e-6 of the output's largest gradient by any coordinate
+            of the same unit.
+        scale: scale of the coordinate; times `largest` it is the bar of a tornado diagram.
     """
 
     output: str
@@ -103,8 +103,8 @@ class Gradient(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Effect(msgspec.Struct, frozen=True, kw_only=True):
-    """One at a time: a variant, and by output the largest change over the samples, with its sign
-    [unit].
+    """A variant of one coordinate at a time: by output, the largest change over the samples, with
+    its sign [unit].
     """
 
     variant: int
@@ -122,22 +122,21 @@ class Failed(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class SweepResults(Tabular, msgspec.Struct, frozen=True, kw_only=True):
-    """A study.
+    """The results of a study.
 
     Attributes:
-        run: its circumstances, as of a run: versions, machine, settings, and what the case is.
-        samples: how many variants were solved.
-        asked: how many there were to be: more than were solved where the sweep was stopped before
-            its end.
-        quantiles_of: how many variants the quantiles and histograms are of.
+        run: its circumstances, as for a run: versions, machine, settings, and facts of the case.
+        samples: number of finished variants.
+        asked: number of requested variants; larger than `samples` if the sweep was stopped.
+        quantiles_of: number of variants used for the quantiles and histograms.
         sampling: choice of the drawn variants: random, latin or sobol.
-        length_unit, angle_unit: in which tables and figures show the numbers.
-        limits: how outputs keep their specification limits; the last is of all limits together.
+        length_unit, angle_unit: units of tables and figures.
+        limits: conformance to the specification limits; the last entry is of all limits together.
         driver: values at the samples by name, as in a run's records.
-        unsolved: variants without a solution somewhere; `failed` lists the first of them.
-        retried: variants that were solved again alone, with divided steps.
-        checked: the cross-checked variants, and the engine that they were checked with.
-        measured: seconds, rate, and the largest memory of this process.
+        unsolved: number of variants without a solution at some samples; `failed` lists the first.
+        retried: number of variants solved again alone, with divided steps.
+        checked: the variants cross-checked with the engine `check_engine`.
+        measured: seconds, rate, and the peak memory of this process.
     """
 
     schema: Literal["kincheck-sweep/1"] = "kincheck-sweep/1"
@@ -167,26 +166,22 @@ class SweepResults(Tabular, msgspec.Struct, frozen=True, kw_only=True):
     limits: list[Capability] = []
 
     def shown_unit(self, unit: str) -> tuple[str, float]:
-        """Return the unit in which tables and figures show numbers of an SI unit, and the factor to
-        it.
-        """
+        """Return the unit of tables and figures for an SI unit, and the factor to it."""
         name, size = in_units(unit, LENGTHS[self.length_unit], ANGLES[self.angle_unit])
         return name, 1.0 / size
 
     @property
     def shown_driver(self) -> tuple[str, float]:
-        """The unit in which tables and figures show the values of the swept driver, and the factor
-        to it.
-        """
+        """The unit of tables and figures for the swept driver, and the factor to it."""
         case = self.run["cases"].get(self.case, {})
         return self.shown_unit(DRIVER_UNITS.get(case.get("driver", {}).get("type", ""), ""))
 
     def unit_of(self, coordinate: str) -> str:
-        """Return the SI unit of a coordinate that varies."""
+        """Return the SI unit of a varied coordinate."""
         return next(each.unit for each in self.coordinates if each.name == coordinate)
 
     def summary(self) -> str:
-        """Return case, mode, variants and what is missing of them."""
+        """Return the case, the mode, and the numbers of variants and of unsolved variants."""
         found = f"{self.case}, {self.mode}, {self.partial or self.samples} variants"
         missing = f"{self.unsolved} without a solution somewhere" if self.unsolved else ""
         return ", ".join(filter(None, [found, f"{len(self.outputs)} outputs", missing]))
@@ -205,32 +200,28 @@ class SweepResults(Tabular, msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def partial(self) -> str:
-        """How many variants of how many there are, of a sweep that was stopped before its end; else
-        empty.
-        """
+        """The numbers of finished and of all variants of a stopped sweep; else empty."""
         return f"{self.samples} of {self.asked}" if self.samples < self.asked else ""
 
     @property
     def deviating(self) -> list[Checked]:
-        """The checked variants that did not pass."""
+        """The checked variants with a bad outcome."""
         return [each for each in self.checked if each.outcome.bad]
 
     @property
     def unjudged(self) -> int:
-        """How many checked variants have no value to compare; all are among those without a
-        solution.
-        """
+        """The number of checked variants without a value to compare; all are unsolved."""
         return sum(each.outcome is Outcome.UNJUDGED for each in self.checked)
 
     @property
     def partly_judged(self) -> str:
-        """The rows not compared in the first passing variant, with the reason; else empty."""
+        """The message of the first passing variant with uncompared rows; else empty."""
         passed = (each.message for each in self.checked if each.outcome is Outcome.PASS)
         return next(filter(None, passed), "")
 
 
 BANDS = ("nominal", "mean", "min", "max", "standard_deviation")
-"""Curves of an envelope."""
+"""Names of the curves of an envelope."""
 
 
 def _bands(each: Envelope) -> list[Numbers]:

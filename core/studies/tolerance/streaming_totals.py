@@ -1,6 +1,4 @@
-"""Totals of numbers that come in lanes, traced as everything else that runs on lanes: whatever runs
-programs can reduce, too.
-"""
+"""Running totals of numbers in lanes. They are a traced program, so every executor can reduce."""
 
 from __future__ import annotations
 
@@ -25,23 +23,23 @@ BEGIN = {
     "least": math.inf,
     "most": -math.inf,
 }
-"""Totals of a lane: how many of its numbers are finite, the first of these, sums of the distances
-from it and of their squares, and the extremes; each with what it begins with. Distances from a
-number among them cost no digits where all are far from zero."""
+"""Totals of a lane and their initial values: the count of finite numbers, the first of these, the
+sums of the distances from the first and of their squares, and the extremes. Distances from the
+first number lose no digits if all numbers are far from zero."""
 AT_A_TIME = 8
-"""Numbers of each lane that are taken before the totals are put out."""
+"""Numbers of each lane taken in one call of the program."""
 NUMPY_LANES = 128
-"""Of the numpy executor: with those at a time, as many variants as are solved together."""
+"""Lanes of the numpy executor; times `AT_A_TIME`, the number of variants solved together."""
 
 
 @cache
 def plan() -> Plan:
-    """The plan that takes numbers into totals; infinite ones count as missing."""
+    """Return the plan of the totals; infinite numbers count as missing."""
     tape, slots = Tape(), range(len(BEGIN), len(BEGIN) + AT_A_TIME)
     count, first, total, squares, least, most = map(tape.input, range(len(BEGIN)))
     for value in map(tape.input, slots):
         first = where_larger(count, 0.0, first, value)
-        away = where_larger(math.inf, value, value - first, 0.0)  # false where it is NaN, too
+        away = where_larger(math.inf, value, value - first, 0.0)  # the condition is false for NaN
         count = count + where_larger(math.inf, value, 1.0, 0.0)
         total, squares = total + away, squares + away * away
         least = minimum(least, where_larger(math.inf, value, value, math.inf))
@@ -55,16 +53,16 @@ def plan() -> Plan:
 
 
 class Totals:
-    """Totals of quantities at n samples, lane by lane: variants are lanes. It belongs to the thread
-    that made it.
+    """Totals of quantities at n samples, lane by lane; each variant goes to a lane. Use an object
+    only in the thread of its creation.
 
     Attributes:
-        found: shape (quantities, len(BEGIN), n, lanes).
-        extremes: as of a summary.
+        found: the totals, shape (quantities, len(BEGIN), n, lanes).
+        extremes: see `Summary.extremes`.
     """
 
     def __init__(self, quantities: int, n: int) -> None:
-        # for this thread: its lanes hold totals while numbers are taken
+        # an executor for this thread alone: its lanes hold the totals during `take`
         self._executor = _executor()
         self.found = np.empty((quantities, len(BEGIN), n, self._executor.group))
         self.found[:] = np.array([*BEGIN.values()])[:, None, None]
@@ -72,10 +70,10 @@ class Totals:
         self._outermost = np.full((2, quantities), np.inf)
 
     def take(self, values: Array, first: int) -> None:
-        """Take variants into account.
+        """Add variants to the totals.
 
         Args:
-            values: NaN where there is none, shape (quantities, n, V).
+            values: values of the variants, NaN if missing, shape (quantities, n, V).
             first: index of the first variant.
         """
         table = values
@@ -96,10 +94,10 @@ class Totals:
             self._outermost[which] = outermost
 
     def summary(self) -> Summary:
-        """Return what the totals say of all variants that were taken into account."""
+        """Return the summary of all added variants."""
         count, total = self["count"], self["sum"]
         whole, some = count.sum(axis=2), count > 0.0
-        with np.errstate(all="ignore"):  # lanes without a number count for nothing
+        with np.errstate(all="ignore"):  # a lane without a number has weight zero
             mean = np.where(some, self["first"] + total / count, 0.0)
             squares = np.where(some, self["squares"] - total * total / count, 0.0)
             mean_of_all = (count * mean).sum(axis=2) / whole
@@ -111,7 +109,7 @@ class Totals:
         )
 
     def __getitem__(self, name: str) -> Array:
-        """The totals of a name, shape (quantities, n, lanes)."""
+        """Return one kind of totals by its name, shape (quantities, n, lanes)."""
         return self.found[:, [*BEGIN].index(name)]
 
 

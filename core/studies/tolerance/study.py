@@ -1,5 +1,6 @@
-"""A study: which variants of which case, and what is wanted of them. Plain data, sent anywhere.
-Made ready, it solves chunks of the variants.
+"""A study of design variants: a case, its variants, and the values to reduce or keep.
+
+A `Study` is plain data, picklable. A `Ready` study has a compiled model, and solves chunks.
 """
 
 from __future__ import annotations
@@ -28,34 +29,34 @@ from .chunk import Chunk, Unsolved
 from .limit_counts import COUNTS, RowLimit, limit_counts
 from .streaming_totals import Totals
 
-# Variants that are solved together: what calls cost that reduce them is lost among as many.
-# `solve_designs`, which reduces nothing, is as fast with a quarter of them.
+# Variants solved together: enough to make the cost of the calls for their reduction negligible.
+# `solve_designs` reduces nothing, and is as fast with a quarter of them.
 TOGETHER = 1024
-# A study is in so many chunks for threads and workers to share, as far as that makes none smaller
-# than the least, nor larger than the most: each costs the other threads a pause of Python's lock,
-# and on a cluster the scheduler a millisecond.
+# Number of chunks for threads and workers to share, and the least and largest number of variants in
+# a chunk. A chunk has a price: the other threads wait for Python's lock, and the scheduler of a
+# cluster spends a millisecond.
 CHUNKS, LEAST, MOST = 64, 64, 4096
-# Where the values of all variants are stored, so many are held at once.
+# Largest chunk if the values of all variants are stored, to limit the memory.
 MOST_STORED = 256
-# Messages of a chunk that are passed on; all variants without a solution are counted.
+# Largest number of messages kept from a chunk; the count of unsolved variants is complete.
 MOST_MESSAGES = 50
 
 
 @dataclass(frozen=True, eq=False)
 class ReducedQuantity:
-    """One quantity that is reduced: an output, or its first or second derivative by time."""
+    """A reduced quantity: an output, or its first or second derivative by time."""
 
     output: Quantity
     derivative: int
 
     @property
     def name(self) -> str:
-        """The name of the output, with that of its derivative as in reference tables."""
+        """The name of the output, with the suffix of its derivative as in reference tables."""
         return self.output.name + (f".{QUANTITIES[self.derivative]}" if self.derivative else "")
 
     @property
     def unit(self) -> str:
-        """The unit, SI."""
+        """The SI unit."""
         return self.output.unit + PER_TIME[self.derivative]
 
 
@@ -64,13 +65,13 @@ class Study:
     """Variants of a case.
 
     Attributes:
-        case: its reference and scene are of no use here.
-        samples: how many variants.
-        order: derivatives of the outputs by time that are wanted besides: 0, 1 or 2.
+        case: the case; its reference and scene are not used.
+        samples: number of variants.
+        order: highest time derivative of the outputs to reduce: 0, 1 or 2.
         tol: largest accepted constraint residual, relative to the mechanism's size.
-        subset: share of the variants whose values are kept for quantiles.
-        picked: variants whose values are wanted, to be cross-checked.
-        whole: the values of all variants are wanted, to be stored.
+        subset: share of the variants in the random subset for quantiles.
+        picked: variants to cross-check; their values are kept.
+        whole: whether to keep the values of all variants, for a store.
     """
 
     case: Case
@@ -88,18 +89,18 @@ class Study:
 
     @property
     def of_a_chunk(self) -> int:
-        """Variants of a chunk, solved in one thread; the study alone decides: sums are equal."""
+        """Variants in a chunk. It depends on the study alone, so sums have the same round-off."""
         share = self.samples // CHUNKS
         return min(MOST_STORED if self.whole else MOST, max(LEAST, share - share % LEAST))
 
     @property
     def chunks(self) -> int:
-        """How many chunks the variants are in."""
+        """The number of chunks."""
         return -(-self.samples // self.of_a_chunk)
 
     @cached_property
     def rows(self) -> tuple[ReducedQuantity, ...]:
-        """What is reduced: outputs, each with its derivatives as far as wanted and known."""
+        """The reduced quantities: each output with its requested and known derivatives."""
         return tuple(
             ReducedQuantity(output, derivative)
             for output in self.case.outputs
@@ -108,7 +109,7 @@ class Study:
 
     @cached_property
     def limits(self) -> tuple[RowLimit, ...]:
-        """The limits of the variation, by rows.
+        """The limits of the variation, by row.
 
         Raises:
             KincheckError: a limited derivative is not reduced.
@@ -136,17 +137,17 @@ class Study:
 
 @dataclass(eq=False)
 class Ready:
-    """A study with its model compiled: solves chunks, in any order and in several threads."""
+    """A study with a compiled model: it solves chunks, in any order and in several threads."""
 
     study: Study
     designs: PreparedDesigns
 
     @staticmethod
     def of(study: Study) -> Ready:
-        """Return a study made ready; no derivative is solved that no output needs."""
+        """Return the study with a compiled model; the model solves only needed derivatives."""
         case = study.case
-        # an output of one derivative less is a quotient of velocities, and of two less has their
-        # derivatives in it
+        # an output with one derivative less is a quotient of velocities; with two less it
+        # contains derivatives of velocities
         order = max(
             3 - output.orders + min(study.order, output.orders - 1) for output in case.outputs
         )
@@ -158,22 +159,25 @@ class Ready:
         return Ready(study, designs)
 
     def along(self, path: Path) -> Ready:
-        """The same model on another path of the same drivers."""
+        """Return the same model on another path of the same drivers."""
         return Ready(self.study, self.designs.along(path))
 
     @property
     def lanes(self) -> int:
-        """Variants that are solved at once."""
+        """The number of variants solved at once."""
         return self.designs.at_once(TOGETHER)
 
     @cached_property
     def nominal(self) -> Array:
-        """The rows at the nominal design, shape (rows, n)."""
+        """The values of the rows at the nominal design, shape (rows, n)."""
         return self.values(np.zeros((len(self.study.variation.coordinates), 1)))[0][:, :, 0]
 
     def values(self, offsets: Array) -> tuple[Array, NDArray[np.bool_], int, Mapping[int, str]]:
-        """The rows of variants, NaN where there is none, shape (rows, n, V); which samples are
-        solved (n, V); retried; messages.
+        """Return the results of variants.
+
+        Returns:
+            The values of the rows, shape (rows, n, V), NaN if missing; whether each sample is
+            solved, shape (n, V); the number of retried variants; messages by variant.
         """
         geometry = self.study.variation.geometry(offsets)
         found = self.designs.solve(geometry, self.study.tol)
@@ -198,7 +202,7 @@ class Ready:
             )
             design[name] = Vec3(*(Jet(each, np.zeros(()), np.zeros(())) for each in where))
         values = np.empty((len(self.study.rows), *found.solved.shape))
-        # what is not known is NaN, and what is made of it becomes NaN
+        # unknown numbers are NaN, and every result of them is NaN
         with np.errstate(all="ignore"):
             case = self.study.case
             path = case.sweep.path
@@ -217,7 +221,7 @@ class Ready:
 
     @cached_property
     def _numbers(self) -> dict[str, slice]:
-        """Where the numbers of each varied place are."""
+        """The slice of each varied place in the geometry."""
         found: dict[str, slice] = {}
         first = 0
         for place, size in self.study.variation.places.items():
@@ -279,8 +283,10 @@ class Ready:
 
 
 def largest(changes: Array) -> Array:
-    """Return of changes, shape (rows, n, V), the largest in size over the samples, signed, shape
-    (rows, V); NaN without any.
+    """Return the changes of largest size over the samples, signed, shape (rows, V).
+
+    Args:
+        changes: shape (rows, n, V). The result is NaN if all samples are NaN.
     """
     sizes = np.nan_to_num(np.abs(changes), nan=-1.0)
     return np.take_along_axis(changes, sizes.argmax(axis=1)[:, None, :], axis=1)[:, 0]

@@ -1,6 +1,4 @@
-"""Sweep over design variants: solve all variants, reduce them chunk by
-chunk, differentiate, cross-check.
-"""
+"""Sweep over design variants: solve and reduce them chunk by chunk, differentiate, cross-check."""
 
 from __future__ import annotations
 
@@ -34,18 +32,18 @@ from .part_file import Part
 from .reduce import quantiles
 from .study import Ready, Study
 
-# Variants kept for quantiles: the standard error of a 1 % quantile is then a tenth of a percent.
+# Variants kept for quantiles: the share below a 1 % quantile then has a standard error of 0.1 %.
 KEPT = 10_000
-# Limit of their memory [bytes]; many outputs over many samples leave room for fewer variants.
+# Limit of the memory of the kept values [bytes]; more outputs and samples allow fewer variants.
 KEPT_BYTES = 64_000_000
-# A larger grid is a mistake: at ten microseconds a variant this is a day.
+# More variants are probably a mistake: at ten microseconds each, this number takes a day.
 MOST_VARIANTS = 10**10
 
 
 @dataclass(frozen=True, eq=False)
 class Progress:
-    """Progress of a sweep: finished variants, total, unsolved ones, and seconds with the variants
-    solved in them.
+    """Progress of a sweep: finished, total and unsolved variants, the seconds of this run, and the
+    variants solved in this run.
     """
 
     done: int
@@ -65,7 +63,7 @@ class Store(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Check:
-    """A cross-check: a share of the variants is solved by another engine too."""
+    """A cross-check: another engine solves a share of the variants too."""
 
     engine: Engine
     share: float
@@ -92,26 +90,25 @@ def sweep_designs(
     part: Part | None = None,
     stopped: Callable[[KeyboardInterrupt | ClusterError], None] | None = None,
 ) -> results.SweepResults:
-    """Solve all variants of a case and reduce its outputs over them, without holding all
-    variants at once.
+    """Solve all variants of a case and reduce its outputs over them, chunk by chunk.
 
     Args:
         case: the case; its reference is not used.
         variation: the varied coordinates, from `read_variation`.
-        samples: number of variants to draw; None where the variation lists them.
-        seed: of the draws; equal seeds give equal variants on any machine and with any `jobs`.
-        sampling: choice of the points that are drawn.
+        samples: number of variants to draw; None if the variation lists them.
+        seed: seed of the draws; equal seeds give equal variants on any machine with any `jobs`.
+        sampling: choice of the drawn points.
         order: highest time derivative of the outputs to reduce: 0, 1 or 2.
         tol: largest accepted constraint residual, relative to the mechanism's size.
-        jobs: threads.
+        jobs: number of threads.
         source: solver of the chunks; None for threads of this process.
         check: an engine to cross-check with.
         store: receives the values of all variants.
         progress: called after every chunk.
         command: the command line, kept with the results.
-        part: keeps the solved chunks, and has those of an earlier, stopped sweep.
-        stopped: called with the reason of an early stop; the results then have the variants solved
-            so far. Without it, or without any solved variant, the reason is raised.
+        part: file of the solved chunks, with the chunks of an earlier, stopped sweep.
+        stopped: called with the reason of an early stop; the results then hold the finished
+            variants. Without `stopped`, or without a finished variant, the reason is raised.
 
     Raises:
         KincheckError: the number of variants is missing or does not fit the mode, the
@@ -138,7 +135,7 @@ def sweep_designs(
     try:
         with closing((source or on_threads(ready, jobs))(study, found.chunks)) as chunks:
             for chunk in chunks:
-                with deferred():  # a chunk counts everywhere or nowhere
+                with deferred():  # an interrupt waits: a chunk is added everywhere or nowhere
                     found.add(chunk)
                     if store is not None:
                         store.write(chunk)
@@ -229,7 +226,7 @@ def how_many(variation: Variation, samples: int | None) -> int:
     """Return the number of variants.
 
     Args:
-        samples: number of draws; None where the variants are listed.
+        samples: number of draws; None if the variants are listed.
 
     Raises:
         KincheckError: the number is missing, superfluous or too large.

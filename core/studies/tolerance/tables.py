@@ -18,8 +18,8 @@ from .results import Envelope, Numbers, SweepResults
 
 
 def print_sweep(results: SweepResults, file: TextIO) -> None:
-    """Print the signs of outputs, a line for each output, histograms, limits, what could not be
-    solved, what deviates, and how fast it was.
+    """Print the signs of outputs, a line for each output, histograms, limits, unsolved variants,
+    deviating variants, and the speed.
     """
     console = terminal.console(file)
     console.print(Text(headline(results), style="bold"))
@@ -123,7 +123,7 @@ def _shown(scale: float, value: float | None) -> str:
 
 
 def remarks(results: SweepResults) -> list[str]:
-    """What the numbers alone do not say, a line each."""
+    """Return remarks on the numbers, a line each."""
     lines = [f"note: {note}" for _, note in notes(results.run)]
     lines += [
         f"unsolved: variant {each.variant}, {each.samples} samples: {each.message}"

@@ -1,3 +1,3 @@
-"""Hardpoints: files of named points as suspension engineers have them, onto templates of
-suspensions, to cases.
+"""Cases from hardpoints: files of named points, as suspension engineers use them, and templates of
+suspensions.
 """

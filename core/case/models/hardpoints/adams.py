@@ -1,10 +1,10 @@
 """Hardpoints of Adams/Car: the [HARDPOINT] blocks of its subsystem, template and assembly files
 (TeimOrbit format).
 
-A block has the columns {hardpoint_name symmetry x_value y_value z_value}; of a 'left/right' pair it
-holds the left one. Rows below a line (VARIANTS) are of other designs; the nominal ones above it
-are read. Adams/Car has x rearward, y to the right and z up. The unit is in the block [UNITS]; a
-block that was cut out of its file has none.
+A block has the columns {hardpoint_name symmetry x_value y_value z_value}. It holds the left point
+of a 'left/right' pair. Rows below a line (VARIANTS) are of other designs; the reader takes the
+nominal rows above it. Adams/Car has x rearward, y to the right and z up. The unit is in the block
+[UNITS]; a block cut out of its file has none.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ _FIELD = re.compile(r"'([^']*)'|(\S+)")
 
 
 def read_adams(file: Path, text: str) -> HardpointTable:
-    """The points of the left side and of the middle, by name.
+    """Return the points of the left side and of the middle, by name.
 
     Raises:
-        CaseError: there is no such block, or a row of it is incomplete.
+        CaseError: there is no such block, or one of its rows is incomplete.
     """
     points: dict[str, Hardpoint] = {}
     unit: str | None = None

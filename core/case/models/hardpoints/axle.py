@@ -23,7 +23,9 @@ RACK, SLIDE, RACK_TRAVEL, STROKE = "rack", "rack_slide", "rack_travel", "stroke"
 
 
 class AxleMotion(StrEnum):
-    """Motion of an axle: wheels alike, wheels opposed, the rack alone."""
+    """Motion of an axle: both wheels in the same direction, in opposite directions, or the rack
+    alone.
+    """
 
     HEAVE = "heave"
     ROLL = "roll"
@@ -33,12 +35,12 @@ class AxleMotion(StrEnum):
 def one_wheel(
     file: Path, template: Template, at: Mapping[str, Vector], travels: Travels
 ) -> tuple[Mechanism, Sweep]:
-    """Return the mechanism of the left wheel and its motion: up and down, and with the rack if that
+    """Return the mechanism of the left wheel and its motion: up and down, with the rack if it
     moves.
 
     Raises:
         CaseError: the rack moves, and there are no tie rods.
-        MechanismError: the places make no such mechanism.
+        MechanismError: the places do not fit the mechanism.
     """
     joints = [*template.joints(at)]
     drivers: list[Driver] = [PointCoordinate(STROKE, WHEEL_CENTER.name, AXES["z"])]
@@ -59,16 +61,14 @@ def one_wheel(
 def whole_axle(
     file: Path, said: str, template: Template, at: Mapping[str, Vector], travels: Travels
 ) -> tuple[Mechanism, Sweep]:
-    """Return the mechanism of both wheels, the right one being the mirror image of the left, and
-    its motion.
+    """Return the mechanism of both wheels, and its motion. The right side mirrors the left.
 
-    The travel is that of the left wheel up and down, or of the rack to the left and to the right.
-    The rack carries the inner joints of the tie rods, and slides along y; without tie rods there is
-    none.
+    The left wheel travels up and down, or the rack to the left and to the right. The rack carries
+    the inner joints of the tie rods, and slides along y. Without tie rods there is no rack.
 
     Raises:
         CaseError: an unknown motion, or steering without tie rods.
-        MechanismError: the places make no such mechanism.
+        MechanismError: the places do not fit the mechanism.
     """
     if said not in list(AxleMotion):
         raise fault(
@@ -131,13 +131,13 @@ def name_of(side: Side, name: str) -> str:
 
 
 def of_side(side: Side, place: Vector) -> Vector:
-    """Return the place on a side of one that is given on the left."""
+    """Return the place on a side for a place on the left."""
     x, y, z = place
     return x, side.left * y, z
 
 
 def _named(side: Side, joint: Joint, template: Template) -> Joint:
-    """Return the joint with the names of a side; the tie rod is on the rack."""
+    """Return the joint with the names of a side; the tie rod joins the rack."""
     inner, outer = (
         RACK if body == GROUND and joint.name == template.steered else _body(side, "", body)
         for body in joint.bodies
@@ -146,13 +146,13 @@ def _named(side: Side, joint: Joint, template: Template) -> Joint:
 
 
 def _body(side: Side, role: str, body: str, *, steered: bool = False) -> str:
-    """Return the body of a side; a point on the rack is not the chassis'."""
+    """Return the body of a role on a side; the rack for the inner joint of a steered tie rod."""
     if body == GROUND:
         return RACK if steered and role == TIEROD_INNER.name else GROUND
     return name_of(side, body)
 
 
 def _bodies(joints: Sequence[Joint]) -> list[Body]:
-    """Return the moving bodies that joints name."""
+    """Return the moving bodies named by joints."""
     names = dict.fromkeys(name for joint in joints for name in joint.bodies if name != GROUND)
     return [Body(name) for name in names]

@@ -1,4 +1,4 @@
-"""The vehicle around the hardpoints of an axle, from options: data of anti-values and Ackermann."""
+"""Data of the vehicle of hardpoints, from options: for anti-values and Ackermann."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from ...suspension import Axle
 
 @dataclass(frozen=True)
 class Car:
-    """Data of the vehicle; None where they are unknown.
+    """Data of the vehicle; None if unknown.
 
     Attributes:
         position: the axle of the hardpoints.
-        wheelbase, cg_height: [m].
-        brake_share, drive_share: parts of the braking and driving force at this axle [-].
+        wheelbase, cg_height: wheelbase, and height of the centre of gravity above the road [m].
+        brake_share, drive_share: shares of the braking and driving force at this axle [-].
     """
 
     position: Axle | None = None
@@ -30,7 +30,7 @@ class Car:
 
     @property
     def anti_outputs(self) -> Iterator[str]:
-        """Types of the outputs that these data define, of a wheel of known radius."""
+        """Yield the types of the outputs defined by these data, for a wheel of known radius."""
         if self.position is None:
             return
         yield "wheelbase_change"
@@ -43,10 +43,10 @@ class Car:
 
 
 def read_car(file: Path, supplied: Supplied) -> Car:
-    """Return the vehicle that options state.
+    """Return the vehicle stated by options.
 
     Raises:
-        CaseError: an option is no length, no share, or no axle.
+        CaseError: an option is not a length, a share, or an axle.
     """
     position = supplied.position
     if position is not None and position not in list(Axle):
@@ -65,10 +65,10 @@ def read_car(file: Path, supplied: Supplied) -> Car:
 
 
 def read_length(file: Path, option: str, text: str | None) -> float | None:
-    """Return a length that an option states [m].
+    """Return the length stated by an option [m].
 
     Raises:
-        CaseError: it is none, or not positive.
+        CaseError: the text is not a length, or the length is not positive.
     """
     if text is None:
         return None

@@ -1,8 +1,8 @@
 """Suspensions of Project Chrono: the JSON files of its vehicle models
 (data/vehicle/**/suspension/*.json).
 
-Points are relative to the subsystem, metres, x forward, y left, z up; those of the left side are
-given (Chrono::Vehicle manual).
+Points are relative to the subsystem, in metres, x forward, y left, z up; the file gives the left
+side (Chrono::Vehicle manual).
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from ...io.typed_tables import as_table
 from .table import Hardpoint, HardpointTable, number
 
 WHEEL_CENTER = "Spindle/COM"
-"""The centre of mass of the spindle, which is where Chrono has its wheel."""
+"""The centre of mass of the spindle: Chrono places the wheel there."""
 
 TOE, CAMBER = "Toe Angle (deg)", "Camber Angle (deg)"
-"""Angles of the wheel at design; positive: toe-in, top outboard (ChDoubleWishbone.cpp turns the
-spindle by them about z, then about x)."""
+"""Angles of the wheel at design; positive: toe-in, top outboard. ChDoubleWishbone.cpp turns the
+spindle by them about z, then about x."""
 
-# What is open goes on to the end of the line or file: were it no match, every quote and every /*
-# would be searched from anew.
+# An unclosed text or comment matches to the end of the line or file. Without a match, the search
+# would start anew at every quote and every /*.
 _STRING_OR_COMMENT = re.compile(r'"(?:\\.|[^"\\\n])*+"?|//[^\n]*|/\*.*?(?:\*/|\Z)', re.DOTALL)
 
 
 def without_comments(text: str) -> str:
-    """JSON without the comments that Chrono takes in it; lines and columns stay what they were."""
+    """Return JSON without Chrono's comments; lines and columns stay the same."""
 
     def blank(found: re.Match[str]) -> str:
         part = found.group()
@@ -39,10 +39,10 @@ def without_comments(text: str) -> str:
 
 
 def read_chrono(file: Path, text: str) -> HardpointTable:
-    """The points of a suspension, named "Section/Key" as in the file.
+    """Return the points of a suspension, named "Section/Key" as in the file.
 
     Raises:
-        CaseError: not JSON, no suspension, or a point that is none.
+        CaseError: not JSON, no suspension, or an invalid point.
     """
     tables = parse(file, without_comments(text))
     kind = tables.get("Type", "Suspension")

@@ -1,4 +1,4 @@
-"""Suspension outputs of a case of hardpoints: all that its points and its template define."""
+"""Suspension outputs of a case of hardpoints: all outputs defined by its points and template."""
 
 from __future__ import annotations
 
@@ -43,8 +43,8 @@ class Wheel:
     """The wheel of a table of hardpoints.
 
     Attributes:
-        radius: from the centre to the road in the wheel plane [m]; None if unknown.
-        toe, camber: at design [rad].
+        radius: distance from the centre to the road in the wheel plane [m]; None if unknown.
+        toe, camber: angles at design [rad].
     """
 
     radius: float | None
@@ -58,12 +58,12 @@ def wheel_of(
     at: Mapping[str, Vector],
     radius: str | None,
 ) -> Wheel:
-    """Return the wheel: radius and attitude follow from points if the table has them.
+    """Return the wheel; its radius and attitude follow from points if the table has them.
 
     Args:
         named: names of the points in the file, by role.
         at: positions by role [m].
-        radius: the length from the user [m].
+        radius: the radius from the user [m].
 
     Raises:
         CaseError: a length is unusable or contradicts the points, or the axis points inboard.
@@ -115,8 +115,8 @@ def with_suspension_outputs(
     template's watched points.
 
     Args:
-        motion: of both wheels; None for one wheel.
-        steered: whether the rack moves while the wheel travels.
+        motion: motion of both wheels; None for one wheel.
+        steered: whether the rack moves during the wheel's travel.
     """
     axle = motion is not None
     extent = size(case)
@@ -174,7 +174,7 @@ def _vehicle(side: Side, template: Template, wheel: Wheel, car: Car, axle: bool)
 def _types(
     template: Template, wheel: Wheel, car: Car, at: Mapping[str, Vector]
 ) -> Iterator[tuple[str, type[SuspensionOutput], Mapping[str, Any]]]:
-    """Yield name, class and own fields of each output that is defined."""
+    """Yield name, class and own fields of each defined output."""
     types = [*WHEEL]
     if template.kingpin:
         types += STEERING_AXIS

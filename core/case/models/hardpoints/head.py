@@ -29,9 +29,9 @@ class Head:
     """The head of a table.
 
     Attributes:
-        columns: places of name, x, y and z among the fields.
+        columns: indices of name, x, y and z among the fields.
         names: names of all fields, as in the file.
-        unit: unit of the coordinates, if the head says it.
+        unit: unit of the coordinates, if the head gives it.
     """
 
     columns: Sequence[int]
@@ -40,7 +40,7 @@ class Head:
 
     @property
     def others(self) -> list[str]:
-        """Names of the further columns."""
+        """The names of the further columns."""
         return [name for k, name in enumerate(self.names) if name and k not in self.columns]
 
 
@@ -54,7 +54,7 @@ def has_head(file: Path, rows: Sequence[Row]) -> bool:
 
 
 def upright(file: Path, rows: Sequence[Row]) -> tuple[Sequence[Row], int] | None:
-    """Return the rows, or the columns where these have the head, and its place among them."""
+    """Return the rows, or the columns if these have the head, and the index of the head."""
     for each in (rows, _turned(rows)):
         if (place := head_place(file, each)) is not None:
             return each, place
@@ -62,7 +62,7 @@ def upright(file: Path, rows: Sequence[Row]) -> tuple[Sequence[Row], int] | None
 
 
 def head_place(file: Path, rows: Sequence[Row]) -> int | None:
-    """Return the place of the head among rows; None if there is none above the first point.
+    """Return the index of the head among rows; None without a head above the first point.
 
     Raises:
         CaseError: two columns of one name, or coordinates in several units.
@@ -97,7 +97,7 @@ def _turned(rows: Sequence[Row]) -> list[Row]:
 
 
 def as_head(file: Path, where: str, cells: Sequence[Cell]) -> Head | None:
-    """Return the head of these fields; None if they are none.
+    """Return the head of these fields; None if they are not a head.
 
     Raises:
         CaseError: two columns of one name, or coordinates in several units.
@@ -120,7 +120,7 @@ def as_head(file: Path, where: str, cells: Sequence[Cell]) -> Head | None:
         units |= {unit} if column != "name" else set()
     if not {"x", "y", "z"} <= columns.keys():
         return None
-    if "name" not in columns:  # the only column before the coordinates, whatever its name is
+    if "name" not in columns:  # the only column before the coordinates, under any name
         before = [*range(min(columns.values()))]
         if len(before) != 1:
             return None
@@ -136,7 +136,7 @@ def as_head(file: Path, where: str, cells: Sequence[Cell]) -> Head | None:
 
 
 def _column(text: str) -> tuple[str, str | None]:
-    """Return the column of a name in the head, and its unit; the column is empty for another."""
+    """Return the column and the unit of a name in the head; empty for a further column."""
     if text in _NAMES or text.replace(" ", "_") in _NAMES:
         return "name", None
     if (found := _COLUMN.fullmatch(text)) is None:
@@ -148,5 +148,5 @@ def _column(text: str) -> tuple[str, str | None]:
 
 
 def written(cells: Sequence[Cell]) -> str:
-    """Return cells as a text, a comma between two."""
+    """Return cells as a text, separated by commas."""
     return ",".join(cell if isinstance(cell, str) else f"{cell:.15g}" for cell in cells)

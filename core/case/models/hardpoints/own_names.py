@@ -1,5 +1,5 @@
-"""A file of one's own names of hardpoints: TOML or JSON, `role = "own name"`, roles as in the
-template.
+"""Reader of a user's own names of hardpoints: TOML or JSON, `role = "own name"`, with the
+template's roles.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ LARGEST_NAMES = 100_000
 
 
 def read_own_names(file: Path, roles: Iterable[str], points: Iterable[str]) -> Mapping[str, str]:
-    """Return the name of a point by role, for the roles in the file.
+    """Return the names of points by role, for the roles in the file.
 
     Args:
         roles: roles of the template.

@@ -1,7 +1,7 @@
-"""Hardpoints in a text table, see `rows`: commas, semicolons, tabs or a sign of one's own between
-the fields.
+"""Hardpoints in a text table, see `rows`. Commas, semicolons, tabs or the sign of a line `sep=`
+separate the fields.
 
-Comments say facts: `# units: mm`, `# axes: rearward,right,up`, `# template: mcpherson`.
+Comments give facts: `# units: mm`, `# axes: rearward,right,up`, `# template: mcpherson`.
 Spreadsheets have dialects: a line `sep=;`, quotes, separators at the end of a line, a decimal
 comma.
 """
@@ -28,7 +28,7 @@ def read_plain(file: Path, text: str) -> HardpointTable:
     """Return the points by name.
 
     Raises:
-        CaseError: no head, or a row that does not match it.
+        CaseError: no head, or a row at odds with the head.
     """
     said: dict[str, str] = {}
     lines: list[tuple[str, str]] = []
@@ -53,9 +53,7 @@ def read_plain(file: Path, text: str) -> HardpointTable:
 
 
 def _delimiter(file: Path, lines: Sequence[tuple[str, str]], possible: str) -> str:
-    """Return the sign between fields by which a line is a head, or else the most frequent one of
-    the first line.
-    """
+    """Return the separator of a head, or else the most frequent separator of the first line."""
     first = lines[0][1]
     for line in lines:
         for delimiter in sorted(possible, key=line[1].count, reverse=True):

@@ -1,5 +1,7 @@
-"""From a file of hardpoints and a template to a case: the wheel goes up and down, the chassis and
-the steering stand still; or both wheels of an axle and a rack move.
+"""Cases from a table of hardpoints and a template.
+
+One wheel moves up and down while chassis and steering stand still, or both wheels of an axle and a
+rack move.
 """
 
 from __future__ import annotations
@@ -24,20 +26,22 @@ from .templates.base import WHEEL_CONTACT, normal, side_of
 from .travels import read_travels
 
 WHEEL = "wheel_center"
-# Racks with joints near the middle have them a little beyond it; no point of one wheel's
-# suspension is farther across than this part of the half track.
+# Inner joints of a rack near the middle may be a little beyond it. No point of a wheel's suspension
+# is farther beyond the middle than this share of the half track.
 ACROSS = 0.25
-# Cars have some tens of hardpoints at a corner; names of many more are not searched for those that
-# are missing.
+# Cars have some tens of hardpoints at a corner. A far larger table is refused, and not searched for
+# missing names.
 MOST_POINTS = 10_000
 
 
 def case_of_hardpoints(table: HardpointTable, supplied: Supplied) -> Case:
-    """Return the case of a suspension: its outputs are those of suspensions that its points define,
-    and the coordinates of three points of the knuckle; it is consensus_only.
+    """Return the case of a suspension; it is consensus_only.
+
+    Its outputs are all suspension outputs defined by its points, and the coordinates of three
+    points of the knuckle.
 
     Raises:
-        CaseError: the table does not say enough, or does not fill the roles of the template.
+        CaseError: the table lacks facts, or does not fill the roles of the template.
     """
     file = table.file
     if len(table.points) > MOST_POINTS:
@@ -111,7 +115,7 @@ def _template(table: HardpointTable, said: str | None) -> Template:
 
 
 def _filled(table: HardpointTable, template: Template, own: Path | None) -> dict[str, str]:
-    """Return the name of the point that fills each role of the template.
+    """Return the name of the point for each role of the template.
 
     Args:
         own: file of the user's own names.
@@ -166,7 +170,7 @@ def _filled(table: HardpointTable, template: Template, own: Path | None) -> dict
 
 
 def _listed(names: Sequence[str]) -> str:
-    """Names to read: all of those that a file of a suspension has."""
+    """Return names as text, abridged if there are more than a suspension has."""
     return shortened([brief(visible(name)) for name in names], MOST_NAMED) or "nothing"
 
 
@@ -177,7 +181,7 @@ def _require_left_and_upright(
     at: Mapping[str, Vector],
     supplied: Supplied,
 ) -> None:
-    """Refuse points that are mirrored or upside down: their axes are others than was said."""
+    """Refuse mirrored points and points upside down: the stated axes are wrong."""
 
     def written(role: str, k: int) -> str:
         return coordinate(table, named[role], k, supplied.units, supplied.axes)

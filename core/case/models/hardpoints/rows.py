@@ -1,8 +1,8 @@
-"""Hardpoints in rows of cells, of a text or of a spreadsheet: a head `name,x,y,z`, then a row a
-point; or columns instead of rows.
+"""Hardpoints in rows of cells, from a text or a spreadsheet: a head `name,x,y,z`, then a row for
+each point; or columns instead of rows.
 
-Titles above the head, further columns, a row of units, and rows that are no points are left out
-and listed. Rows above the head say facts: `units: mm`, `axes: rearward,right,up`, `template:
+The reader leaves out and lists titles above the head, further columns, a row of units, and rows
+without a point. Rows above the head give facts: `units: mm`, `axes: rearward,right,up`, `template:
 mcpherson`.
 """
 
@@ -43,12 +43,12 @@ def read_rows(
 
     Args:
         tool: program of the format.
-        rows: rows that are not blank.
+        rows: rows with filled cells.
         said: facts from comments: unit, axes, template.
-        delimiter: the sign between the fields of a text.
+        delimiter: the separator of the fields of a text.
 
     Raises:
-        CaseError: no such head, or a row that does not match it.
+        CaseError: no such head, or a row at odds with the head.
     """
     found = upright(file, rows)
     if found is None:
@@ -61,7 +61,7 @@ def read_rows(
         )
     rows, place = found
     head = as_head(file, *rows[place])
-    assert head is not None  # its place was found by it
+    assert head is not None  # `upright` has found the head there
     facts = dict(said)
     left_out: list[str] = []
     for where, cells in rows[:place]:
@@ -108,9 +108,9 @@ def read_rows(
 
 
 def remark(cells: Sequence[Cell], *, comment: bool = False) -> tuple[str, str] | None:
-    """Return the fact that a row says, and its value; None if it says none.
+    """Return the fact in a row, and its value; None without a fact.
 
-    A spreadsheet divides a comment at its commas, and a title `units: mm` is in one cell or two.
+    A spreadsheet divides a comment at its commas. A title `units: mm` is in one cell or two.
 
     Args:
         comment: whether the row must be a comment.
@@ -170,7 +170,7 @@ def _units(cells: Sequence[Cell]) -> str | None:
 
 
 def _is_note(cells: Sequence[Cell], head: Head) -> bool:
-    """Return whether a row is no point: it lacks coordinates, and has the name of no point of a
+    """Return whether a row is a note: it lacks coordinates, and its name is no role's name in any
     template.
     """
     name, *coordinates = (cells[k] if k < len(cells) else "" for k in head.columns)
@@ -183,8 +183,9 @@ def _complete(
 ) -> list[Cell]:
     """Return name, x, y and z of a row.
 
-    A decimal comma between commas makes a field of its own. It cannot be told from a value of a
-    further column, if the row may be shorter or longer than the head.
+    If commas separate the fields, a decimal comma splits a number into two fields. The second is
+    indistinguishable from a value of a further column if rows may be shorter or longer than the
+    head.
     """
     filled = len(cells)
     while filled and cells[filled - 1] == "":

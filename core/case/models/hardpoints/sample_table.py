@@ -1,4 +1,4 @@
-"""A sample table of hardpoints for each template, which the reader of tables reads."""
+"""A sample table of hardpoints for each template, fit for the reader of tables."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ AXES = "forward,left,up"
 
 
 def sample_tables(names: Sequence[str]) -> list[str]:
-    """Return the sample tables of the templates of these names, or of all if none is given.
+    """Return the sample tables of the templates of these names; of all templates without names.
 
     Raises:
         CaseError: there is no such template.
@@ -25,7 +25,7 @@ def sample_tables(names: Sequence[str]) -> list[str]:
 
 
 def sample_table(template: Template) -> str:
-    """Return the text of a table of one's own to begin with, in mm; its numbers are made up."""
+    """Return the text of a table to begin one's own with, in mm; its numbers are invented."""
     text = io.StringIO()
     text.write(f"# template: {template.name}\n# units: mm\n# axes: {AXES}\n")
     rows = csv.writer(text, lineterminator="\n")

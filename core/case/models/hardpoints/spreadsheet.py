@@ -10,7 +10,7 @@ from .head import HEAD, has_head
 from .rows import read_rows
 from .table import HardpointTable
 
-# The most points that are read, and as many rows between them.
+# Largest number of points, and as many other rows.
 MOST_ROWS = 20_000
 
 
@@ -18,11 +18,11 @@ def read_spreadsheet(file: Path, wanted: str | None) -> HardpointTable:
     """Return the points by name.
 
     Args:
-        wanted: name of the sheet; None for the only one with a head.
+        wanted: name of the sheet; None for the only sheet with a head.
 
     Raises:
-        CaseError: the file is no readable workbook, no sheet or several have a head, or a row does
-            not match it.
+        CaseError: the file is no readable workbook, no sheet or several sheets have a head, or a
+            row is at odds with the head.
     """
     sheets = read_sheets(file, wanted, MOST_ROWS)
     tables = [sheet for sheet in sheets if has_head(file, sheet.rows)]

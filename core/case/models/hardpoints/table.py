@@ -1,4 +1,4 @@
-"""A table of hardpoints as its file gives it, and its way to metres in the axes of ISO 8855: x
+"""A table of hardpoints as in its file, and its conversion to metres in the axes of ISO 8855: x
 forward, y left, z up.
 """
 
@@ -61,12 +61,12 @@ _ADVICE: Sequence[tuple[re.Pattern[str], str]] = (
     (re.compile(r"[\u2010-\u2015]"), "write the minus sign as a hyphen, -"),
     (re.compile(r"\d{4}-\d\d-\d\d"), "a spreadsheet took the number for a date: type it anew"),
 )
-"""Remedies for texts that are no coordinates."""
+"""Remedies for invalid coordinates."""
 
 
 @dataclass(frozen=True)
 class Hardpoint:
-    """Coordinates as in the file, and their place there for messages."""
+    """Coordinates as in the file, and their place in the file for messages."""
 
     position: Vector
     where: str
@@ -78,12 +78,12 @@ class HardpointTable:
 
     Attributes:
         tool: program of the format.
-        points: by the name in the file.
+        points: points by their name in the file.
         unit: unit of the coordinates, if file or format define it.
         axes: directions of x, y and z, if file or format define them: "forward,left,up".
-        template: suspension of the points, if the file names it.
+        template: template of the points, if the file names it.
         static_toe, static_camber: angles of the wheel at design, if the file gives them [rad].
-        left_out: other content, of no use for kinematics or a template.
+        left_out: other content, without use for kinematics or a template.
     """
 
     file: Path
@@ -109,7 +109,7 @@ def number(file: Path, where: str, text: object, sign: str = ".") -> float:
     found = math.nan
     if isinstance(text, str | int | float) and not isinstance(text, bool):
         try:
-            # word processors write the minus sign of typography
+            # word processors write the typographic minus sign
             found = (
                 decimal(text.replace(sign, ".").replace("\u2212", "-"))
                 if isinstance(text, str)
@@ -132,10 +132,10 @@ def placed(table: HardpointTable, units: str | None, axes: str | None) -> dict[s
 
     Args:
         units, axes: values from the user, required if the file gives none; they must not contradict
-            it.
+            the file.
 
     Raises:
-        CaseError: unit or axes are unknown, or contradict each other.
+        CaseError: unit or axes are unknown, or the user contradicts the file.
     """
     convert = unit_of(table, units)
     places = _axes(table, axes)
@@ -152,9 +152,7 @@ def placed(table: HardpointTable, units: str | None, axes: str | None) -> dict[s
 def coordinate(
     table: HardpointTable, name: str, k: int, units: str | None, axes: str | None
 ) -> str:
-    """The coordinate of a point that became its x, y or z (0, 1, 2), as the file has it: "y = 750
-    mm".
-    """
+    """Return the source of a point's x, y or z (0, 1, 2) as text, as in the file: "y = 750 mm"."""
     column = next(column for column, (axis, _) in enumerate(_axes(table, axes)) if axis == k)
     return (
         f"{'xyz'[column]} = {plain(table.points[name].position[column])}"
@@ -163,7 +161,7 @@ def coordinate(
 
 
 def require_size(table: HardpointTable, used: Mapping[str, Vector], units: str | None) -> None:
-    """Refuse points as far apart as in no suspension: their unit is wrong."""
+    """Refuse points too far apart for a suspension: their unit is wrong."""
     positions = list(used.values())
     size = max(math.dist(a, b) for a in positions for b in positions)
     if found := SUSPENSIONS.improbable(size, unit_of(table, units)):
@@ -172,7 +170,7 @@ def require_size(table: HardpointTable, used: Mapping[str, Vector], units: str |
 
 
 def unit_of(table: HardpointTable, said: str | None) -> Unit:
-    """Return the unit of the coordinates, which converts them to SI."""
+    """Return the unit of the coordinates, for their conversion to SI."""
     return LENGTHS[_unit(table, said)]
 
 
@@ -210,7 +208,7 @@ def _unit(table: HardpointTable, said: str | None) -> str:
 
 
 def length_name(text: str) -> str:
-    """Return the name in `LENGTHS` of a unit, or of what else the text is, in small letters."""
+    """Return the name of a unit in `LENGTHS`; for another text, the text in small letters."""
     name = text.strip().lower()
     return _UNIT_NAMES.get(name, name)
 

@@ -15,7 +15,7 @@ from ...io.schema import MOST_SAMPLES
 # The middle of the wheel travel of passenger cars, which is about 0.08 m each way; samples every
 # 2.5 mm.
 TRAVEL, SAMPLES = 0.05, 41
-# No wheel and no rack of the largest lorry goes so far: what is longer are millimetres.
+# No wheel and no rack of the largest lorry goes so far: a larger number is in millimetres.
 FARTHEST = 1.0
 
 
@@ -24,10 +24,10 @@ class Travels:
     """Travels over the samples [m].
 
     Attributes:
-        wheel: of the wheel up, of the left wheel of an axle, or of the rack alone if it steers;
-            shape (n,).
-        rack: of the rack to the left at the first and at the last sample, straight over the wheel's
-            travel; None if it stands still.
+        wheel: upward travel of the wheel, or of the left wheel of an axle, or travel of the rack
+            alone in steering; shape (n,).
+        rack: travel of the rack to the left at the first and at the last sample, linear in the
+            wheel's travel; None if the rack stands still.
     """
 
     wheel: Array
@@ -35,7 +35,7 @@ class Travels:
 
     @property
     def of_rack(self) -> Motion:
-        """Motion of the rack; the time is the wheel's travel."""
+        """Return the motion of the rack; its time is the wheel's travel."""
         assert self.rack is not None
         (low, high), (first, last) = (self.wheel[0], self.wheel[-1]), self.rack
         if first * high == last * low:
@@ -44,10 +44,10 @@ class Travels:
 
 
 def read_travels(file: Path, travel: str | None, rack: str | None) -> Travels:
-    """Return the travels that options say, or those of a passenger car's wheel.
+    """Return the travels given by options; by default, the travel of a passenger car's wheel.
 
     Raises:
-        CaseError: an option is no travel.
+        CaseError: an option is not a travel.
     """
     if travel is None:
         return Travels(np.linspace(-TRAVEL, TRAVEL, SAMPLES), _ends(file, rack))
@@ -89,7 +89,7 @@ def _ends(file: Path, rack: str | None) -> tuple[float, float] | None:
 
 
 def _interval(numbers: list[float]) -> tuple[float, float] | None:
-    """Return the ends of METRES, which goes both ways, or of START:STOP; None for anything else."""
+    """Return the ends of METRES, which goes both ways, or of START:STOP; None for another text."""
     if len(numbers) == 1 and numbers[0] > 0.0:
         numbers = [-numbers[0], numbers[0]]
     if len(numbers) != 2 or not all(abs(each) <= FARTHEST for each in numbers):

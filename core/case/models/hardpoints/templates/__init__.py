@@ -1,5 +1,5 @@
-"""Templates of suspensions: each file the roles of its hardpoints and a function from their places
-to joints.
+"""Templates of suspensions. Each file has the roles of its hardpoints, and a function from their
+places to joints.
 """
 
 from .base import Role, Template
@@ -24,6 +24,6 @@ TEMPLATES = {
         SEMI_TRAILING_ARM,
     )
 }
-"""By the name that --template takes."""
+"""Templates by name, as for --template."""
 
 __all__ = ["TEMPLATES", "Role", "Template"]

@@ -1,7 +1,7 @@
-"""Suspension templates: roles of hardpoints, and the joints that follow from their places.
+"""Suspension templates: roles of hardpoints, and the joints at their places.
 
-Places are in metres, x forward, y left, z up. A template is of the left side, the chassis is the
-ground, the steering is locked.
+Places are in metres, x forward, y left, z up. A template describes the left side; the chassis is
+the ground, and the steering is locked.
 """
 
 from __future__ import annotations
@@ -15,24 +15,24 @@ from .....joints import Joint
 from .....mechanism.mechanism import GROUND, Point, Vector
 
 KNUCKLE = "knuckle"
-"""The body that carries the wheel, in every template."""
+"""The wheel carrier in every template."""
 
 _SIDES = (
     re.compile(r"(?P<name>.+?)_(?P<side>left|right|l|r|fl|fr|rl|rr)"),
     re.compile(r"(?P<side>left|right|fl|fr|rl|rr)_(?P<name>.+)"),
 )
-"""Side or corner at the end of a normal name, or before it."""
+"""Side or corner at the end of a normal name, or at its start."""
 
 Kingpin: TypeAlias = tuple[str, str] | tuple[tuple[str, str], ...]
 
 
 @dataclass(frozen=True)
 class Role:
-    """A hardpoint that a template needs.
+    """A hardpoint of a template.
 
     Attributes:
-        meaning: what it is, for messages.
-        also: other names it goes by; one point may fill several roles.
+        meaning: description of the hardpoint, for messages.
+        also: other names of the hardpoint; one point may fill several roles.
     """
 
     name: str
@@ -41,7 +41,7 @@ class Role:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """All names it goes by, in their normal form."""
+        """All names of the hardpoint, in their normal form."""
         return tuple(normal(name) for name in (self.name, *self.also))
 
 
@@ -50,19 +50,19 @@ class Template:
     """A kind of suspension.
 
     Attributes:
-        also: its names in files.
-        joints: from places by role; the bodies are those named by the joints.
-        watched: roles of non-collinear points of the knuckle: their motion is compared, and with it
-            the knuckle's.
-        above, ahead: pairs of roles; in any car the first is above the second, or in front of it,
-            which detects wrong axes.
-        sample: places by role for a table to begin with [m], made up.
-        optional: roles of points that only outputs need.
-        kingpin: of the steering axis: roles of its lower and its upper point, or of the ends of the
-            four rods that define it, see `Vehicle`; None without steering.
-        steered: the joint whose first end is on the rack, if there is steering.
+        also: other names of the template in files.
+        joints: function from places by role to joints; the joints name the bodies.
+        watched: roles of non-collinear points of the knuckle; outputs compare their motion, and
+            with it the knuckle's.
+        above, ahead: pairs of roles, to detect wrong axes; in any car the first is above the
+            second, or in front of it.
+        sample: places by role for a sample table [m], invented.
+        optional: roles of points for outputs only.
+        kingpin: the steering axis: roles of its lower and its upper point, or of the ends of its
+            four rods, see `Vehicle`; None without steering.
+        steered: the joint with its first end on the rack, if there is steering.
         springs: roles of the ends of springs and dampers by the names of their motion ratios.
-        bodies: the body of each role that is a point of the case, if it is not the knuckle.
+        bodies: the body of each role among the points of the case, unless it is the knuckle.
     """
 
     name: str
@@ -80,7 +80,7 @@ class Template:
     bodies: Mapping[str, str] = field(default_factory=dict[str, str])
 
     def points(self, at: Mapping[str, Vector]) -> list[Point]:
-        """Return the points that outputs read, of those roles that have a place."""
+        """Return the points for outputs, from the roles with a place."""
         read = [*self.watched, *flattened(self.kingpin or ())]
         read += [role for ends in self.springs.values() if all(map(at.get, ends)) for role in ends]
         return [
@@ -89,8 +89,8 @@ class Template:
 
 
 def normal(name: str) -> str:
-    """A hardpoint's name without the differences that do not matter: case, blanks, the prefix of
-    Adams/Car, spelling of centre.
+    """Return a hardpoint's name in normal form: without differences in case, blanks, the prefix of
+    Adams/Car, and the spelling of centre.
     """
     plain = (
         re.sub(r"[^a-z0-9]+", "_", name.lower())
@@ -102,8 +102,8 @@ def normal(name: str) -> str:
 
 
 def side_of(name: str) -> tuple[str, str]:
-    """Return a hardpoint's normal name without the side or corner in it, and the side: "left",
-    "right" or none.
+    """Return a hardpoint's normal name without its side or corner, and the side: "left", "right" or
+    an empty text.
     """
     plain = normal(name)
     for pattern in _SIDES:
@@ -119,7 +119,7 @@ def flattened(kingpin: Kingpin | tuple[()]) -> list[str]:
 
 
 def prefixed(prefix: str, kingpin: Kingpin | None) -> Kingpin | None:
-    """Return the steering axis by the names of points with a prefix."""
+    """Return the steering axis with a prefix before each name of a point."""
     if kingpin is None:
         return None
     ends: list[Any] = [

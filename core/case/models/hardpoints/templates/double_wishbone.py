@@ -1,4 +1,6 @@
-"""Double wishbone: two arms, the knuckle between them, a tie rod; and reduced to rods for arms."""
+"""Double wishbone: two arms, the knuckle between them, a tie rod; also with two rods for each
+arm.
+"""
 
 from __future__ import annotations
 
@@ -105,6 +107,4 @@ REDUCED_DOUBLE_WISHBONE = replace(
     optional=(*WHEEL, *spring_roles("knuckle", "Location Upright")),
     bodies=spring_bodies(KNUCKLE),
 )
-"""Arms of no mass, as Project Chrono has them: each is two rods. Spring and damper are on the
-knuckle.
-"""
+"""Massless arms, as in Project Chrono: each is two rods. Spring and damper are on the knuckle."""

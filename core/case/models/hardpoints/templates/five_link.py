@@ -1,5 +1,5 @@
-"""Five links: the knuckle on five rods. An arm with two pivots and one ball is two of them, which
-move the wheel alike.
+"""Five links: the knuckle on five rods. Two rods replace an arm with two pivots and one ball; the
+motion of the wheel is the same.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
-"""McPherson strut: an arm, the knuckle, a strut that slides on the knuckle and turns in its top
-mount, a tie rod.
+"""McPherson strut: an arm, the knuckle, a strut, a tie rod. The strut slides on the knuckle, and
+turns in its top mount.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from .base import (
 
 
 def _joints(at: Mapping[str, Vector]) -> Sequence[Joint]:
-    """The decomposition of SAE 943745: translational and spherical; Chrono's cylindrical and
-    universal moves the wheel alike.
+    """Return the joints. The strut has a translational and a spherical joint, as in SAE 943745;
+    Chrono's cylindrical and universal joints give the same motion of the wheel.
     """
     return (
         Revolute(

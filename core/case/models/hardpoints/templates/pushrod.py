@@ -1,4 +1,4 @@
-"""Double wishbones whose spring and damper are on a rocker, which a pushrod or a pullrod turns."""
+"""Double wishbones with spring and damper on a rocker; a pushrod or a pullrod turns the rocker."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _DAMPER = (
 
 
 def _joints(body: str) -> Callable[[Mapping[str, Vector]], Sequence[Joint]]:
-    """Return the function from places to joints, the pushrod being on a body."""
+    """Return the function from places to joints, for a pushrod on a body."""
 
     def joints(at: Mapping[str, Vector]) -> Sequence[Joint]:
         axis = between(at["rocker_pivot"], at["rocker_axis"])
@@ -43,7 +43,7 @@ def _template(mount: str, body: str, what: str, outer: Vector) -> Template:
 
     Args:
         what: the body, in words.
-        outer: place of the pushrod's joint on it in the sample [m].
+        outer: place of the pushrod's joint on this body in the sample [m].
     """
     role = Role(
         "pushrod_outer",

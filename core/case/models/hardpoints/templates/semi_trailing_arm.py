@@ -1,4 +1,4 @@
-"""Semi-trailing arm: an arm on one oblique hinge carries the wheel."""
+"""Semi-trailing arm: an arm on an oblique hinge carries the wheel."""
 
 from __future__ import annotations
 

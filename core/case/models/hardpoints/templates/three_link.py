@@ -1,4 +1,4 @@
-"""Three links: a trailing arm on a ball of the chassis carries the wheel, two rods hold it."""
+"""Three links: a trailing arm on a ball of the chassis carries the wheel; two rods guide it."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from .base import (
 
 
 def _joints(at: Mapping[str, Vector]) -> Sequence[Joint]:
-    """A rod replaces Chrono's links between a universal joint and a ball, which move the wheel
-    alike.
+    """Return the joints. A rod replaces each of Chrono's links between a universal joint and a
+    ball; the motion of the wheel is the same.
     """
     return (
         Spherical("arm_pivot", GROUND, KNUCKLE, at["arm_pivot"]),
