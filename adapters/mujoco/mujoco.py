@@ -16,7 +16,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -97,6 +97,8 @@ class MuJoCoModel:
     each driver.
     """
 
+    gives_forces: ClassVar[bool] = True
+
     def __init__(self, mj: Any, case: Case) -> None:
         self.case = case
         mechanism, sketch = case.mechanism, Sketch(mj, case.mechanism)
@@ -104,7 +106,7 @@ class MuJoCoModel:
             point.name: sketch.site(sketch.bodies[point.body], point.position)
             for point in mechanism.points
         }
-        loaded = LoadedMuJoCo(mj, case, sketch) if case.forces else None
+        loaded = LoadedMuJoCo(mj, case, sketch) if self.gives_forces and case.forces else None
         self.mj, self.m = mj, sketch.spec.compile()
         self.d = mj.MjData(self.m)
         self.watched = [int(sites[name].id) for name in case.points]

@@ -132,10 +132,15 @@ def projecting() -> Stepping:
     return Stepping("mujoco-projecting", "projecting", 5)
 
 
+class _Massless(MuJoCoModel):
+    # with gravity in the model, MuJoCo's accelerations of sites are less it
+    gives_forces = False
+
+
 class _Steps:
     def __init__(self, mj: Any, case: Case, how: Stepping) -> None:
         case = replace(case, mechanism=jointed(case.mechanism))
-        self.mj, self.how, self.of = mj, how, MuJoCoModel(mj, case)
+        self.mj, self.how, self.of = mj, how, _Massless(mj, case)
         self.start = start_of(self.of, case)
         m = self.m = self.of.m
         self.longest = float(m.opt.timestep)

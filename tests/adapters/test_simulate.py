@@ -95,6 +95,24 @@ def test_the_strut_is_simulated_as_well_as_the_simulator_can(name):
     assert found.outcome is Outcome.PASS or "is off by" in found.message
 
 
+@pytest.mark.parametrize("name", adapters.SIMULATIONS)
+def test_masses_and_gravity_change_no_motion(name):
+    """The motion is prescribed: its outputs are the same bits with outputs of forces and without;
+    MuJoCo's accelerations were less gravity.
+    """
+    engine = simulation(name)
+    case = cases.load("mcpherson_strut_loaded")
+    case = replace(case, sweep=replace(case.sweep, values=case.sweep.values[80:84]))
+    motion = replace(case, outputs=tuple(each for each in case.outputs if each.unit == "m"))
+    assert case.forces
+    assert not motion.forces
+    found, plain = (engine.solve(engine.build(each), each, 1e-12) for each in (case, motion))
+    for point, moved in plain.points.items():
+        for quantity in ("position", "velocity", "acceleration"):
+            here, there = (getattr(each, quantity) for each in (found.points[point], moved))
+            assert (here is None and there is None) or np.array_equal(here, there, equal_nan=True)
+
+
 @pytest.mark.parametrize("name", [name for name in adapters.SIMULATIONS if name != "exudyn-alpha"])
 def test_a_stroke_out_of_reach_ends_and_says_so(name):
     case = strut()
