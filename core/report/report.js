@@ -42,11 +42,19 @@
     box.dataset.drawn = "";
   }
 
-  // What is about to be seen is drawn, so that a report of many cases opens as fast as one of few.
-  const plots = [...document.querySelectorAll(".plot")];
+  // Figures in or near view are drawn, so that a report of many cases opens as fast as one of few:
+  // at once and when something unfolds; the observer, which a busy browser calls late, when the page scrolls.
+  const MARGIN = 600, plots = [...document.querySelectorAll(".plot")];
+  const near = (box) => {
+    const { top, bottom, height } = box.getBoundingClientRect();
+    return height > 0 && bottom > -MARGIN && top < innerHeight + MARGIN && !box.closest("details:not([open])");
+  };
+  const drawNear = () => plots.filter(near).forEach(draw);
+  drawNear();
+  document.addEventListener("toggle", drawNear, true);
   const watch = new IntersectionObserver((seen) => {
     for (const { isIntersecting, target } of seen) if (isIntersecting) draw(target);
-  }, { rootMargin: "600px" });
+  }, { rootMargin: `${MARGIN}px` });
   plots.forEach((box) => watch.observe(box));
 
   for (const button of document.querySelectorAll("[data-save]")) {
