@@ -36,23 +36,9 @@ def error_figure(
         errors = taken(absolute_errors(values, standard), axis.kept, 1.0)
         # three digits are as many as an error deserves, and keep the page small
         rounded = [None if e is None else float(f"{e:.2e}") for e in errors]
-        line = {"width": 1.2, "color": style.colour, "dash": style.dash}
-        marker = {
-            "size": 5,
-            "symbol": style.symbol,
-            "color": style.colour,
-            "maxdisplayed": 3 * MARKERS,
-        }
-        look = {
-            "name": style.name,
-            "uid": style.key,
-            "meta": style.name,
-            "line": line,
-            "marker": marker,
-        }
-        traces.append(
-            {"type": "scatter", "mode": "lines+markers", "x": "driver", "y": rounded, **look}
-        )
+        curve = style.curve("driver", rounded, width=1.2, size=5)
+        curve["marker"]["maxdisplayed"] = 3 * MARKERS
+        traces.append(curve)
     worst = max((deviation for *_, deviation in curves), key=lambda deviation: deviation.max_abs)
     if worst.worst_step < len(axis.values) and 0 < worst.max_abs < math.inf:
         place = {

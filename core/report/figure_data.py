@@ -7,7 +7,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from .error_figure import log_axis
 from .figures import Figure, Style
@@ -66,7 +65,7 @@ def trend_figures(history: Sequence[Past], styles: Mapping[str, Style]) -> dict[
         # a category each: a date would otherwise become a place on a calendar, and runs of one
         # night one point
         curves = [
-            _curve(style, runs, [values.get((style.name, run)) for run in runs]) for style in drawn
+            style.curve(runs, [values.get((style.name, run)) for run in runs]) for style in drawn
         ]
         return {
             "data": curves,
@@ -121,8 +120,7 @@ def precision_figure(efforts: Sequence[Effort], styles: Mapping[str, Style]) -> 
             (each for each in efforts if each.engine == style.name),
             key=lambda each: each.us_per_sample,
         )
-        curve = _curve(
-            style,
+        curve = style.curve(
             [_finite(each.us_per_sample) for each in mine],
             [_finite(each.error) for each in mine],
         )
@@ -135,19 +133,6 @@ def precision_figure(efforts: Sequence[Effort], styles: Mapping[str, Style]) -> 
     return _floored(
         {"data": traces, "layout": {"xaxis": ticked_axis(TIMES, times), "hovermode": "closest"}}
     )
-
-
-def _curve(style: Style, x: Sequence[Any], y: Sequence[float | None]) -> Figure:
-    line = {"width": 1.8, "color": style.colour, "dash": style.dash}
-    marker = {"size": 8, "symbol": style.symbol, "color": style.colour}
-    look = {
-        "name": style.name,
-        "uid": style.key,
-        "meta": style.name,
-        "line": line,
-        "marker": marker,
-    }
-    return {"type": "scatter", "mode": "lines+markers", "x": x, "y": y, **look}
 
 
 def _floored(figure: Figure) -> Figure:

@@ -57,6 +57,22 @@ class Style:
             f"s{k}", name, COLOURS[k], DASHES[index % len(DASHES)], SYMBOLS[index % len(SYMBOLS)]
         )
 
+    def curve(
+        self, x: Any, y: Sequence[float | None], *, width: float = 1.8, size: int = 8
+    ) -> Figure:
+        """Return the trace of a curve with markers, its line and markers of these sizes."""
+        return {
+            "type": "scatter",
+            "mode": "lines+markers",
+            "x": x,
+            "y": y,
+            "name": self.name,
+            "uid": self.key,
+            "meta": self.name,
+            "line": {"width": width, "color": self.colour, "dash": self.dash},
+            "marker": {"size": size, "symbol": self.symbol, "color": self.colour},
+        }
+
 
 def output_figure(
     output: str,

@@ -113,24 +113,8 @@ def _against(
     curves: list[Figure] = []
     for style in styles:
         mine = [(x, y) for name, x, y in points if name == style.name]
-        look: Figure = {
-            "name": style.name,
-            "uid": style.key,
-            "meta": style.name,
-            "line": {"width": 1.8, "color": style.colour, "dash": style.dash},
-            "marker": {"size": 8, "symbol": style.symbol, "color": style.colour},
-        }
         x, y = ([each[k] for each in mine] for k in range(2))
-        curves.append(
-            {
-                "type": "scatter",
-                "mode": "lines+markers",
-                "x": x,
-                "y": y,
-                "hovertemplate": "%{x}: %{y:.3~g} µs",
-                **look,
-            }
-        )
+        curves.append(style.curve(x, y) | {"hovertemplate": "%{x}: %{y:.3~g} µs"})
     axes: Figure = {
         "xaxis": ticked_axis(x_title, [x for _, x, _ in points]),
         "yaxis": ticked_axis(y_title, [y for *_, y in points]),
