@@ -15,9 +15,9 @@ from ..report.progress import complain
 from ..version import VERSION
 from . import execution_options, import_options
 from .registry import House, Status
-from .sweep_inputs import limited, only, replay_problems
+from .sweep_inputs import limited, only
 from .sweep_options import FILES, LIMITS, PART, add_options
-from .sweep_replay import checking_solver, replay
+from .sweep_replay import checking_solver, replay, replay_problems
 
 if TYPE_CHECKING:
     from ..harness.engine import Engine

@@ -1,4 +1,4 @@
-"""What kincheck sweep makes of its options: outputs, limits, and variants to solve again."""
+"""What kincheck sweep makes of its options: outputs and limits."""
 
 from __future__ import annotations
 
@@ -6,25 +6,12 @@ import argparse
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from ..case.variation.modes import Sampling
 from ..errors import unknown
 from ..report.progress import complain
 
 if TYPE_CHECKING:
     from ..case.case import Case
     from ..case.variation.variation import Variation
-
-
-def replay_problems(options: argparse.Namespace) -> list[str]:
-    """Return what keeps variants from being solved again: a Latin hypercube takes their number."""
-    if not options.replay:
-        return []
-    if options.sampling is Sampling.LATIN:
-        if options.samples is None:
-            return ["--replay: a Latin hypercube depends on the number of variants; give --samples"]
-    elif options.samples is not None:
-        return ["--replay: a variant is known by seed and index; leave out --samples"]
-    return []
 
 
 def only(case: Case, names: list[str], problems: list[str]) -> Case:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
+from ..case.variation.modes import Sampling
 from ..errors import KincheckError
 from ..report.progress import complain, lacking, uncompared
 from .registry import House, Status
@@ -13,6 +14,18 @@ if TYPE_CHECKING:
     from ..harness.engine import Engine
     from ..harness.execution import Solver
     from ..studies.tolerance.study import Study
+
+
+def replay_problems(options: argparse.Namespace) -> list[str]:
+    """Return what keeps variants from being solved again: a Latin hypercube takes their number."""
+    if not options.replay:
+        return []
+    if options.sampling is Sampling.LATIN:
+        if options.samples is None:
+            return ["--replay: a Latin hypercube depends on the number of variants; give --samples"]
+    elif options.samples is not None:
+        return ["--replay: a variant is known by seed and index; leave out --samples"]
+    return []
 
 
 def replay(options: argparse.Namespace, house: House, study: Study, engine: Engine | None) -> int:
