@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from ..case.case import Case
 from ..kinematics import NativeSolver, ProgramSize
+from ..trajectory import shown
 
 ORDERS = ("positions only", "and velocities", "and accelerations")
 
@@ -26,7 +27,7 @@ def explain(case: Case) -> list[str]:
     ]
     full = sizes[-1]
     held = [driver.name for driver in mechanism.drivers if driver.name not in moving]
-    unread = [point.name for point in mechanism.points if point.name not in case.points]
+    unread = shown(point.name for point in mechanism.points if point.name not in case.points)
     fixed = [body.name for body in mechanism.bodies if body.fixed]
     grounded = [joint.name for joint in mechanism.grounded]
     lines = [
@@ -46,7 +47,7 @@ def explain(case: Case) -> list[str]:
         (f"  rows solved {full.rows}, redundant and only checked: {_names(full.redundant)}"),
         f"  drivers moving: {_names(moving)}; held, constants: {_names(held)}",
         (
-            f"  points computed: {_names(case.points)}; not read by an output, not computed:"
+            f"  points computed: {_names(shown(case.points))}; not read by an output, not computed:"
             f" {_names(unread)}"
         ),
     ]
