@@ -133,7 +133,7 @@ def projecting() -> Stepping:
 
 
 class _Massless(MuJoCoModel):
-    # with gravity in the model, MuJoCo's accelerations of sites are less it
+    # mj_objectAcceleration subtracts the gravity of the model
     gives_forces = False
 
 

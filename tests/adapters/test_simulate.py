@@ -97,8 +97,8 @@ def test_the_strut_is_simulated_as_well_as_the_simulator_can(name):
 
 @pytest.mark.parametrize("name", adapters.SIMULATIONS)
 def test_masses_and_gravity_change_no_motion(name):
-    """The motion is prescribed: its outputs are the same bits with outputs of forces and without;
-    MuJoCo's accelerations were less gravity.
+    """The motion is prescribed, so its outputs have the same bits with force outputs and without:
+    no acceleration has gravity subtracted.
     """
     engine = simulation(name)
     case = cases.load("mcpherson_strut_loaded")

@@ -11,18 +11,18 @@ def limit_notes(results: SweepResults) -> list[str]:
     lines = ["A variant counts as inside if it is inside the limits at every sample."]
     if any(each.cpk is not None for each in results.limits):
         lines.append(
-            "Cp and Cpk suppose a normal distribution, the last column does not; of each, the least"
-            " over the samples counts."
+            "Cp and Cpk assume a normal distribution; the last column does not. Each index is the"
+            " smallest over the samples."
         )
     if any(each.interval for each in results.limits) and results.sampling != "random":
         lines.append(
-            f"The interval supposes independent variants; with {results.sampling} sampling it is"
-            " mostly wider than it need be."
+            f"The confidence interval assumes independent variants; for {results.sampling}"
+            " sampling it is usually too wide."
         )
     if unknown := max((each.unknown for each in results.limits), default=0):
         lines.append(
-            f"{unknown} variants with missing samples are neither inside nor outside; the yield"
-            " leaves them out."
+            f"{unknown} variants with missing samples are neither inside nor outside, and do not"
+            " count in the yield."
         )
     return lines
 

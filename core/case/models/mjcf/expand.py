@@ -125,7 +125,7 @@ class Expansion:
 
 
 def _near(file: Path, folder: Path) -> bool:
-    """Return whether a file is in a folder or below, or a model in a folder beside that one."""
+    """Return whether a file is in a folder or below, or a model below the folder above."""
     around = folder.parent
     beside = file.suffix.lower() in MODELS and around != around.parent
     return file.is_relative_to(folder) or (beside and file.is_relative_to(around))
