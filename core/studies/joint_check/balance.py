@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ...algebra import quat, rotation_less_identity
 from ...case.case import Case
 from ...mechanism.body import inertia_matrix
 from ...mechanism.loads import SpringDamper
@@ -19,13 +20,8 @@ from .loaded_probe import GRAVITY, Probe
 
 def _turn(motion: BodyMotion) -> Array:
     """Return the rotation body -> global, shape (n, 3, 3)."""
-    e0, x, y, z = motion.p.T
-    rows = (
-        (e0 * e0 + x * x - 0.5, x * y - e0 * z, x * z + e0 * y),
-        (x * y + e0 * z, e0 * e0 + y * y - 0.5, y * z - e0 * x),
-        (x * z - e0 * y, y * z + e0 * x, e0 * e0 + z * z - 0.5),
-    )
-    return 2.0 * np.moveaxis(np.array(rows), 2, 0)
+    change = rotation_less_identity(quat(motion.p.T))
+    return np.eye(3) + np.moveaxis(np.array([[*change.x], [*change.y], [*change.z]]), 2, 0)
 
 
 def _moving(probe: Probe, body: str, point: Any) -> tuple[Array, Array, Array, Array]:

@@ -25,9 +25,9 @@ from .loaded_probe import Probe, solved
 # squared for accelerations, and ten times that.
 LIMIT = 1e-10
 WHY = "round-off over the squared smallest singular value of the probe, relative to the forces"
-# An exact change of units, and a shift by which coordinates lose three digits [m].
+# An exact change of units, and a shift of the probe [m]: its coordinates lose three digits.
 SMALLER, SHIFT = 2.0**-10, 128.0
-PLACE_LIMIT = 1e-7
+PLACE_LIMIT = 1e3 * LIMIT
 
 
 def reactions(probe: Probe, case: Case) -> Iterator[Finding]:
