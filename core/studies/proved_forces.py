@@ -12,9 +12,9 @@ from ..kinematics import EnclosedForces, Enclosure, Proofs
 from .native_error import Column
 
 FORCES_NOTE = (
-    " Forces are those of the solution: the multipliers of the rows solved, the rows left out carry"
-    " nothing. A component is printed where a multiplier of one of a row left out changes it by at"
-    f" most {DETERMINED:g}. Turns of torsional springs are counted as the native engine does."
+    " Forces are those of the solved rows; redundant rows, which are left out, carry nothing. A"
+    " component is printed only if a unit multiplier of a redundant row changes it by at most"
+    f" {DETERMINED:g}. Turns of torsional springs are counted as the native engine counts them."
 )
 
 

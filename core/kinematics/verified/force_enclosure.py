@@ -1,8 +1,8 @@
 """Forces of a proved sample as balls.
 
-The multipliers solve F'^T mu = G with the inverse of F' that the motion is enclosed by; see
-`exact_forces`. Rows left out as redundant carry nothing. What they could carry shows how far each
-force is determined: with the multiplier one of a row left out, the others balance it.
+The multipliers solve F'^T mu = G with the inverse of F' that encloses the motion; see
+`exact_forces`. Redundant rows are left out and carry nothing. To find undetermined forces, each of
+them is given a unit multiplier, and the solved rows balance it: forces that change are undetermined.
 """
 
 from __future__ import annotations
