@@ -2,7 +2,7 @@
 
 The multipliers solve F'^T mu = G with the inverse of F' that encloses the motion; see
 `exact_forces`. Redundant rows are left out and carry nothing. To find undetermined forces, each of
-them is given a unit multiplier, and the solved rows balance it: forces that change are undetermined.
+them is given a unit multiplier, and the solved rows balance it: what changes is undetermined.
 """
 
 from __future__ import annotations
