@@ -9,7 +9,6 @@ from typing import Any, TextIO
 
 from rich.cells import cell_len
 from rich.console import Console
-from rich.padding import Padding
 from rich.text import Text
 
 from ..case.io.escape import visible
@@ -155,7 +154,7 @@ def _print_below_titles(
         for *_, cells in group:
             table.add_row(*cells)
         table.show_header, show_header = show_header, False
-        console.print(Padding(table, (0, 0, 0, 2), expand=False))
+        console.print(terminal.indented(table))
 
 
 def _standard(records: Sequence[Record]) -> str:
