@@ -6,7 +6,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 UV := $(shell command -v uv 2>/dev/null)
 
-.PHONY: run test docs lock fuzz clean
+.PHONY: run test docs lock sizes fuzz clean
 
 run: .venv/ready
 	$(BIN)/kincheck run mcpherson_strut --out report
@@ -59,6 +59,12 @@ lock: .venv/ready
 	$(LOCK) --extra dev pyproject.toml --output-file requirements.lock
 	$(LOCK) --extra engines --extra fast --extra proofs --extra yaml --extra parquet --constraint requirements.lock \
 		pyproject.toml --output-file requirements-runtime.lock
+
+# What an installation without extras and with some takes on the disk [MB], for docs/pages/start/install.md.
+sizes:
+	for extras in '' '[engines]' '[all]' '[all-engines]'; do \
+		folder=$$(mktemp -d) && $(PYTHON) -m venv $$folder && $$folder/bin/python -m pip install --quiet ".$$extras" \
+		&& echo "kincheck$$extras $$(du -sm $$folder | cut -f1) MB"; rm -rf $$folder; done
 
 # An hour on each reader.
 fuzz: .venv/ready

@@ -166,6 +166,15 @@ class Case:
     angle_unit: str = "rad"
     assembly: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        """Return name, truth, sweep and outputs in one line."""
+        values = self.sweep.values
+        return (
+            f"<Case: {self.name} ({self.truth.replace('_', ' ')}); {len(values)} samples of"
+            f" {self.sweep.driver}, {values[0]:g} to {values[-1]:g}; outputs:"
+            f" {', '.join(output.name for output in self.outputs) or 'none'}>"
+        )
+
     @property
     def points(self) -> tuple[str, ...]:
         """Names of the points that outputs read; no other motion is needed."""

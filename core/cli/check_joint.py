@@ -1,4 +1,4 @@
-"""kincheck check-joint: check a user's joint type."""
+"""kincheck check-joint: check a joint type, a user's or a built-in one."""
 
 from __future__ import annotations
 
@@ -15,13 +15,16 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     checking: argparse.ArgumentParser
     checking = commands.add_parser(
-        "check-joint", help="check a joint type of your own", description=_check_joint.__doc__
+        "check-joint",
+        help="check a joint type of your own, or a built-in one",
+        description=_check_joint.__doc__,
     )
     checking.set_defaults(do=_check_joint)
     checking.add_argument(
         "joint",
-        metavar="MODULE:CLASS",
-        help="the class, in a module of this folder or an installed one",
+        metavar="JOINT",
+        help="a class as MODULE:CLASS, in a module of this folder or an installed one; or a"
+        " built-in type, such as revolute",
     )
     checking.add_argument(
         "--seed",
@@ -38,10 +41,10 @@ def _check_joint(options: argparse.Namespace, house: House) -> int:
     in every engine.
     """
     from ..studies.joint_check.check_joint import check_joint
-    from .joint_loading import load_joint
+    from .joint_loading import named_joint
 
     report = check_joint(
-        load_joint(options.joint), seed=options.seed, engines=[*map(house.engine, house.engines)]
+        named_joint(options.joint), seed=options.seed, engines=[*map(house.engine, house.engines)]
     )
     report.print(sys.stdout, quiet=options.quiet)
     return Status.WITHIN if report.passed else Status.DEVIATES

@@ -42,6 +42,7 @@ def _complete(options: argparse.Namespace, house: House) -> int:
     import shtab
 
     from ..case.models.hardpoints.templates import TEMPLATES
+    from ..joints import Joint
     from ..studies.stress.families import Family
     from .main import parser
 
@@ -50,6 +51,7 @@ def _complete(options: argparse.Namespace, house: House) -> int:
         "family": [*Family.registry],
         "template": [*TEMPLATES],
         "to": [*house.writers],
+        "joint": sorted(Joint.registry),
         "export": [*house.writers],
     }
     found = parser([])

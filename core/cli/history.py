@@ -187,26 +187,29 @@ def _print_trends(history: History) -> None:
     from ..history.regression.change_points import steps
     from ..report.regression_labels import step_says
     from ..report.terminal import columns, page
-    from ..report.trends import largest_length, run_name
+    from ..report.trends import largest_errors, run_name
 
     console = page(None)
     for (case, engine, mode), entries in history.pairs.items():
+        rows = [history.runs[entry.run] for entry in entries]
+        errors = [
+            largest_errors(entry, case, row) for entry, row in zip(entries, rows, strict=True)
+        ]
+        units = [*dict.fromkeys(unit for each in errors for unit in each)] or ["m"]
         table = columns(
             "run",
             "version",
             "outcome",
-            ">error m",
+            *(f">error\n{unit}" for unit in units),
             ">us/step",
             title=f"{case} · {product(engine, mode)}",
         )
-        for entry in entries:
-            row = history.runs[entry.run]
-            error = largest_length(entry, case, row)
+        for row, entry, error in zip(rows, entries, errors, strict=True):
             table.add_row(
                 run_name(row),
                 entry.version or "–",
                 entry.outcome.shown,
-                number(error),
+                *(number(error.get(unit)) for unit in units),
                 number(entry.us_per_step),
             )
         console.print(table)

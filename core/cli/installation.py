@@ -47,6 +47,7 @@ MODULES = {
     "dartpy": "dartpy",
     "opensim": "opensim",
 }
+LIBRARIES = "of Debian: libgomp1 for Pinocchio, libgl1 and libx11-6 for Exudyn"
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
 
@@ -203,9 +204,16 @@ def _imported(found: Sequence[Part], modules: Mapping[str, str]) -> list[Part]:
     result: list[Part] = []
     for part in found:
         problem = _ended(running[part.name]) if part.name in running else part.problem
-        remedy = part.remedy or (f"pip install --force-reinstall {part.name}" if problem else "")
+        remedy = part.remedy or (_repair(part.name, problem) if problem else "")
         result.append(msgspec.structs.replace(part, problem=problem, remedy=remedy))
     return result
+
+
+def _repair(name: str, problem: str) -> str:
+    """Return the remedy for a part that is installed and cannot be imported."""
+    if library := re.search(r"(\S+): cannot open shared object file", problem):
+        return f"install the system's package with {library[1]} ({LIBRARIES})"
+    return f"pip install --force-reinstall {name}"
 
 
 def _ended(importing: subprocess.Popen[str]) -> str:

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
-from ..errors import KincheckError
+from ..errors import KincheckError, unknown
 from ..joints import Coupler, Joint
 from .class_loading import load_named
 
@@ -19,6 +19,27 @@ belong to the user.
 
 def _is_joint(each: object) -> bool:
     return isinstance(each, type) and issubclass(each, Joint) and each is not Joint
+
+
+def named_joint(where: str) -> type[Joint]:
+    """Return the joint class at MODULE:CLASS, or the built-in one of this type.
+
+    Raises:
+        KincheckError: there is no such type, or as `load_joint` has it.
+    """
+    if where in Joint.registry:
+        return Joint.registry[where]
+    if ":" in where:
+        return load_joint(where)
+    if where in Coupler.registry:
+        raise KincheckError(
+            f"{where!r} couples two other joints; check-joint checks those between two bodies:"
+            f" {', '.join(sorted(Joint.registry))}"
+        )
+    raise KincheckError(
+        f"{unknown('joint type', where, sorted(Joint.registry))}; write MODULE:CLASS"
+        " for a class of your own, such as my_joint:MyJoint for a class in my_joint.py"
+    )
 
 
 def load_joint(where: str) -> type[Joint]:

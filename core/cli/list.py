@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
+import re
+import textwrap
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -12,8 +14,14 @@ from .registry import House, Status, add_joint_types
 from .verbosity import add_verbosity
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from ..harness.engine import Engine
 
+SOURCE_WIDTH = 100
+"""Characters of a line of the docstrings that `--schema` prints."""
+BROKEN = 96
+"""Characters, with the next word, from which such a line may have been broken."""
 CUT = {"no_wrap": True, "overflow": "ellipsis", "crop": True}
 
 
@@ -57,14 +65,7 @@ def _list(options: argparse.Namespace, house: House) -> int:
     how: Any = {"soft_wrap": True} if options.verbose or not console.is_terminal else CUT
     tell = partial(console.print, **how)
     if options.schema or options.joints or options.outputs:
-        from ..case.io.catalogue import catalogue, output_catalogue
-
-        listed = [*(_references() if options.schema else ())]
-        listed += [
-            *(catalogue() if options.joints else ()),
-            *(output_catalogue() if options.outputs else ()),
-        ]
-        console.print(*listed, sep="\n", soft_wrap=True)
+        _print_references(options, console)
         return Status.WITHIN
     cases = house.cases()
     if options.quiet:
@@ -87,7 +88,7 @@ def _list(options: argparse.Namespace, house: House) -> int:
             if version is None
             else f"{version}  {engine.mode}, loop: {engine.loop}"
         )
-        tell(f"  {engine.name:{width}}  {state}")
+        console.print(f"  {engine.name:{width}}  {state}", soft_wrap=True)
     return Status.WITHIN
 
 
@@ -98,11 +99,78 @@ def _version(engine: Engine) -> str | None:
     return installed_version(engine.name) if is_extra(engine.name) else versions([engine])[0]
 
 
-def _references() -> Iterator[str]:
-    """Yield the descriptions of the keys of case and variation files, from their readers."""
+def _print_references(options: argparse.Namespace, console: Console) -> None:
+    """Print keys and types: whole lines for a pipe, and for a terminal what fits it."""
+    from ..case.io import catalogue
+    from ..report.terminal import LOG_WIDTH, indented, unheaded
+
+    if options.schema:
+        lines = [*_keys()]
+        if console.width < SOURCE_WIDTH:
+            lines = [part for line in _joined(lines) for part in _hung(line, console.width)]
+        console.print(*lines, sep="\n", soft_wrap=True)
+    if console.width >= LOG_WIDTH:
+        lines = [
+            *(catalogue.catalogue() if options.joints else ()),
+            *(catalogue.output_catalogue() if options.outputs else ()),
+        ]
+        if lines:
+            console.print(*lines, sep="\n", soft_wrap=True)
+        return
+    for wanted, remarks, tables in (
+        (options.joints, catalogue.ON_TYPES, catalogue.type_tables),
+        (options.outputs, (), catalogue.output_tables),
+    ):
+        if wanted:
+            console.print(*remarks, sep="\n")
+        for heading, rows in tables().items() if wanted else ():
+            console.print(heading)
+            console.print(indented(unheaded(rows)))
+    if options.outputs:
+        console.print(catalogue.ON_OUTPUTS)
+
+
+def _keys() -> Iterator[str]:
+    """Yield the lines on the keys of case and variation files, from their readers."""
     from ..case.io import loads, schema
     from ..case.variation import variation_schema
 
     for module in (schema, loads, variation_schema):
         what, _, keys = (module.__doc__ or "").partition("Reference. ")
-        yield f"{what.splitlines()[0]}\n\n{keys}"
+        yield from (what.splitlines()[0], "", *keys.splitlines(), "")
+
+
+def _joined(lines: Sequence[str]) -> list[str]:
+    """Return the lines with those joined that only the width of the source file broke: the next
+    one stands below the text, begins no key, and its first word had hardly any room.
+    """
+    found: list[str] = []
+    last = ""
+    for line in lines:
+        text = line.lstrip()
+        new = not text or re.match(r"\(?\w+\)? = ", text)
+        broken = not new and last and len(last) + 1 + len(text.split()[0]) > BROKEN
+        if broken and len(line) - len(text) == _start(found[-1]):
+            found[-1] += f" {text}"
+        else:
+            found.append(line)
+        last = line
+    return found
+
+
+def _start(line: str) -> int:
+    """Return the column of a line's text: behind its indentation, or a key and the gap after it."""
+    found = re.match(r" *(?:\S.*?\S {2,}(?=\S))?", line)
+    return found.end() if found else 0
+
+
+def _hung(line: str, width: int) -> list[str]:
+    """Return the line in parts that fit the width, the further ones below the text."""
+    parts = textwrap.wrap(
+        line,
+        width,
+        subsequent_indent=" " * _start(line),
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    return parts or [""]

@@ -5,10 +5,11 @@ engine's errors against them.
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..case.io.escape import file_name
+from ..case.io.escape import file_name, visible
 from ..errors import KincheckError
 from .option_types import whole
 from .registry import House, Status, add_joint_types
@@ -17,6 +18,7 @@ from .verbosity import add_verbosity
 
 if TYPE_CHECKING:
     from ..case.io.reference_file import Reference
+    from ..report.fitting_table import FittingTable
     from ..studies.native_error import NativeError
 
 # A double has 17 digits; beyond 1000 digits only the time grows.
@@ -81,6 +83,7 @@ def _prove(options: argparse.Namespace, house: House) -> int:
     """
     from ..case.io.atomic_files import unwritable, write
     from ..harness.record import to_json
+    from ..report.terminal import indented, page
     from ..studies.verified_reference import prove_case
 
     unread: dict[str, str] = {}
@@ -105,15 +108,17 @@ def _prove(options: argparse.Namespace, house: House) -> int:
         numbers = "decimal" if options.decimal else "double"
         found, errors = prove_case(case, digits=options.digits, numbers=numbers, tol=TOL)
         complete &= found.proved == len(found.samples)
-        lines = _lines(found, errors, len(found.samples) if options.verbose else NAMED)
+        lines = _lines(found, len(found.samples) if options.verbose else NAMED)
         print(*(lines[:1] if options.quiet else lines), sep="\n", flush=True)
+        if errors and not options.quiet:
+            page(None).print(indented(_table(errors)))
         if options.out is not None:
             write("--out", options.out / name, to_json(found))
     return Status.WITHIN if complete else Status.DEVIATES
 
 
-def _lines(found: Reference, errors: list[NativeError], named: int) -> list[str]:
-    """Return the lines of a report: proved and unproved samples, and the native engine's errors."""
+def _lines(found: Reference, named: int) -> list[str]:
+    """Return the lines of a report on proved and unproved samples."""
     count, proved = len(found.samples), [sample for sample in found.samples if sample.proved]
     each = 1e3 * found.seconds / max(1, count)
     lines = [
@@ -148,25 +153,26 @@ def _lines(found: Reference, errors: list[NativeError], named: int) -> list[str]
         for words in dict.fromkeys(each.signs for each in found.outputs.values())
         if words
     ]
-    if errors:
-        wide = max(len(error.output) for error in errors)
-        from ..trajectory import QUANTITIES
-
-        heads = ("native error", *QUANTITIES)
-        lines.append(f"  {heads[0]:{wide}}" + "".join(f"  {head:>20}" for head in heads[1:]))
-        for error in errors:
-            cells = (_cell(*pair) for pair in zip(error.largest, error.ulps, strict=True))
-            lines.append(
-                f"  {error.output:{wide}}"
-                + "".join(f"  {cell:>20}" for cell in cells)
-                + f"  {error.unit}"
-            )
     return lines
+
+
+def _table(errors: Sequence[NativeError]) -> FittingTable:
+    """Return the native engine's errors."""
+    from rich.text import Text
+
+    from ..report.terminal import columns
+    from ..trajectory import QUANTITIES
+
+    table = columns("native error", *(f">{quantity}" for quantity in QUANTITIES), "unit")
+    for error in errors:
+        cells = (_cell(*pair) for pair in zip(error.largest, error.ulps, strict=True))
+        table.add_row(*map(Text, (visible(error.output), *cells, visible(error.unit))))
+    return table
 
 
 def _cell(largest: float | None, ulps: float | None) -> str:
     if largest is None:
-        return "-"
+        return "–"
     return f"{largest:.1e}" + (f" {ulps:6.1f} ulp" if ulps is not None else "")
 
 

@@ -97,6 +97,7 @@ def _stress(options: argparse.Namespace, house: House) -> int:
     from ..case.io.atomic_files import write
     from ..harness.standard import STANDARD
     from ..report.sections import deliver
+    from ..report.terminal import page, unheaded
     from ..studies.stress.families import Family
     from ..studies.stress.report import idle, markdown, report
     from ..studies.stress.verdicts import BAD
@@ -107,9 +108,8 @@ def _stress(options: argparse.Namespace, house: House) -> int:
             options, [name for name in vars(options) if name not in ("list", "command", "do")]
         ):
             raise KincheckError(f"--list runs nothing; leave out {found}")
-        width = max(map(len, Family.registry))
-        for name, family in Family.registry.items():
-            print(f"{name:{width}}  {family.about}")
+        rows = [(name, family.about) for name, family in Family.registry.items()]
+        page(None).print(unheaded(rows))
         return Status.WITHIN
     problems: list[str] = []
     engines = house.find_engines(options.engine or [STANDARD], problems, options.mode)

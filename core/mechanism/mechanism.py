@@ -18,6 +18,7 @@ from ..input_checks import require_finite, triple
 from ..joints.base import Joint, Kind, unit
 from ..joints.coupler import Coupler
 from ..joints.gap import gap
+from ..trajectory import MARKER
 from .body import Body, Vector
 from .drivers import Driver, JointDriver, PointCoordinate
 from .loads import ForceElement, TorsionSpringDamper
@@ -122,6 +123,26 @@ class Mechanism:
                 _known(f"driver {driver.name!r}", "joint", driver.joint, self._named["joints"], key)
                 driver.check(self.joint(driver.joint))
         self._check_loads(known)
+
+    def __repr__(self) -> str:
+        """Return the names of the members in one line; a point that the case reader adds is none
+        of the user's.
+        """
+        named = {
+            "bodies": self.bodies,
+            "joints": self.joints,
+            "grounded": self.grounded,
+            "couplers": self.couplers,
+            "points": [each for each in self.points if not each.name.startswith(MARKER)],
+            "drivers": self.drivers,
+            "forces": self.forces,
+        }
+        told = [
+            f"{what}: {', '.join(each.name for each in found)}"
+            for what, found in named.items()
+            if found
+        ]
+        return f"<Mechanism: {'; '.join([self.name, *told])}>"
 
     def _check_loads(self, bodies: Mapping[str, None]) -> None:
         what = "gravity"

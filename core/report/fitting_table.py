@@ -20,7 +20,7 @@ class FittingTable(Table):
     """A table without lines that breaks no word.
 
     Where the console is too narrow for all columns, each row is a block: its first cell, and below
-    it the others with their heads.
+    it the others with their heads. A first cell that is a number has its head too.
     """
 
     def __init__(self, *, title: str | None = None) -> None:
@@ -60,7 +60,9 @@ class FittingTable(Table):
         for number, cells in enumerate(zip(*(each.cells for each in self.columns), strict=True)):
             style = self.rows[number].style or ""
             first, *others = map(_text, cells)
-            if first:
+            if first and self.columns[0].justify == "right":
+                yield Text.assemble((f"{heads[0]} ", "dim"), first, style=style)
+            elif first:
                 yield Text.assemble(first, style=style)
             line = Text(style=style)
             for head, cell in zip(heads[1:], others, strict=True):

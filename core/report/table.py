@@ -9,7 +9,6 @@ from typing import Any, TextIO
 
 from rich.cells import cell_len
 from rich.console import Console
-from rich.padding import Padding
 from rich.text import Text
 
 from ..case.io.escape import visible
@@ -31,6 +30,7 @@ HEADS = (
     *(f">error\n{motion_unit(LENGTH, quantity)}" for quantity in QUANTITIES),
     ">us/step",
 )
+OUTPUT_HEADS = ("output", *(f">{quantity}" for quantity in QUANTITIES), "unit")
 
 
 def print_table(results: Results, file: TextIO) -> None:
@@ -55,31 +55,52 @@ def print_table(results: Results, file: TextIO) -> None:
 def print_outputs(results: Results, file: TextIO) -> None:
     """Print a line for each output of each record, its largest errors and their tolerances, the
     reasons of those that are missing, then what `print_table` prints.
+
+    Where the console is too narrow, the outputs stand below their case and engine.
     """
     console = terminal.console(file)
-    table = terminal.columns(
-        "case", "engine", "output", *(f">{each}" for each in QUANTITIES), "unit"
-    )
+    rows = [
+        ((record.case, record.engine), _of_output(record, name))
+        for record in results.records
+        for name in record.errors
+    ]
+    table = terminal.columns("case", "engine", *OUTPUT_HEADS)
+    for names, cells in rows:
+        table.add_row(*(Text(visible(each)) for each in names), *cells)
+    if table.natural_width(console, console.options) <= console.width:
+        console.print(table)
+    else:
+        titled = [(" · ".join(names), "", cells) for names, cells in rows]
+        _print_below_titles(titled, OUTPUT_HEADS, console)
     for record in results.records:
-        for name, errors in record.errors.items():
-            unit = record.outputs[name].unit if name in record.outputs else LENGTH
-            cells = (_of_tolerance(getattr(errors, quantity)) for quantity in QUANTITIES)
-            names = (record.case, record.engine, name)
-            table.add_row(*(Text(visible(each)) for each in names), *cells, unit)
-    console.print(table)
-    for record in results.records:
-        for reason, outputs in _uncompared(record).items():
+        for reason, outputs in _missing(record).items():
             line = f"–: {record.case} · {record.engine}: {', '.join(outputs)}: {reason}"
             console.print(Text(visible(line)), soft_wrap=True)
     print_table(results, file)
 
 
-def _uncompared(record: Record) -> dict[str, list[str]]:
-    """Return the reasons why quantities are not compared, each with its outputs."""
+def _of_output(record: Record, name: str) -> tuple[Text, ...]:
+    """Return the cells of `OUTPUT_HEADS`."""
+    errors = record.errors[name]
+    unit = record.outputs[name].unit if name in record.outputs else LENGTH
+    cells = (_of_tolerance(getattr(errors, quantity)) for quantity in QUANTITIES)
+    return Text(visible(name)), *cells, Text(visible(unit))
+
+
+def _missing(record: Record) -> dict[str, list[str]]:
+    """Return the reasons why quantities are not compared or have no values, each with its outputs.
+
+    What a message on the comparison repeats of the values is left out.
+    """
     found: dict[str, list[str]] = {}
     for name, errors in record.errors.items():
         if errors.reason:
             found.setdefault(errors.reason, []).append(name)
+        output = record.outputs.get(name)
+        if output is None or not output.reason or None not in output.position:
+            continue
+        if not (errors.reason and errors.reason in output.reason):
+            found.setdefault(output.reason, []).append(name)
     return found
 
 
@@ -104,22 +125,36 @@ def _cells(record: Record, several: bool) -> tuple[Text, ...]:
 
 
 def _print_by_case(rows: Sequence[tuple[Record, tuple[Text, ...]]], console: Console) -> None:
-    """Print the records of each case below its name and standard, all in the same columns."""
-    heads = [head.removeprefix(">").split("\n") for head in HEADS]
-    texts = [[*lines, *(cells[k].plain for _, cells in rows)] for k, lines in enumerate(heads)]
+    """Print the records of each case below its name and standard."""
+    standards = {
+        case: _standard([record for record, _ in group])
+        for case, group in groupby(rows, lambda row: row[0].case)
+    }
+    titled = [(record.case, standards[record.case], cells) for record, cells in rows]
+    _print_below_titles(titled, HEADS, console)
+
+
+def _print_below_titles(
+    rows: Sequence[tuple[str, str, tuple[Text, ...]]], heads: Sequence[str], console: Console
+) -> None:
+    """Print rows below their titles and remarks, all in the same columns."""
+    lines = [head.removeprefix(">").split("\n") for head in heads]
+    texts = [[*head, *(cells[k].plain for *_, cells in rows)] for k, head in enumerate(lines)]
     widths = [max(map(cell_len, column)) for column in texts]
     show_header = True
-    for case, group in groupby(rows, lambda row: row[0].case):
-        found = [*group]
-        standard = _standard([record for record, _ in found])
-        console.print(Text.assemble((visible(case), "bold"), "  ", (visible(standard), "dim")))
-        table = terminal.columns(*HEADS)
+    for (title, remark), group in groupby(rows, lambda row: row[:2]):
+        console.print(
+            Text.assemble(
+                (visible(title), "bold"), "  " if remark else "", (visible(remark), "dim")
+            )
+        )
+        table = terminal.columns(*heads)
         for column, width in zip(table.columns, widths, strict=True):
             column.min_width = width
-        for _, cells in found:
+        for *_, cells in group:
             table.add_row(*cells)
         table.show_header, show_header = show_header, False
-        console.print(Padding(table, (0, 0, 0, 2), expand=False))
+        console.print(terminal.indented(table))
 
 
 def _standard(records: Sequence[Record]) -> str:

@@ -12,6 +12,7 @@ from typing import IO, Any, TextIO
 
 import msgspec
 from rich.console import Console
+from rich.padding import Padding
 from rich.text import Text
 
 from ..case.io.atomic_files import to_standard_output, write
@@ -73,6 +74,20 @@ def columns(*heads: str, title: str | None = None) -> FittingTable:
             no_wrap=right,
         )
     return table
+
+
+def unheaded(rows: Sequence[Sequence[str]]) -> FittingTable:
+    """Return rows of as many cells each, without heads, as a table that fits the console."""
+    table = columns(*[""] * max(map(len, rows), default=0))
+    table.show_header = False
+    for row in rows:
+        table.add_row(*map(Text, row))
+    return table
+
+
+def indented(table: FittingTable) -> Padding:
+    """Return the table below a line of text."""
+    return Padding(table, (0, 0, 0, 2), expand=False)
 
 
 def write_json(found: msgspec.Struct | Mapping[str, Any], json: str | None) -> None:

@@ -4,7 +4,7 @@ the runs.
 
 from __future__ import annotations
 
-from ..harness.labels import product
+from ..harness.labels import motion_unit, product
 from ..history.queries import Entry, History, unit_of
 from ..history.store import RunRow
 from .figure_data import Past
@@ -32,9 +32,14 @@ def run_name(row: RunRow) -> str:
 
 def largest_length(entry: Entry, case: str, row: RunRow) -> float | None:
     """Return the largest position error of the outputs in metres [m]; None if none was compared."""
-    lengths = [
-        deviations.position.max_abs
-        for name, deviations in entry.errors.items()
-        if deviations.position is not None and unit_of(row, case, name) == "m"
-    ]
-    return max(lengths, default=None)
+    return largest_errors(entry, case, row).get("m")
+
+
+def largest_errors(entry: Entry, case: str, row: RunRow) -> dict[str, float]:
+    """Return the largest error of the outputs by unit: of values, velocities and accelerations."""
+    found: dict[str, float] = {}
+    for name, deviations in entry.errors.items():
+        for quantity, deviation in deviations.items():
+            unit = motion_unit(unit_of(row, case, name), quantity) or "1"
+            found[unit] = max(found.get(unit, 0.0), deviation.max_abs)
+    return found

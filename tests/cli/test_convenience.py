@@ -8,7 +8,9 @@ import sys
 
 import pytest
 from kincheck import cases
+from kincheck.core import Revolute
 from kincheck.core.cli import main
+from kincheck.core.cli.joint_loading import named_joint
 from kincheck.core.cli.option_types import whole
 from kincheck.core.harness.provenance import truth_of
 from kincheck.core.report.meter import Meter
@@ -159,3 +161,116 @@ def test_bash_completes_commands_cases_engines_and_options(tmp_path, capsys):
             ["bash", "-c", TRY.format(script=script, words=words)], capture_output=True, text=True
         )
         assert sorted(told.stdout.split()) == sorted(expected.split())
+
+
+@pytest.mark.parametrize(
+    "argv",
+    [["list", "--schema"], ["list", "--joints"], ["list", "--outputs"], ["stress", "--list"]],
+    ids=" ".join,
+)
+def test_lists_fit_the_console_and_keep_every_word(argv, capsys, monkeypatch):
+    def words(width):
+        monkeypatch.setenv("COLUMNS", str(width))
+        assert main.main(argv) == 0
+        lines = capsys.readouterr().out.splitlines()
+        assert max(map(len, lines)) <= width or width == 200
+        return sorted(" ".join(lines).split())
+
+    assert words(60) == words(80) == words(100) == words(200)
+
+
+@pytest.mark.parametrize("width", [60, 80, 100])
+def test_the_tables_of_every_output_and_of_its_history_fit(
+    kincheck_main, tmp_path, capsys, monkeypatch, width
+):
+    monkeypatch.setenv("COLUMNS", str(width))
+    history = ("--history", tmp_path / "runs.sqlite")
+    engines = [RIGHT, Fake("a-twin-with-a-long-name")]
+    assert kincheck_main("run", "crank", "--verbose", *history, engines=engines) == 0
+    out = capsys.readouterr().out
+    assert kincheck_main("history", *history, engines=engines) == 0
+    assert kincheck_main("history", "--case", "crank", *history, engines=engines) == 0
+    assert max(map(len, (out + capsys.readouterr().out).splitlines())) <= width
+    assert out.count("0.0e+00 of ") == 12  # two outputs of two engines, three orders each
+
+
+UNDETERMINED = """
+schema = "kincheck-case/1"
+name = "two_hinges"
+source = "made up for this test"
+gravity = [0, 0, -9.81]
+
+[bodies.door]
+mass = 2.0
+center_of_mass = [0.5, 0, 0]
+
+[joints.upper]
+type = "revolute"
+bodies = ["ground", "door"]
+point = [0, 1, 0]
+axis = [0, 1, 0]
+
+[joints.lower]
+type = "revolute"
+bodies = ["ground", "door"]
+point = [0, 0, 0]
+axis = [0, 1, 0]
+
+[drivers.turn]
+type = "joint_angle"
+joint = "upper"
+
+[sweep]
+driver = "turn"
+start = 0
+stop = 1
+steps = 3
+
+[outputs.hinge]
+type = "joint_force"
+joint = "upper"
+component = "z"
+"""
+VARIED = """
+schema = "kincheck-vary/1"
+mode = "monte_carlo"
+
+[hardpoints.mass]
+at = "bodies.door.mass"
+half_width = 0.1
+"""
+
+
+def test_run_and_study_say_why_a_force_has_no_value(tmp_path, capsys):
+    (case := tmp_path / "two_hinges.toml").write_text(UNDETERMINED)
+    main.main(["run", str(case), "--engine", "native", "-v"])
+    assert "hinge: samples without a value are null; rigid bodies do not" in capsys.readouterr().out
+    (varied := tmp_path / "mass.toml").write_text(VARIED)
+    assert main.main(["sweep", str(case), "--vary", str(varied), "--samples", "4", "-q"]) == 0
+    out = capsys.readouterr().out
+    assert "no variant has a value of hinge; kincheck run CASE --engine native --verbose" in out
+    assert "None" not in out
+
+
+def test_mechanisms_and_cases_print_as_one_line_without_points_of_the_reader():
+    case = cases.load("mcpherson_suspension")
+    assert any(point.name.startswith("~") for point in case.mechanism.points)
+    assert "~" not in repr(case.mechanism)
+    assert "strut_slide" in repr(case.mechanism)
+    assert repr(case).startswith("<Case: mcpherson_suspension (in house oracle); 33 samples of ")
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("revolut", "did you mean 'revolute'?; write MODULE:CLASS"),
+        ("gear", "'gear' couples two other joints"),
+    ],
+)
+def test_check_joint_knows_the_names_of_built_in_joints(name, said, capsys):
+    assert main.main(["check-joint", name]) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_a_built_in_joint_is_named_by_its_type():
+    assert named_joint("revolute") is Revolute

@@ -114,7 +114,10 @@ def test_trends_of_a_pair_and_its_steps(path, capsys):
     assert history(path, "--case", "first", "--engine", "mujoco") == 0
     out = capsys.readouterr().out
     assert out.splitlines()[0].strip() == "first · mujoco"
-    assert "2026-11-09 03:00 #9  4.0.0    pass       5e-13 " in out
+    assert " ".join(out.split()).startswith(
+        "first · mujoco error error error run version outcome m m/s m/s² us/step"
+    )
+    assert "2026-11-09 03:00 #9  4.0.0    pass     5e-13 " in out
     assert "worse: first · mujoco: time: " in out
     assert "since run 7 (2026-11-07 03:00); after run 6: numpy 2.0.0 → 2.1.0, commit" in out
     assert "second" not in out

@@ -121,6 +121,13 @@ def test_what_is_installed_and_broken_is_told_from_what_works(imported, said, mo
     assert found.remedy == "pip install --force-reinstall numpy"
 
 
+def test_a_missing_system_library_is_named():
+    part = installation.Part("pin", "4.1", "engine", False, "", "")
+    broken = {"pin": "ctypes; ctypes.CDLL('libnothing.so.7')"}
+    (found,) = installation._imported([part], broken)
+    assert found.remedy.startswith("install the system's package with libnothing.so.7 (of Debian: ")
+
+
 def test_a_sound_module_has_no_problem():
     part = installation.Part("msgspec", "1.0", "kincheck", True, "", "")
     assert installation._imported([part], {}) == [part]

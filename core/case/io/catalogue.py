@@ -35,24 +35,28 @@ _SENTENCES = re.compile(r"(?<=[^.]\.) (?=[A-Z])")
 
 Rows: TypeAlias = list[tuple[str, ...]]
 
+ON_TYPES = (
+    "points and directions are [x, y, z], global, at the design; of points and axes there is one on"
+    " each body",
+    "keys in brackets may be left out; body i is the first, j the second",
+)
+ON_OUTPUTS = (
+    "each with its derivative by wheel travel, jounce: NAME.per_travel [unit/m]; the table"
+    " [suspension] says of which wheel"
+)
+"""Remarks on the tables."""
+
 
 def catalogue() -> Iterator[str]:
     """Yield lines to print, one for each type of joint, coupler, driver, motion and force."""
-    yield (
-        "points and directions are [x, y, z], global, at the design; of points and axes there is"
-        " one on each body"
-    )
-    yield "keys in brackets may be left out; body i is the first, j the second"
+    yield from ON_TYPES
     yield from _printed(type_tables())
 
 
 def output_catalogue() -> Iterator[str]:
     """Yield lines of the output types: unit, keys, needs from [suspension], and signs."""
     yield from _printed(output_tables())
-    yield (
-        "each with its derivative by wheel travel, jounce: NAME.per_travel [unit/m]; the table"
-        " [suspension] says of which wheel"
-    )
+    yield ON_OUTPUTS
 
 
 def type_tables() -> dict[str, Rows]:

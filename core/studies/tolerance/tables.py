@@ -46,12 +46,13 @@ def _extremes(results: SweepResults) -> FittingTable:
         unit, scale = results.shown_unit(each.unit)
         bands = zip(each.quantiles["0.01"], each.quantiles["0.99"], strict=True)
         widths = [high - low for low, high in bands if low is not None and high is not None]
-        top = max((g for g in results.gradients if g.output == name), key=effect, default=None)
+        known = (g for g in results.gradients if g.output == name and g.largest is not None)
+        top = max(known, key=effect, default=None)
         table.add_row(
             Text(name),
             unit,
-            *(_shown(scale, min(_known(each.min), default=None)), str(each.min_variant)),
-            *(_shown(scale, max(_known(each.max), default=None)), str(each.max_variant)),
+            *(_shown(scale, min(_known(each.min), default=None)), _count(each.min_variant)),
+            *(_shown(scale, max(_known(each.max), default=None)), _count(each.max_variant)),
             _shown(scale, max(_known(each.standard_deviation), default=None)),
             _shown(scale, max(widths, default=None)),
             Text("–" if top is None else f"{top.coordinate} {_shown(scale, effect(top))}"),
@@ -122,6 +123,10 @@ def _shown(scale: float, value: float | None) -> str:
     return number(None if value is None else scale * value)
 
 
+def _count(number: int | None) -> str:
+    return "–" if number is None else str(number)
+
+
 def remarks(results: SweepResults) -> list[str]:
     """Return remarks on the numbers, a line each."""
     lines = [f"note: {note}" for _, note in notes(results.run)]
@@ -158,6 +163,13 @@ def remarks(results: SweepResults) -> list[str]:
         lines.append(
             f"a Sobol sequence is balanced at powers of two; {results.asked} is none, so the means"
             f" converge more slowly: {1 << results.asked.bit_length()} would be"
+        )
+    if len(results.failed) < results.samples and (
+        empty := [name for name, each in results.outputs.items() if not any(each.count)]
+    ):
+        lines.append(
+            f"no variant has a value of {', '.join(empty)}; kincheck run CASE --engine native"
+            " --verbose says why"
         )
     if results.retried:
         lines.append(f"{results.retried} variants needed divided steps")
