@@ -18,7 +18,7 @@ from ..unit_text import value_text, with_unit
 from .figures import Figure
 
 _HERE = Path(__file__).parent
-_SCRIPTS = (
+SCRIPTS = (
     "elements.js",
     "axes.js",
     "frame.js",
@@ -33,6 +33,7 @@ _SCRIPTS = (
     "overview.js",
     "report.js",
 )
+"""Scripts of a page with figures, in their order: each uses only those before it as it loads."""
 
 LONG = 300
 """Characters of a message that the page shows at once; the rest unfolds."""
@@ -81,7 +82,7 @@ def figure_parts(
     data = {"drivers": drivers or {}, "figures": figures, "scenes": scenes or {}}
     return {
         "css": style_sheet(),
-        "script": "\n".join(_script(name) for name in _SCRIPTS),
+        "script": "\n".join(_script(name) for name in SCRIPTS),
         "data": packed(json.dumps(data, allow_nan=False, separators=(",", ":"))),
     }
 
