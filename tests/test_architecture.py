@@ -22,6 +22,7 @@ PACKAGE = Path("core/kincheck")
 """Folder of the package kincheck itself, which names its parts in full: they lie elsewhere."""
 SIMULATORS = {"mujoco", "pinocchio", "exudyn", "opensim", "pydrake", "dartpy"}
 LONGEST = 300
+WIDEST = 100
 LARGEST_SHARE = 0.25
 
 LAYERS = (
@@ -144,13 +145,17 @@ IMPORTS = {
 MAY_IMPORT = {folder: set(others.split()) for folder, others in IMPORTS.items()}
 
 
-def files(*folders):
+def files(*folders, ending="py"):
     return sorted(
-        path.relative_to(ROOT) for folder in folders for path in (ROOT / folder).rglob("*.py")
+        path.relative_to(ROOT)
+        for folder in folders
+        for path in (ROOT / folder).rglob(f"*.{ending}")
     )
 
 
 SOURCES = files("core", "adapters", "cases")
+PAGES = [path for ending in ("css", "html", "js") for path in files("core", ending=ending)]
+"""Scripts, style sheets and templates of the pages."""
 TESTS = files("tests")
 
 
@@ -456,7 +461,19 @@ def lines(path: Path) -> int:
 
 
 def test_no_file_is_too_long():
-    assert {str(path): n for path in SOURCES if (n := lines(path)) > LONGEST} == {}
+    assert {str(path): n for path in [*SOURCES, *PAGES] if (n := lines(path)) > LONGEST} == {}
+
+
+def test_no_line_of_a_page_is_too_wide():
+    """As ruff holds it for Python."""
+    wide = [
+        f"{path}:{number}"
+        for path in PAGES
+        for number, line in enumerate((ROOT / path).read_text("utf-8").splitlines(), 1)
+        if len(line) > WIDEST
+    ]
+    assert wide == []
+    assert {path.suffix for path in PAGES} == {".css", ".html", ".js"}
 
 
 def test_no_layer_is_too_large():

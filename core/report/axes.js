@@ -1,18 +1,21 @@
 "use strict";
 // Axes of figures: scales from values to pixels, their ticks, and numbers as text.
 
-const SUPERSCRIPTS = { "-": "⁻", 0: "⁰", 1: "¹", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶", 7: "⁷", 8: "⁸", 9: "⁹" };
+const SUPERSCRIPTS = { ..."⁰¹²³⁴⁵⁶⁷⁸⁹", "-": "⁻" };
 
 // A number to some digits; a format such as ".9g" says how many.
 function shown(value, format) {
   if (typeof value !== "number") return String(value);
   const digits = Number((/\d+/.exec(format || "") || [6])[0]);
-  return String(Number(value.toPrecision(digits))).replace("-", "−").replace("e-", "e−").replace("e+", "e");
+  const text = String(Number(value.toPrecision(digits)));
+  return text.replace("-", "−").replace("e-", "e−").replace("e+", "e");
 }
+
+const titleOf = (side) => (side.title && side.title.text) || "";
 
 // The unit in the brackets of an axis' title; empty without one.
 function unitOf(side) {
-  const found = /\[([^\]]*)\]/.exec((side.title && side.title.text) || "");
+  const found = /\[([^\]]*)\]/.exec(titleOf(side));
   return found ? ` ${found[1]}` : "";
 }
 
@@ -24,33 +27,34 @@ function niceStep(step) {
 
 // The scale of one side of a figure.
 //   side: the axis of the layout; values: all that is drawn, or the categories;
-//   from, to: pixels of its ends; count: ticks that have room; view: two values that were zoomed to, or null.
+//   from, to: pixels of its ends; count: ticks that have room;
+//   view: two values that were zoomed to, or null.
 function scaled(side, values, from, to, count, view) {
   if (isCategory(side, values)) return categories(side, values, from, to, count);
-  const log = side.type === "log", ahead = log ? Math.log10 : (value) => value;
-  const [low, high] = view ? view.map(ahead) : side.range || around(values.map(ahead).filter(Number.isFinite), side);
-  const ends = side.autorange === "reversed" ? [to, from] : [from, to];
-  const place = (value) => ends[0] + ((ahead(value) - low) / (high - low)) * (ends[1] - ends[0]);
+  const log = side.type === "log";
+  const ahead = log ? Math.log10 : (value) => value;
+  const whole = () => side.range || around(values.map(ahead).filter(Number.isFinite), side);
+  const [low, high] = view ? view.map(ahead) : whole();
+  const [start, end] = side.autorange === "reversed" ? [to, from] : [from, to];
+  const place = (value) => start + ((ahead(value) - low) / (high - low)) * (end - start);
   const back = (pixel) => {
-    const value = low + ((pixel - ends[0]) / (ends[1] - ends[0])) * (high - low);
+    const value = low + ((pixel - start) / (end - start)) * (high - low);
     return log ? 10 ** value : value;
   };
-  const ticks = side.tickvals && !view ? side.tickvals.map((at, k) => [at, side.ticktext[k]]) : log ? logTicks(low, high, count) : linearTicks(low, high, count, side.dtick);
-  const inside = ([at]) => ahead(at) >= low - 1e-9 * (high - low) && ahead(at) <= high + 1e-9 * (high - low);
-  return { place, back, ticks: apart(ticks.filter(inside), place) };
+  const margin = 1e-9 * (high - low);
+  const inside = ([at]) => ahead(at) >= low - margin && ahead(at) <= high + margin;
+  const ticks = ticksOf(side, low, high, count, view).filter(inside);
+  return { place, back, ticks: apart(ticks, place) };
 }
 
-// Ticks with room between them, the first one always.
-function apart(ticks, place) {
-  return ticks.reduce((kept, tick) => (kept.length && Math.abs(place(tick[0]) - place(kept.at(-1)[0])) < 13 ? kept : [...kept, tick]), []);
-}
-
-const isCategory = (side, values) => side.type === "category" || values.some((value) => typeof value === "string");
+const isCategory = (side, values) =>
+  side.type === "category" || values.some((value) => typeof value === "string");
 
 // The range around values, with room at both ends.
 function around(values, side) {
   if (side.rangemode === "tozero") values.push(0);
-  const low = values.reduce((a, b) => Math.min(a, b), Infinity), high = values.reduce((a, b) => Math.max(a, b), -Infinity);
+  const low = values.reduce((a, b) => Math.min(a, b), Infinity);
+  const high = values.reduce((a, b) => Math.max(a, b), -Infinity);
   if (low > high) return [0, 1];
   if (high - low <= 1e-14 * Math.max(Math.abs(low), Math.abs(high))) {
     const half = side.type === "log" ? 0.5 : 0.1 * Math.abs(low) || 1;
@@ -59,12 +63,29 @@ function around(values, side) {
   return [low - 0.05 * (high - low), high + 0.05 * (high - low)];
 }
 
+// Ticks as values and texts; the axis' own unless the figure is zoomed.
+function ticksOf(side, low, high, count, zoomed) {
+  if (side.tickvals && !zoomed) return side.tickvals.map((at, k) => [at, side.ticktext[k]]);
+  if (side.type === "log") return logTicks(low, high, count);
+  return linearTicks(low, high, count, side.dtick);
+}
+
+// Ticks with room between them, the first one always.
+function apart(ticks, place) {
+  const kept = [];
+  for (const tick of ticks) {
+    if (!kept.length || Math.abs(place(tick[0]) - place(kept.at(-1)[0])) >= 13) kept.push(tick);
+  }
+  return kept;
+}
+
 function linearTicks(low, high, count, given) {
   let step = given || niceStep((0.75 * (high - low)) / count);
   while ((high - low) / step > 2 * count) step *= 2;
   const found = [];
   for (let k = Math.ceil(low / step - 1e-9); k <= high / step + 1e-9 && found.length < 100; k++) {
-    found.push([k * step, k ? shown(k * step, `.${Math.min(15, 2 + Math.ceil(Math.log10(Math.abs(k) + 1)))}g`) : "0"]);
+    const digits = Math.min(15, 2 + Math.ceil(Math.log10(Math.abs(k) + 1)));
+    found.push([k * step, k ? shown(k * step, `.${digits}g`) : "0"]);
   }
   return found;
 }
@@ -72,25 +93,33 @@ function linearTicks(low, high, count, given) {
 // Powers of ten; within few decades also 2 and 5 times them.
 function logTicks(low, high, count) {
   if (high - low < 0.3) return linearTicks(10 ** low, 10 ** high, count);
-  const stride = Math.max(1, Math.ceil((high - low) / count)), found = [];
+  const stride = Math.max(1, Math.ceil((high - low) / count));
+  const factors = 3 * (high - low) <= count + 1 ? [1, 2, 5] : [1];
+  const found = [];
   for (let power = Math.ceil(low) - 1; power <= high; power++) {
-    for (const factor of 3 * (high - low) <= count + 1 ? [1, 2, 5] : [1]) {
-      if (power % stride) continue;
-      const raised = `10${[...String(power)].map((sign) => SUPERSCRIPTS[sign]).join("")}`;
-      found.push([factor * 10 ** power, Math.abs(power) < 4 ? shown(factor * 10 ** power) : factor === 1 ? raised : `${factor}·${raised}`]);
-    }
+    if (power % stride) continue;
+    for (const factor of factors) found.push([factor * 10 ** power, powerText(factor, power)]);
   }
   return found;
+}
+
+function powerText(factor, power) {
+  if (Math.abs(power) < 4) return shown(factor * 10 ** power);
+  const raised = `10${[...String(power)].map((sign) => SUPERSCRIPTS[sign]).join("")}`;
+  return factor === 1 ? raised : `${factor}·${raised}`;
 }
 
 // Places side by side; names that have no room get no tick.
 function categories(side, values, first, last, count) {
   const [from, to] = side.autorange === "reversed" ? [last, first] : [first, last];
-  const names = [...new Set(values)], width = (to - from) / Math.max(1, names.length);
+  const names = [...new Set(values)];
+  const width = (to - from) / Math.max(1, names.length);
   const stride = Math.ceil(names.length / Math.min(count, side.nticks || Infinity));
   return {
     place: (name) => from + (names.indexOf(name) + 0.5) * width,
     width: Math.abs(width),
-    ticks: names.map((name) => [name, name]).filter((_, k) => (names.length - 1 - k) % stride === 0),
+    ticks: names
+      .map((name) => [name, name])
+      .filter((_, k) => (names.length - 1 - k) % stride === 0),
   };
 }

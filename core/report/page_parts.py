@@ -18,7 +18,22 @@ from ..unit_text import value_text, with_unit
 from .figures import Figure
 
 _HERE = Path(__file__).parent
-_SCRIPTS = ("axes.js", "plot.js", "scene.js", "report.js")
+SCRIPTS = (
+    "elements.js",
+    "axes.js",
+    "frame.js",
+    "traces.js",
+    "readout.js",
+    "plot.js",
+    "vectors.js",
+    "motion.js",
+    "canvas.js",
+    "scene.js",
+    "mechanism.js",
+    "overview.js",
+    "report.js",
+)
+"""Scripts of a page with figures, in their order: each uses only those before it as it loads."""
 
 LONG = 300
 """Characters of a message that the page shows at once; the rest unfolds."""
@@ -67,9 +82,17 @@ def figure_parts(
     data = {"drivers": drivers or {}, "figures": figures, "scenes": scenes or {}}
     return {
         "css": style_sheet(),
-        "script": "\n".join((_HERE / name).read_text("utf-8") for name in _SCRIPTS),
+        "script": "\n".join(_script(name) for name in SCRIPTS),
         "data": packed(json.dumps(data, allow_nan=False, separators=(",", ":"))),
     }
+
+
+def _script(name: str) -> str:
+    """Return a script of the pages without indentation and lines of comment, which a page need not
+    carry.
+    """
+    lines = [line.strip() for line in (_HERE / name).read_text("utf-8").splitlines()]
+    return "\n".join(line for line in lines if line and not line.startswith("//"))
 
 
 def parted(message: str) -> tuple[str, str]:

@@ -1,38 +1,59 @@
 "use strict";
+// The page: its packed data, when its figures are drawn, and what its buttons do.
+
+const MARGIN = 600; // of the view, within which figures are drawn [px]
+const PAPER = [330, 270]; // size of a figure on paper [px]
+
+function trouble(text) {
+  Object.assign(document.getElementById("trouble"), { textContent: text, hidden: false });
+}
+
+// The JSON or text that an element holds as base64 of its zlib stream.
+async function unpacked(id) {
+  const text = atob(document.getElementById(id).textContent);
+  const bytes = Uint8Array.from(text, (sign) => sign.charCodeAt(0));
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+  return new Response(stream).text();
+}
+
+function save(text, type, name) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(new Blob([text], { type }));
+  link.download = name;
+  link.click();
+  URL.revokeObjectURL(link.href);
+}
+
+function onClick(selector, act) {
+  for (const button of document.querySelectorAll(selector)) {
+    button.addEventListener("click", () => act(button));
+  }
+}
+
 (async () => {
-  const hidden = new Map([...document.querySelectorAll("[data-case]")].map((section) => [section, new Set()]));
-  overview();
-
-  const trouble = (text) => Object.assign(document.getElementById("trouble"), { textContent: text, hidden: false });
-  if (!window.DecompressionStream) return trouble("Figures and mechanisms need a browser of 2023 or later; all tables are here without it.");
-  const { drivers, figures, scenes } = JSON.parse(await unpacked("report-data"));
-  for (const button of document.querySelectorAll("[data-curves]")) {
-    button.addEventListener("click", async () => save(JSON.parse(await unpacked("curves"))[button.dataset.curves], "text/csv", button.dataset.file));
-  }
-  const canvases = [...document.querySelectorAll("[data-scene]")].map((box) => mechanism(box, scenes[box.dataset.scene]));
-
-  async function unpacked(id) {
-    const bytes = Uint8Array.from(atob(document.getElementById(id).textContent), (sign) => sign.charCodeAt(0));
-    const stream = new DecompressionStream("deflate"), input = stream.writable.getWriter();
-    input.write(bytes);
-    input.close();
-    return new Response(stream.readable).text();
-  }
-
-  function save(text, type, name) {
-    const link = document.createElement("a");
-    link.href = URL.createObjectURL(new Blob([text], { type }));
-    link.download = name;
-    link.click();
-    URL.revokeObjectURL(link.href);
-  }
-
+  const sections = [...document.querySelectorAll("[data-case]")];
+  const hidden = new Map(sections.map((section) => [section, new Set()]));
+  const plots = [...document.querySelectorAll(".plot")];
   const drawn = new Map();
+  overview();
+  if (!window.DecompressionStream) {
+    const needed = "Figures and mechanisms need a browser of 2023 or later";
+    return trouble(`${needed}; all tables are here without it.`);
+  }
+  const { drivers, figures, scenes } = JSON.parse(await unpacked("report-data"));
+  onClick("[data-curves]", async ({ dataset }) => {
+    save(JSON.parse(await unpacked("curves"))[dataset.curves], "text/csv", dataset.file);
+  });
+  const boxes = [...document.querySelectorAll("[data-scene]")];
+  const canvases = boxes.map((box) => mechanism(box, scenes[box.dataset.scene]));
+
   function draw(box) {
     if (drawn.has(box)) return;
-    const section = box.closest("[data-case]"), { data, layout } = figures[box.dataset.figure], driver = drivers[section.dataset.case];
+    const section = box.closest("[data-case]");
+    const { data, layout } = figures[box.dataset.figure];
     // samples at the driver's values say "driver"
-    const whole = data.map((trace) => ({ ...trace, x: trace.x === "driver" ? driver : trace.x, y: trace.y === "driver" ? driver : trace.y }));
+    const values = (given) => (given === "driver" ? drivers[section.dataset.case] : given);
+    const whole = data.map((trace) => ({ ...trace, x: values(trace.x), y: values(trace.y) }));
     try {
       drawn.set(box, plot(box, { data: whole, layout }));
     } catch (error) {
@@ -43,44 +64,47 @@
   }
 
   // Figures in or near view are drawn, so that a report of many cases opens as fast as one of few:
-  // at once and when something unfolds; the observer, which a busy browser calls late, when the page scrolls.
-  const MARGIN = 600, plots = [...document.querySelectorAll(".plot")];
-  const near = (box) => {
+  // at once and when something unfolds; the observer, which a busy browser calls late, when the
+  // page scrolls.
+  const isFolded = (box) => box.closest("details:not([open])");
+  const isNear = (box) => {
     const { top, bottom, height } = box.getBoundingClientRect();
-    return height > 0 && bottom > -MARGIN && top < innerHeight + MARGIN && !box.closest("details:not([open])");
+    return height > 0 && bottom > -MARGIN && top < innerHeight + MARGIN && !isFolded(box);
   };
-  const drawNear = () => plots.filter(near).forEach(draw);
+  const drawNear = () => plots.filter(isNear).forEach(draw);
   drawNear();
   document.addEventListener("toggle", drawNear, true);
-  const watch = new IntersectionObserver((seen) => {
+  const reached = (seen) => {
     for (const { isIntersecting, target } of seen) if (isIntersecting) draw(target);
-  }, { rootMargin: `${MARGIN}px` });
+  };
+  const watch = new IntersectionObserver(reached, { rootMargin: `${MARGIN}px` });
   plots.forEach((box) => watch.observe(box));
 
-  for (const button of document.querySelectorAll("[data-save]")) {
-    button.addEventListener("click", () => save(standalone(button.closest("figure").querySelector(".plot")), "image/svg+xml", `${button.dataset.save}.svg`));
-  }
-  for (const button of document.querySelectorAll("[data-reset]")) {
-    button.addEventListener("click", () => drawn.get(button.closest("figure").querySelector(".plot")).reset());
-  }
-  for (const button of document.querySelectorAll("[data-series][aria-pressed]")) {
-    button.addEventListener("click", () => {
-      const section = button.closest("[data-case]"), off = hidden.get(section), series = button.dataset.series;
-      const show = off.delete(series);
-      if (!show) off.add(series);
-      button.setAttribute("aria-pressed", String(show));
-      for (const box of section.querySelectorAll(".plot[data-drawn]")) drawn.get(box).show(series, show);
-    });
-  }
+  const plotOf = (button) => button.closest("figure").querySelector(".plot");
+  onClick("[data-save]", (button) => {
+    save(standalone(plotOf(button)), "image/svg+xml", `${button.dataset.save}.svg`);
+  });
+  onClick("[data-reset]", (button) => drawn.get(plotOf(button)).reset());
+  onClick("[data-series][aria-pressed]", (button) => {
+    const section = button.closest("[data-case]");
+    const series = button.dataset.series;
+    const show = hidden.get(section).delete(series);
+    if (!show) hidden.get(section).add(series);
+    press(button, show);
+    for (const box of section.querySelectorAll(".plot[data-drawn]")) {
+      drawn.get(box).show(series, show);
+    }
+  });
 
-  // Paper is light and narrower than the screen, and sends no resize event. What the filters hide stays away.
+  // Paper is light and narrower than the screen, and sends no resize event. What the filters hide
+  // stays away.
   window.addEventListener("beforeprint", () => {
     document.documentElement.dataset.paper = "";
     for (const rest of document.querySelectorAll(".problems details")) rest.open = true;
     canvases.forEach((redraw) => redraw());
-    for (const box of plots.filter((each) => !each.closest("[hidden], details:not([open])"))) {
+    for (const box of plots.filter((each) => !isFolded(each) && !each.closest("[hidden]"))) {
       draw(box);
-      if (drawn.has(box)) drawn.get(box).fit(330, 270);
+      if (drawn.has(box)) drawn.get(box).fit(...PAPER);
     }
   });
   window.addEventListener("afterprint", () => {
@@ -89,59 +113,4 @@
     drawn.forEach((figure) => figure.fit());
   });
   document.documentElement.dataset.ready = "";
-
-  // Rows by words and outcome, columns by engine; a case that is not shown above is not shown below either.
-  function overview() {
-    const form = document.querySelector(".filters");
-    if (!form) return;
-    const search = form.querySelector("#search"), worst = form.querySelector("#worst-first");
-    const rows = [...document.querySelectorAll(".overview tbody tr")], body = rows[0].parentElement;
-    const buttons = [...form.querySelectorAll("button[aria-pressed]")];
-    const pressed = (kind) => buttons.filter((each) => each.dataset[kind] && each.getAttribute("aria-pressed") === "true").map((each) => each.dataset[kind]);
-
-    function apply() {
-      const words = search.value.toLowerCase().split(/\s+/).filter(Boolean);
-      const outcomes = pressed("outcome"), engines = pressed("engine");
-      let count = 0;
-      for (const cell of document.querySelectorAll(".overview [data-engine]")) {
-        cell.hidden = engines.length > 0 && !engines.includes(cell.dataset.engine);
-      }
-      for (const row of rows) {
-        let found = false;
-        for (const cell of row.querySelectorAll("td[data-engine]")) {
-          const there = outcomes.length ? (cell.dataset.outcome || "").split(" ").some((each) => outcomes.includes(each)) : true;
-          cell.classList.toggle("other", !there);
-          found ||= there && !cell.hidden;
-        }
-        row.hidden = !(found && words.every((word) => row.dataset.words.includes(word)));
-        document.getElementById(row.dataset.anchor).hidden = row.hidden;
-        count += !row.hidden;
-      }
-      const sorted = worst.getAttribute("aria-pressed") === "true";
-      body.append(...(sorted ? rows.slice().sort((a, b) => b.dataset.severity - a.dataset.severity) : rows));
-      document.getElementById("none").hidden = count > 0;
-      document.getElementById("shown").textContent = count === rows.length ? "" : `${count} of ${rows.length} cases`;
-    }
-    function clear() {
-      search.value = "";
-      buttons.forEach((button) => button.setAttribute("aria-pressed", "false"));
-      apply();
-    }
-    for (const button of buttons) {
-      button.addEventListener("click", () => {
-        button.setAttribute("aria-pressed", String(button.getAttribute("aria-pressed") !== "true"));
-        apply();
-      });
-    }
-    search.addEventListener("input", apply);
-    form.addEventListener("submit", (event) => event.preventDefault());
-    document.addEventListener("keydown", (event) => {
-      if (event.ctrlKey || event.metaKey || event.altKey) return;
-      if (event.key === "Escape") clear();
-      if (event.key === "/" && !event.target.closest("input, select, textarea")) {
-        event.preventDefault();
-        search.focus();
-      }
-    });
-  }
 })();

@@ -85,7 +85,6 @@ def test_code_that_calls_something_outside_makes_no_image():
 
 def positions() -> np.ndarray:
     clear_caches()
-    jit._made.cache_clear()
     return solve(mcpherson(), "stroke", np.linspace(-0.08, 0.08, 33)).points["wheel"].position
 
 

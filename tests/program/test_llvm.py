@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import fields, replace
+from gc import collect
 from itertools import pairwise
 from typing import Any
 
@@ -143,12 +144,27 @@ def test_a_lane_that_cannot_be_reached_is_reported_alike():
     assert messages[0] == messages[1]
 
 
+def test_code_in_use_stays_after_clearing_the_caches():
+    mechanism, path = four_bar(), np.linspace(0.0, 1.0, 5)
+    driver, point = mechanism.drivers[0].name, mechanism.points[0].name
+    model = compile_model(mechanism, Request((driver,), (point,)))
+    assert model._code.interpreted
+
+    def positions():
+        return sweep(model, Path({driver: Ramp(1.0)}, path), 1e-12).points[point].position
+
+    expected = positions()
+    clear_caches()
+    collect()
+    np.testing.assert_array_equal(positions(), expected)
+
+
 def test_cached_code_is_used_and_a_damaged_entry_is_rebuilt(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     wanted = np.linspace(0.0, 1.0, 5)
 
     def positions(*, often: bool = False):
-        jit._made.cache_clear()  # as another process
+        clear_caches()  # as another process
         mechanism = four_bar()
         driver, point = mechanism.drivers[0].name, mechanism.points[0].name
         model = compile_model(mechanism, Request((driver,), (point,)))

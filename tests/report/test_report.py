@@ -8,6 +8,8 @@ import base64
 import json
 import math
 import re
+import shutil
+import subprocess
 import zlib
 from html.parser import HTMLParser
 from pathlib import Path
@@ -18,6 +20,7 @@ import pytest
 from kincheck.core import solve
 from kincheck.core.harness.labels import number
 from kincheck.core.harness.record import Deviation, Deviations, Outcome, Results
+from kincheck.core.report import page_parts
 from kincheck.core.report.axis import SAMPLES
 from kincheck.core.report.figure_data import Past
 from kincheck.core.report.figures import SYMBOLS
@@ -299,6 +302,17 @@ def test_nothing_is_fetched(tmp_path: Path) -> None:
     assert policy
     assert str(policy[0]).startswith("default-src 'none'")
     assert "http" not in str(policy[0])
+
+
+def test_a_page_has_every_script_without_comments_and_its_syntax_is_right(tmp_path: Path) -> None:
+    folder = Path(page_parts.__file__).parent
+    assert sorted(page_parts.SCRIPTS) == sorted(path.name for path in folder.glob("*.js"))
+    script = page_parts.figure_parts({})["script"]
+    assert not re.search(r"^\s", script, re.MULTILINE)
+    assert not re.search(r"^//", script, re.MULTILINE)
+    (file := tmp_path / "page.js").write_text(script, "utf-8")
+    if node := shutil.which("node"):
+        subprocess.run([node, "--check", file], check=True)
 
 
 def test_what_was_not_computed_leaves_a_gap_and_no_number(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ import inspect
 import pickle
 from collections.abc import Callable, Mapping
 from functools import cache
+from typing import Any
 
 from .. import disk_cache
 from . import compiler, elf_loader
@@ -24,7 +25,7 @@ class Code:
 
     Attributes:
         address: return the address of a function by name.
-        calls: functions with a signature.
+        calls: functions with a signature; each keeps the code alive.
     """
 
     def __init__(self, code: bytes, signatures: Mapping[str, int]) -> None:
@@ -38,9 +39,11 @@ class Code:
             name: ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_void_p] * count)
             for name, count in signatures.items()
         }
-        self.calls: dict[str, Callable[..., int]] = {
-            name: kind(self.address(name)) for name, kind in types.items()
-        }
+        self.calls: dict[str, Callable[..., int]] = {}
+        for name, kind in types.items():
+            call: Any = kind(self.address(name))
+            call.alive = self.address
+            self.calls[name] = call
 
 
 def load(

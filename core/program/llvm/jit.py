@@ -13,6 +13,7 @@ from functools import cache, partial
 from pathlib import Path
 from threading import Lock, Thread
 
+from ...caches import keep_last
 from .. import bytecode, disk_cache, lowering, plan, tape
 from ..plan import Plan
 from . import code_cache, compiler
@@ -80,14 +81,11 @@ class LlvmCode:
         self.memory = PlanInMemory(plan, self.width, self.stride)
         if code:
             self._take(code)
-        for name, table in tables.items():
-            self.memory.entries[self.memory.calls[name]] = (
-                _loop("interpret", self.width).address("interpret"),
-                table.words.ctypes.data,
-            )
+        else:
+            self._interpret(tables)
         operations = sum(len(each.nodes) for each in plan.programs.values())
         often = 0 if _AT_ONCE.get() else AGAIN if again else OFTEN
-        self._alive, self._left = tables, often * max(OPERATIONS, operations) // OPERATIONS
+        self._left = often * max(OPERATIONS, operations) // OPERATIONS
 
     def call(self, loop: str, name: str) -> Callable[..., int]:
         """Return a function of a loop, bound to this plan."""
@@ -103,6 +101,15 @@ class LlvmCode:
                 if self.interpreted:
                     self._take(code_cache.load(self._content, self._text))
                     self.interpreted = False
+
+    def _interpret(self, tables: Mapping[str, bytecode.Bytecode]) -> None:
+        loop = _loop("interpret", self.width)
+        for name, table in tables.items():
+            self.memory.entries[self.memory.calls[name]] = (
+                loop.address("interpret"),
+                table.words.ctypes.data,
+            )
+        self._alive = tables, loop  # keeps their addresses valid
 
     def _take(self, code: code_cache.Code) -> None:
         self._code = code
@@ -164,7 +171,7 @@ def _loop(name: str, width: int) -> code_cache.Code:
 _LOCK = Lock()
 
 
-@cache
+@keep_last(2 * len(LOOPS))
 def _made(name: str, width: int) -> code_cache.Code:
     """Return functions that run any plan."""
     writers, signatures = LOOPS[name]

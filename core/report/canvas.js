@@ -1,0 +1,89 @@
+"use strict";
+// A canvas: the projection onto it, and what its pen draws and writes.
+
+// The pen of an empty canvas, as sharp as the screen.
+function cleared(canvas, width, height) {
+  const pen = canvas.getContext("2d");
+  const ratio = window.devicePixelRatio || 1;
+  const [wide, high] = [Math.round(width * ratio), Math.round(height * ratio)];
+  if (canvas.width !== wide) canvas.width = wide;
+  if (canvas.height !== high) canvas.height = high;
+  pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+  pen.clearRect(0, 0, width, height);
+  return pen;
+}
+
+// The projection of a direction to look from.
+// Returns `seen`, the place of a point on the canvas [px] and its depth in sizes of the mechanism,
+// and `flat`, the components of a vector to the right and down.
+function cameraOf(azimuth, elevation, zoom, bounds, width, height) {
+  const [ca, sa] = [Math.cos(azimuth), Math.sin(azimuth)];
+  const [ce, se] = [Math.cos(elevation), Math.sin(elevation)];
+  const right = [-sa, ca, 0];
+  const up = [-se * ca, -se * sa, ce];
+  const near = [ce * ca, ce * sa, se];
+  const reach = (axis) => Math.max(bounds.reach(axis), 0.05 * bounds.size);
+  const fit = Math.min((width / 2 - 60) / reach(right), (height / 2 - 34) / reach(up));
+  const scale = zoom * fit;
+  const flat = (vector) => [dot(right, vector), -dot(up, vector)];
+  const seen = (at) => {
+    const arm = sum(at, bounds.middle, -1);
+    const [x, y] = flat(arm);
+    return [width / 2 + scale * x, height / 2 + scale * y, dot(near, arm) / bounds.size];
+  };
+  return { seen, flat };
+}
+
+// What a pen draws of points on the canvas.
+function brush(pen) {
+  const line = (points, stroke, thick, dash = [], alpha = 1) => {
+    pen.beginPath();
+    points.forEach(([x, y], k) => (k ? pen.lineTo(x, y) : pen.moveTo(x, y)));
+    const round = { lineCap: "round", lineJoin: "round" };
+    Object.assign(pen, { strokeStyle: stroke, lineWidth: thick, globalAlpha: alpha, ...round });
+    pen.setLineDash(dash);
+    pen.stroke();
+    pen.setLineDash([]);
+    pen.globalAlpha = 1;
+  };
+  const area = (points, shade, alpha) => {
+    pen.beginPath();
+    points.forEach(([x, y]) => pen.lineTo(x, y));
+    Object.assign(pen, { fillStyle: shade, globalAlpha: alpha });
+    pen.fill();
+    pen.globalAlpha = 1;
+  };
+  const disc = ([x, y], radius, fill, edge) => {
+    pen.beginPath();
+    pen.arc(x, y, radius, 0, 2 * Math.PI);
+    Object.assign(pen, { fillStyle: fill, strokeStyle: edge, lineWidth: 1.6 });
+    pen.fill();
+    pen.stroke();
+  };
+  return { pen, line, area, disc };
+}
+
+// What writes text beside a place, where no other text is; or nothing where there is no room.
+//   offsets: places to try: to the left (-1), over (0) or to the right (1), and down [px].
+function writer(pen, width, height, family, halo) {
+  const written = [];
+  return ([x, y], text, fill, offsets, font = "") => {
+    pen.font = `${font} 12px ${family}`;
+    const wide = pen.measureText(text).width;
+    const aside = (side) => (side < 0 ? -10 - wide : side ? 10 : -wide / 2);
+    const isFree = ([left, top]) =>
+      written.every(
+        ([l, t, w]) => left > l + w + 3 || l > left + wide + 3 || Math.abs(top - t) > 13,
+      );
+    const isInside = ([left, top]) =>
+      left >= 2 && left + wide <= width - 2 && top >= 0 && top <= height - 14;
+    const corners = offsets.map(([side, down]) => [x + aside(side), y + down - 10]);
+    const corner = corners.find((each) => isFree(each) && isInside(each));
+    if (!corner) return;
+    const [left, top] = corner;
+    written.push([left, top, wide]);
+    Object.assign(pen, { strokeStyle: halo, fillStyle: fill, lineWidth: 3 });
+    pen.strokeText(text, left, top + 10);
+    pen.fillText(text, left, top + 10);
+  };
+}
