@@ -17,10 +17,11 @@ from ...io.decimal_sign import find_decimal_sign
 from ...io.document import fault, shown
 from ...io.workbook import Cell, Row
 from ...units import LENGTHS
-from .head import HEAD, Head, as_head, upright, written
+from .forms import with_head
+from .head import HEAD, Head, as_head, turned, upright, written
 from .table import Hardpoint, HardpointTable, length_name, number
 from .templates import TEMPLATES
-from .templates.base import normal
+from .templates.base import compact
 
 _UNIT = re.compile(r"[\[(]?\s*([a-z]+)\s*[\])]?", re.IGNORECASE)
 _REMARK = re.compile(r"(#?)\s*(unit|axes|template)s?\s*[:=,]+\s*(.+)", re.IGNORECASE)
@@ -50,14 +51,14 @@ def read_rows(
     Raises:
         CaseError: no such head, or a row at odds with the head.
     """
-    found = upright(file, rows)
+    found = table_in(file, rows)
     if found is None:
         where, cells = rows[0]
         raise fault(
             file,
             where,
             f"found {shown(written(cells))}, expected the head {','.join(HEAD)}; write it above"
-            " the points",
+            " the points, or a name and x, y, z alone in each row",
         )
     rows, place = found
     head = as_head(file, *rows[place])
@@ -81,6 +82,13 @@ def read_rows(
             " correct either",
         )
     notes = [row for row in body if _is_note(row[1], head)]
+    for where, cells in body:
+        if as_head(file, where, cells):
+            raise fault(
+                file,
+                where,
+                "found a second head, expected one table (of the front, or of the rear); keep one",
+            )
     points = _points(
         file,
         [
@@ -105,6 +113,20 @@ def read_rows(
         facts.get("template"),
         left_out,
     )
+
+
+def table_in(file: Path, rows: Sequence[Row]) -> tuple[Sequence[Row], int] | None:
+    """Return the rows with a head, and its index; None for rows of no known form.
+
+    Raises:
+        CaseError: two columns of one name, coordinates in several units, or a row at odds with its
+            form.
+    """
+    if (found := upright(file, rows)) is not None:
+        return found
+    if any(as_head(file, *row) for row in rows):  # below a point
+        return None
+    return with_head(file, rows) or with_head(file, turned(rows))
 
 
 def remark(cells: Sequence[Cell], *, comment: bool = False) -> tuple[str, str] | None:
@@ -175,7 +197,7 @@ def _is_note(cells: Sequence[Cell], head: Head) -> bool:
     """
     name, *coordinates = (cells[k] if k < len(cells) else "" for k in head.columns)
     lacking = any(cell == "" for cell in coordinates)
-    return lacking and not (isinstance(name, str) and normal(name) in _ROLES)
+    return lacking and not (isinstance(name, str) and compact(name) in _ROLES)
 
 
 def _complete(
