@@ -50,7 +50,7 @@ def one(data: bytes) -> None:
     if data.startswith(SHEET):
         return read_or_refused(lambda: of_cells(data.removeprefix(SHEET)))
     if data.startswith(YAML):
-        said = replace(SAID, sheet="front" if b"rear:" in data else None)
+        said = replace(SAID, sheet="front" if b"\nrear:" in data else None)
         return read_or_refused(lambda: load(written("car.yaml", data), said))
     if data.startswith(SCRIPT):
         return read_or_refused(lambda: load(written("car.m", data), SAID))

@@ -117,7 +117,7 @@ def seeds() -> list[bytes]:
     units = few.replace("stroke", "stroke [m]").replace("camber", "camber (rad)", 1)
     below = ["# curve", "travel;toe;Spur;Load", "mm;deg;deg;N"]
     below += [row.replace(",", ";") for row in rig[1:]]
-    sheet = workbook([line.split(",") for line in CSV.splitlines()])
+    sheet = workbook([str(line).split(",") for line in CSV.splitlines()])
     return [
         *(text.encode() for text in (CSV, json.dumps(PROVED), few, units)),
         *("\n".join(each).encode() for each in (["# curve", *rig], below)),

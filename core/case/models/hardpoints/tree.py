@@ -85,15 +85,19 @@ def leaves(value: Any, keys: Keys = ()) -> Iterator[Leaf]:
         table = cast("Mapping[str, Any]", value)
         for key, each in table.items():
             yield from leaves(each, (*keys, str(key)))
-    elif isinstance(value, list):
-        items = cast("list[Any]", value)
+    elif _is_list(value):
+        items: list[Any] = value
         if items and not any(isinstance(each, dict | list) for each in items):
             yield Leaf(keys, items, ".".join(keys))
             return
         for k, each in enumerate(items):
             yield from leaves(_unnamed(each), (*keys, _name_of(each) or f"[{k}]"))
     else:
-        yield Leaf(keys, cast("Any", value), ".".join(keys))
+        yield Leaf(keys, value, ".".join(keys))
+
+
+def _is_list(value: Any) -> bool:
+    return isinstance(value, list)
 
 
 def _name_of(item: Any) -> str:
@@ -164,8 +168,8 @@ def _points(file: Path, tree: Sequence[Leaf]) -> tuple[dict[Keys, Hardpoint], li
     others: list[Leaf] = []
     for leaf in tree:
         keys = leaf.keys
-        if isinstance(leaf.value, list):
-            items = cast("list[Any]", leaf.value)
+        if _is_list(leaf.value):
+            items: list[Any] = leaf.value
             last = normal(keys[-1]) if keys else ""
             if len(items) == 3 and all(map(is_number, items)) and not _NO_PLACE.fullmatch(last):
                 keys = keys[:-1] if last in _LAST and len(keys) > 1 else keys
