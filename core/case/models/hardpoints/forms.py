@@ -13,6 +13,8 @@ from ...io.document import decimal, fault, shown
 from ...io.workbook import Cell, Row
 from ...units import LENGTHS
 from .table import length_name
+from .templates import ROLES
+from .templates.base import compact
 
 FEWEST = 3
 """Fewest rows to recognise a form."""
@@ -96,11 +98,14 @@ def _coordinates(file: Path, rows: Sequence[Row]) -> tuple[Sequence[Row], int] |
         )
     body: list[Row] = []
     for name, place in points.items():
-        if len(place) < 3:
+        if len(place) == 3:
+            body.append((place["x"][0], [name, *(place[axis][1] for axis in "xyz")]))
+        elif compact(name) in ROLES:
             missing = " and ".join(axis for axis in "xyz" if axis not in place)
             where, _ = next(iter(place.values()))
             raise fault(file, where, f"found {name} without {missing}, expected all three; add it")
-        body.append((place["x"][0], [name, *(place[axis][1] for axis in "xyz")]))
+        else:
+            others += [(where, [f"{name} {axis}"]) for axis, (where, _) in place.items()]
     unit = next(iter(units), "") or _unit_above(others)
     head = ["name", *(f"{axis} [{unit}]" if unit else axis for axis in "xyz")]
     return [*others, ("the head", head), *body], len(others)

@@ -20,17 +20,11 @@ from ...units import LENGTHS
 from .forms import with_head
 from .head import HEAD, Head, as_head, turned, upright, written
 from .table import Hardpoint, HardpointTable, length_name, number
-from .templates import TEMPLATES
+from .templates import ROLES
 from .templates.base import compact
 
 _UNIT = re.compile(r"[\[(]?\s*([a-z]+)\s*[\])]?", re.IGNORECASE)
 _REMARK = re.compile(r"(#?)\s*(unit|axes|template)s?\s*[:=,]+\s*(.+)", re.IGNORECASE)
-_ROLES = {
-    name
-    for template in TEMPLATES.values()
-    for role in (*template.roles, *template.optional)
-    for name in role.names
-}
 
 
 def read_rows(
@@ -197,7 +191,7 @@ def _is_note(cells: Sequence[Cell], head: Head) -> bool:
     """
     name, *coordinates = (cells[k] if k < len(cells) else "" for k in head.columns)
     lacking = any(cell == "" for cell in coordinates)
-    return lacking and not (isinstance(name, str) and compact(name) in _ROLES)
+    return lacking and not (isinstance(name, str) and compact(name) in ROLES)
 
 
 def _complete(

@@ -22,7 +22,7 @@ from .forms import FEWEST, axis_of, is_number
 from .hub import wheel_points
 from .sections import Keys, chosen_points
 from .table import Hardpoint, HardpointTable, is_axes, length_name, number
-from .templates import TEMPLATES
+from .templates import ROLES, TEMPLATES
 from .templates.base import compact, normal
 
 _LAST = ("position", "pos", "coordinates", "coords", "coord", "location", "loc", "xyz", "point")
@@ -73,8 +73,8 @@ def has_points(tree: Sequence[Leaf]) -> bool:
 
 
 def _is_place(leaf: Leaf) -> bool:
-    if isinstance(leaf.value, list):
-        items = cast("list[Any]", leaf.value)
+    if _is_list(leaf.value):
+        items: list[Any] = leaf.value
         return len(items) == 3 and all(map(is_number, items))
     return bool(leaf.keys) and is_number(leaf.value) and _coordinate(leaf.keys) is not None
 
@@ -174,39 +174,48 @@ def _points(file: Path, tree: Sequence[Leaf]) -> tuple[dict[Keys, Hardpoint], li
             if len(items) == 3 and all(map(is_number, items)) and not _NO_PLACE.fullmatch(last):
                 keys = keys[:-1] if last in _LAST and len(keys) > 1 else keys
                 x, y, z = (number(file, leaf.where, each) for each in items)
-                points[keys] = Hardpoint((x, y, z), leaf.where)
+                _add(file, points, keys, Hardpoint((x, y, z), leaf.where))
                 continue
         elif keys and (split := _coordinate(keys)) and is_number(leaf.value):
             place, axis = split
             last = normal(place[-1]) if place else ""
             if place and not _NO_PLACE.fullmatch(last):
                 place = place[:-1] if last in _LAST and len(place) > 1 else place
-                single.setdefault(place, {})[axis] = leaf
+                before = single.setdefault(place, {}).setdefault(axis, leaf)
+                if before is not leaf:
+                    raise fault(
+                        file,
+                        leaf.where,
+                        f"{'.'.join(place)} {axis}: given before, in {before.where}, expected once;"
+                        " remove one of them",
+                    )
                 continue
         others.append(leaf)
     for keys, found in single.items():
-        if len(found) < 3:
-            if any(keys[:-1] == each[:-1] for each in points) or len(found) == 2:
-                leaf = next(iter(found.values()))
-                given = " and ".join(sorted(found))
-                missing = " and ".join(axis for axis in "xyz" if axis not in found)
-                raise fault(
-                    file,
-                    leaf.where,
-                    f"found {given} of {'.'.join(keys)}, expected {missing} too; add it",
-                )
-            others += found.values()
-            continue
-        if keys in points:
+        if len(found) == 3:
+            x, y, z = (number(file, found[axis].where, found[axis].value) for axis in "xyz")
+            _add(file, points, keys, Hardpoint((x, y, z), found["x"].where))
+        elif compact(".".join(keys[-2:])) in ROLES or compact(keys[-1]) in ROLES:
+            missing = " and ".join(axis for axis in "xyz" if axis not in found)
             raise fault(
                 file,
-                found["x"].where,
-                f"{'.'.join(keys)}: given before, in {points[keys].where}, expected once; remove"
-                " one of them",
+                next(iter(found.values())).where,
+                f"found {'.'.join(keys)} without {missing}, expected all three; add it",
             )
-        x, y, z = (number(file, found[axis].where, found[axis].value) for axis in "xyz")
-        points[keys] = Hardpoint((x, y, z), ".".join(keys))
+        else:
+            others += found.values()
     return points, others
+
+
+def _add(file: Path, points: dict[Keys, Hardpoint], keys: Keys, point: Hardpoint) -> None:
+    if keys in points:
+        raise fault(
+            file,
+            point.where,
+            f"{'.'.join(keys)}: given before, in {points[keys].where}, expected once; remove one of"
+            " them",
+        )
+    points[keys] = point
 
 
 def _coordinate(keys: Keys) -> tuple[Keys, str] | None:
