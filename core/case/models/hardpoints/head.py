@@ -86,6 +86,8 @@ def as_head(file: Path, where: str, cells: Sequence[Cell]) -> Head | None:
     columns: dict[str, int] = {}
     units: set[str | None] = set()
     texts = [cell if isinstance(cell, str) else "" for cell in cells]
+    if sum(text.lower() == "x" for text in texts) > 2:  # a column of the coordinates' names
+        return None
     for k, text in enumerate(texts):
         column, unit = _column(text.lower())
         if column not in HEAD:

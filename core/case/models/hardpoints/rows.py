@@ -66,7 +66,7 @@ def read_rows(
             left_out.append(f"{where} ({brief(written(cells).strip(','))})")
     body = list(rows[place + 1 :])
     unit = head.unit
-    if unit is None and body and (below := _units(body[0][1])):
+    if unit is None and body and (below := _units(body[0][1], head)):
         unit, body = below, body[1:]
     if unit and length_name(facts.get("unit", unit)) != length_name(unit):
         raise fault(
@@ -176,10 +176,12 @@ def _points(
     return points
 
 
-def _units(cells: Sequence[Cell]) -> str | None:
+def _units(cells: Sequence[Cell], head: Head) -> str | None:
     """Return the unit in a row of units below the head; None if the row is of a point."""
     found = [
-        _UNIT.fullmatch(cell) if isinstance(cell, str) else None for cell in cells[1:] if cell != ""
+        _UNIT.fullmatch(cell) if isinstance(cell, str) else None
+        for k, cell in enumerate(cells)
+        if cell != "" and k != head.columns[0]
     ]
     names = {length_name(each.group(1)) if each else "" for each in found}
     return names.pop() if len(found) >= 3 and len(names) == 1 and names <= LENGTHS.keys() else None
