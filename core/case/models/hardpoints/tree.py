@@ -154,7 +154,7 @@ def table_of(
     millimetres = length_name(facts.get("unit", "")) == "mm"
     found |= wheel_points(found, values, millimetres=millimetres)
     listed = [*left_out, *dropped]
-    if unused := [leaf.where for leaf in others if leaf.where not in facts.values()]:
+    if unused := [leaf.where for leaf in others if leaf.value not in facts.values()]:
         listed.append(f"values {shortened([brief(each) for each in unused], 8)}")
     return HardpointTable(
         file, tool, found, facts.get("unit"), facts.get("axes"), facts.get("template"), listed
