@@ -67,6 +67,11 @@ LENGTHS: Mapping[str, Unit] = {
 ANGLES: Mapping[str, Unit] = {"rad": RADIAN, "deg": Unit("deg", math.pi / 180.0, math.radians)}
 
 
+def si_of(unit: Unit) -> str:
+    """Return the SI unit of a unit of length, angle or time."""
+    return "m" if unit.name in LENGTHS else "rad" if unit.name in ANGLES else "s"
+
+
 def in_units(unit: str, length: Unit, angle: Unit) -> tuple[str, float]:
     """Return the name of an SI unit, N and s as they are, with other units of length and angle, and
     the size of one of it [SI]: N m with mm is N mm, a thousandth.

@@ -31,7 +31,10 @@ def add_options(command: argparse.ArgumentParser) -> None:
     )
     points = command.add_argument_group(
         "hardpoints",
-        "Suspensions of Project Chrono (.json), Adams/Car (.sub), tables (.csv, .xlsx).",
+        (
+            "Suspensions of Project Chrono (.json), Adams/Car (.sub), tables (.csv, .xlsx), trees"
+            " (.yaml, .json) and scripts (.m)."
+        ),
     )
     points.add_argument(
         "--template",
@@ -102,7 +105,11 @@ def add_options(command: argparse.ArgumentParser) -> None:
     points.add_argument(
         "--drive-share", metavar="X", help="part of the driving force at this axle, 0 to 1"
     )
-    points.add_argument("--sheet", metavar="NAME", help="of a workbook with several tables")
+    points.add_argument(
+        "--sheet",
+        metavar="NAME",
+        help="of a workbook with several tables; or the section of a tree, such as front",
+    )
     model = command.add_argument_group(
         "models", "Models (MJCF, URDF, SDF); nothing in them says how they are driven."
     )

@@ -19,10 +19,11 @@ from ..report.progress import complain, lacking, progress, uncompared
 from . import execution_options, history_options, import_options
 from .engine_loading import WHERE
 from .registry import House, Status
-from .run_options import HISTORY, add_options
+from .run_options import HISTORY, add_options, curve_options
 
 if TYPE_CHECKING:
     from ..case.case import Case
+    from ..case.io.reference_curve import CurveOptions
     from ..harness.engine import Engine
     from ..harness.record import Record, Results
     from ..history.run_recorder import Keeping
@@ -138,12 +139,13 @@ def _planned(options: argparse.Namespace, house: House, to: Destinations) -> _Pl
     )
     import_options.tell_left_out(cases)
     unused: list[str] = []
+    curve = curve_options(options)
+    if not options.reference and curve != type(curve)():
+        problems.append("the options for measured curves need one: give --reference FILE")
     if options.reference and not problems:
-        from ..case.io.reference_file import judged_by
-
         try:
             # a reference may name an unreadable case: that does not stop the others
-            cases = judged_by(cases, options.reference, unused if unread else None)
+            cases = _judged(cases, options.reference, curve, unused if unread else None)
         except KincheckError as error:
             problems += str(error).splitlines()
     engines, baseline = _engines(options, house, problems)
@@ -162,6 +164,32 @@ def _planned(options: argparse.Namespace, house: House, to: Destinations) -> _Pl
         [each.name for each in house.find_engines(options.require, [], options.mode)],
         [each.name for each in engines] if options.engine else [],
     )
+
+
+def _judged(
+    cases: Sequence[Case], files: Sequence[Path], curve: CurveOptions, unused: list[str] | None
+) -> list[Case]:
+    """Return the cases with the references in these files; how a curve was read is printed.
+
+    Raises:
+        KincheckError: a file cannot be used, or a curve is not of one case.
+    """
+    from ..case.io.reference import PROVED
+    from ..case.io.reference_curve import with_curve
+    from ..case.io.reference_file import judged_by
+
+    curves = [file for file in files if file.suffix.lower() != PROVED]
+    proved = [file for file in files if file not in curves]
+    if len(curves) > 1 or (curves and (proved or len(cases) != 1)):
+        raise KincheckError(
+            f"{curves[0]}: found {len(files)} references and {len(cases)} cases, expected a"
+            " measured curve and its case alone; run them one by one"
+        )
+    if not curves:
+        return judged_by(cases, proved, unused)
+    case, notes = with_curve(cases[0], curves[0], curve)
+    complain(notes)
+    return [case]
 
 
 def _solved(

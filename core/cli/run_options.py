@@ -5,10 +5,14 @@ from __future__ import annotations
 import argparse
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from . import execution_options, import_options
 from .option_types import positive
 from .verbosity import add_verbosity
+
+if TYPE_CHECKING:
+    from ..case.io.reference_curve import CurveOptions
 
 # Largest accepted constraint residual [m or -]: a thousand times the round-off of metre-sized
 # coordinates, and a thousandth of the outputs' 1e-9 m, so that a residual amplified a hundredfold
@@ -88,8 +92,8 @@ def add_options(run: argparse.ArgumentParser) -> None:
         type=Path,
         metavar="FILE",
         help=(
-            "judge cases by these proved references, which kincheck reference wrote, instead of"
-            " their own"
+            "judge cases by these files instead of their own references: proved references of"
+            " kincheck reference (.json), or one measured curve (.csv, .xlsx, ...)"
         ),
     )
     run.add_argument(
@@ -111,6 +115,7 @@ def add_options(run: argparse.ArgumentParser) -> None:
         verbose="print the errors of every output, with their tolerances",
     )
     import_options.add_options(run)
+    _add_curve_options(run)
     execution_options.add_options(run, positive)
     run.add_argument(
         "--history",
@@ -129,4 +134,60 @@ def add_options(run: argparse.ArgumentParser) -> None:
             "resume the latest unfinished run in the history with identical cases, engines,"
             " tolerance, limits, versions and commit"
         ),
+    )
+
+
+def _add_curve_options(run: argparse.ArgumentParser) -> None:
+    """Add the options for a measured curve, see --reference."""
+    curve = run.add_argument_group(
+        "measured curves", "What the file of --reference does not state; one case at a time."
+    )
+    curve.add_argument(
+        "--map",
+        action="append",
+        default=[],
+        metavar="COLUMN=OUTPUT",
+        help=(
+            'what a column holds, where its name does not say it: "Toe Angle=toe [deg]"; with the'
+            " opposite sign: COLUMN=-OUTPUT"
+        ),
+    )
+    curve.add_argument(
+        "--signs",
+        metavar="CONVENTION",
+        help="iso8855 or sae_j670, where the file has no comment '# signs: CONVENTION'",
+    )
+    curve.add_argument(
+        "--accuracy",
+        action="append",
+        default=[],
+        metavar="OUTPUT=NUMBER UNIT",
+        help='of the measurement, as tolerance of the output: "toe=0.02 deg"',
+    )
+    curve.add_argument(
+        "--citation",
+        metavar="TEXT",
+        help="source of the curve; without it, agreement is not called validated",
+    )
+    curve.add_argument(
+        "--reference-sheet", metavar="NAME", help="of a workbook with several tables"
+    )
+    curve.add_argument(
+        "--at-reference",
+        action="store_true",
+        help="solve at the samples of the curve, instead of interpolating it",
+    )
+
+
+def curve_options(options: argparse.Namespace) -> CurveOptions:
+    """Return what the options state of a measured curve."""
+    from ..case.io.reference_curve import CurveOptions
+
+    return CurveOptions(
+        (*options.map,),
+        options.signs,
+        (*options.accuracy,),
+        options.citation,
+        options.reference_sheet,
+        options.at_reference,
     )

@@ -226,7 +226,7 @@ TABLE_FAULTS = {
         WHOLE,
         ["lca_rear, the lower arm's rear pivot", "is it 'lca_raer', line 4?"],
     ),
-    "no head": (("name,x,y,z\n", ""), WHOLE, ["line 1", "expected the head name,x,y,z"]),
+    "no head": (("name,x,y,z\n", "1,2,3,4,5\n"), WHOLE, ["line 1", "expected the head name,x,y,z"]),
     "two units": (("name,x,y,z", "name,x [mm],y [mm],z [m]"), WHOLE, ["line 1", "one unit"]),
     "unit contradicts": (
         ("name,x,y,z", "name,x [m],y [m],z [m]"),

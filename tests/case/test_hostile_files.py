@@ -238,7 +238,7 @@ TEXTS: dict[str, tuple[str, str | bytes, str]] = {
             "pipe.csv": "not a regular file",
             ".": "not a regular file",
             "below": "not a regular file",
-            "a.toml": "line 3, column",
+            "a.toml": "line 8: found 1 numbers",
             "a" * 300: "cannot be read",
             "a" * 9999: "cannot be read",
             "~/tip.csv": "no such file",

@@ -7,7 +7,7 @@ from kincheck.core.case.case import Truth
 from kincheck.core.case.io import reference_table
 from kincheck.core.case.io.case_file import load_case
 
-from ..support.case_texts import BASE, BY_FILE, CSV, INLINE, complains, write
+from ..support.case_texts import BASE, BY_FILE, CSV, INLINE, complains, edited, write
 
 
 def test_reference_in_a_file(tmp_path: Path):
@@ -127,3 +127,50 @@ def test_a_large_reference_is_refused(tmp_path: Path, monkeypatch: pytest.Monkey
     monkeypatch.setattr(reference_table, "LARGEST_FILE", 20)
     write(tmp_path, CSV, "tip.csv")
     complains(write(tmp_path, BASE + BY_FILE), ["tip.csv", "larger than 20 bytes", "thin out"])
+
+
+UNITS = {
+    "in brackets": "push [mm], tip_x [mm], tip_x.velocity [mm/s]",
+    "in parentheses": "push (mm), tip_x (mm), tip_x.velocity (mm/s)",
+    "as last words": "push_mm, tip_x mm, tip_x.velocity mm/s",
+    "below": "push, tip_x, tip_x.velocity\nmm, mm, mm/s",
+    "twice alike": "push_mm [mm], tip_x (mm), tip_x.velocity [mm/s]\n, mm, mm/s",
+}
+
+
+@pytest.mark.parametrize("at", ["", 'at = "reference"'])
+@pytest.mark.parametrize("kind", UNITS)
+def test_units_of_columns(tmp_path: Path, kind: str, at: str):
+    """They go before those of the case file, also for samples taken from the reference."""
+    rows = "-100, 1400, 2000\n0, 1500, 2000\n100, 1600, 2000\n"
+    write(tmp_path, f"{UNITS[kind]}\n{rows}", "tip.csv")
+    base = edited(("start = -0.1\nstop = 0.1\nsteps = 3", at)) if at else BASE
+    case = load_case(write(tmp_path, base + BY_FILE))
+    assert case.sweep.values.tolist() == [-0.1, 0.0, 0.1]
+    assert case.reference["tip_x"].position.tolist() == [1.4, 1.5, 1.6]
+    assert case.reference["tip_x"].velocity.tolist() == [2.0, 2.0, 2.0]
+    assert case.origin
+    assert case.origin.units == {"push": "mm", "tip_x": "mm"}
+
+
+def test_units_of_rows_in_the_case_file(tmp_path: Path):
+    text = INLINE.replace('"push", "tip_x"', '"push [cm]", "tip_x [m]"').replace(
+        "0.1, 1.", "10, 1."
+    )
+    case = load_case(write(tmp_path, BASE + text))
+    assert case.reference["tip_x"].position.tolist() == [1.4, 1.5, 1.6]
+
+
+@pytest.mark.parametrize(
+    ("head", "fragments"),
+    [
+        ("push [deg], tip_x", ["line 1", "'deg' of column 'push [deg]'", "a length: m, mm"]),
+        ("push, tip_x [parsec]", ["line 1", "'parsec'", "a length"]),
+        ("push, tip_x [mm/s]", ["line 1", "'mm/s'", "a length"]),
+        ("push, tip_x_mm [m]", ["line 1", "in 'mm' and 'm'", "one unit"]),
+        ("push, tip_y [mm]", ["line 1", "column 'tip_y [mm]'", "tip_x"]),
+    ],
+)
+def test_wrong_units_of_columns(tmp_path: Path, head: str, fragments: list[str]):
+    write(tmp_path, f"{head}\n-0.1, 1.4\n0, 1.5\n0.1, 1.6\n", "tip.csv")
+    complains(write(tmp_path, BASE + BY_FILE), ["tip.csv", *fragments])

@@ -129,7 +129,7 @@ def test_a_sheet_is_chosen(tmp_path, plain, capsys):
     csv = tmp_path / "car.csv"
     csv.write_text(table())
     assert main(["explain", str(csv), *options, "--sheet", "Front"]) == 2
-    assert "--sheet: found for a hardpoint table" in capsys.readouterr().err
+    assert "--sheet: found 'Front' for a table of text" in capsys.readouterr().err
 
 
 FAULTS = {
@@ -149,7 +149,10 @@ FAULTS = {
         {"a": [*ROWS[:-1], ["wheel_center", 0.25, None, 228.25]]},
         ["row 10: wheel_center: y", "''"],
     ),
-    "no head": ({"a": ROWS[1:], "b": [["x"]]}, ["no head on the sheets 'a', 'b'", "name,x,y,z"]),
+    "no head": (
+        {"a": [[1, 2], ["x"]], "b": [["x"]]},
+        ["no head on the sheets 'a', 'b'", "name,x,y,z"],
+    ),
     "nothing": ({"a": []}, ["no sheet with cells"]),
     "many rows": ({"a": [*ROWS, *([f"p{k}", 1, 2, 3] for k in range(91))]}, ["than 100 rows"]),
     "many columns": ({"a": [[*HEAD, *range(1200)]]}, ["1000 columns"]),

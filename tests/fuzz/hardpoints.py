@@ -1,10 +1,12 @@
 """Hardpoint files: Project Chrono (JSON with comments), Adams/Car blocks, plain tables, workbooks
-and the cells of their sheets, onto a template.
+and the cells of their sheets, trees in YAML and JSON, and assignments of scripts, onto a template.
 """
 
 import importlib.util
+import json
 import math
 from contextlib import suppress
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 
@@ -29,6 +31,7 @@ ROLES = [
 ]
 KEYS = """name x y z mm cm inch [HARDPOINT] [UNITS] {hardpoint_name symmetry x_value y_value z_value} left/right single right LENGTH
 = Type Template Suspension Spindle COM Location // /* */ $ # units: axes: rearward,right,up
+hardpoints left right front rear position type type: = [1,2,3]; _x .y z= [mm] value wheel offset axle_inboard axle_outboard tire
 units axes left_ _FL CHAS_LowFor =A1+1 sep=; (VARIANTS) 1,5 -1.234,5 1,234 "2,5" point;"""  # noqa: E501
 WORDS = (
     *KEYS.split(),
@@ -38,17 +41,25 @@ WORDS = (
 )
 
 
-SHEET = b"sheet\n"
+SHEET, YAML, SCRIPT = b"sheet\n", b"---\n", b"%"
+SAID = Supplied("double_wishbone", "mm", "adams")
 
 
 def one(data: bytes) -> None:
     """Read one input as the kind of file that it begins like."""
     if data.startswith(SHEET):
         return read_or_refused(lambda: of_cells(data.removeprefix(SHEET)))
+    if data.startswith(YAML):
+        said = replace(SAID, sheet="front" if b"\nrear:" in data else None)
+        return read_or_refused(lambda: load(written("car.yaml", data), said))
+    if data.startswith(SCRIPT):
+        return read_or_refused(lambda: load(written("car.m", data), SAID))
     if data.startswith(b"PK"):
         said = Supplied("double_wishbone", "mm", "adams")
         return read_or_refused(lambda: load(written("car.xlsx", data), said))
     start = data.lstrip()[:1]
+    if data.lstrip().startswith((b"[{", b"[[")) or b'"hardpoints"' in data:
+        return read_or_refused(lambda: load(written("tree.json", data), SAID))
     if start in (b"{", b"/"):
         return read_or_refused(
             lambda: load(
@@ -65,7 +76,7 @@ def one(data: bytes) -> None:
         if b"rocker" in data
         else "double_wishbone"
     )
-    if b"[" in data.split(b"\n", 1)[0] or b"[HARDPOINT]" in data:
+    if start == b"[" or b"[HARDPOINT]" in data:
         return read_or_refused(lambda: load(written("car.sub", data), Supplied(template)))
     said = Supplied(
         template, None if b"unit" in data else "mm", None if b"axes" in data else "adams"
@@ -107,7 +118,27 @@ def seeds() -> list[bytes]:
     variants = adams.replace(
         "[PARAMETER]", "(VARIANTS)\n 'lca_outer' 'left/right' 1 2 3\n[PARAMETER]"
     )
+    points = {row[0].removeprefix("hpl_"): row[-3:] for row in rows}
+    each = [f"{name}_{'xyz'[k]},{at[k]}" for name, at in points.items() for k in range(3)]
+    assigned = [f"car.{name} = [{' '.join(at)}]; % [mm]" for name, at in points.items()]
+    flow = [f"  {name}: [{', '.join(at)}]" for name, at in points.items()]
+    block = [f"  {name}: {{x: {x}, y: {y}, z: {z}}}" for name, (x, y, z) in points.items()]
+    config = "config:\n  wheel: {offset: 0, tire: {rim_diameter: 13}}\n"
+    tree = {"units": "mm", "hardpoints": {"left": points}}
+    listed = [{"name": name, "x": x, "y": y, "z": z} for name, (x, y, z) in points.items()]
+    forms = [
+        "\n".join(["parameter,value [mm]", *each]),
+        "\n".join(each).replace(",", " = "),
+        "\n".join(",".join([name, *at]) for name, at in points.items()),
+        "\n".join(" ".join([*at, name]) for name, at in points.items()),
+        "\n".join(["% units: mm", *assigned]),
+        "\n".join(["---", "hardpoints:", *flow, config]),
+        "\n".join(["---", "front:", *block, "rear: {lca_front: [1, 2, 3]}"]),
+        json.dumps(tree),
+        json.dumps(listed),
+    ]
     return [
+        *(text.encode() for text in forms),
         *(file.read_bytes() for file in sorted(DATA.glob("*.json"))),
         *(text.encode() for text in (adams, table, other, variants)),
         german.removeprefix("Car\n").encode("utf-16"),

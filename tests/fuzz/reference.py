@@ -1,12 +1,17 @@
-"""Reference tables beside a case file: CSV, and proved references in JSON."""
+"""Reference tables beside a case file: CSV, and proved references in JSON; and measured curves
+given with a case.
+"""
 
 import json
 import tomllib
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import kincheck.cases
+from kincheck.core.case.case import Case
 from kincheck.core.case.io.case_file import load_case
+from kincheck.core.case.io.reference_curve import CurveOptions, with_curve
 
 from ..support.case_texts import BASE, CSV
 from .fuzzing import changing, read_or_refused, written
@@ -42,6 +47,8 @@ PROVED = {
     ],
     "seconds": 0.1,
 }
+CURVE = b"# curve"
+OPTIONS = CurveOptions(["Spur=-camber [deg]"])
 SUSPENSION = "mcpherson_suspension"
 WORDS = (
     *[
@@ -57,6 +64,7 @@ WORDS = (
         "iso8855",
         "sae_j670",
         "time",
+        *("[mm]", "(deg)", "_deg", "[deg/mm]", "travel", "KPI", "Toe Angle", "mm", "deg", "[-]"),
     ],
     *PROVED,
 )
@@ -66,6 +74,9 @@ def one(data: bytes) -> None:
     """Read one input as the table of a case with one output, or of a suspension where it is about
     one.
     """
+    if data.startswith(CURVE):
+        read_or_refused(lambda: with_curve(car(), written("curve.csv", data), OPTIONS)[0])
+        return
     name = "table.json" if data.lstrip().startswith(b"{") else "table.csv"
     name = "table.xlsx" if data.startswith(b"PK") else name
     written(name, data)
@@ -73,10 +84,19 @@ def one(data: bytes) -> None:
 
 
 @cache
+def car() -> Case:
+    """The case that a curve is of."""
+    return replace(load_case(case("", True)), reference={}, origin=None)
+
+
+@cache
 def case(table: str, suspension: bool) -> Path:
     """A case file that names the table; JSON, which takes less time to read than TOML."""
     text = (kincheck.cases.FOLDER / f"{SUSPENSION}.toml").read_text() if suspension else BASE
-    tables = tomllib.loads(text.replace("steps = 33", "steps = 5")) | {"reference": {"file": table}}
+    tables = tomllib.loads(text.replace("steps = 33", "steps = 5"))
+    tables = {key: value for key, value in tables.items() if key not in ("reference", "truth")}
+    if table:
+        tables |= {"truth": "closed_form", "reference": {"file": table}}
     return written(f"case_of_{table}_{suspension}.json", json.dumps(tables).encode())
 
 
@@ -92,9 +112,15 @@ def seeds() -> list[bytes]:
     )
     head, *rows = CSV.removeprefix("# made up\n\n").replace(",", ";").splitlines()
     german = "\n".join(["sep=;", "Rig 3", head, *(row.replace(".", ",") for row in rows)])
-    sheet = workbook([line.split(",") for line in CSV.splitlines()])
+    rig = ["Travel [mm],toe_deg,Spur,Load (N)", "-70,0.1,0.2,3", "-20,0.2,0.4,x", "10,0,0,3"]
+    rig += ["30.5,0.3,0.21,2", "77,0.1,0.3,1"]
+    units = few.replace("stroke", "stroke [m]").replace("camber", "camber (rad)", 1)
+    below = ["# curve", "travel;toe;Spur;Load", "mm;deg;deg;N"]
+    below += [row.replace(",", ";") for row in rig[1:]]
+    sheet = workbook([str(line).split(",") for line in CSV.splitlines()])
     return [
-        *(text.encode() for text in (CSV, json.dumps(PROVED), few)),
+        *(text.encode() for text in (CSV, json.dumps(PROVED), few, units)),
+        *("\n".join(each).encode() for each in (["# curve", *rig], below)),
         german.encode("utf-16"),
         *sheet,
     ]

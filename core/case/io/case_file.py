@@ -19,7 +19,8 @@ from .in_si import geometry_in_si, load_in_si
 from .joints import read_joints
 from .loads import inertia_in_si, read_forces
 from .outputs import read_outputs
-from .reference import Convert, read_reference
+from .reference import read_reference
+from .reference_columns import Convert
 from .reference_samples import ReferenceKeys
 from .schema import (
     SCHEMA,

@@ -14,7 +14,7 @@ import re
 import reprlib
 import tomllib
 from collections import Counter
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, TypeAlias, cast
@@ -207,7 +207,7 @@ def parse(file: Path, text: str) -> dict[str, Any]:
             file, "", f"found {shown(data)}, expected the keys of a case; write an object {{...}}"
         )
     tables = cast("dict[str, Any]", data)
-    _check_values(file, tables)
+    check_values(file, tables)
     return tables
 
 
@@ -245,7 +245,7 @@ def _written(path: _Path) -> str:
     return key
 
 
-def _check_values(file: Path, tables: Mapping[str, Any]) -> None:
+def check_values(file: Path, tables: object) -> None:
     """Refuse unusable numbers, deep nesting, and text unprintable on terminals and in reports."""
     # a stack: nesting may be deeper than Python recurses
     waiting: list[tuple[_Path, Any, int]] = [(None, tables, 0)]

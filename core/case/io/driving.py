@@ -18,7 +18,8 @@ from ..case import TIME, Sweep
 from ..units import SECOND, Unit, plain
 from .class_keys import driver_keys, motion_keys, own_fields
 from .document import explained, fault, join, shown
-from .reference import Convert, read_grid
+from .reference import read_grid
+from .reference_columns import Convert
 from .reference_samples import ReferenceKeys
 from .schema import MOST_SAMPLES, CaseKeys, SweepKeys
 from .typed_tables import class_of, typed
@@ -103,7 +104,7 @@ def read_sweep(
     if sweep.driver != TIME:
         driver = mechanism.driver(sweep.driver)
         convert, design = _unit(driver, length, angle), mechanism.design_value(sweep.driver)
-    grid = np.array([convert(value) for value in _samples(file, sweep, keys.sweep, reference)])
+    grid = np.array(_samples(file, sweep, keys.sweep, convert, reference))
     found = Sweep(
         sweep.driver, grid, convert(1.0 if sweep.rate is None else sweep.rate), design, motions
     )
@@ -113,9 +114,13 @@ def read_sweep(
 
 
 def _samples(
-    file: Path, sweep: SweepKeys, written: Mapping[str, Any], reference: ReferenceKeys | None
+    file: Path,
+    sweep: SweepKeys,
+    written: Mapping[str, Any],
+    convert: Unit,
+    reference: ReferenceKeys | None,
 ) -> Sequence[float]:
-    """Return the samples in the file's unit: an even grid, or the reference's samples."""
+    """Return the samples [SI]: an even grid, or the reference's samples."""
     if sweep.at is None:
         for key, expected in _EVEN.items():
             if written.get(key) is None:
@@ -127,7 +132,8 @@ def _samples(
                 )
         assert None not in (sweep.start, sweep.stop, sweep.steps)
         _check_even(file, sweep, written)
-        return np.linspace(sweep.start or 0.0, sweep.stop or 0.0, sweep.steps or 1).tolist()
+        even = np.linspace(sweep.start or 0.0, sweep.stop or 0.0, sweep.steps or 1)
+        return [convert(value) for value in even.tolist()]
     for key in _EVEN:
         if written.get(key) is not None:
             problem = f"found {shown(written[key])} beside at = {shown(sweep.at)}, expected one"
@@ -135,7 +141,7 @@ def _samples(
     if reference is None:
         problem = f"found {shown(sweep.at)}, but the case has no [reference] with samples"
         raise fault(file, "sweep.at", f"{problem}; add one, or give start, stop and steps")
-    found = read_grid(file, reference)
+    found = read_grid(file, reference, convert)
     if len(found) > MOST_SAMPLES:
         problem = f"found {len(found)} rows of the reference, expected {MOST_SAMPLES} at most"
         raise fault(file, "sweep.at", f"{problem}; thin them out, or give start, stop and steps")

@@ -19,7 +19,7 @@ from ...mechanism.mechanism import Mechanism, Vector
 from ..case import Case, pace, size
 from ..measures import NAMES, ForceMeasure, Measure, key_of, own_keys
 from .document import explained
-from .reference import Convert
+from .reference_columns import Convert
 from .schema import Flag, Text, ToleranceKeys
 from .tolerance import tolerance
 from .typed_tables import typed

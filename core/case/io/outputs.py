@@ -14,7 +14,8 @@ from ..measures import Measure
 from .coordinates import AXES
 from .document import fault, join, shown
 from .measures import read_measure
-from .reference import Convert, is_derivative
+from .reference import is_derivative
+from .reference_columns import Convert
 from .schema import COORDINATE, CaseKeys, OutputKeys
 from .tolerance import tolerance
 from .typed_tables import as_table, class_of, typed

@@ -3,7 +3,8 @@ from rows inside it, or proved ones.
 
 The first column holds driver values. If they differ from the sweep's values, the reference is
 interpolated, or compared at its own samples only: see `reference_grid`. Further columns are OUTPUT,
-OUTPUT.velocity and OUTPUT.acceleration, in the units of the case file. An output without a column
+OUTPUT.velocity and OUTPUT.acceleration, in the units of their heads, such as `toe [deg]`, or else
+in the units of the case file. An output without a column
 has no reference, and the comparison says so. A file ending in .json is a proved reference
 (`reference_file`), in SI units, on the grid of the sweep.
 
@@ -13,17 +14,21 @@ signs: iso8855". So people can read the file alone, and nobody takes it for one 
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TypeAlias
 
-from ...errors import remedy
 from ...trajectory import QUANTITIES, Array
 from ..case import Origin, Quantity, Series
 from ..units import Unit
 from .document import fault, sha256, shown
+from .reference_columns import (
+    DERIVATIVES,
+    Columns,
+    Convert,
+    driver_unit,
+    read_columns,
+)
 from .reference_file import read, series
 from .reference_grid import Grid
 from .reference_samples import (
@@ -35,13 +40,11 @@ from .reference_samples import (
     only_beside,
 )
 from .reference_table import from_table
+from .workbook import WORKBOOKS
 
-DERIVATIVES = (".velocity", ".acceleration")
 PROVED = ".json"
 """Suffix of the files of proved references."""
-
-Convert: TypeAlias = Callable[[float], float]
-"""Conversion from the unit of a file to SI."""
+CHOICE = 'sheet = "NAME" in [reference]'
 
 
 def is_derivative(name: str) -> bool:
@@ -49,9 +52,11 @@ def is_derivative(name: str) -> bool:
     return name.endswith(DERIVATIVES)
 
 
-def read_grid(case_file: Path, keys: ReferenceKeys) -> Sequence[float]:
-    """Return the driver values of a reference in the units of the case file, or in SI for a proved
-    reference.
+def read_grid(case_file: Path, keys: ReferenceKeys, driver: Unit) -> Sequence[float]:
+    """Return the driver values of a reference [SI].
+
+    Args:
+        driver: unit of the driver values, unless the head of their column gives another one.
 
     Raises:
         CaseError: the file is unreadable or lies elsewhere.
@@ -61,9 +66,20 @@ def read_grid(case_file: Path, keys: ReferenceKeys) -> Sequence[float]:
         return [value for values in [*proved.values()][:1] for value in values]
     if keys.file is None and keys.rows is not None and keys.columns is None:
         # the columns are the outputs, and `read_reference` checks them
-        return [row[0] for row in keys.rows if row]
-    samples = inline(case_file, keys, ()) if keys.file is None else from_table(case_file, keys)
-    return [row[0] for _, row in samples.rows]
+        return [driver(row[0]) for row in keys.rows if row]
+    samples = _samples(case_file, keys, ())
+    _, driver = driver_unit(samples, driver)
+    return [driver(row[0]) for _, row in samples.rows]
+
+
+def _samples(case_file: Path, keys: ReferenceKeys, outputs: Sequence[Quantity]) -> Samples:
+    if keys.file is None:
+        return inline(case_file, keys, outputs)
+    file = only_beside(case_file, keys)
+    if keys.sheet is not None and file.suffix.lower() not in WORKBOOKS:
+        problem = f"found {shown(keys.sheet)}, but {keys.file} is no workbook (.xlsx)"
+        raise fault(case_file, "reference.sheet", f"{problem}, expected none; remove it")
+    return from_table(file, keys.sheet, CHOICE)
 
 
 def read_reference(
@@ -91,28 +107,43 @@ def read_reference(
         CaseError: the file is unreadable or lies elsewhere, a column is unknown, the sweep has no
             sample within the grid, or the signs differ from the case's signs.
     """
-    by_name = {output.name: output for output in outputs}
     if keys.file is not None and keys.file.endswith(PROVED):
         file = only_beside(case_file, keys)
         known = series(file, read(file), values, outputs)
         return known, replace(_origin(case_file, keys), signs=convention)
-    samples = inline(case_file, keys, outputs) if keys.file is None else from_table(case_file, keys)
-    names = list(samples.columns[1:])
-    _check_columns(samples, names, [*by_name])
-    signed = any(by_name[name].signs for name in names if name in by_name)
+    samples = _samples(case_file, keys, outputs)
+    columns = read_columns(samples, driver, units, outputs)
+    signed = any(output.signs for output in outputs if output.name in columns.of)
     if keys.file is not None:
-        _check_signs(samples, convention if signed else "")
-    grid = Grid(samples, driver, values, own=own_grid)
+        check_signs(samples, convention if signed else "")
+    known, origin = compared(samples, columns, outputs, values, _origin(case_file, keys), own_grid)
+    return known, replace(origin, signs=samples.signs or (convention if signed else ""))
+
+
+def compared(
+    samples: Samples,
+    columns: Columns,
+    outputs: Sequence[Quantity],
+    values: Array,
+    origin: Origin,
+    own_grid: bool,
+) -> tuple[dict[str, Series], Origin]:
+    """Return the values of the columns at the samples of a sweep, by output name, and the origin
+    with their units, grid and known errors.
+
+    Raises:
+        CaseError: no sample is within the range of the rows, or they cannot be interpolated.
+    """
+    grid = Grid(samples, columns.driver, values, own=own_grid)
     known: dict[str, Series] = {}
     limits: dict[str, str] = {}
     for output in outputs:
-        if output.name not in names:
+        if output.name not in columns.of:
             continue
-        unit, scale = unit_of(output.unit, units)
         found = {
-            quantity: grid.column(1 + names.index(name), scale)
+            quantity: grid.column(columns.of[name].place, columns.of[name].convert)
             for quantity, ending in zip(QUANTITIES, ("", *DERIVATIVES), strict=True)
-            if (name := output.name + ending) in names
+            if (name := output.name + ending) in columns.of
         }
         known[output.name] = Series(
             found["position"].values,
@@ -124,14 +155,15 @@ def read_reference(
             },
         )
         if reasons := found["position"].reasons:
+            of = columns.of[output.name]
+            scale, unit = abs(of.convert(1.0)), of.unit.partition(", ")[0]
             limits[output.name] = "; ".join(
-                f"{why}: {largest / scale(1.0):.2g} {unit}" for why, largest in reasons
+                f"{why}: {largest / scale:.2g} {unit}" for why, largest in reasons
             )
-    own = {samples.columns[0]: driver.name}
+    units = {columns.name: columns.driver.name}
     return known, replace(
-        _origin(case_file, keys),
-        units=own | {name: unit_of(by_name[name].unit, units)[0] for name in known},
-        signs=samples.signs or (convention if signed else ""),
+        origin,
+        units=units | {name: columns.of[name].unit for name in known},
         grid=grid.words,
         limits=limits,
     )
@@ -167,19 +199,12 @@ def _origin(case_file: Path, keys: ReferenceKeys) -> Origin:
     return Origin(citation, keys.file, found, own=keys.file.endswith(PROVED))
 
 
-def unit_of(unit: str, units: Mapping[str, Convert]) -> tuple[str, Convert]:
-    """Return the unit of an output in the file, and the conversion of its numbers to SI."""
-    above, _, below = unit.partition("/")
-    convert = units[above]
-    name, per = (getattr(units[each], "name", each) if each else "" for each in (above, below))
-    if not below:
-        return name, convert
-    scale = units[below](1.0)
-    return f"{name}/{per}", lambda number: convert(number) / scale
+def check_signs(samples: Samples, convention: str) -> None:
+    """Refuse a table of suspension outputs if it names no sign convention, or another one.
 
-
-def _check_signs(samples: Samples, convention: str) -> None:
-    """Refuse a table of suspension outputs if it names no sign convention, or another one."""
+    Args:
+        convention: convention of the case; empty if no compared output has one.
+    """
     if convention not in ("", samples.signs):
         found = f"found {shown(samples.signs)}" if samples.signs else "found no convention"
         problem = (
@@ -187,37 +212,3 @@ def _check_signs(samples: Samples, convention: str) -> None:
             f' {convention}" if its signs are so'
         )
         raise fault(samples.file, "signs", problem)
-
-
-def _check_columns(samples: Samples, names: Sequence[str], outputs: Sequence[str]) -> None:
-    known = {name + suffix: None for name in outputs for suffix in ("", *DERIVATIVES)}
-    counts = Counter(names)
-    if not names:
-        raise fault(
-            samples.file,
-            samples.header,
-            f"found no column of an output, expected some of {', '.join(outputs)}; add one",
-        )
-    if samples.columns[0] in known:
-        problem = (
-            f"found {samples.columns[0]!r} first, the name of an output, expected the driver values"
-        )
-        problem += "; put their column first, or name it otherwise"
-        raise fault(samples.file, samples.header, problem)
-    for name in names:
-        if counts[name] > 1:
-            raise fault(
-                samples.file,
-                samples.header,
-                f"found the column {name!r} twice, expected it once; remove one",
-            )
-        if name not in known:
-            problem = (
-                f"found the column {shown(name)}, expected outputs of the case;"
-                f" {remedy(name, known)}"
-            )
-            raise fault(samples.file, samples.header, problem)
-        stem = name.removesuffix(".velocity").removesuffix(".acceleration")
-        if stem not in counts:
-            problem = f"found {name!r} alone, expected its positions too; add the column {stem!r}"
-            raise fault(samples.file, samples.header, problem)

@@ -61,7 +61,7 @@ class Grid:
         rows = np.array([driver(x) for x in self._written.tolist()])
         self._allowed = allowed = SAME_GRID * float(np.max(np.abs(values)))
         self._index = np.arange(len(rows)) if own else matched(rows, values, allowed)
-        half = samples.printed[0].half(self._written) * driver(1.0)
+        half = samples.printed[0].half(self._written) * abs(driver(1.0))
         if (self._index is not None and not own) or even(self._written):
             half = np.zeros_like(half)  # the driver values are exact as printed
         self._order = np.argsort(rows, kind="stable")
@@ -118,7 +118,7 @@ class Grid:
         written = np.array([row[k] for _, row in self._samples.rows])
         printed = self._samples.printed[k]
         y = np.array([scale(value) for value in written.tolist()])
-        half = printed.half(written) * scale(1.0)
+        half = printed.half(written) * abs(scale(1.0))
         error = np.zeros_like(self._at)
         if self._index is not None:
             there = self._index >= 0

@@ -118,7 +118,7 @@ def inline(file: Path, keys: ReferenceKeys, outputs: Sequence[Quantity]) -> Samp
         raise fault(file, key, f"found none, {ROWS}")
     samples = Samples(file, "reference.columns", columns, rows, key, printed=printed)
     for where, row in rows:
-        check_width(samples, where, len(row))
+        check_width(file, where, len(row), columns)
         for column, number in zip(printed, row, strict=True):
             column.add(repr(number))
     return samples
@@ -161,10 +161,8 @@ def beside(case_file: Path, name: str) -> Path:
     return file
 
 
-def check_width(samples: Samples, where: str, found: int) -> None:
+def check_width(file: Path, where: str, found: int, columns: Sequence[str]) -> None:
     """Refuse a row without a number for each column."""
-    if found != len(samples.columns):
-        expected = f"{len(samples.columns)} ({', '.join(samples.columns)})"
-        raise fault(
-            samples.file, where, f"found {found} numbers, expected {expected}; complete the row"
-        )
+    if found != len(columns):
+        expected = f"{len(columns)} ({', '.join(columns)})"
+        raise fault(file, where, f"found {found} numbers, expected {expected}; complete the row")

@@ -1,7 +1,7 @@
 """Samples of a reference from a table beside the case file: a CSV file of a spreadsheet, or a sheet
 of a workbook.
 
-Commas, semicolons or tabs separate the fields. With semicolons or tabs the decimal sign may be a
+Commas, semicolons, tabs or blanks separate the fields. But for commas, the decimal sign may be a
 comma. The reader skips titles above the head, and comments, such as `# signs: iso8855`.
 """
 
@@ -11,35 +11,55 @@ import csv
 import math
 import re
 from array import array
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
+from itertools import chain
 from pathlib import Path
+from typing import TypeAlias
 
 from ..printed import Printed
+from .column_units import is_unit_row
 from .decimal_sign import find_decimal_sign
 from .document import LARGEST, SMALLEST, decimal, fault, read_text, shown
-from .reference_samples import ROWS, ReferenceKeys, Samples, check_width, only_beside
+from .reference_samples import ROWS, Samples, check_width
 from .workbook import WORKBOOKS, Cell, Row, one_sheet, read_sheets
 
 LARGEST_FILE = 64_000_000
 # A line for each sample of the largest sweep, and as many other lines.
 MOST_LINES = 2_000_000
 _SIGNS = re.compile(r"\"?\s*#\s*signs:\s*(\w+)")
+_BLANKS, _BEFORE_UNIT = re.compile(r"\s+"), re.compile(r"\s+(?=[\[(])")
+_NUMBERS = re.compile(r"\s*[-+]?[\d.]+\S*(?:\s+[-+]?[\d.]+\S*)+\s*")
 _SEPARATOR = re.compile(r"\"?sep=([;\t,])\"?", re.IGNORECASE)
 
+Choose: TypeAlias = Callable[[Path, str, Sequence[str]], Sequence[int]]
+"""Choice of columns, see `from_table`."""
 
-def from_table(case_file: Path, keys: ReferenceKeys) -> Samples:
-    """Read the samples of the table beside a case file.
+
+def every_column(_file: Path, _where: str, heads: Sequence[str]) -> Sequence[int]:
+    """Return the indices of all columns."""
+    return range(len(heads))
+
+
+def from_table(
+    file: Path, sheet: str | None, option: str, choose: Choose = every_column
+) -> Samples:
+    """Read the samples of a table.
+
+    Args:
+        sheet: name of the sheet of a workbook; None for the only sheet with cells.
+        option: the option to choose a sheet, for messages.
+        choose: returns the indices of the columns to read, from the place of their heads and the
+            heads.
 
     Raises:
-        CaseError: the file is unreadable or lies elsewhere, or is no table of numbers.
+        CaseError: the file is unreadable, or is no table of numbers.
     """
-    file = only_beside(case_file, keys)
     if file.suffix.lower() in WORKBOOKS:
-        return _of_sheet(file, keys.sheet)
-    if keys.sheet is not None:
-        problem = f"found {shown(keys.sheet)}, but {keys.file} is no workbook (.xlsx)"
-        raise fault(case_file, "reference.sheet", f"{problem}, expected none; remove it")
+        return _of_sheet(file, sheet, option, choose)
+    if sheet is not None:
+        problem = f"found the sheet {shown(sheet)} of a file that is no workbook (.xlsx)"
+        raise fault(file, "sheet", f"{problem}, expected none; leave it out")
     text = read_text(file, LARGEST_FILE, "thin out the samples", of_spreadsheet=True)
     lines = text.splitlines()
     if len(lines) > MOST_LINES:
@@ -53,22 +73,25 @@ def from_table(case_file: Path, keys: ReferenceKeys) -> Samples:
     # blank comment lines, not drop them: the reader's line numbers are then the file's
     lines = ["" if line.lstrip('" \t').startswith("#") else line for line in lines]
     delimiter = _delimiter(lines)
+    if delimiter == " ":
+        lines = [_BLANKS.sub(" ", _BEFORE_UNIT.sub("", line.strip())) for line in lines]
     reader = csv.reader(lines, delimiter=delimiter, skipinitialspace=True, strict=True)
-    rows = ((f"line {reader.line_num}", cells) for cells in reader if cells)
+    rows = (
+        (f"line {reader.line_num}", trimmed) for cells in reader if (trimmed := _trimmed(cells))
+    )
     try:
         if delimiter == ",":
-            return _samples(file, rows, signs, lines)
-        plain = _below_titles([(where, _trimmed(cells)) for where, cells in rows])
+            return _samples(file, _below_titles(rows), signs, choose, lines)
+        return _with_sign(file, [*_below_titles(rows)], signs, choose)
     except csv.Error as error:
         raise fault(
             file, f"line {reader.line_num}", f"not valid CSV: {error}; correct the line"
         ) from None
-    return _samples(file, plain, signs, sign=_decimal_sign(file, plain[1:]))
 
 
-def _of_sheet(file: Path, wanted: str | None) -> Samples:
+def _of_sheet(file: Path, wanted: str | None, option: str, choose: Choose) -> Samples:
     """Read the samples of the wanted sheet of a workbook, or of its only sheet with cells."""
-    sheet = one_sheet(file, read_sheets(file, wanted, MOST_LINES), 'sheet = "NAME" in [reference]')
+    sheet = one_sheet(file, read_sheets(file, wanted, MOST_LINES), option)
     comments = [str(cells[0]) for _, cells in sheet.rows]
     signs = next((found[1] for text in comments if (found := _SIGNS.match(text))), "")
     rows = [
@@ -76,8 +99,23 @@ def _of_sheet(file: Path, wanted: str | None) -> Samples:
         for row, text in zip(sheet.rows, comments, strict=True)
         if not text.startswith("#") or _filled(row[1]) > 1
     ]
-    table = _below_titles(rows)
-    return _samples(file, table, signs, sign=_decimal_sign(file, table[1:]))
+    return _with_sign(file, [*_below_titles(rows)], signs, choose)
+
+
+def _with_sign(file: Path, rows: Sequence[Row], signs: str, choose: Choose) -> Samples:
+    """Read the samples of a table whose decimal sign may be a comma."""
+    if not rows:
+        return _samples(file, rows, signs, choose)
+    (where, heads), *body = rows
+    wanted = [*choose(file, where, [str(cell).strip() for cell in heads])]
+    texts = [
+        (place, cell)
+        for k, (place, cells) in enumerate(body)
+        if k or not is_unit_row(cells)
+        for cell in (cells[n] for n in wanted if n < len(cells))
+        if isinstance(cell, str) and cell
+    ]
+    return _samples(file, rows, signs, choose, sign=find_decimal_sign(file, texts))
 
 
 def _delimiter(lines: list[str]) -> str:
@@ -92,15 +130,22 @@ def _delimiter(lines: list[str]) -> str:
         counts = {sign: line.count(sign) for sign in ";\t,"}
         if any(counts.values()):
             return max(counts, key=lambda sign: counts[sign])
+        if _NUMBERS.fullmatch(line):
+            return " "
     return ","
 
 
-def _below_titles(rows: Sequence[Row]) -> Sequence[Row]:
+def _below_titles(rows: Iterable[Row]) -> Iterator[Row]:
     """Return the rows from the head on, the first row with several cells; all rows without a
     head.
     """
-    first = next((k for k, (_, cells) in enumerate(rows) if _filled(cells) > 1), 0)
-    return rows[first:]
+    above: list[Row] = []
+    rest = iter(rows)
+    for row in rest:
+        above.append(row)
+        if _filled(row[1]) > 1:
+            return chain(above[-1:], rest)
+    return iter(above)
 
 
 def _filled(cells: Sequence[Cell]) -> int:
@@ -115,62 +160,59 @@ def _trimmed(cells: Sequence[str]) -> list[Cell]:
     return [*found]
 
 
-def _decimal_sign(file: Path, rows: Sequence[Row]) -> str:
-    """Return the decimal sign of the texts in rows."""
-    texts = [
-        (where, cell) for where, cells in rows for cell in cells if isinstance(cell, str) and cell
-    ]
-    return find_decimal_sign(file, texts)
-
-
 def _samples(
     file: Path,
-    rows: Iterable[tuple[str, Sequence[Cell]]],
+    rows: Iterable[Row],
     signs: str,
+    choose: Choose,
     lines: Sequence[str] = (),
     sign: str = ".",
 ) -> Samples:
-    """Return the samples of a head and rows of numbers.
+    """Return the samples of a head and rows of numbers; a row of units may stand between.
 
     Args:
         lines: lines of a CSV file, for messages.
         sign: decimal sign of texts.
     """
-    samples: Samples | None = None
-    numbers: list[tuple[str, Sequence[float]]] = []
-    for where, cells in rows:
-        if samples is None:
-            samples = Samples(
-                file,
-                where,
-                [str(cell).strip() for cell in cells],
-                numbers,
-                signs=signs,
-                lines=lines,
-                printed=[Printed() for _ in cells],
-            )
-            continue
-        check_width(samples, where, len(cells))
-        # convert at once: the cells of a large file as texts would take many times its size
-        found = array(
-            "d",
-            (
-                _number(file, where, name, cell, sign)
-                for name, cell in zip(samples.columns, cells, strict=True)
-            ),
-        )
-        numbers.append((where, found))
-        for column, cell in zip(samples.printed, cells, strict=True):
-            column.add(cell.replace(sign, ".") if isinstance(cell, str) else repr(cell))
-    if samples is None:
+    rest = iter(rows)
+    nothing: Row = ("", [])
+    where, heads = next(rest, nothing)
+    if not heads:
         raise fault(
             file,
             "",
             "found no samples, expected a line of column names and rows of numbers; add them",
         )
+    names = [str(cell).strip() for cell in heads]
+    wanted = [*choose(file, where, names)]
+    numbers: list[tuple[str, Sequence[float]]] = []
+    printed = [Printed() for _ in wanted]
+    all_columns = wanted == [*range(len(names))]
+    for k, (place, cells) in enumerate(rest):
+        if k == 0 and is_unit_row(cells):
+            units = [*map(str, cells), *[""] * len(names)]
+            names = [
+                f"{name} [{unit.strip('[]() ')}]" if unit else name
+                for name, unit in zip(names, units, strict=False)
+            ]
+            continue
+        if not all_columns and not any(cells[n] != "" for n in wanted if n < len(cells)):
+            continue  # a note
+        if all_columns or not max(wanted) < len(cells) <= len(names):
+            check_width(file, place, len(cells), names)
+        # convert at once: the cells of a large file as texts would take many times its size
+        found = array("d", (_number(file, place, names[n], cells[n], sign) for n in wanted))
+        numbers.append((place, found))
+        for column, n in zip(printed, wanted, strict=True):
+            cell = cells[n]
+            column.add(cell.replace(sign, ".") if isinstance(cell, str) else repr(cell))
     if not numbers:
         raise fault(file, "", f"found column names only, {ROWS}")
-    return samples
+    first = wanted[:1] == [0]  # messages quote the driver values of the first column
+    columns = [names[n] for n in wanted]
+    return Samples(
+        file, where, columns, numbers, signs=signs, lines=lines if first else (), printed=printed
+    )
 
 
 def _number(file: Path, where: str, column: str, cell: Cell, sign: str) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...trajectory import QUANTITIES, Array
 from ..case import Case
-from .reference import DERIVATIVES
+from .reference_columns import DERIVATIVES
 
 
 def reference_table(case: Case, driver_values: Array) -> Mapping[str, Any]:

@@ -14,7 +14,7 @@ import msgspec
 from ..case import Case, Quantity, size
 from ..suspension import AxleOutput, PerTravel, Side, SuspensionOutput, Vehicle, own_keys
 from .document import fault, join, shown
-from .reference import Convert
+from .reference_columns import Convert
 from .schema import Flag, Text, ToleranceKeys
 from .suspension_table import Points, Sides, SuspensionTable, check_point, one_of
 from .tolerance import tolerance

@@ -18,7 +18,7 @@ from ..case import Case
 from ..suspension import Axle, Convention, Reaction, Side, Vehicle
 from ..units import Unit
 from .document import fault, join, shown
-from .reference import Convert
+from .reference_columns import Convert
 from .schema import Flag, Number, Numbers3, Text
 from .travel_driver import travel_driver
 from .typed_tables import typed

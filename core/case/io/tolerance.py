@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from .document import fault, join
-from .reference import Convert
+from .reference_columns import Convert
 from .schema import ToleranceKeys
 
 # Hardpoints are measured to about a micrometre; double precision rounds coordinates of metre-sized

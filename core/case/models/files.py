@@ -15,24 +15,24 @@ if TYPE_CHECKING:
     from .hardpoints.table import HardpointTable
 
 CASE_FILES = (".toml", ".json")
-TABLES = (".csv", ".tsv")
+TABLES = (".csv", ".tsv", ".tab", ".dat", ".prn", ".m", ".hpts")
+TREES = (".yaml", ".yml")
 ADAMS_FILES = (".sub", ".tpl", ".asy", ".hpt")
 MODELS = (".xml", ".mjcf", ".urdf", ".sdf", ".world")
-SUFFIXES = (*CASE_FILES, *TABLES, *WORKBOOKS, *ADAMS_FILES, *MODELS)
+SUFFIXES = (*CASE_FILES, *TABLES, *TREES, *WORKBOOKS, *ADAMS_FILES, *MODELS)
 """Suffixes of names that are files, whether they exist or not."""
 
-CASE, CHRONO, ADAMS, TABLE, WORKBOOK, MODEL = (
+CASE, CHRONO, ADAMS, TABLE, TREE, WORKBOOK, MODEL = (
     "case file",
     "Project Chrono suspension",
     "Adams/Car hardpoints",
     "hardpoint table",
+    "tree of hardpoints",
     "workbook of hardpoints",
     "model",
 )
 HARDPOINTS = (CHRONO, ADAMS, TABLE)
 UNREAD = {
-    ".yaml": "is beside a URDF of the same name; give that file, NAME.urdf",
-    ".yml": "is beside a URDF of the same name; give that file, NAME.urdf",
     ".constraints.json": "holds the loops of a URDF beside it; give that file, NAME.urdf",
     ".xacro": "holds macros; expand them: xacro FILE > robot.urdf",
     ".mjb": "is compiled; give the MJCF that it is made of",
@@ -77,7 +77,7 @@ _OPTIONS = {
     CASE: ("closure",),
     MODEL: ("drive", "hold", "hold-rest", "start", "closure"),
     **dict.fromkeys(HARDPOINTS, _OF_HARDPOINTS),
-    WORKBOOK: (*_OF_HARDPOINTS, "sheet"),
+    **dict.fromkeys((WORKBOOK, TREE, TABLE), (*_OF_HARDPOINTS, "sheet")),
 }
 
 
@@ -124,11 +124,14 @@ def _hardpoints(file: Path, kind: str, supplied: Supplied) -> HardpointTable:
     from .hardpoints.chrono import read_chrono
     from .hardpoints.plain import read_plain
     from .hardpoints.spreadsheet import read_spreadsheet
+    from .hardpoints.tree import read_tree
 
     if kind == WORKBOOK:
         return read_spreadsheet(file, supplied.sheet)
     text = _text(file, of_spreadsheet=kind in (TABLE, ADAMS))
-    return {CHRONO: read_chrono, ADAMS: read_adams, TABLE: read_plain}[kind](file, text)
+    if kind in (TREE, TABLE):
+        return {TREE: read_tree, TABLE: read_plain}[kind](file, text, supplied.sheet)
+    return {CHRONO: read_chrono, ADAMS: read_adams}[kind](file, text)
 
 
 def kind_of(file: Path, supplied: Supplied = NOTHING) -> str:
@@ -141,16 +144,10 @@ def kind_of(file: Path, supplied: Supplied = NOTHING) -> str:
     if suffix == ".toml":
         return CASE
     if suffix == ".json":
-        from .hardpoints.chrono import without_comments
-
-        tables = parse(file, without_comments(_text(file)))
-        return (
-            CHRONO
-            if "schema" not in tables and ("Template" in tables or supplied.template)
-            else CASE
-        )
+        return _kind_of_json(file, supplied)
     for kind, suffixes in (
         (TABLE, TABLES),
+        (TREE, TREES),
         (WORKBOOK, WORKBOOKS),
         (ADAMS, ADAMS_FILES),
         (MODEL, MODELS),
@@ -162,7 +159,22 @@ def kind_of(file: Path, supplied: Supplied = NOTHING) -> str:
         return ADAMS
     if text.lstrip().startswith("<"):
         return MODEL
-    return TABLE if supplied.template else CASE
+    return TABLE if supplied.template or suffix == ".txt" else CASE
+
+
+def _kind_of_json(file: Path, supplied: Supplied) -> str:
+    from .hardpoints.chrono import is_chrono, without_comments
+    from .hardpoints.tree import has_points, json_tree
+
+    text = without_comments(_text(file))
+    if text.lstrip().startswith("["):
+        return TREE
+    tables = parse(file, text)
+    if "schema" in tables:
+        return CASE
+    if is_chrono(tables):
+        return CHRONO
+    return TREE if supplied.template or has_points(json_tree(file, text)) else CASE
 
 
 def _text(file: Path, *, of_spreadsheet: bool = False) -> str:

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 from ...io.document import fault, parse, shown
 from ...io.typed_tables import as_table
@@ -36,6 +37,16 @@ def without_comments(text: str) -> str:
         return part if part.startswith('"') else re.sub(r"[^\n]", " ", part)
 
     return _STRING_OR_COMMENT.sub(blank, text)
+
+
+def is_chrono(tables: Mapping[str, Any]) -> bool:
+    """Return whether the tables of a JSON file are of a vehicle model of Chrono."""
+    sections = [cast("dict[str, Any]", each) for each in tables.values() if isinstance(each, dict)]
+    return (
+        "Template" in tables
+        or isinstance(tables.get("Type"), str)
+        or any(key.startswith("Location") for section in sections for key in section)
+    )
 
 
 def read_chrono(file: Path, text: str) -> HardpointTable:

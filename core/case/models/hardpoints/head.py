@@ -10,9 +10,10 @@ from dataclasses import dataclass
 from itertools import zip_longest
 from pathlib import Path
 
-from ...io.document import decimal, fault, shown
+from ...io.document import fault, shown
 from ...io.workbook import Cell, Row
 from ...units import LENGTHS
+from .forms import is_number
 from .table import length_name
 
 HEAD = ("name", "x", "y", "z")
@@ -44,18 +45,9 @@ class Head:
         return [name for k, name in enumerate(self.names) if name and k not in self.columns]
 
 
-def has_head(file: Path, rows: Sequence[Row]) -> bool:
-    """Return whether rows, or their columns, have a head.
-
-    Raises:
-        CaseError: two columns of one name, or coordinates in several units.
-    """
-    return upright(file, rows) is not None
-
-
 def upright(file: Path, rows: Sequence[Row]) -> tuple[Sequence[Row], int] | None:
     """Return the rows, or the columns if these have the head, and the index of the head."""
-    for each in (rows, _turned(rows)):
+    for each in (rows, turned(rows)):
         if (place := head_place(file, each)) is not None:
             return each, place
     return None
@@ -75,18 +67,7 @@ def head_place(file: Path, rows: Sequence[Row]) -> int | None:
     return None
 
 
-def is_number(cell: Cell) -> bool:
-    """Return whether a cell is a number, with either decimal sign."""
-    if not isinstance(cell, str):
-        return True
-    try:
-        decimal(cell.replace(",", "."))
-    except ValueError:
-        return False
-    return True
-
-
-def _turned(rows: Sequence[Row]) -> list[Row]:
+def turned(rows: Sequence[Row]) -> list[Row]:
     """Return the columns of rows as rows."""
     columns = zip_longest(*(cells for _, cells in rows), fillvalue="")
     return [
@@ -105,6 +86,8 @@ def as_head(file: Path, where: str, cells: Sequence[Cell]) -> Head | None:
     columns: dict[str, int] = {}
     units: set[str | None] = set()
     texts = [cell if isinstance(cell, str) else "" for cell in cells]
+    if sum(text.lower() == "x" for text in texts) > 2:  # a column of the coordinates' names
+        return None
     for k, text in enumerate(texts):
         column, unit = _column(text.lower())
         if column not in HEAD:
@@ -120,10 +103,12 @@ def as_head(file: Path, where: str, cells: Sequence[Cell]) -> Head | None:
         units |= {unit} if column != "name" else set()
     if not {"x", "y", "z"} <= columns.keys():
         return None
-    if "name" not in columns:  # the only column before the coordinates, under any name
+    if "name" not in columns:  # the only column before the coordinates, under any name, or beside
         before = [*range(min(columns.values()))]
         if len(before) != 1:
-            return None
+            before = [k for k in range(4) if k not in columns.values()]
+            if before[0] != 3 or any(texts[3:]):  # below no name, at the end
+                return None
         columns["name"] = before[0]
     if len(units) > 1:
         raise fault(

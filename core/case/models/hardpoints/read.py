@@ -22,7 +22,7 @@ from .default_outputs import wheel_of, with_suspension_outputs
 from .own_names import read_own_names
 from .table import HardpointTable, coordinate, placed, require_size, unit_of
 from .templates import TEMPLATES, Template
-from .templates.base import WHEEL_CONTACT, normal, side_of
+from .templates.base import WHEEL_CONTACT, compact, side_of
 from .travels import read_travels
 
 WHEEL = "wheel_center"
@@ -81,8 +81,8 @@ def case_of_hardpoints(table: HardpointTable, supplied: Supplied) -> Case:
 
 
 def _template(table: HardpointTable, said: str | None) -> Template:
-    known = {normal(name): each for each in TEMPLATES.values() for name in (each.name, *each.also)}
-    if said is not None and normal(said) not in known:
+    known = {compact(name): each for each in TEMPLATES.values() for name in (each.name, *each.also)}
+    if said is not None and compact(said) not in known:
         raise fault(
             table.file,
             "--template",
@@ -97,15 +97,15 @@ def _template(table: HardpointTable, said: str | None) -> Template:
                 "does not say what suspension it is of, expected it from you; add --template, one"
                 f" of {names}",
             )
-        return known[normal(said)]
-    if normal(table.template) not in known:
+        return known[compact(said)]
+    if compact(table.template) not in known:
         problem = (
             f"found {shown(table.template)}, expected one of those that there is a template for;"
             f" known: {names}"
         )
         raise fault(table.file, "Template", problem)
-    written = known[normal(table.template)]
-    if said is not None and known[normal(said)] is not written:
+    written = known[compact(table.template)]
+    if said is not None and known[compact(said)] is not written:
         problem = (
             f"found {said}, but the file is of a {table.template}, expected {written.name}; leave"
             " out --template"
@@ -120,13 +120,13 @@ def _filled(table: HardpointTable, template: Template, own: Path | None) -> dict
     Args:
         own: file of the user's own names.
     """
-    by_normal_name: dict[str, list[str]] = {}
+    by_compact_name: dict[str, list[str]] = {}
     by_left_name: dict[str, list[str]] = {}
     for name in table.points:
-        by_normal_name.setdefault(normal(name), []).append(name)
+        by_compact_name.setdefault(compact(name), []).append(name)
         plain, side = side_of(name)
         if side == "left":
-            by_left_name.setdefault(plain, []).append(name)
+            by_left_name.setdefault(compact(plain), []).append(name)
     filled: dict[str, str] = {}
     if own is not None:
         filled |= read_own_names(
@@ -136,7 +136,7 @@ def _filled(table: HardpointTable, template: Template, own: Path | None) -> dict
         if role.name in filled:
             continue
         names = dict.fromkeys(role.names)
-        found = [name for each in names for name in by_normal_name.get(each, ())]
+        found = [name for each in names for name in by_compact_name.get(each, ())]
         found = found or [name for each in names for name in by_left_name.get(each, ())]
         if len(found) > 1:
             places = " and ".join(f"{name!r} ({table.points[name].where})" for name in found)
@@ -150,7 +150,7 @@ def _filled(table: HardpointTable, template: Template, own: Path | None) -> dict
     missing = [role for role in template.roles if role.name not in filled]
     if not missing:
         return filled
-    unused = {normal(name): name for name in table.points if name not in filled.values()}
+    unused = {compact(name): name for name in table.points if name not in filled.values()}
     lines: list[str] = []
     for role in missing:
         close = [near for each in role.names if (near := similar(each, unused, 0.75))]

@@ -17,19 +17,14 @@ from ...io.decimal_sign import find_decimal_sign
 from ...io.document import fault, shown
 from ...io.workbook import Cell, Row
 from ...units import LENGTHS
-from .head import HEAD, Head, as_head, upright, written
+from .forms import with_head
+from .head import HEAD, Head, as_head, turned, upright, written
 from .table import Hardpoint, HardpointTable, length_name, number
-from .templates import TEMPLATES
-from .templates.base import normal
+from .templates import ROLES
+from .templates.base import compact
 
 _UNIT = re.compile(r"[\[(]?\s*([a-z]+)\s*[\])]?", re.IGNORECASE)
 _REMARK = re.compile(r"(#?)\s*(unit|axes|template)s?\s*[:=,]+\s*(.+)", re.IGNORECASE)
-_ROLES = {
-    name
-    for template in TEMPLATES.values()
-    for role in (*template.roles, *template.optional)
-    for name in role.names
-}
 
 
 def read_rows(
@@ -50,14 +45,14 @@ def read_rows(
     Raises:
         CaseError: no such head, or a row at odds with the head.
     """
-    found = upright(file, rows)
+    found = table_in(file, rows)
     if found is None:
         where, cells = rows[0]
         raise fault(
             file,
             where,
             f"found {shown(written(cells))}, expected the head {','.join(HEAD)}; write it above"
-            " the points",
+            " the points, or a name and x, y, z alone in each row",
         )
     rows, place = found
     head = as_head(file, *rows[place])
@@ -71,7 +66,7 @@ def read_rows(
             left_out.append(f"{where} ({brief(written(cells).strip(','))})")
     body = list(rows[place + 1 :])
     unit = head.unit
-    if unit is None and body and (below := _units(body[0][1])):
+    if unit is None and body and (below := _units(body[0][1], head)):
         unit, body = below, body[1:]
     if unit and length_name(facts.get("unit", unit)) != length_name(unit):
         raise fault(
@@ -81,6 +76,13 @@ def read_rows(
             " correct either",
         )
     notes = [row for row in body if _is_note(row[1], head)]
+    for where, cells in body:
+        if as_head(file, where, cells):
+            raise fault(
+                file,
+                where,
+                "found a second head, expected one table (of the front, or of the rear); keep one",
+            )
     points = _points(
         file,
         [
@@ -105,6 +107,20 @@ def read_rows(
         facts.get("template"),
         left_out,
     )
+
+
+def table_in(file: Path, rows: Sequence[Row]) -> tuple[Sequence[Row], int] | None:
+    """Return the rows with a head, and its index; None for rows of no known form.
+
+    Raises:
+        CaseError: two columns of one name, coordinates in several units, or a row at odds with its
+            form.
+    """
+    if (found := upright(file, rows)) is not None:
+        return found
+    if any(as_head(file, *row) for row in rows):  # below a point
+        return None
+    return with_head(file, rows) or with_head(file, turned(rows))
 
 
 def remark(cells: Sequence[Cell], *, comment: bool = False) -> tuple[str, str] | None:
@@ -160,10 +176,12 @@ def _points(
     return points
 
 
-def _units(cells: Sequence[Cell]) -> str | None:
+def _units(cells: Sequence[Cell], head: Head) -> str | None:
     """Return the unit in a row of units below the head; None if the row is of a point."""
     found = [
-        _UNIT.fullmatch(cell) if isinstance(cell, str) else None for cell in cells[1:] if cell != ""
+        _UNIT.fullmatch(cell) if isinstance(cell, str) else None
+        for k, cell in enumerate(cells)
+        if cell != "" and k != head.columns[0]
     ]
     names = {length_name(each.group(1)) if each else "" for each in found}
     return names.pop() if len(found) >= 3 and len(names) == 1 and names <= LENGTHS.keys() else None
@@ -175,7 +193,7 @@ def _is_note(cells: Sequence[Cell], head: Head) -> bool:
     """
     name, *coordinates = (cells[k] if k < len(cells) else "" for k in head.columns)
     lacking = any(cell == "" for cell in coordinates)
-    return lacking and not (isinstance(name, str) and normal(name) in _ROLES)
+    return lacking and not (isinstance(name, str) and compact(name) in ROLES)
 
 
 def _complete(

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from ...io.document import fault, shown
 from ...io.workbook import one_sheet, read_sheets
-from .head import HEAD, has_head
-from .rows import read_rows
+from .head import HEAD
+from .rows import read_rows, table_in
 from .table import HardpointTable
 
 # Largest number of points, and as many other rows.
@@ -18,14 +18,14 @@ def read_spreadsheet(file: Path, wanted: str | None) -> HardpointTable:
     """Return the points by name.
 
     Args:
-        wanted: name of the sheet; None for the only sheet with a head.
+        wanted: name of the sheet; None for the only sheet with a table.
 
     Raises:
         CaseError: the file is no readable workbook, no sheet or several sheets have a head, or a
             row is at odds with the head.
     """
     sheets = read_sheets(file, wanted, MOST_ROWS)
-    tables = [sheet for sheet in sheets if has_head(file, sheet.rows)]
+    tables = [sheet for sheet in sheets if table_in(file, sheet.rows) is not None]
     if sheets and not tables:
         names = ", ".join(shown(sheet.name) for sheet in sheets)
         raise fault(

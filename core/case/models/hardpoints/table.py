@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ....errors import remedy
+from ....errors import CaseError, remedy
 from ....mechanism.mechanism import Vector
 from ...io.document import decimal, fault, shown, usable
 from ...sizes import SUSPENSIONS
@@ -234,6 +234,15 @@ def _axes(table: HardpointTable, said: str | None) -> list[tuple[int, float]]:
             f"found {said}, but the points of this file are {table.axes}; leave out --axes",
         )
     return found
+
+
+def is_axes(text: str) -> bool:
+    """Return whether a text states where x, y and z point."""
+    try:
+        _places(Path(), "", text)
+    except CaseError:
+        return False
+    return True
 
 
 def _places(file: Path, key: str, text: str) -> list[tuple[int, float]]:

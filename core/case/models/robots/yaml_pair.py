@@ -11,16 +11,15 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any
 
 import msgspec
 
 from ....algebra import X
 from ....errors import remedy
 from ...io.document import fault, shown
+from ...io.yaml_document import parse_yaml
 from .robot import Connection, Described, Loop, Move, Robot
 
-INSTALL = "pip install 'kincheck[yaml]'"
 _UNIVERSAL = re.compile(r"UJOINT_([XYZ])([XYZ])")
 _TYPES = {"SPHERICAL": "spherical", "FIXED": "fixed"}
 
@@ -42,7 +41,7 @@ def read_pairs(file: Path, text: str) -> PairedFile:
         CaseError: PyYAML is missing, or the text is no such file.
     """
     try:
-        found = msgspec.convert(_parsed(file, text), PairedFile)
+        found = msgspec.convert(parse_yaml(file, text), PairedFile)
     except msgspec.ValidationError as error:
         raise fault(
             file,
@@ -109,33 +108,3 @@ def add_pairs(file: Path, pairs: PairedFile, robot: Robot) -> None:
         robot.loops.append(Loop(Connection(title, (first, second), moves, element), places))
     coordinates = {move.name for joint in robot.joints for move in joint.moves}
     robot.actuated += [name for name in pairs.name_mot if name in coordinates]
-
-
-def _parsed(file: Path, text: str) -> Any:
-    """Return the data of a YAML text: mappings, sequences and texts, without references.
-
-    Raises:
-        CaseError: PyYAML is missing, or the text is not valid.
-    """
-    try:
-        import yaml
-    except ImportError:
-        raise fault(
-            file, "", f"needs PyYAML, which is not installed; {INSTALL}, or move the file away"
-        ) from None
-
-    class Plain(yaml.BaseLoader):
-        """Makes texts of all scalars, and refuses references, which can multiply without end."""
-
-        def compose_node(self, parent: Any, index: Any) -> Any:
-            if self.check_event(yaml.AliasEvent):  # pyright: ignore[reportUnknownMemberType]
-                raise yaml.YAMLError("found a reference (*NAME), expected none")
-            return super().compose_node(parent, index)
-
-    try:
-        return yaml.load(text, Plain)
-    except RecursionError:
-        what = "nested too deeply"
-    except (yaml.YAMLError, ValueError) as error:
-        what = " ".join(str(error).split())
-    raise fault(file, "", f"not valid YAML: {what}; correct the syntax") from None

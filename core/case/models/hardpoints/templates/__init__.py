@@ -26,4 +26,12 @@ TEMPLATES = {
 }
 """Templates by name, as for --template."""
 
-__all__ = ["TEMPLATES", "Role", "Template"]
+ROLES = frozenset(
+    name
+    for template in TEMPLATES.values()
+    for role in (*template.roles, *template.optional)
+    for name in role.names
+)
+"""All names of all roles, in their compact form."""
+
+__all__ = ["ROLES", "TEMPLATES", "Role", "Template"]

@@ -41,8 +41,8 @@ class Role:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """All names of the hardpoint, in their normal form."""
-        return tuple(normal(name) for name in (self.name, *self.also))
+        """All names of the hardpoint, in their compact form."""
+        return tuple(map(compact, (self.name, *self.also)))
 
 
 @dataclass(frozen=True)
@@ -101,6 +101,13 @@ def normal(name: str) -> str:
     return re.sub(r"^hp[ls]_", "", plain)
 
 
+def compact(name: str) -> str:
+    """Return a hardpoint's name in normal form without separators, also of words written together:
+    `upperBallJoint`.
+    """
+    return normal(name).replace("_", "")
+
+
 def side_of(name: str) -> tuple[str, str]:
     """Return a hardpoint's normal name without its side or corner, and the side: "left", "right" or
     an empty text.
@@ -134,18 +141,51 @@ def between(a: Vector, b: Vector) -> Vector:
     return b[0] - a[0], b[1] - a[1], b[2] - a[2]
 
 
+_ARMS = ("{}_arm", "{}_wishbone", "{}_a_arm", "{}_control_arm", "{0[0]}ca", "{0[0]}wb")
+_ENDS: Mapping[str, Sequence[str]] = {
+    end: (
+        *(f"{word}{joined}" for word in words for joined in ("", "_pivot", "_inboard", "_inner")),
+        *(f"{before}_{word}" for word in words for before in ("inboard", "inner", "chassis")),
+        short,
+    )
+    for end, words, short in (("front", ("front", "fore"), "if"), ("rear", ("rear", "aft"), "ir"))
+} | {"outer": ("outer", "outboard", "outer_ball_joint", "ball_joint", "knuckle", "upright", "o")}
+_RODS = ("tierod", "trackrod", "track_rod", "steering_rod", "tr")
+_ROD_ENDS: Mapping[str, Sequence[str]] = {
+    "inner": ("inner", "inboard", "chassis", "rack", "i", "inner_ball_joint"),
+    "outer": ("outer", "outboard", "upright", "knuckle", "hub", "o", "outer_ball_joint"),
+}
+
+
+def arm_names(level: str, end: str) -> tuple[str, ...]:
+    """Return names of a point of a wishbone in tables of Adams/Car, Lotus Suspension Analysis,
+    suspension-explorer, OptimumK and others.
+
+    Args:
+        level: upper or lower.
+        end: front, rear or outer.
+    """
+    optimum = {"front": "CHAS_{}For", "rear": "CHAS_{}Aft", "outer": "UPRI_{}Pnt"}[end]
+    balls = (f"{level}_ball_joint", f"{level[0]}bj") if end == "outer" else ()
+    arms = [arm.format(level) for arm in _ARMS]
+    named = [f"{arm}_{name}" for arm in arms for name in _ENDS[end]]
+    return (*named, *balls, optimum.format(level[:3].capitalize()))
+
+
+def rod_names(end: str) -> tuple[str, ...]:
+    """Return names of an end of the tie rod: inner or outer."""
+    return tuple(f"{rod}_{name}" for rod in _RODS for name in _ROD_ENDS[end])
+
+
 WHEEL_CENTER = Role(
-    "wheel_center", "the wheel's centre", ("wheel", "Spindle/COM", "wheel_center_point")
+    "wheel_center", "the wheel's centre", ("wheel", "wc", "Spindle/COM", "wheel_center_point")
 )
 TIEROD_INNER = Role(
     "tierod_inner",
     "the tie rod's joint on the rack or chassis",
     (
         "Tierod/Location Chassis",
-        "tierod_chassis",
-        "tierod_rack",
-        "tierod_inboard",
-        "trackrod_inboard",
+        *rod_names("inner"),
         "Inner track rod ball joint",
         "CHAS_TiePnt",
     ),
@@ -155,10 +195,7 @@ TIEROD_OUTER = Role(
     "the tie rod's joint on the knuckle",
     (
         "Tierod/Location Upright",
-        "tierod_upright",
-        "tierod_knuckle",
-        "tierod_outboard",
-        "trackrod_outboard",
+        *rod_names("outer"),
         "Outer track rod ball joint",
         "UPRI_TiePnt",
     ),
@@ -192,28 +229,6 @@ def spring_roles(lower: str, section: str) -> tuple[Role, ...]:
             ("upper", "chassis", "Location Chassis", (f"upr_{name}_mount",)),
         )
     )
-
-
-def arm_names(level: str, end: str) -> tuple[str, ...]:
-    """Return names of a point of a wishbone in tables of Adams/Car, Lotus Suspension Analysis,
-    suspension-explorer and OptimumK.
-
-    Args:
-        level: upper or lower.
-        end: front, rear or outer.
-    """
-    wishbone, optimum = f"{level}_wishbone", level[:3].capitalize()
-    own = {
-        "front": (f"{wishbone}_front_pivot", f"{wishbone}_inboard_front", f"CHAS_{optimum}For"),
-        "rear": (f"{wishbone}_rear_pivot", f"{wishbone}_inboard_rear", f"CHAS_{optimum}Aft"),
-        "outer": (
-            f"{level}_ball_joint",
-            f"{wishbone}_outer_ball_joint",
-            f"{wishbone}_outboard",
-            f"UPRI_{optimum}Pnt",
-        ),
-    }
-    return (f"{level}_arm_{end}", *own[end])
 
 
 SPRINGS: Mapping[str, tuple[str, str]] = {

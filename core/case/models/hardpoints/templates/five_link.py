@@ -33,8 +33,15 @@ def _joints(at: Mapping[str, Vector]) -> Sequence[Joint]:
 
 def _link(link: str, inner: Sequence[str], outer: Sequence[str]) -> tuple[Role, Role]:
     name = f"the {link.replace('_', ' ')} link's joint"
-    return Role(f"{link}_inner", f"{name} on the chassis", inner), Role(
-        f"{link}_outer", f"{name} on the knuckle", outer
+    links = (link, f"{link}_link")
+    return Role(
+        f"{link}_inner",
+        f"{name} on the chassis",
+        (*inner, *(f"{each}_{end}" for each in links for end in ("inboard", "chassis"))),
+    ), Role(
+        f"{link}_outer",
+        f"{name} on the knuckle",
+        (*outer, *(f"{each}_{end}" for each in links for end in ("outboard", "upright"))),
     )
 
 

@@ -64,7 +64,13 @@ MCPHERSON = Template(
         Role(
             "strut_lower",
             "a point of the strut's axis on the knuckle",
-            ("Spring/Location Upright", "strut_lwr_mount", "lwr_strut_mount", "strut_lower_mount"),
+            (
+                "Spring/Location Upright",
+                "strut_lwr_mount",
+                "lwr_strut_mount",
+                "strut_lower_mount",
+                "strut_bottom",
+            ),
         ),
         Role(
             "strut_upper",

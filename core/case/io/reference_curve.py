@@ -1,0 +1,267 @@
+"""A measured curve as the reference of a case: a table of a rig or of another program, with its own
+columns, units and grid.
+
+A column without a unit is in metres or radians.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...errors import MOST_NAMED, brief, remedy, shortened
+from ...trajectory import Array
+from ..case import TIME, Case, Origin, Quantity, Truth
+from ..suspension import Convention
+from ..units import METRE, RADIAN, SECOND, Unit
+from .column_units import required_unit, unit_of_head
+from .curve_columns import MAP, Target, match, read_stated
+from .document import decimal, fault, sha256, shown
+from .reference import compared
+from .reference_columns import Column, Columns, Convert, column_of, driver_unit, known_columns
+from .reference_samples import Samples
+from .reference_table import from_table
+from .schema import MOST_SAMPLES
+
+# A rig may go farther than the sweep. Millimetres taken for metres are 1000 times as far, degrees
+# for radians 57 times.
+FARTHER = 20.0
+_SI: dict[str, Convert] = {"m": METRE, "rad": RADIAN, "1": float, "N": float, "N m": METRE}
+
+
+@dataclass(frozen=True)
+class CurveOptions:
+    """What the user states of a curve.
+
+    Attributes:
+        columns: what columns hold: "COLUMN=[-]OUTPUT [UNIT]".
+        signs: convention of signs, if the file names none.
+        accuracy: tolerances of outputs: "OUTPUT=NUMBER UNIT".
+        citation: source of the values.
+        sheet: sheet of a workbook with several tables.
+        own_samples: whether the sweep takes the samples of the curve.
+    """
+
+    columns: Sequence[str] = ()
+    signs: str | None = None
+    accuracy: Sequence[str] = ()
+    citation: str | None = None
+    sheet: str | None = None
+    own_samples: bool = False
+
+
+def with_curve(case: Case, file: Path, options: CurveOptions) -> tuple[Case, list[str]]:
+    """Return the case with a measured curve as its reference, and notes on how it was read.
+
+    Raises:
+        CaseError: the curve cannot be read, an option is wrong, no column is of the driver or of an
+            output, or the signs are not the case's.
+    """
+    driver, known = case.sweep.driver, known_columns(case.outputs)
+    stated = read_stated(file, options.columns, driver, known)
+    targets: list[Target] = []
+    left_out: list[str] = []
+
+    def choose(file: Path, where: str, heads: Sequence[str]) -> Sequence[int]:
+        found = match(file, where, heads, driver, known, stated)
+        targets[:] = found.values()
+        left_out[:] = [head for k, head in enumerate(heads) if head and k not in found]
+        return [*found]
+
+    samples = _stated_units(
+        from_table(file, options.sheet, "--reference-sheet NAME", choose), targets
+    )
+    unit, of = _columns(case, samples, targets)
+    outputs = _with_accuracy(file, case.outputs, [*of], options.accuracy)
+    convention, signs = _convention(outputs, [*of]), _signs(file, samples.signs, options.signs)
+    if signs and convention not in ("", signs):
+        raise fault(
+            file,
+            "signs",
+            f"found {shown(signs)}, expected {convention!r} as in the case; turn columns with the"
+            f' opposite sign by {MAP} "COLUMN=-OUTPUT", and say --signs {convention}',
+        )
+    bare = [text for text in samples.columns if not unit_of_head(file, "", text, known)[1]]
+    driven = np.array([unit(row[0]) for _, row in samples.rows])
+    if samples.columns[0] in bare:
+        _require_size(samples, unit, driven, case)
+    values = _own_samples(file, driven) if options.own_samples else case.sweep.values
+    origin = Origin((options.citation or "").strip(), file.name, sha256(file))
+    series, origin = compared(
+        samples, Columns(unit, driver, of), outputs, values, origin, options.own_samples
+    )
+    assumed = bool(convention) and not signs
+    words = convention + " (assumed: the file names none)" * assumed
+    case = replace(
+        case,
+        truth=Truth.THIRD_PARTY_DATA,
+        sweep=replace(case.sweep, values=values),
+        outputs=outputs,
+        reference=series,
+        origin=replace(origin, signs=words),
+    )
+    return case, _notes(file, origin, left_out, bare, convention if assumed else "")
+
+
+def _stated_units(samples: Samples, targets: Sequence[Target]) -> Samples:
+    """Return samples whose heads have the units that the user states."""
+    heads = zip(samples.columns, targets, strict=True)
+    return replace(
+        samples,
+        columns=[f"{text} [{target.unit}]" if target.unit else text for text, target in heads],
+    )
+
+
+def _columns(
+    case: Case, samples: Samples, targets: Sequence[Target]
+) -> tuple[Unit, dict[str, Column]]:
+    """Return the unit of the driver values, and the columns of outputs."""
+    driver, known = case.sweep.driver, known_columns(case.outputs)
+    turns = driver != TIME and case.mechanism.driver(driver).turns
+    _, unit = driver_unit(samples, SECOND if driver == TIME else RADIAN if turns else METRE)
+    if targets[0].opposite:
+        unit = Unit(unit.name, unit.size, _opposite(unit.convert))
+    of: dict[str, Column] = {}
+    for k, (text, target) in enumerate(zip(samples.columns, targets, strict=True)):
+        if k == 0:
+            continue
+        name, written = unit_of_head(samples.file, samples.header, text, known)
+        found = column_of(samples, k, written, known[target.name], _SI)
+        words = found.unit
+        if name != target.name:
+            words += f", column {shown(text)}"
+        if target.opposite:
+            words += ", with the opposite sign"
+            found = replace(found, convert=_opposite(found.convert))
+        of[target.name] = replace(found, unit=words)
+    for name in of:
+        stem = name.removesuffix(".velocity").removesuffix(".acceleration")
+        if stem not in of:
+            raise fault(
+                samples.file,
+                samples.header,
+                f"found {name!r} alone, expected its positions too; add the column {stem!r}",
+            )
+    return unit, of
+
+
+def _opposite(convert: Convert) -> Convert:
+    return lambda number: -convert(number)
+
+
+def _with_accuracy(
+    file: Path, outputs: Sequence[Quantity], compared: Sequence[str], texts: Sequence[str]
+) -> tuple[Quantity, ...]:
+    """Return outputs with the tolerances that the user states, as "OUTPUT=NUMBER UNIT"."""
+    stated: dict[str, float] = {}
+    units = {output.name: output.unit for output in outputs if output.name in compared}
+    for text in texts:
+        name, _, right = (part.strip() for part in text.partition("="))
+        if name not in units:
+            raise fault(
+                file,
+                "--accuracy",
+                f"found {shown(name)}, expected an output with a column; {remedy(name, units)}",
+            )
+        number, _, unit = right.partition(" ")
+        try:
+            found = decimal(number)
+        except ValueError:
+            found = float("nan")
+        if not 0.0 < found < float("inf") or not (unit.strip() or units[name] == "1"):
+            raise fault(
+                file,
+                "--accuracy",
+                f"found {shown(text)}, expected OUTPUT=NUMBER UNIT; say --accuracy"
+                f' "{name}=0.02 {"deg" if units[name] == "rad" else units[name]}"',
+            )
+        measured = required_unit(file, "--accuracy", name, unit.strip() or "-", units[name])
+        stated[name] = measured.convert(found)
+    why = f"the accuracy of {file.name}, as its user states it"
+    return tuple(
+        _replaced(output, stated[output.name], why) if output.name in stated else output
+        for output in outputs
+    )
+
+
+def _replaced(output: Any, atol: float, why: str) -> Quantity:
+    """Return an output with another tolerance; a slope has that of its own alone."""
+    if hasattr(output, "of_output"):
+        return replace(output, atol=atol)
+    return replace(output, atol=atol, rtol=0.0, why=why)
+
+
+def _convention(outputs: Sequence[Any], compared: Sequence[str]) -> str:
+    """Return the convention of signs of the compared suspension outputs; empty without any."""
+    return next(
+        (str(each.vehicle.convention) for each in outputs if each.name in compared and each.signs),
+        "",
+    )
+
+
+def _signs(file: Path, written: str, stated: str | None) -> str:
+    """Return the convention of signs that the file or the user states; empty without any."""
+    if stated is not None and stated not in list(Convention):
+        raise fault(
+            file,
+            "--signs",
+            f"found {shown(stated)}, expected a convention; {remedy(stated, [*Convention])}",
+        )
+    if stated is not None and written not in ("", stated):
+        raise fault(
+            file,
+            "--signs",
+            f"found {stated}, but the file names {shown(written)}, expected the same; leave out"
+            " --signs, or correct the file",
+        )
+    return stated or written
+
+
+def _require_size(samples: Samples, unit: Unit, driven: Array, case: Case) -> None:
+    """Refuse driver values without a unit in their head, if they go much farther than the sweep."""
+    most, sweep = float(np.abs(driven).max()), case.sweep
+    if sweep.driver == TIME or most <= FARTHER * float(np.abs(sweep.values).max()):
+        return
+    small = "deg" if unit.name == RADIAN.name else "mm"
+    raise fault(
+        samples.file,
+        samples.header,
+        f"found driver values up to {most:g} in column {shown(samples.columns[0])} without a unit,"
+        f" expected them within the sweep, up to {float(np.abs(sweep.values).max()):g} {unit.name};"
+        f" write the unit into the head, {samples.columns[0]} [{small}], or say {MAP}"
+        f' "{samples.columns[0]}={sweep.driver} [{small}]"',
+    )
+
+
+def _own_samples(file: Path, values: Array) -> Array:
+    """Return the samples of the curve as the sweep's."""
+    if len(values) > MOST_SAMPLES:
+        raise fault(
+            file,
+            "",
+            f"found {len(values)} rows, expected {MOST_SAMPLES} at most; thin them out",
+        )
+    return values
+
+
+def _notes(
+    file: Path, origin: Origin, left_out: Sequence[str], bare: Sequence[str], assumed: str
+) -> list[str]:
+    """Return what the user should know of how a curve was read."""
+    read = ", ".join(f"{name} [{unit}]" for name, unit in origin.units.items())
+    notes = [f"{file}: read {read}"]
+    if left_out:
+        listed = shortened([brief(shown(head)) for head in left_out], MOST_NAMED)
+        notes.append(f"{file}: left out the columns {listed}")
+    if bare:
+        listed = shortened([brief(shown(head)) for head in bare], MOST_NAMED)
+        notes.append(f"{file}: without a unit, taken in SI units: {listed}")
+    if assumed:
+        notes.append(
+            f"{file}: names no convention of signs, {assumed} is assumed; state it: --signs"
+        )
+    return notes

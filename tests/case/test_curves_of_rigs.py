@@ -1,0 +1,173 @@
+"""Measured curves given with a case on the command line: a rig's own names, units, columns and
+grid, judged as the reference of a case file is.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from kincheck.adapters.native import Native
+from kincheck.core.case.io.reader_options import Supplied
+from kincheck.core.case.io.reference_curve import CurveOptions, with_curve
+from kincheck.core.case.models.files import load
+from kincheck.core.case.models.hardpoints.sample_table import sample_table
+from kincheck.core.case.models.hardpoints.templates import TEMPLATES
+from kincheck.core.cli.main import main
+from kincheck.core.errors import CaseError
+from kincheck.core.harness.record import Outcome
+from kincheck.core.harness.run import run
+
+from .test_measured_curves import GRID
+from .test_published_suspensions import solved
+
+# Two minutes of arc: the repeatability of a rig, made up; its noise is an eighth of that.
+ATOL = 2.0 / 60.0
+ACCURACY = (f"toe={ATOL} deg", "camber=2 arcmin")
+
+
+@pytest.fixture(scope="module")
+def car(tmp_path_factory):
+    """A case of hardpoints, and toe and camber on the rig's grid [deg]."""
+    file = tmp_path_factory.mktemp("car") / "car.csv"
+    file.write_text(sample_table(TEMPLATES["mcpherson"]))
+    case = load(file, Supplied(travel="0.05:21"))
+    fine = load(file, Supplied(travel="0.05:401"))
+    wanted = tuple(each for each in fine.outputs if each.name in ("toe", "camber"))
+    found = solved(replace(fine, outputs=wanted))
+    noise = np.random.default_rng(5).normal(scale=ATOL / 8.0, size=(2, len(GRID)))
+    rows = [
+        np.degrees(np.interp(GRID, fine.sweep.values, found[name])) for name in ("toe", "camber")
+    ]
+    return case, np.array(rows) + noise
+
+
+def rig(folder, rows, head="Travel [mm],toe [deg],camber [deg]", form="{},{},{}", name="rig.csv"):
+    table = zip(
+        (f"{1e3 * x:.6g}" for x in GRID),
+        *([f"{y:.6g}" for y in each] for each in rows),
+        strict=False,
+    )
+    file = folder / name
+    file.write_text("\n".join([head, *(form.format(*row) for row in table)]) + "\n")
+    return file
+
+
+def judged(car, file, **options):
+    case, notes = with_curve(car[0], file, CurveOptions(accuracy=ACCURACY, **options))
+    return run([case], [Native()], tol=1e-12).records[0], notes
+
+
+FORMS = {
+    "in the heads": {},
+    "other names": {"head": "Wheel Travel (mm),Toe Angle_deg,Camber/deg"},
+    "below the heads": {"head": "Rig 3\nbump,toe,camber\nmm,deg,deg"},
+    "further columns": {
+        "head": "No,Load (N),stroke [mm],camber_left [deg],toe_in [deg],camber_right [deg],ok",
+        "form": "1,x,{0},{2},{1},,True",
+    },
+    "blanks": {"head": "travel [mm]  toe (deg)  camber (deg)", "form": "{}   {} {}"},
+    "decimal points and semicolons": {"head": "travel;toe;camber\nmm;deg;°", "form": "{};{};{}"},
+}
+
+
+@pytest.mark.parametrize("kind", FORMS)
+def test_a_curve_is_judged(tmp_path, car, kind):
+    record, notes = judged(car, rig(tmp_path, car[1], **FORMS[kind]), citation="made up")
+    assert record.outcome is Outcome.PASS
+    assert record.evidence.sound
+    assert {record.errors[name].position.against for name in ("toe", "camber")} == {record.truth}
+    assert ATOL < np.degrees(record.errors["toe"].position.tolerance) < 2.0 * ATOL
+    assert "interpolated between 23 rows" in record.evidence.limits["toe"]
+    assert "printed to 6 digits" in record.evidence.limits["toe"]
+    assert record.evidence.units["stroke"] == "mm"
+    assert record.evidence.units["toe"].startswith(("deg", "°"))
+    assert record.evidence.signs == "iso8855 (assumed: the file names none)"
+    assert any("left out" in note for note in notes) == (kind == "further columns")
+
+
+def test_what_the_user_states(tmp_path, car):
+    """Columns of other names, one with the opposite sign and without a unit; signs; the samples."""
+    toe, camber = car[1]
+    file = rig(tmp_path, (-toe, camber), "z [mm],Spur,Sturz [deg]")
+    columns = ("z=stroke", "Spur=-toe [deg]", "Sturz=camber")
+    record, _ = judged(car, file, columns=columns, signs="iso8855", own_samples=True)
+    assert record.outcome is Outcome.PASS
+    assert not record.evidence.sound  # no citation
+    assert len(record.driver["stroke"]) == len(GRID)
+    assert record.evidence.units["toe"] == "deg, column 'Spur [deg]', with the opposite sign"
+    assert record.evidence.signs == "iso8855"
+    assert "interpolated" not in record.evidence.limits["toe"]
+
+
+@pytest.mark.parametrize("k", [0, 1])
+def test_a_shift_of_two_tolerances_is_found(tmp_path, car, k):
+    record, _ = judged(car, rig(tmp_path, car[1]))
+    name = ("toe", "camber")[k]
+    shift = np.zeros((2, 1))
+    shift[k] = np.degrees(2.0 * record.errors[name].position.tolerance)
+    record, _ = judged(car, rig(tmp_path, car[1] + shift))
+    assert record.outcome is Outcome.FAIL
+    assert f"{name}: position is off by" in record.message
+
+
+FAULTS = {
+    "unknown unit": ({"head": "travel [mm],toe [furlong],camber"}, {}, ["'furlong'", "an angle"]),
+    "another unit": ({"head": "travel [mm],toe [mm],camber"}, {}, ["'mm'", "an angle: deg"]),
+    "two units": ({"head": "travel [mm],toe_deg [rad],camber"}, {}, ["in 'deg' and 'rad'"]),
+    "two rows of units": (
+        {"head": "travel [mm],toe [deg],camber\nmm,rad,rad"},
+        {},
+        ["in 'deg' and 'rad'", "one unit"],
+    ),
+    "no unit": ({"head": "travel,toe,camber"}, {}, ["43.7", "without a unit", "travel [mm]"]),
+    "no output": ({"head": "travel [mm],a,b"}, {}, ["'a', 'b'", "--map"]),
+    "two toes": ({"head": "travel [mm],toe_left,toe angle"}, {}, ["'toe_left' and 'toe angle'"]),
+    "other signs": (
+        {"head": "# signs: sae_j670\ntravel [mm],toe,camber"},
+        {},
+        ["--map", "-OUTPUT"],
+    ),
+    "contradicting signs": (
+        {"head": "# signs: iso8855\ntravel [mm],toe,camber"},
+        {"signs": "sae_j670"},
+        ["--signs: found sae_j670", "'iso8855'"],
+    ),
+    "unknown signs": ({}, {"signs": "iso"}, ["--signs", "iso8855"]),
+    "no such column": ({}, {"columns": ["Spur=toe"]}, ["--map: found no column 'Spur'"]),
+    "no such output": ({}, {"columns": ["toe=tow"]}, ["--map: found 'tow'", "'toe'"]),
+    "no equals": ({}, {"columns": ["toe"]}, ["--map: found 'toe'", "COLUMN=OUTPUT"]),
+    "stated unit contradicts": ({}, {"columns": ["toe=toe [rad]"]}, ["in 'deg' and 'rad'"]),
+    "accuracy without a unit": ({}, {"accuracy": ["toe=0.1"]}, ["--accuracy", "toe=0.02 deg"]),
+    "accuracy of nothing": ({}, {"accuracy": ["caster=1 deg"]}, ["'caster'", "with a column"]),
+    "a gap": ({"form": "{},,{}"}, {}, ["line 2", "''", "finite number"]),
+}
+
+
+@pytest.mark.parametrize("kind", FAULTS)
+def test_faults(tmp_path, car, kind):
+    form, options, fragments = FAULTS[kind]
+    with pytest.raises(CaseError) as caught:
+        with_curve(car[0], rig(tmp_path, car[1], **form), CurveOptions(**options))
+    message = str(caught.value)
+    assert message.startswith(str(tmp_path))
+    assert [each for each in fragments if each not in message] == [], message
+
+
+def test_the_command_line(tmp_path, car, capsys):
+    table = tmp_path / "car.csv"
+    table.write_text(sample_table(TEMPLATES["mcpherson"]))
+    toe, camber = car[1]
+    file = rig(tmp_path, (-toe, camber), "z [mm],Spur,Sturz [deg]")
+    stated = ["--map", "z=stroke", "--map", "Spur=-toe [deg]", "--map", "Sturz=camber"]
+    stated += [part for each in ACCURACY for part in ("--accuracy", each)]
+    command = ["run", str(table), "--engine", "native"]
+    assert main([*command, "--reference", str(file), *stated, "--citation", "rig"]) == 0
+    said = capsys.readouterr().err
+    assert "read stroke [mm], toe [deg, column 'Spur [deg]', with the opposite sign]" in said
+    assert "iso8855 is assumed" in said
+    assert main([*command, "--reference", str(file), *stated[:2]]) == 2
+    assert "--map" in capsys.readouterr().err
+    assert main([*command, "--citation", "rig"]) == 2
+    assert "give --reference FILE" in capsys.readouterr().err
+    assert main([*command, "mcpherson_strut", "--reference", str(file)]) == 2
+    assert "one by one" in capsys.readouterr().err

@@ -1,0 +1,219 @@
+"""Hardpoints in further forms: a coordinate in each row, rows without a head, trees in YAML and
+JSON, and assignments of scripts. Each gives the mechanism of the plain table.
+"""
+
+import json
+from dataclasses import replace
+
+import pytest
+from kincheck.core.case.io.reader_options import Supplied
+from kincheck.core.case.models.files import load
+from kincheck.core.errors import CaseError
+
+from .test_hardpoint_dialects import POINTS, comma, table
+from .test_spreadsheets import book
+
+SAID = Supplied("double_wishbone", "mm", "rearward,right,up")
+
+
+def lines(form, points=POINTS, between="\n"):
+    return between.join(form.format(name, *at) for name, at in points.items()) + "\n"
+
+
+def axes(form, points=POINTS, names="xyz", last="\n"):
+    return "".join(
+        form.format(name, axis, x) + last
+        for name, at in points.items()
+        for axis, x in zip(names, at, strict=True)
+    )
+
+
+def written(folder, name, text):
+    file = folder / name
+    file.write_text(text)
+    return file
+
+
+@pytest.fixture
+def plain(tmp_path):
+    return load(written(tmp_path, "plain.csv", table().replace(";", ",")), SAID).mechanism
+
+
+def tree(points=POINTS):
+    return {name: dict(zip("xyz", at, strict=True)) for name, at in points.items()}
+
+
+LISTED = [{"name": name, "position": list(at)} for name, at in POINTS.items()]
+RIGHT = {name: (x, -y, z) for name, (x, y, z) in POINTS.items()}
+NESTED = {
+    "uca": {"chassis_front": "uca_front", "chassis_rear": "uca_rear", "knuckle": "uca_outer"},
+    "lca": {"chassis_front": "lca_front", "chassis_rear": "lca_rear", "knuckle": "lca_outer"},
+    "tie_rod": {"rack": "tierod_inner", "knuckle": "tierod_outer"},
+    "wheel": {"center": "wheel_center"},
+}
+NESTED = {part: {end: POINTS[role] for end, role in ends.items()} for part, ends in NESTED.items()}
+FORMS = {
+    "a coordinate a row": ("car.csv", axes("{}_{},{}")),
+    "with a head and units": ("car.csv", axes("{} {};{};[mm];a note").join(["point;value\n", ""])),
+    "a coordinate a row, decimal comma": ("car.csv", comma(axes("{}|{};{}")).replace("|", ".")),
+    "axis in a cell": ("car.csv", axes("{};{};{}", names="XYZ")),
+    "one wide row": (
+        "car.csv",
+        "\n".join(
+            ",".join(each)
+            for each in zip(*(x.split(",") for x in axes("{}_{},{}").split()), strict=False)
+        ),
+    ),
+    "no head": ("car.csv", lines("{};{};{};{}")),
+    "no head, decimal comma": ("car.csv", "Front axle\n" + comma(lines("{};{};{};{}"))),
+    "no head, names last": ("car.csv", lines("{1},{2},{3},{0}")),
+    "head, names last": ("car.csv", "X,Y,Z,\n(mm),(mm),(mm),\n" + lines("{1},{2},{3},{0}")),
+    "blanks": ("car.txt", "name x [mm] y [mm] z [mm]\n" + lines("{}   {}  {} {}")),
+    "blanks, no head": ("car.dat", lines("  {}   {}  {} {}")),
+    "SolidWorks": ("car.txt", axes('"{}_{}" = {}mm')),
+    "MATLAB": ("car.m", "clear\n% units: mm\n" + lines("front.{} = [{} {}, {}]; % [mm]")),
+    "MATLAB, left and right": (
+        "car.m",
+        lines("hp.left.{} = [{}, {}, {}];") + lines("hp.right.{} = [{}, {}, {}];", RIGHT),
+    ),
+    "Python": ("car.txt", lines("p['{}'] = np.array([{}, {}, {}])")),
+    "one letter a line": ("car.m", axes("P.{}.{} = {};")),
+    "YAML": ("car.yaml", "hardpoints:\n" + lines("  {}: {{x: {}, y: {}, z: {}}}")),
+    "YAML, lists": ("car.yml", "units: millimeters\nfront:\n" + lines("  {}: [{}, {}, {}]")),
+    "YAML, named items": ("car.yaml", "points:\n" + lines("- [{}, {}, {}, {}]")),
+    "JSON": ("car.json", json.dumps({"unit": "mm", "hardpoints": {"left": tree()}})),
+    "JSON, parts": ("car.json", json.dumps(NESTED)),
+    "JSON, a list": ("car.json", json.dumps(LISTED)),
+    "JSON, flat": (
+        "car.json",
+        json.dumps(
+            {f"{n}_{a}": x for n, at in POINTS.items() for a, x in zip("xyz", at, strict=False)}
+        ),
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", FORMS)
+def test_forms(tmp_path, plain, kind):
+    name, text = FORMS[kind]
+    if name.endswith(("yaml", "yml")):
+        pytest.importorskip("yaml")
+    found = load(written(tmp_path, name, text), SAID).mechanism
+    assert replace(found, name=plain.name) == plain
+
+
+def test_a_coordinate_a_row_of_a_sheet(tmp_path, plain):
+    rows = [[f"{n}_{a}", x] for n, at in POINTS.items() for a, x in zip("xyz", at, strict=True)]
+    file = book(tmp_path, {"a": [["Hardpoint", "Value [mm]"], *rows], "b": [["x"]]})
+    assert replace(load(file, replace(SAID, units=None)).mechanism, name=plain.name) == plain
+
+
+def test_template_unit_and_axes_of_a_tree(tmp_path, plain):
+    keys = {"type": "double_wishbone", "units": "mm", "axes": "rearward,right,up", "side": "left"}
+    file = written(tmp_path, "car.json", json.dumps({**keys, "hardpoints": tree()}))
+    assert replace(load(file).mechanism, name=plain.name) == plain
+
+
+def test_a_section_is_chosen(tmp_path, plain):
+    text = json.dumps({"front": tree(), "rear": tree(RIGHT)})
+    file = written(tmp_path, "car.json", text)
+    with pytest.raises(CaseError, match=r"found points in 'front', 'rear', .* --sheet NAME"):
+        load(file, SAID)
+    found = load(file, replace(SAID, sheet="front"))
+    assert replace(found.mechanism, name=plain.name) == plain
+    assert "9 points of other sections" in found.source
+    with pytest.raises(CaseError, match=r"--sheet: found no section 'frnt', .* 'front'"):
+        load(file, replace(SAID, sheet="frnt"))
+
+
+def test_words_written_together_are_names(tmp_path, plain):
+    text = lines("{};{};{};{}").replace("uca_outer", "upperBallJoint").replace("_center", "Centre")
+    found = load(written(tmp_path, "car.csv", text), SAID).mechanism
+    assert replace(found, name=plain.name) == plain
+
+
+EXPLORER = """type: macpherson
+units: millimeters
+hardpoints:
+  lower_wishbone_inboard_front: {x: 250, y: 400, z: 200}
+  lower_wishbone_inboard_rear: {x: -250, y: 450, z: 200}
+  lower_wishbone_outboard: {x: 0, y: 900, z: 200}
+  strut_top: {x: -40, y: 700, z: 850}
+  strut_bottom: {x: -14, y: 830, z: 427.5}
+  trackrod_inboard: {x: 50, y: 200, z: 250}
+  trackrod_outboard: {x: 150, y: 800, z: 275}
+  axle_inboard: {x: -20, y: 800, z: 300}
+  axle_outboard: {x: -20, y: 950, z: 300}
+config:
+  wheel:
+    offset: 40
+    tire: {aspect_ratio: 0.55, section_width: 270, rim_diameter: 13}
+"""
+
+
+def test_the_wheel_of_hub_face_offset_and_tire(tmp_path):
+    """The offset is inboard; the radius is half the rim in inches and the height of the tire."""
+    pytest.importorskip("yaml")
+    case = load(written(tmp_path, "car.yaml", EXPLORER), Supplied(axes="iso"))
+    assert case.mechanism.point("wheel_center").position == pytest.approx((-0.02, 0.91, 0.3))
+    (toe,) = (each for each in case.outputs if each.name == "toe")
+    assert toe.vehicle.wheel_radius == pytest.approx(0.3136)
+    assert toe.vehicle.static_camber == 0.0
+
+
+def test_a_direction_is_no_place(tmp_path):
+    """An axis of one metre from the origin would be a wheel of another attitude."""
+    text = json.dumps({**NESTED, "wheel": NESTED["wheel"] | {"spin_axis": [0, 1, 0]}})
+    case = load(written(tmp_path, "car.json", text), SAID)
+    assert "wheel.spin_axis" in case.source
+
+
+ROW = axes("{}_{},{}")
+FAULTS = {
+    "two numbers": ("car.csv", ROW.replace(",-611.75", ",-611,75"), ["line 26", "2 numbers"]),
+    "no z": ("car.csv", ROW.replace("wheel_center_z,228.25\n", ""), ["wheel_center without z"]),
+    "twice": ("car.csv", ROW + "lca_front_x,1\n", ["lca_front x: given before, in line 10"]),
+    "two units": (
+        "car.csv",
+        axes("{}_{};{};mm").replace("228.25;mm", "228.25;m"),
+        ["line 27", "'m', and 'mm' above", "one unit"],
+    ),
+    "no names": ("car.csv", lines("{1},{2},{3}"), ["line 1", "three numbers without a name"]),
+    "four numbers": ("car.csv", lines("{0},1,{1},{2},{3}"), ["line 1", "expected the head"]),
+    "two heads": ("car.csv", (table() * 2).replace(";", ","), ["line 11", "a second head"]),
+    "twice in a script": ("car.m", lines("{} = [{}, {}, {}];") * 2, ["given before, in line 1"]),
+    "two units in a script": (
+        "car.m",
+        lines("{} = [{}, {}, {}]; % [mm]") + "a = [1 2 3]; % [in]",
+        ["line 10", "'inch', and 'mm' above"],
+    ),
+    "an expression": (
+        "car.m",
+        lines("{} = [{}, {}, {}];").replace("228.25", "r/2"),
+        ["missing wheel_center"],
+    ),
+    "twice in a tree": ("car.json", json.dumps([*LISTED, LISTED[0]]), ["uca_front: given before"]),
+    "no z in a tree": (
+        "car.json",
+        json.dumps(tree() | {"wheel_center": {"x": 1, "y": 2}}),
+        ["wheel_center without z"],
+    ),
+    "a word": (
+        "car.json",
+        json.dumps(tree() | {"wheel_center": [1, 2, "three"]}),
+        ["missing wheel_center"],
+    ),
+    "no points": ("car.yaml", "a: 1\nb: [1, 2]\n", ["found no point", "beside a URDF"]),
+    "a key twice": ("car.yaml", "a: [1, 2, 3]\na: [1, 2, 3]\n", ["'a' is given twice"]),
+    "a reference": ("car.yaml", "a: &b [1, 2, 3]\nc: *b\n", ["expected none"]),
+}
+
+
+@pytest.mark.parametrize("kind", FAULTS)
+def test_faults(tmp_path, kind):
+    name, text, fragments = FAULTS[kind]
+    if name.endswith("yaml"):
+        pytest.importorskip("yaml")
+    with pytest.raises(CaseError) as caught:
+        load(written(tmp_path, name, text), SAID)
+    assert [each for each in fragments if each not in str(caught.value)] == [], caught.value
