@@ -19,6 +19,7 @@ from ..mjcf.elements import Element
 from ..mjcf.frames import HERE, Place
 from .as_mjcf import fitted
 from .beside import read_beside
+from .dynamics import add_urdf_damper
 from .inertials import urdf_inertial
 from .robot import Connection, Kind, Loop, Mimic, Move, Robot
 from .values import direction, named, only_child, require_children, required, roll_pitch_yaw
@@ -132,7 +133,8 @@ def _joints(robot: Robot) -> dict[str, Element]:
                 " tree; write the joint that closes a loop as <constraint>"
             )
         above[child], found[name] = name, element
-        for each in ("limit", "dynamics", "calibration", "safety_controller"):
+        add_urdf_damper(robot, element)
+        for each in ("limit", "calibration", "safety_controller"):
             if any(element.only(each)):
                 robot.count(f"{each} of joints")
     roots = [name for name in robot.elements if name not in above]
