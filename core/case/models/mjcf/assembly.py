@@ -32,6 +32,8 @@ NEAR, DAMPING = 1e-6, 0.1
 # A gap of this part of the model's size is no rounding, and its assembly may be another one than
 # meant.
 FAR = 0.1
+# Points nearer to each other are one, and rounding is between them [m].
+SMALLEST_MODEL = 1e-9
 # Rounding of composed frames, relative to the size: not worth an assembly.
 CLOSED = 1e-12
 MOST_TOLD = 12
@@ -125,7 +127,8 @@ def size_of(pose: Pose, equalities: Sequence[Equality]) -> float:
         if not isinstance(each, Relation):
             ends = zip((each.i, each.j), each.points, strict=True)
             points += [pose.carried[body].point(point) for body, point in ends]
-    return float(np.ptp(np.array([[*each] for each in points]), axis=0).max()) or 1.0
+    extent = float(np.ptp(np.array([[*each] for each in points]), axis=0).max())
+    return extent if extent > SMALLEST_MODEL else 1.0
 
 
 def _closed(closing: Closing, start: Pose, at_rest: Sequence[Collection[str]]) -> Pose:

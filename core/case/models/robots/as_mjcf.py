@@ -92,11 +92,10 @@ class _Writer:
         root = robot.root
         name = root.attributes.get("name", root.file.stem)
         gravity = " ".join(map(_number, robot.gravity))
-        return Element(
-            root.file,
+        return self.element(
             "mujoco",
             {"model": name},
-            root.line,
+            root,
             [
                 Element(root.file, "compiler", {"angle": "radian"}, root.line),
                 Element(root.file, "option", {"gravity": gravity}, root.line),

@@ -141,6 +141,9 @@ def _joints(robot: Robot, frames: Frames, short: Short, version: tuple[int, ...]
             raise element.fault(
                 f"joins {ends[0]!r} with itself, expected two links; correct parent or child"
             )
+        if {*ends} <= robot.fixed:
+            robot.count("joints of what stands still")
+            continue
         place = frames.place(element, full)
         links = ends[0], ends[1]
         joint = _joint(robot, frames, full, short(full), links, place, version)

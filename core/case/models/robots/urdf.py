@@ -17,6 +17,7 @@ from ....joints.base import triad
 from ...io.document import shown
 from ..mjcf.elements import Element
 from ..mjcf.frames import HERE, Place
+from ..mjcf.tree import WORLD
 from .as_mjcf import fitted
 from .beside import read_beside
 from .dynamics import add_urdf_damper
@@ -109,6 +110,9 @@ def _links(robot: Robot) -> None:
         for child in element.children:
             if child.tag != "inertial":
                 robot.count(child.tag)
+    parents = [each for joint in robot.root.only("joint") for each in joint.only("parent")]
+    if any(each.attributes.get("link") == WORLD for each in parents):
+        robot.elements.setdefault(WORLD, robot.root)  # as in Drake, which has it without a link
     if not robot.elements:
         raise robot.root.fault("has no link, expected a mechanism; give a robot that moves")
 
