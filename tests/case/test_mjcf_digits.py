@@ -29,3 +29,12 @@ def test_a_gap_of_the_digits_is_not_followed_along_weak_directions(
     rod = case.mechanism.body("rod")
     assert np.allclose(rod.origin, (0.03, 0.0, 0.04), rtol=0, atol=1e-6)
     assert np.allclose(rod.euler_parameters, (1, 0, 0, 0), rtol=0, atol=1e-6)
+
+
+def test_what_moves_by_the_digits_alone_is_not_held(tmp_path: Path):
+    """The joint across the plane moves by a ten thousandth of what the others move by."""
+    file = tmp_path / "model.xml"
+    across = '<joint name="across" axis="1 0 0"/><joint name="pin"'
+    file.write_text(FIVE_BAR.format(tilt="0.00001", gap="0").replace('<joint name="pin"', across))
+    case = load(file, Supplied(drive=("crank:0:0.1:3",), hold_rest=True))
+    assert [driver.name for driver in case.mechanism.drivers] == ["crank", "pin"]
