@@ -75,7 +75,6 @@ def test_what_is_lost_is_listed():
     listed = load(GRIPPER, CLOSING).source.split(LEFT_OUT)[1].split(", ")
     assert {
         "ranges of joints (8)",
-        "springs of joints (2)",
         "armature of joints (2)",
     } <= set(listed)
     assert {"tendon: fixed (1)", "actuator: general (1)"} <= set(listed)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from kincheck import adapters, cases
+from kincheck import adapters
 from kincheck.core.algebra import X, Y, Z
 from kincheck.core.case.case import Case, Sweep, Truth
 from kincheck.core.case.io.model_writer import written
@@ -19,7 +19,7 @@ from kincheck.core.mechanism.drivers import JointAngle
 from kincheck.core.mechanism.mechanism import Body, Mechanism
 
 from ..fuzz import urdf as seeds
-from ..support.exported_again import by_joints, same_motion
+from ..support.exported_again import same_motion
 from ..support.model_poses import coordinate, solution
 
 # Rounding of metre-sized coordinates, some operations deep.
@@ -174,43 +174,6 @@ def test_paired_frames_need_not_meet_in_the_zero_pose(tmp_path: Path):
         in (case.assembly[0])
     )
     assert solution(case).solved.all()
-
-
-BUILT_IN = (
-    *("four_bar", "double_cardan", "hooke_joint", "planar_slider_crank", "rssr"),
-    *("mcpherson_steered", "chrono_multi_link_bodies", "delta_robot"),
-)
-
-
-@pytest.mark.parametrize("name", ["four_bar", "delta_robot"])
-def test_an_export_as_sdf_is_read_back_and_moves_alike(name: str, tmp_path: Path):
-    """Loops are Drake's ball constraints there, which are read too."""
-    case = by_joints(cases.load(name))
-    file = tmp_path / "robot.sdf"
-    file.write_text(written(case, adapters.writer("sdf"))[".sdf"])
-    swept, *held = (driver.name for driver in case.mechanism.drivers)
-    again = load(file, Supplied(drive=(f"{swept}:0:0.02:2",), hold=tuple(held)))
-    assert same_motion(case, again) < EXACT
-    for body in case.mechanism.moving:
-        there = again.mechanism.body(body.name)
-        assert there.mass == body.mass
-        if body.inertia is not None:
-            assert np.allclose(there.inertia, body.inertia, rtol=0, atol=EXACT)
-
-
-@pytest.mark.parametrize("name", BUILT_IN)
-def test_an_export_is_read_back_and_moves_alike(name: str, tmp_path: Path):
-    """By joints, which models can be driven by, at their two ends."""
-    case = by_joints(cases.load(name))
-    texts = written(case, adapters.writer("urdf"))
-    file = robot(tmp_path, texts[".urdf"], constraints_json=texts[".constraints.json"])
-    swept, *held = (driver.name for driver in case.mechanism.drivers)
-    known = texts[".urdf"]
-    again = load(
-        file,
-        Supplied(drive=(f"{swept}:0:0.02:2",), hold=tuple(h for h in held if f'"{h}"' in known)),
-    )
-    assert same_motion(case, again) < EXACT
 
 
 def test_a_polynomial_coupling_is_read_back(tmp_path: Path):

@@ -66,6 +66,10 @@ WORDS = (
         "weld",
         "connect",
         "tendon",
+        "springlength",
+        "spring",
+        "damper",
+        "passive",
     ],
 )
 
@@ -94,6 +98,11 @@ CURVED = b"""<mujoco model="drive in:0:0.5:5 hold rest keyframe:k out0=0.2 "><wo
 <body name="c" pos="1 0 0"><joint name="end" type="ball"/><site name="t" pos="0 0 1.001"/></body></body></replicate>
 </body></worldbody><equality><joint joint1="in" joint2="out0" polycoef="0.1 1 0.2 -0.3 0.1"/></equality>
 <keyframe><key name="k" qpos="0 0 0 1 0 0 0 0.1 0 1 0 0 0 0 1 0 0 0"/></keyframe></mujoco>"""  # noqa: E501
+SPRINGS = b"""<mujoco model="drive s:0:0.1:3 hold h "><default><tendon stiffness="3"/></default><worldbody>
+<body name="a"><joint name="s" type="slide" stiffness="40" springref="-0.2" damping="2"/><site name="p" pos="0 1 1"/>
+<body name="b" pos="1 0 0"><joint name="h" ref="30" springref="10" stiffness="5 0 0" damping="1"/><geom size="0.1"/></body></body>
+<site name="q"/></worldbody><tendon><spatial name="t" springlength="0.5" damping="1"><site site="p"/><site site="q"/></spatial>
+</tendon></mujoco>"""  # noqa: E501
 
 
 def one(data: bytes) -> None:
@@ -111,7 +120,7 @@ def one(data: bytes) -> None:
 
 
 def seeds() -> list[bytes]:
-    """A gripper, a linkage, sliders, a rod, and copies on curves from a keyframe."""
+    """A gripper, a linkage, sliders, a rod, copies on curves from a keyframe, and springs."""
     gripper = (Path(__file__).parent.parent / "data" / "mjcf" / "robotiq_2f85.xml").read_bytes()
     springs = b"right_driver_joint:0:0.8:17 hold right_spring_link_joint left_spring_link_joint "
     return [
@@ -119,6 +128,7 @@ def seeds() -> list[bytes]:
         SLIDERS,
         ROD,
         CURVED,
+        SPRINGS,
         re.sub(rb'model="[^"]*"', b'model="drive ' + springs + b'"', gripper, count=1),
     ]
 

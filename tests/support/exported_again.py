@@ -1,41 +1,9 @@
-"""A case, exported as a model and read again: both are driven by joints, which models have."""
-
-from dataclasses import replace
+"""A case, exported as a model and read again: both move alike."""
 
 import numpy as np
-from kincheck.core.case.case import Case, Sweep
-from kincheck.core.errors import SolveError
-from kincheck.core.kinematics import degrees_of_freedom, require_driven
-from kincheck.core.mechanism.drivers import JointAngle, JointDisplacement
+from kincheck.core.case.case import Case
 
 from .model_poses import solution
-
-STOP = 0.02
-"""End of the sweep [rad or m]: far from any singular pose of the built-in cases."""
-
-
-def by_joints(case: Case) -> Case:
-    """Return the case with joints driven, as few as its freedoms; the first one is swept."""
-    bare = replace(case.mechanism, drivers=())
-    candidates = [
-        cls(joint.name, joint.name)
-        for joint in bare.joints
-        for cls in (JointAngle, JointDisplacement)
-        if cls.freedom in joint.freedoms and len(joint.freedoms) == 1
-    ]
-    wanted = degrees_of_freedom(bare)
-    for first in range(len(candidates)):
-        chosen = candidates[first : first + wanted]
-        driven = replace(bare, drivers=chosen)
-        try:
-            require_driven(driven)
-            sweep = Sweep(chosen[0].name, np.linspace(0.0, STOP, 2))
-            found = replace(case, mechanism=driven, sweep=sweep, outputs=(), reference={})
-            if solution(found).solved.all():
-                return found
-        except (SolveError, IndexError):
-            continue
-    raise AssertionError(f"{case.name}: no joints drive it")
 
 
 def same_motion(case: Case, again: Case) -> float:

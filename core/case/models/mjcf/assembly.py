@@ -26,11 +26,14 @@ from .start import Start
 from .tree import Tree
 
 MAX_ITERATIONS = 100
-# Below this residual Newton's steps end the assembly; damping as in kinematics.assembly.
+# Below this residual, or that of the file's digits, Newton's steps end the assembly: damped ones
+# would follow the digits along weak directions. Damping as in kinematics.assembly.
 NEAR, DAMPING = 1e-6, 0.1
 # A gap of this part of the model's size is no rounding, and its assembly may be another one than
 # meant.
 FAR = 0.1
+# Points nearer to each other are one, and rounding is between them [m].
+SMALLEST_MODEL = 1e-9
 # Rounding of composed frames, relative to the size: not worth an assembly.
 CLOSED = 1e-12
 MOST_TOLD = 12
@@ -124,7 +127,8 @@ def size_of(pose: Pose, equalities: Sequence[Equality]) -> float:
         if not isinstance(each, Relation):
             ends = zip((each.i, each.j), each.points, strict=True)
             points += [pose.carried[body].point(point) for body, point in ends]
-    return float(np.ptp(np.array([[*each] for each in points]), axis=0).max()) or 1.0
+    extent = float(np.ptp(np.array([[*each] for each in points]), axis=0).max())
+    return extent if extent > SMALLEST_MODEL else 1.0
 
 
 def _closed(closing: Closing, start: Pose, at_rest: Sequence[Collection[str]]) -> Pose:
@@ -144,10 +148,14 @@ def _closed(closing: Closing, start: Pose, at_rest: Sequence[Collection[str]]) -
 
 def _descended(closing: Closing, pose: Pose, moving: Array) -> Pose:
     metres, last = closing.metres(pose), math.inf
+    near = max(NEAR, closing.digits.tolerance / closing.size)
+    best, least = pose, math.inf
     for _ in range(MAX_ITERATIONS):
         residual, slope = closing.rows(pose)
         slope = slope * moving
-        if float(np.abs(residual).max()) < NEAR:
+        if (left := float(np.abs(residual).max())) < least:
+            best, least = pose, left
+        if left < near:
             step = _newton(closing, slope, residual)
             # a residual within the digits may stay; steps that do not shrink are round-off
             if (length := float(np.abs(step).max())) >= 0.5 * last:
@@ -158,7 +166,7 @@ def _descended(closing: Closing, pose: Pose, moving: Array) -> Pose:
             damped = slope @ slope.T + mu * np.eye(len(slope))
             step = -slope.T @ np.linalg.lstsq(damped, residual, rcond=None)[0]
         pose = pose.moved(metres * moving * step)
-    return pose
+    return best
 
 
 def _newton(closing: Closing, slope: Array, residual: Array) -> Array:

@@ -140,8 +140,6 @@ WRITE_OUT = (
 
 DYNAMIC = {
     "range": "ranges",
-    "stiffness": "springs",
-    "damping": "damping",
     "armature": "armature",
     "frictionloss": "friction",
 }

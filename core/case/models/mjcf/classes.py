@@ -13,8 +13,8 @@ from .elements import Element
 MAIN = "main"
 READ = {"joint": "joint", "site": "site", "equality": "connect"}
 """Kinds of elements whose defaults matter, and where their attributes are listed."""
-GEOM = "geom"
-"""Kind of elements with masses alone, whose other attributes are left out unread."""
+WEIGHED_OR_SPRUNG = ("geom", "tendon")
+"""Kinds of elements with masses or springs alone, whose other attributes are left out unread."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ def read_classes(root: Element) -> Classes:
         for child in element.children:
             if child.tag in READ:
                 child.require_known(KNOWN[READ[child.tag]])
-            if child.tag in READ or child.tag == GEOM:
+            if child.tag in (*READ, *WEIGHED_OR_SPRUNG):
                 own[child.tag] = _over(own.get(child.tag, {}), child.attributes)
         found[name] = own
         for child in element.only("default"):

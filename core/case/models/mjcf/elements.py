@@ -8,6 +8,7 @@ because a mistyped one would silently fall back to its default.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -98,6 +99,12 @@ class Element:
         return found
 
 
+def _without_declaration(text: str) -> str:
+    """Return a text without its declaration, which other parsers take after white space too."""
+    found = re.match(r"\s*<\?xml\b[^>]*\?>", text)
+    return text if found is None else "\n" * found[0].count("\n") + text[found.end() :]
+
+
 def parse_xml(file: Path, text: str) -> Element:
     """The root element of a text.
 
@@ -151,7 +158,7 @@ def parse_xml(file: Path, text: str) -> Element:
     parser.CharacterDataHandler = text_in
     parser.StartDoctypeDeclHandler = refuse
     try:
-        parser.Parse(text.encode("utf-8"), True)
+        parser.Parse(_without_declaration(text).encode("utf-8"), True)
     except expat.ExpatError as error:
         raise fault(
             file,

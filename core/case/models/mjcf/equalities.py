@@ -9,6 +9,7 @@ from typing import TypeAlias
 
 from ....algebra import Quat, Vec3, quat, vec
 from ....errors import remedy
+from ....mechanism.mechanism import GROUND
 from ...io.document import shown
 from .attributes import KNOWN
 from .classes import MAIN
@@ -111,7 +112,11 @@ def read_equalities(root: Element, tree: Tree) -> Iterator[Equality]:
                     " the equalities"
                 )
             names.add(name)
-            yield _READERS[element.tag](name, element, tree, tendons)
+            found = _READERS[element.tag](name, element, tree, tendons)
+            if isinstance(found, Connect) and found.i == found.j == GROUND:
+                tree.count("equalities of what stands still")
+            else:
+                yield found
 
 
 _Tendons = Mapping[str, Element]
@@ -149,8 +154,7 @@ def _weld(name: str, element: Element, tree: Tree, _: _Tendons) -> Connect:
             else there.seen_from(here)
         )
     here = here.then(wanted)
-    found = Connect(name, i, j, (here.at, there.at), element, (here.turn, there.turn))
-    return _of_two(found)
+    return _of_two(Connect(name, i, j, (here.at, there.at), element, (here.turn, there.turn)))
 
 
 def _joint(name: str, element: Element, tree: Tree, _: _Tendons) -> Relation:
@@ -289,7 +293,7 @@ def _sites(element: Element, tree: Tree) -> list[tuple[str, Place]]:
 
 
 def _of_two(connect: Connect) -> Connect:
-    if connect.i == connect.j:
+    if connect.i == connect.j != GROUND:
         raise connect.element.fault(
             f"joins {connect.i!r} with itself, expected two bodies that move otherwise; remove it"
         )

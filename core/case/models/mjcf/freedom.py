@@ -22,6 +22,9 @@ from .pose import UNKNOWNS
 
 # Of motions of length one: less of a coordinate is round-off, or at rest within the digits.
 AT_REST = 1e-6
+# A joint that moves by less of them may do so by the file's digits alone, which lead the mechanism
+# anywhere when it is held. It is held if no other one can be.
+CLEARLY = 0.01
 
 
 class Freedom:
@@ -53,6 +56,13 @@ class Freedom:
         """Return how many of a joint's motions are left."""
         rows = self._free[:, [*self._columns[joint]]]
         return int((np.linalg.svd(rows, compute_uv=False) > AT_REST).sum()) if rows.size else 0
+
+    def holds(self, joint: str, clearly: float) -> bool:
+        """Return whether each of a joint's unknowns can be held: it moves by more than this."""
+        rows = self._free[:, [*self._columns[joint]]]
+        count = rows.shape[1]
+        sizes = np.linalg.svd(rows, compute_uv=False)
+        return len(rows) >= count and bool(sizes[count - 1] > clearly)
 
     def take(self, joint: str) -> None:
         """Drive or hold a joint."""
@@ -100,10 +110,12 @@ def taken(
     held: list[str] = [*driving.held]
     fixed: list[str] = [*driving.fixed]
     if hold_rest and driving.driven:
-        for name, kind in _candidates(root, model, driving):
-            if freedom.left and freedom.moves(name) == UNKNOWNS[kind]:
-                freedom.take(name)
-                (held if kind in ("hinge", "slide") else fixed).append(name)
+        candidates = _candidates(root, model, driving)
+        for clearly in (CLEARLY, AT_REST):
+            for name, kind in candidates:
+                if name not in (*held, *fixed) and freedom.holds(name, clearly):
+                    freedom.take(name)
+                    (held if kind in ("hinge", "slide") else fixed).append(name)
     if freedom.left or freedom.taken != freedom.dof or not driving.driven:
         raise _undriven(file, root, model, driving, freedom)
     return replace(driving, held=tuple(held), fixed=tuple(fixed))

@@ -4,7 +4,7 @@ others held.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +12,7 @@ from ....errors import remedy
 from ....joints import Revolute
 from ....kinematics import degrees_of_freedom
 from ....mechanism.drivers import JointAngle, JointDisplacement, JointDriver
+from ....mechanism.loads import ForceElement
 from ....mechanism.mechanism import Mechanism, Point
 from ....mechanism.motions import Absolute, Motion, Table
 from ...case import Case, Sweep, Truth
@@ -32,17 +33,16 @@ from .frames import coordinates, read_compiler
 from .freedom import taken
 from .parts import Parts, parts_of, require_coupled
 from .rods import Spin, spins
+from .springs import springs_of
 from .start import QPOS0, read_start
 from .tree import Tree, read_tree
 
-# What these hold is for looks, forces and measurements. Tendons are read where an equality holds
-# one.
+# What these hold is for looks, actuators and measurements.
 _LEFT_OUT = (
     "contact",
     "actuator",
     "sensor",
     "keyframe",
-    "tendon",
     "custom",
     "extension",
     "deformable",
@@ -103,7 +103,7 @@ def case_of(file: Path, document: Document, supplied: Supplied) -> Case:
     tree = read_tree(root, read_classes(root), read_compiler(root))
     if not tree.moving:
         raise root.fault("has no body with a joint, expected a mechanism; give a model that moves")
-    for section in root.only(*_LEFT_OUT) if document.left_out is None else ():
+    for section in root.only(*_LEFT_OUT):
         for element in section.children:
             tree.count(f"{section.tag}: {element.tag}")
     driving = read_driving(file, tree, supplied)
@@ -116,7 +116,8 @@ def case_of(file: Path, document: Document, supplied: Supplied) -> Case:
     axes = {name: spin.axis for name, spin in free.items()}
     driving = taken(file, root, model, driving, axes, hold_rest=supplied.hold_rest)
     parts = parts_of(model.tree, model.equalities, driving, free)
-    return _case(file, document, model, driving, parts, free)
+    springs = springs_of(root, tree, model.tree, parts, driving, model.size)
+    return _case(file, document, model, driving, parts, free, springs)
 
 
 def _digits(root: Element, size: float, closure: float | None) -> Digits:
@@ -131,6 +132,7 @@ def _case(
     driving: Driving,
     parts: Parts,
     free: Mapping[str, Spin],
+    springs: Sequence[ForceElement],
 ) -> Case:
     """Return the case of the parts, without rows that are redundant within the digits."""
     tree, digits = model.tree, model.digits
@@ -141,7 +143,9 @@ def _case(
         drivers = [_driver(parts, name) for name in driving.joints]
         joints, couplers = list(parts.joints.values()), list(parts.couplers.values())
         mechanism = Mechanism(
-            file.stem, found.bodies, joints, points, drivers, couplers, gravity=gravity
+            *(file.stem, found.bodies, joints, points, drivers, couplers),
+            gravity=gravity,
+            forces=springs,
         )
     counted = tree.left_out if document.left_out is None else document.left_out
     others = [

@@ -139,11 +139,6 @@ class Tree:
     def _body(self, element: Element, around: Place, outer: str, childclass: str) -> None:
         element.require_known(KNOWN["body"])
         name = element.attributes.get("name", self._unused(f"body{len(self.places)}"))
-        if name == GROUND:
-            raise element.fault(
-                f"name: found {shown(name)}, which is what does not move in a mechanism; rename the"
-                " body"
-            )
         if name in self.places:
             raise element.fault(
                 f"name: found {shown(name)} again, expected a name of its own; rename one of the"
@@ -164,6 +159,11 @@ class Tree:
                 raise element.fault(
                     f"found more than the {most} that are read, expected fewer {what}"
                 )
+        if name == GROUND and (elements or outer != GROUND):
+            raise element.fault(
+                f"name: found {shown(name)}, which is what does not move in a mechanism; rename the"
+                " body"
+            )
         if not elements:
             carrier = outer
             if element.attributes.get("mocap") == "true":

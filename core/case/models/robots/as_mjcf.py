@@ -14,7 +14,7 @@ from ....algebra import Quat, Vec3
 from ..mjcf.elements import DEEPEST, Element
 from ..mjcf.frames import HERE, Place, unit_quaternion
 from ..mjcf.tree import WORLD
-from .robot import Connection, Described, Inertial, Loop, Move, Robot
+from .robot import Connection, Described, Inertial, Loop, Move, Robot, Rod, Spring, Strut
 from .tree import spanned
 
 FIXED = ("world", "ground")
@@ -92,11 +92,10 @@ class _Writer:
         root = robot.root
         name = root.attributes.get("name", root.file.stem)
         gravity = " ".join(map(_number, robot.gravity))
-        return Element(
-            root.file,
+        return self.element(
             "mujoco",
             {"model": name},
-            root.line,
+            root,
             [
                 Element(root.file, "compiler", {"angle": "radian"}, root.line),
                 Element(root.file, "option", {"gravity": gravity}, root.line),
@@ -155,6 +154,8 @@ class _Writer:
         if move.kind != "ball":
             back = Place(turn=place.turn.conjugate())
             attributes["axis"] = _text(back.direction(move.axis))
+        if (spring := self.robot.springs.get(move.name)) is not None:
+            attributes |= {**_law(spring), "springref": _number(spring.rest)}
         return self.element("joint", attributes, joint)
 
     def close(self, loop: Loop) -> None:
@@ -191,13 +192,14 @@ class _Writer:
         self.equalities.append(self.element(tag, {"name": closure, **attributes}, joint))
 
     def relate(self) -> None:
-        """Add rods, couplings and mimics."""
+        """Add rods, struts, couplings and mimics."""
         for rod in self.robot.rods:
-            ends = [self.unused(f"{rod.name}.{each}") for each in ("parent", "child")]
-            for name, link, point in zip(ends, rod.links, rod.points, strict=True):
-                self.site(name, link, Place(point), rod.element)
-            sites = [self.element("site", {"site": name}, rod.element) for name in ends]
-            self.tendon("spatial", rod.name, sites, rod.element)
+            self.tendon("spatial", rod.name, self.ends(rod), rod.element)
+        for strut in self.robot.struts:
+            law = {**_law(strut.spring), "springlength": _number(strut.spring.rest)}
+            attributes = {"name": self.unused(strut.name), **law}
+            ends = self.ends(strut)
+            self.tendons.append(self.element("spatial", attributes, strut.element, ends))
         for each in self.robot.couplings:
             joints = [
                 self.element("joint", {"joint": name, "coef": _number(weight)}, each.element)
@@ -211,6 +213,13 @@ class _Writer:
             self.equalities.append(
                 self.element("joint", {"name": each.name, **attributes}, each.element)
             )
+
+    def ends(self, each: Rod | Strut) -> list[Element]:
+        """Add sites at both ends of a rod or strut; return their mentions in a tendon."""
+        names = [self.unused(f"{each.name}.{end}") for end in ("parent", "child")]
+        for name, link, point in zip(names, each.links, each.points, strict=True):
+            self.site(name, link, Place(point), each.element)
+        return [self.element("site", {"site": name}, each.element) for name in names]
 
     def tendon(self, tag: str, name: str, inside: Sequence[Element], origin: Element) -> None:
         """Add a tendon of constant length."""
@@ -253,6 +262,10 @@ def _mass(inertial: Inertial) -> dict[str, str]:
         return {}
     entries = " ".join(map(_number, inertial.inertia))
     return {**_pose(inertial.place), "mass": _number(inertial.mass), "fullinertia": entries}
+
+
+def _law(spring: Spring) -> dict[str, str]:
+    return {"stiffness": _number(spring.stiffness), "damping": _number(spring.damping)}
 
 
 def _pose(place: Place) -> dict[str, str]:

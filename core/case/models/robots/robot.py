@@ -93,6 +93,32 @@ class Rod:
 
 
 @dataclass(frozen=True)
+class Spring:
+    """A linear spring and damper.
+
+    Attributes:
+        stiffness: [N/m or N m/rad].
+        damping: [N s/m or N m s/rad].
+        rest: coordinate or length without force [m or rad].
+    """
+
+    stiffness: float
+    damping: float
+    rest: float
+
+
+@dataclass(frozen=True)
+class Strut:
+    """A spring and damper between two points of two links [m]."""
+
+    name: str
+    links: tuple[str, str]
+    points: tuple[Vec3, Vec3]
+    element: Element
+    spring: Spring
+
+
+@dataclass(frozen=True)
 class Coupling:
     """A weighted sum of coordinates, constantly zero [rad, m]."""
 
@@ -140,6 +166,7 @@ class Robot:
         fixed: links of the world.
         inertials: masses of links.
         gravity: [m/s^2].
+        springs: those of joints, by coordinate.
         frames: names of places on links, for outputs: link and place.
         actuated: coordinates with a motor.
         left_out: number of omitted items, by name.
@@ -159,6 +186,8 @@ class Robot:
     rods: list[Rod] = field(default_factory=list[Rod])
     couplings: list[Coupling] = field(default_factory=list[Coupling])
     mimics: list[Mimic] = field(default_factory=list[Mimic])
+    springs: dict[str, Spring] = field(default_factory=dict[str, Spring])
+    struts: list[Strut] = field(default_factory=list[Strut])
     frames: dict[str, tuple[str, Place]] = field(default_factory=dict[str, tuple[str, Place]])
     actuated: list[str] = field(default_factory=list[str])
     left_out: dict[str, int] = field(default_factory=dict[str, int])

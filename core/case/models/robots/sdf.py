@@ -9,6 +9,7 @@ from ....algebra import Vec3, X
 from ...io.document import shown
 from ..mjcf.elements import Element
 from ..mjcf.frames import HERE, Place
+from .dynamics import add_sdf_spring
 from .inertials import UNIT, sdf_inertial
 from .robot import Connection, Coupling, Inertial, Mimic, Move, Robot
 from .sdf_drake import add_ties, mimic_of
@@ -140,11 +141,15 @@ def _joints(robot: Robot, frames: Frames, short: Short, version: tuple[int, ...]
             raise element.fault(
                 f"joins {ends[0]!r} with itself, expected two links; correct parent or child"
             )
+        if {*ends} <= robot.fixed:
+            robot.count("joints of what stands still")
+            continue
         place = frames.place(element, full)
         links = ends[0], ends[1]
         joint = _joint(robot, frames, full, short(full), links, place, version)
         robot.joints.append(joint)
         _mimics(robot, frames, short, full, joint.moves)
+        _springs(robot, element, joint.moves)
         if (mimic := mimic_of(frames, short, full, joint)) is not None:
             robot.mimics.append(mimic)
 
@@ -217,6 +222,16 @@ def _axis(frames: Frames, full: str, tag: str, place: Place, version: tuple[int,
         base = frames.within(axis, framed.scope, given)
         place = frames.place(axis, base)
     return place.direction(direction(axis if xyz is None else xyz, numbers))
+
+
+def _springs(robot: Robot, joint: Element, moves: Sequence[Move]) -> None:
+    """Add the springs and dampers of the axes."""
+    for tag, move in zip(("axis", "axis2"), moves, strict=False):
+        for axis in joint.only(tag):
+            if joint.attributes.get("type") != "screw":
+                add_sdf_spring(robot, move.name, axis)
+            elif any(axis.only("dynamics")):  # of the turn or of the shift
+                robot.count("dynamics of screw joints")
 
 
 def _mimics(robot: Robot, frames: Frames, short: Short, full: str, moves: Sequence[Move]) -> None:

@@ -1,4 +1,4 @@
-"""Elements of SDF that Drake reads beyond the format: ball constraints and mimics of joints.
+"""Elements of SDF that Drake reads beyond the format: ball constraints, mimics, spring-dampers.
 
 `kincheck export --to sdf` closes its loops by them. Three ball constraints of two links hold them
 together as a whole.
@@ -10,22 +10,23 @@ import math
 from collections.abc import Sequence
 
 from ....algebra import Vec3, X, cross, vec
-from ....errors import remedy
+from ....errors import CaseError, remedy
 from ...io.document import shown
 from ..mjcf.elements import Element
 from ..mjcf.frames import Place, of_axes
-from .robot import Connection, Loop, Mimic, Move, Robot
+from .dynamics import strut_spring
+from .robot import Connection, Loop, Mimic, Move, Robot, Strut
 from .sdf_frames import Frames, Short, text_of
 from .values import numbers_of, only_child
 
 PREFIX = "drake:"
-BALL, MIMIC = "drake:ball_constraint", "drake:mimic"
+BALL, MIMIC, STRUT = "drake:ball_constraint", "drake:mimic", "drake:linear_spring_damper"
 # Of the distance of two points, what lies on the line through both.
 ON_LINE = 1e-6
 
 
 def add_ties(robot: Robot, frames: Frames, short: Short) -> None:
-    """Add the ball constraints of all models; other elements of Drake's are counted.
+    """Add the ball constraints and spring-dampers of all models; other elements are counted.
 
     Raises:
         CaseError: a link is unknown, or a point is not three numbers.
@@ -33,13 +34,13 @@ def add_ties(robot: Robot, frames: Frames, short: Short) -> None:
     found: dict[tuple[str, str], list[tuple[Element, Vec3, Vec3]]] = {}
     for full, framed in frames.models.items():
         for element in framed.element.children:
-            if element.tag != BALL:
-                if element.tag.startswith(PREFIX):
-                    robot.count(element.tag)
-                continue
-            ends = [_link(frames, short, element, full, f"{BALL}_body_{side}") for side in "AB"]
-            points = [_point(element, f"{BALL}_p_{side}") for side in ("AP", "BQ")]
-            found.setdefault((ends[0], ends[1]), []).append((element, points[0], points[1]))
+            if element.tag == BALL:
+                links, points = _ends(frames, short, element, full)
+                found.setdefault(links, []).append((element, *points))
+            elif element.tag == STRUT:
+                _add_strut(robot, frames, short, element, full)
+            elif element.tag.startswith(PREFIX):
+                robot.count(element.tag)
     for links, ties in found.items():
         if links[0] == links[1]:
             raise ties[0][0].fault(
@@ -55,6 +56,20 @@ def add_ties(robot: Robot, frames: Frames, short: Short) -> None:
             at = here.then(Place(first)), there.then(Place(second))
             ball = Move("ball", _name(element, links), at[0].at, X)
             robot.loops.append(Loop(Connection(ball.name, links, (ball,), element), at))
+
+
+def _add_strut(robot: Robot, frames: Frames, short: Short, element: Element, model: str) -> None:
+    """Add a spring-damper of two points; one that makes no sense is counted."""
+    try:
+        links, points = _ends(frames, short, element, model)
+        spring = strut_spring(element)
+    except CaseError:
+        robot.count(STRUT)
+        return
+    here, there = (
+        robot.links[link].point(point) for link, point in zip(links, points, strict=True)
+    )
+    robot.struts.append(Strut(_name(element, links), links, (here, there), element, spring))
 
 
 def mimic_of(frames: Frames, short: Short, full: str, joint: Connection) -> Mimic | None:
@@ -81,6 +96,15 @@ def mimic_of(frames: Frames, short: Short, full: str, joint: Connection) -> Mimi
     (factor,) = element.numbers("multiplier", (1,), (1.0,))
     (offset,) = element.numbers("offset", (1,), (0.0,))
     return Mimic(f"{joint.name}.mimic", (joint.name, short(leader)), (offset, factor), element)
+
+
+def _ends(
+    frames: Frames, short: Short, element: Element, model: str
+) -> tuple[tuple[str, str], tuple[Vec3, Vec3]]:
+    """Return the links of an element between two points, and the points in them."""
+    tag = element.tag
+    first, second = (_link(frames, short, element, model, f"{tag}_body_{side}") for side in "AB")
+    return (first, second), (_point(element, f"{tag}_p_AP"), _point(element, f"{tag}_p_BQ"))
 
 
 def _link(frames: Frames, short: Short, element: Element, model: str, tag: str) -> str:

@@ -17,8 +17,10 @@ from ....joints.base import triad
 from ...io.document import shown
 from ..mjcf.elements import Element
 from ..mjcf.frames import HERE, Place
+from ..mjcf.tree import WORLD
 from .as_mjcf import fitted
 from .beside import read_beside
+from .dynamics import add_urdf_damper
 from .inertials import urdf_inertial
 from .robot import Connection, Kind, Loop, Mimic, Move, Robot
 from .values import direction, named, only_child, require_children, required, roll_pitch_yaw
@@ -108,6 +110,9 @@ def _links(robot: Robot) -> None:
         for child in element.children:
             if child.tag != "inertial":
                 robot.count(child.tag)
+    parents = [each for joint in robot.root.only("joint") for each in joint.only("parent")]
+    if any(each.attributes.get("link") == WORLD for each in parents):
+        robot.elements.setdefault(WORLD, robot.root)  # as in Drake, which has it without a link
     if not robot.elements:
         raise robot.root.fault("has no link, expected a mechanism; give a robot that moves")
 
@@ -132,7 +137,8 @@ def _joints(robot: Robot) -> dict[str, Element]:
                 " tree; write the joint that closes a loop as <constraint>"
             )
         above[child], found[name] = name, element
-        for each in ("limit", "dynamics", "calibration", "safety_controller"):
+        add_urdf_damper(robot, element)
+        for each in ("limit", "calibration", "safety_controller"):
             if any(element.only(each)):
                 robot.count(f"{each} of joints")
     roots = [name for name in robot.elements if name not in above]

@@ -1,0 +1,194 @@
+"""Robots of a folder, such as a checked-out public repository, against simulators' own equations:
+
+    python -m tests.oracles.public_robots FOLDER
+
+Each model with closed loops is driven by its first actuated joint, with the rest held. Poses are
+compared with an independent Newton iteration: on MuJoCo's residuals for MJCF, on Pinocchio's frames
+for URDF with YAML. A table in Markdown is printed. Further arguments are files or folders too.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from kincheck.core.case.case import Case
+from kincheck.core.case.io.reader_options import LEFT_OUT, Supplied
+from kincheck.core.case.models.files import load
+from kincheck.core.case.models.mjcf import read
+from kincheck.core.case.models.mjcf.assembly import Assembled
+from kincheck.core.case.models.mjcf.driving import Driving
+from kincheck.core.errors import KincheckError
+from kincheck.core.kinematics import NativeSolver
+
+from .mujoco_newton import MujocoNewton
+from .naive import A
+
+SPAN, SAMPLES = 0.1, 9
+SUBSTEP = 0.02
+"""Longest step between poses of the oracle, so that it stays on its branch [rad or m]."""
+COLUMNS = (
+    *("Model", "Freedoms", "Bodies, joints", "Closures", "Left out", "Samples"),
+    *("Largest difference [m]", "[rad]", "Residual"),
+)
+
+
+@dataclass(frozen=True)
+class Row:
+    """What was found of a model.
+
+    Attributes:
+        cells: of the table, in its order.
+    """
+
+    cells: Sequence[str]
+
+    def __str__(self) -> str:
+        return f"| {' | '.join(self.cells)} |"
+
+
+def rows_of(paths: Sequence[Path], drive: str = "") -> Iterator[Row]:
+    """Yield the rows of all models with loops, and of those that are refused.
+
+    Args:
+        drive: the joint to be driven; the first actuated one unless given.
+    """
+    for path in paths:
+        files = sorted(path.rglob("*")) if path.is_dir() else [path]
+        for file in files:
+            if file.suffix not in (".xml", ".urdf") or not _has_loops(file):
+                continue
+            name = str(file.relative_to(path)) if path.is_dir() else file.name
+            try:
+                found = compared(file, drive)
+            except KincheckError as error:
+                found = (f"refused: {str(error).removeprefix(f'{file}: ')}",)
+            except (ValueError, AssertionError) as error:  # of the oracle
+                found = (f"not compared: {' '.join(str(error).split())}",)
+            yield Row((name, *found))
+
+
+def _has_loops(file: Path) -> bool:
+    text = file.read_text(errors="replace")
+    if file.suffix == ".urdf":
+        return file.with_suffix(".yaml").exists()
+    return (
+        "<mujoco" in text
+        and re.search(r"<(connect|weld|joint|tendon)\s[^>]*(1=)", text) is not None
+    )
+
+
+def compared(file: Path, drive: str = "") -> Sequence[str]:
+    """Return the cells of a model: its size, and the largest differences.
+
+    Raises:
+        KincheckError: the model is refused.
+    """
+    dof, joint = _freedoms(file, drive)
+    *_, driving, assembled = posed(file, Supplied(drive=(f"{joint}:0:1",), hold_rest=True))
+    at = assembled.tree.joints[joint].value
+    sweep = f"{joint}:{at - SPAN!r}:{at + SPAN!r}:{SAMPLES}"
+    case, driving, assembled = posed(file, Supplied(drive=(sweep,), hold_rest=True))
+    mechanism = case.mechanism
+    names = tuple(body.name for body in mechanism.moving)
+    found = NativeSolver(order=0).prepare(mechanism, case.sweep.path, bodies=names)(1e-12)
+    differences = _differences(file, found, case, driving, assembled)
+    left_out = re.sub(r"[a-z]+: [a-z]+ \(\d+\),? ?", "", case.source.split(LEFT_OUT)[1])
+    return (
+        str(dof),
+        f"{len(mechanism.moving)}, {len(mechanism.joints)}",
+        str(len(assembled.equalities)),
+        left_out.strip(", ") or "nothing",
+        f"{int(found.solved.sum())} of {len(found.solved)}",
+        *(f"{each:.0e}" for each in differences),
+    )
+
+
+def _freedoms(file: Path, drive: str) -> tuple[int, str]:
+    """Return the freedom of a model and its first actuated joint, which the message names."""
+    try:
+        load(file)
+    except KincheckError as error:
+        freedom = re.search(r"has (\d+) degree", str(error))
+        joints = re.search(r"joints, actuated ones first: ([^;]*)", str(error))
+        if freedom and (drive or joints):
+            return int(freedom[1]), drive or joints[1].split(", ")[0]
+        raise
+    raise AssertionError(f"{file} is read without a drive")
+
+
+def posed(file: Path, supplied: Supplied) -> tuple[Case, Driving, Assembled]:
+    """Return the case of a model, its driven and held joints, and its start."""
+    found: list[tuple[Driving, Assembled]] = []
+    own = read.taken
+
+    def taken(*arguments, **options):
+        found.append((own(*arguments, **options), arguments[2]))
+        return found[-1][0]
+
+    read.taken = taken
+    try:
+        case = load(file, supplied)
+    finally:
+        read.taken = own
+    return case, *found[-1]
+
+
+def _differences(file, found, case, driving, assembled):
+    """Return the largest differences [m] and [rad], and the oracle's residual."""
+    oracle = _oracle(file, assembled, driving)
+    ((swept, values),) = driving.driven.items()
+    held = {name: assembled.tree.joints[name].value for name in driving.held}
+    start, at = oracle.state, assembled.tree.joints[swept].value
+    far = turned = residual = 0.0
+    for side in (1.0, -1.0):
+        oracle.state, last = start, at
+        for k in sorted(range(len(values)), key=lambda k: abs(values[k] - at)):
+            if (values[k] - at) * side < 0.0:
+                continue
+            steps = int(np.ceil(abs(values[k] - last) / SUBSTEP)) + 1
+            for value in np.linspace(last, values[k], steps):
+                oracle.move({**held, swept: value})
+            last = values[k]
+            residual = max(residual, oracle.residual)
+            for name, motion in found.bodies.items() if found.solved[k] else ():
+                if name in assembled.tree.massless or (place := oracle.body(name)) is None:
+                    continue
+                turn = A(motion.p[k]) @ place[1].T - np.eye(3)
+                far = max(far, float(np.abs(motion.r[k] - place[0]).max()))
+                turned = max(turned, float(np.abs(turn).max()))
+    return far, turned, residual
+
+
+def _oracle(file, assembled, driving):
+    if file.suffix == ".xml":
+        return MujocoNewton(file, assembled, driving.fixed)
+    from .pinocchio_newton import PinocchioNewton  # its solver takes a second to load
+
+    return PinocchioNewton(file, assembled, driving.fixed)
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Print the table."""
+    parser = argparse.ArgumentParser(
+        prog="python -m tests.oracles.public_robots",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("path", type=Path, nargs="+", metavar="FOLDER")
+    parser.add_argument("--drive", default="", help="joint to be driven; the first actuated one")
+    options = parser.parse_args(arguments)
+    print(Row(COLUMNS))
+    print(Row(["---"] * len(COLUMNS)))
+    for row in rows_of(options.path, options.drive):
+        print(row, flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
