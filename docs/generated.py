@@ -12,8 +12,8 @@ from pathlib import Path
 
 from kincheck.core.case.io import loads, schema
 from kincheck.core.case.io.catalogue import output_tables, type_tables
-from kincheck.core.case.variation import variation_schema
 from kincheck.core.cli.main import parser as parser_of
+from kincheck.core.studies.variation import variation_schema
 
 ROOT = Path(__file__).parent.parent
 SHARED = {

@@ -94,7 +94,6 @@ IMPORTS = {
     "case/models/hardpoints": (
         ". joints mechanism case/models/hardpoints/templates case case/suspension case/io"
     ),
-    "case/variation": ". joints mechanism kinematics case case/io",
     "case/models/mjcf": ". joints mechanism kinematics case case/io",
     "case/models/robots": ". joints mechanism case/io case/models/mjcf",
     "case/models": "case case/io case/models/hardpoints case/models/mjcf case/models/robots",
@@ -106,6 +105,7 @@ IMPORTS = {
     "history": ". case case/io harness",
     "history/regression": ". case case/io harness history",
     "report": ". joints mechanism case case/io harness history history/regression",
+    "studies/variation": ". joints mechanism kinematics case case/io",
     "studies/stress/truth": ". program joints mechanism kinematics case case/measures",
     "studies/stress/families": ". joints mechanism case case/measures case/io studies/stress/truth",
     "studies": ". program joints mechanism kinematics case case/io harness report",
@@ -117,8 +117,8 @@ IMPORTS = {
         ". primitives joints case harness harness/workers studies studies/joint_check"
     ),
     "studies/tolerance": (
-        ". program program/llvm mechanism kinematics case case/measures case/io "
-        "case/variation harness harness/workers history report"
+        ". program program/llvm mechanism kinematics case case/measures case/io harness "
+        "harness/workers history report studies/variation"
     ),
     "studies/stress": (
         ". joints mechanism kinematics case case/io harness harness/workers report "
@@ -127,15 +127,15 @@ IMPORTS = {
     "studies/paper": ". primitives program joints mechanism kinematics case harness report",
     "studies/diagnosis": ". joints kinematics case harness report",
     "studies/bench": (
-        ". program/llvm joints mechanism kinematics case case/io case/variation harness "
-        "report studies studies/tolerance studies/paper"
+        ". program/llvm joints mechanism kinematics case case/io harness report "
+        "studies/variation studies studies/tolerance studies/paper"
     ),
     "cli": (
         ". program program/llvm joints kinematics case/models/hardpoints/templates case "
-        "case/io case/models/hardpoints case/variation case/models harness "
-        "harness/workers history history/regression report studies/stress/families "
-        "studies studies/joint_check studies/engine_check studies/tolerance "
-        "studies/stress studies/paper studies/diagnosis studies/bench"
+        "case/io case/models/hardpoints case/models harness harness/workers history "
+        "history/regression report studies/variation studies/stress/families studies "
+        "studies/joint_check studies/engine_check studies/tolerance studies/stress "
+        "studies/paper studies/diagnosis studies/bench"
     ),
     "__init__": ". joints mechanism kinematics case case/io harness studies/joint_check",
     "kincheck": "case case/io harness harness/workers studies cli __init__",

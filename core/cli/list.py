@@ -133,7 +133,7 @@ def _print_references(options: argparse.Namespace, console: Console) -> None:
 def _keys() -> Iterator[str]:
     """Yield the lines on the keys of case and variation files, from their readers."""
     from ..case.io import loads, schema
-    from ..case.variation import variation_schema
+    from ..studies.variation import variation_schema
 
     for module in (schema, loads, variation_schema):
         what, _, keys = (module.__doc__ or "").partition("Reference. ")

@@ -47,9 +47,9 @@ def _sweep(options: argparse.Namespace, house: House) -> int:
     Exit status: 0 if every variant has a solution and every cross-check agrees, 1 if not, 2 if the
     work could not be done. An interrupted sweep writes what it has, and ends with 130.
     """
-    from ..case.variation.variation_file import read_variation
     from ..studies.tolerance.study import Study
     from ..studies.tolerance.sweep import how_many
+    from ..studies.variation.variation_file import read_variation
     from .destinations import Destinations
 
     problems: list[str] = []

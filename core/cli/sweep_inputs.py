@@ -11,7 +11,7 @@ from ..report.progress import complain
 
 if TYPE_CHECKING:
     from ..case.case import Case
-    from ..case.variation.variation import Variation
+    from ..studies.variation.variation import Variation
 
 
 def only(case: Case, names: list[str], problems: list[str]) -> Case:
@@ -28,7 +28,7 @@ def limited(
     """Return the variation with the limits of the options too, which replace those of the file; of
     the outputs of the case alone.
     """
-    from ..case.variation.limits import limits_of_texts
+    from ..studies.variation.limits import limits_of_texts
 
     given = limits_of_texts(options.limit, whole, variation.units)
     limits = {each.output: each for each in (*variation.limits, *given)}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..case.variation.modes import Sampling
+from ..studies.variation.modes import Sampling
 from . import import_options
 from .option_types import positive, whole
 from .run_options import TOL

@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from ..case.variation.modes import Sampling
 from ..errors import KincheckError
 from ..report.progress import complain, lacking, uncompared
+from ..studies.variation.modes import Sampling
 from .registry import House, Status
 
 if TYPE_CHECKING:

@@ -9,13 +9,13 @@ from kincheck.core.case.io.catalogue import catalogue, rows_of
 from kincheck.core.case.io.class_keys import driver_keys, joint_keys, motion_keys
 from kincheck.core.case.io.driving import DRIVERS
 from kincheck.core.case.io.loads import force_keys
-from kincheck.core.case.variation import variation_schema
 from kincheck.core.cli import main
 from kincheck.core.errors import MechanismError
 from kincheck.core.joints import Coupler, Joint, Spherical
 from kincheck.core.joints.base import directions
 from kincheck.core.mechanism.loads import ELEMENTS
 from kincheck.core.mechanism.motions import Motion
+from kincheck.core.studies.variation import variation_schema
 
 # Rows as in textbooks: six less the freedoms left.
 ROWS = {

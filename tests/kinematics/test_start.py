@@ -25,7 +25,6 @@ from kincheck.core import (
 from kincheck.core import solve_designs as designs
 from kincheck.core.case.case import Case, Output, Sweep, Truth
 from kincheck.core.case.io.model_writer import way_to
-from kincheck.core.case.variation.variation_file import read_variation
 from kincheck.core.kinematics.by_components.block_solver import Cascade
 from kincheck.core.kinematics.by_components.sweep import CascadeSweep
 from kincheck.core.kinematics.compiled.motion_start import start_of
@@ -34,6 +33,7 @@ from kincheck.core.kinematics.solver_selection import prepare
 from kincheck.core.kinematics.sparse.sweep import solve_sparse
 from kincheck.core.mechanism.motions import Absolute, Path, Ramp, Sine, Table
 from kincheck.core.studies.tolerance.sweep import sweep_designs
+from kincheck.core.studies.variation.variation_file import read_variation
 from kincheck.core.studies.verified_reference import prove_case
 
 from ..support.mechanisms import slider_crank

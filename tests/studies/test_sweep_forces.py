@@ -7,13 +7,13 @@ import pytest
 from kincheck import adapters
 from kincheck.cases import load
 from kincheck.core import CaseError
-from kincheck.core.case.variation.variation_file import read_variation
 from kincheck.core.cli.main import main
 from kincheck.core.harness.compare import output_series
 from kincheck.core.harness.execution import here
 from kincheck.core.kinematics import NativeSolver
 from kincheck.core.studies.tolerance.study import Ready, Study
 from kincheck.core.studies.tolerance.sweep import Check, sweep_designs
+from kincheck.core.studies.variation.variation_file import read_variation
 
 from ..case.test_vary import HEAD, vary
 

@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck.core.case.variation.limits import Limit
-from kincheck.core.case.variation.modes import Sampling
 from kincheck.core.cli.main import main
 from kincheck.core.errors import KincheckError
 from kincheck.core.studies.tolerance.histograms import sparkline
 from kincheck.core.studies.tolerance.limit_counts import RowLimit, limit_counts
 from kincheck.core.studies.tolerance.page import page
 from kincheck.core.studies.tolerance.sweep import sweep_designs
+from kincheck.core.studies.variation.limits import Limit
+from kincheck.core.studies.variation.modes import Sampling
 from scipy import stats
 
 from ..case.test_vary import HEAD, vary

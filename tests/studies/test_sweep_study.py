@@ -15,7 +15,6 @@ from kincheck.core import SolveError, solve
 from kincheck.core.algebra import Vec3
 from kincheck.core.case.case import without_forces
 from kincheck.core.case.suspension.base import where_moving
-from kincheck.core.case.variation.variation_file import read_variation
 from kincheck.core.errors import KincheckError
 from kincheck.core.harness.compare import output_series
 from kincheck.core.harness.execution import here
@@ -25,6 +24,7 @@ from kincheck.core.studies.tolerance.cross_check import chosen
 from kincheck.core.studies.tolerance.reduce import QUANTILES
 from kincheck.core.studies.tolerance.study import Ready, Study
 from kincheck.core.studies.tolerance.sweep import Check, sweep_designs
+from kincheck.core.studies.variation.variation_file import read_variation
 
 from ..case.test_vary import vary
 from ..support.fakes import Fake, crank, exact

@@ -13,11 +13,11 @@ import msgspec
 import numpy as np
 
 from ...case.case import Case, size
-from ...case.variation.distributions import Law
-from ...case.variation.variation import Coordinate, Mode, Variation
 from ...joints import Kind
 from ...kinematics import kinds, places
 from ..tolerance.sweep import sweep_designs
+from ..variation.distributions import Law
+from ..variation.variation import Coordinate, Mode, Variation
 from .batch import SCATTER, SEED
 from .peak import Peak
 from .rounds import Spread, spread

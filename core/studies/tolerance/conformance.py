@@ -26,8 +26,8 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from ...case.variation.modes import Mode
 from ...trajectory import Array
+from ..variation.modes import Mode
 from .reduce import Summary
 from .study import Study
 

@@ -9,9 +9,9 @@ from typing import Any, Self
 
 import numpy as np
 
-from ...case.variation.variation import Coordinate
 from ...errors import KincheckError
 from ...extras import library
+from ..variation.variation import Coordinate
 from .chunk import Chunk
 from .study import Study
 

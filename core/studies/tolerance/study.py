@@ -17,14 +17,14 @@ from ...case.case import Case, Quantity, without_forces
 from ...case.held import require_no_held
 from ...case.measures import ForceMeasure
 from ...case.rotation import counted
-from ...case.variation.modes import Mode
-from ...case.variation.sampling import Stream, generator
-from ...case.variation.variation import Variation
 from ...errors import KincheckError
 from ...jet import Jet
 from ...kinematics import ForcesOfDesigns, NativeSolver, PreparedDesigns, Variants, placed
 from ...mechanism.motions import Path
 from ...trajectory import PER_TIME, QUANTITIES, Array
+from ..variation.modes import Mode
+from ..variation.sampling import Stream, generator
+from ..variation.variation import Variation
 from .chunk import Chunk, Unsolved
 from .limit_counts import COUNTS, RowLimit, limit_counts
 from .streaming_totals import Totals

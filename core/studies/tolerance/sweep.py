@@ -13,14 +13,14 @@ from time import perf_counter, process_time
 from typing import Any, Protocol
 
 from ...case.case import Case
-from ...case.variation.modes import Mode, Sampling
-from ...case.variation.variation import Variation
 from ...errors import KincheckError
 from ...harness.engine import Engine
 from ...harness.execution import Solver
 from ...harness.interrupts import deferred, hold
 from ...harness.provenance import circumstances
 from ...harness.workers.distributed import ClusterError
+from ..variation.modes import Mode, Sampling
+from ..variation.variation import Variation
 from . import cross_check, result_tables, results
 from .chunk import Chunk
 from .chunk_execution import Source, on_threads

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ...case.case import Case, Quantity
+from ...case.io.document import decimal, fault, join
+from ...case.io.typed_tables import typed
+from ...case.units import ANGLES, LENGTHS, in_units
 from ...errors import KincheckError, remedy
 from ...trajectory import PER_TIME, QUANTITIES
-from ..case import Case, Quantity
-from ..io.document import decimal, fault, join
-from ..io.typed_tables import typed
-from ..units import ANGLES, LENGTHS, in_units
 from .file_units import FileUnits
 from .variation_schema import LimitKeys
 

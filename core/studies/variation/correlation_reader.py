@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
+from ...case.io.document import fault, join
+from ...case.io.typed_tables import typed
 from ...errors import unknown
-from ..io.document import fault, join
-from ..io.typed_tables import typed
 from .correlations import Correlation, problem_of
 from .modes import Mode
 from .variation_schema import CorrelationKeys, VaryKeys

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ...case.io.document import fault, join, shown
 from ...mechanism.dimension import ANGLE, Dimension
-from ..io.document import fault, join, shown
 from .distributions import Law
 from .modes import Mode
 from .variation import Coordinate

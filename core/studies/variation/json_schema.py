@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..io.json_schema import document_schema
+from ...case.io.json_schema import document_schema
 from .variation_schema import (
     SCHEMA,
     CorrelationKeys,

@@ -5,11 +5,11 @@ import json
 import numpy as np
 import pytest
 from kincheck.core import CaseError
-from kincheck.core.case.variation.distributions import Law
-from kincheck.core.case.variation.modes import Sampling
-from kincheck.core.case.variation.sampling import DRAWN
-from kincheck.core.case.variation.variation_file import read_variation
 from kincheck.core.errors import KincheckError
+from kincheck.core.studies.variation.distributions import Law
+from kincheck.core.studies.variation.modes import Sampling
+from kincheck.core.studies.variation.sampling import DRAWN
+from kincheck.core.studies.variation.variation_file import read_variation
 from scipy import stats
 
 from ..support.fakes import crank

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
+from ...case.case import Case
+from ...case.io.document import fault, join, parse, read_text, shown
+from ...case.io.typed_tables import typed
 from ...joints import Kind
 from ...mechanism.drivers import PointCoordinate
 from ...trajectory import Array
-from ..case import Case
-from ..io.document import fault, join, parse, read_text, shown
-from ..io.typed_tables import typed
 from .coordinate_reader import CoordinateReader
 from .correlation_reader import read_correlations
 from .file_units import FileUnits, unit_of_offsets

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
+from ...case.case import MARKER
 from ...errors import remedy
 from ...joints import Kind
 from ...kinematics import kinds, load_places, places
 from ...mechanism.dimension import Dimension
 from ...mechanism.mechanism import Mechanism
-from ..case import MARKER
 
 # Closer positions are one hardpoint [m]: hardpoints are measured to a micrometre at best.
 SAME = 1e-6

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from ...case.case import Case
+from ...case.io.document import fault
+from ...case.units import ANGLES, LENGTHS, RADIAN
 from ...joints import Kind
 from ...mechanism.dimension import ANGLE, LENGTH, Dimension
-from ..case import Case
-from ..io.document import fault
-from ..units import ANGLES, LENGTHS, RADIAN
 from .variation_schema import VaryUnits
 
 
