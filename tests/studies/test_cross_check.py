@@ -13,9 +13,9 @@ from kincheck.core.studies.tolerance.cross_check import judged
 from kincheck.core.studies.tolerance.study import Study
 from kincheck.core.trajectory import QUANTITIES
 
-from ..case.test_vary import HEAD, vary
 from ..support.fakes import Fake
 from .test_sweep_command import POINTS
+from .test_vary import HEAD, vary
 
 
 def test_a_deviating_check_makes_status_1_and_its_variant_is_made_again(

@@ -17,8 +17,8 @@ from kincheck.core.studies.tolerance.chunk_execution import on_cluster, solve_th
 from kincheck.core.studies.tolerance.study import Study
 from kincheck.core.studies.tolerance.sweep import sweep_designs
 
-from ..case.test_vary import vary
 from ..support.fakes import crank
+from .test_vary import vary
 
 POINTS = {
     "ball": {"at": "ball", "sigma": 1.0},

@@ -17,8 +17,8 @@ from kincheck.core.studies.tolerance.page import page
 from kincheck.core.studies.tolerance.sweep import sweep_designs
 from kincheck.core.studies.tolerance.tables import print_sweep
 
-from ..case.test_vary import HEAD, vary
 from ..support.fakes import crank
+from .test_vary import HEAD, vary
 
 POINTS = {
     "ball": {"at": "ball", "sigma": 1.0},

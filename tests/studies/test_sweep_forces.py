@@ -15,7 +15,7 @@ from kincheck.core.studies.tolerance.study import Ready, Study
 from kincheck.core.studies.tolerance.sweep import Check, sweep_designs
 from kincheck.core.studies.variation.variation_file import read_variation
 
-from ..case.test_vary import HEAD, vary
+from .test_vary import HEAD, vary
 
 COUNT = 4
 SLIDER_CRANK = {

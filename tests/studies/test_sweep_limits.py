@@ -16,8 +16,8 @@ from kincheck.core.studies.variation.limits import Limit
 from kincheck.core.studies.variation.modes import Sampling
 from scipy import stats
 
-from ..case.test_vary import HEAD, vary
 from ..support.fakes import crank
+from .test_vary import HEAD, vary
 
 TIP = {"at": "tip", "sigma": [0.0, 1.0, 0.0]}
 

@@ -18,8 +18,8 @@ from kincheck.core.studies.tolerance.reduce import QUANTILES, merged, nothing, q
 from kincheck.core.studies.tolerance.streaming_totals import Totals
 from kincheck.core.studies.tolerance.study import Ready, Study
 
-from ..case.test_vary import vary
 from ..support.fakes import crank
+from .test_vary import vary
 
 BALL = {"at": "ball", "sigma": 1.0}
 AXIS = {"at": "joints.lca_pivot.axis", "sigma": 0.1}

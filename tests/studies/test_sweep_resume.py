@@ -10,9 +10,9 @@ from kincheck.core.cli.main import main
 from kincheck.core.studies.tolerance.study import Ready
 from kincheck.core.studies.tolerance.sweep import sweep_designs
 
-from ..case.test_vary import HEAD, vary
 from ..support.fakes import crank
 from .test_sweep_study import TIP
+from .test_vary import HEAD, vary
 
 POINTS = {"ball": {"at": "ball", "sigma": 1.0}}
 VARIANTS, CHUNK = 640, 64

@@ -26,8 +26,8 @@ from kincheck.core.studies.tolerance.study import Ready, Study
 from kincheck.core.studies.tolerance.sweep import Check, sweep_designs
 from kincheck.core.studies.variation.variation_file import read_variation
 
-from ..case.test_vary import vary
 from ..support.fakes import Fake, crank, exact
+from .test_vary import vary
 
 TIP = {"at": "tip", "sigma": [1.0, 2.0, 0.0]}
 PIVOT = {"at": "pivot", "half_width": [0.0, 5.0, 0.0]}
