@@ -11,6 +11,7 @@ import sys
 import tomllib
 from collections import Counter
 from collections.abc import Iterator
+from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -159,14 +160,20 @@ PAGES = [path for ending in ("css", "html", "js") for path in files("core", endi
 TESTS = files("tests")
 
 
+@cache
 def tree(path):
     return ast.parse((ROOT / path).read_text(encoding="utf-8"))
 
 
-def imported(path: Path, syntax: ast.AST) -> Iterator[tuple[str, ...]]:
-    """Yield the imports of a file as paths from the top; relative ones are resolved, and those of
+@cache
+def imported(path: Path, syntax: ast.AST) -> list[tuple[str, ...]]:
+    """Return the imports of a file as paths from the top; relative ones are resolved, and those of
     the package kincheck itself.
     """
+    return [*_resolved(path, syntax)]
+
+
+def _resolved(path: Path, syntax: ast.AST) -> Iterator[tuple[str, ...]]:
     for target in _named(path, syntax):
         if path.parent != PACKAGE or target[0] != "kincheck":
             yield target

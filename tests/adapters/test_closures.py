@@ -147,7 +147,7 @@ def test_every_joint_moves_as_in_the_native_engine(
     tree: Callable[[Mechanism], SpanningTree],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    mechanism, turn = on_crank(kind, *bodies), np.linspace(-0.4, 0.4, 81)
+    mechanism, turn = on_crank(kind, *bodies), np.linspace(-0.4, 0.4, 41)
     monkeypatch.setattr("kincheck.adapters.shared.tree_model.spanning_tree", tree)
     found, native = solved(mechanism, turn, 2.0), solve(mechanism, "turn", turn, rate=2.0)
     assert native.solved.all()

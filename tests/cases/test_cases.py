@@ -5,6 +5,7 @@ mpmath, and published values.
 import csv
 from collections.abc import Callable, Sequence
 from decimal import Decimal
+from functools import cache
 
 import mpmath as mp
 import numpy as np
@@ -218,12 +219,18 @@ def test_closed_forms_solve_the_constraints(name: str, angle: float):
     case, rate = cases.load(name), 1.7
     motion = CLOSED_FORMS[name].motion(jet.steady(np.array([angle]), rate))
     near = {point: [mp.mpf(each.x[0]) for each in xyz] for point, xyz in motion.items()}
+
+    @cache
+    def solved(t: mp.mpf, prec: int) -> Points:
+        """All coordinates at a time, solved once with a precision: higher derivatives take more."""
+        return SOLVERS[name](case, angle + rate * t, near)
+
     with mp.workdps(40):
         for point, xyz in motion.items():
             for k, closed in enumerate(xyz):
 
                 def coordinate(t: mp.mpf, point: str = point, k: int = k) -> mp.mpf:
-                    return SOLVERS[name](case, angle + rate * t, near)[point][k]
+                    return solved(t, mp.mp.prec)[point][k]
 
                 for order, found in enumerate((closed.x, closed.v, closed.a)):
                     expected = float(mp.diff(coordinate, 0, order))

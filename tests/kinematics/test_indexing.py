@@ -43,7 +43,7 @@ def indexing():
     )
 
 
-@pytest.mark.parametrize("turns", [1, 2, -5])
+@pytest.mark.parametrize("turns", [1, -5])
 def test_turns_between_two_samples_are_not_lost(turns):
     rest = np.arange(-40.0, 41.0) * 0.01
     table = Table(

@@ -184,8 +184,13 @@ def test_six_typed_digits_are_as_good_as_all(solved, kind):
         )
 
 
-@pytest.mark.parametrize("solved", WAYS)
-@pytest.mark.parametrize("turns", [1.0, 3.0])
+@pytest.mark.parametrize(
+    ("solved", "turns"),
+    [
+        pytest.param(*way.values, (1.0, 3.0)[k % 2], id=way.id, marks=way.marks)
+        for k, way in enumerate(WAYS)
+    ],
+)
 def test_relative_drivers_and_a_phase_of_whole_half_turns(solved, turns):
     """The sine of pi is 1e-16 and that of 3.14159 is 3e-6, and both are none to who types them."""
     mechanism = replace(arm(30.0), drivers=[JointAngle("u", "h"), JointAngle("v", "k")])

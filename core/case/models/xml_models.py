@@ -27,7 +27,7 @@ def read_model(file: Path, text: str, supplied: Supplied) -> Case:
 
             robot = read_sdf(root)
         case _:
-            return read_mjcf(file, text, supplied)
+            return read_mjcf(file, root, supplied)
     from .robots.as_mjcf import as_mjcf
 
     name = root.attributes.get("name", file.stem)

@@ -55,8 +55,10 @@ class Expansion:
                 case "replicate" if self.compiler is not None:
                     inside = self.children(child, depth + 1)
                     found += self._copies(child, inside, self.compiler)
-                case _:
+                case _ if child.children:
                     found.append(replace(child, children=self.children(child, depth + 1)))
+                case _:
+                    found.append(child)
             self.elements += 1
             if self.elements > MOST_ELEMENTS:
                 raise child.fault(

@@ -10,7 +10,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from ....algebra import IDENTITY, ZERO, Quat, Vec3, X, Y, Z
+from ....algebra import IDENTITY, ZERO, Quat, Vec3, X, Y, Z, cross
 from ....mechanism.mechanism import GROUND
 from ....trajectory import Array
 from .frames import HERE, Place, unit_quaternion
@@ -87,7 +87,6 @@ class Pose:
             Two arrays of shape (3, unknowns).
         """
         along, about = np.zeros((2, 3, self.unknowns))
-        here = np.array([*point])
         for joint in self._paths[body]:
             columns, before = self.columns[joint.name], self.carried[joint.outer]
             if joint.type == "slide":
@@ -99,11 +98,11 @@ class Pose:
                 turning = columns[3:]
             # a free body turns about its own point where that is now
             carrier = self.carried[joint.inner] if joint.type == "free" else before
-            arm = here - [*carrier.point(joint.point)]
+            arm = point - carrier.point(joint.point)
             axes = (joint.axis,) if joint.type == "hinge" else AXES
             for column, axis in zip(turning, axes, strict=True):
-                a = np.array([*before.direction(axis)])
-                about[:, column], along[:, column] = a, np.cross(a, arm)
+                a = before.direction(axis)
+                about[:, column], along[:, column] = [*a], [*cross(a, arm)]
         return along, about
 
     def moved(self, step: Array) -> Pose:

@@ -26,7 +26,7 @@ from .bodies import bodies_of, gravity_of
 from .classes import read_classes
 from .digits import Digits, digits_of
 from .driving import Driving, read_driving
-from .elements import Element, parse_xml
+from .elements import Element
 from .equalities import read_equalities
 from .expand import expanded
 from .frames import coordinates, read_compiler
@@ -61,14 +61,13 @@ OTHERS = {
 NO_GRAVITY = (0.0, 0.0, 0.0)
 
 
-def read_mjcf(file: Path, text: str, supplied: Supplied) -> Case:
+def read_mjcf(file: Path, root: Element, supplied: Supplied) -> Case:
     """The case of a model; outputs are the coordinates of the origins of bodies and of sites, those
     of joints, and the rotations of bodies.
 
     Raises:
         CaseError: not a readable model, or the options do not say how it moves.
     """
-    root = parse_xml(file, text)
     _require_model(root)
     root = expanded(file, root)
     _require_model(root)

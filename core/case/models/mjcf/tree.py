@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import islice
 
 from ....algebra import Vec3, X, vec
 from ....errors import CaseError, remedy
@@ -146,7 +147,8 @@ class Tree:
             )
         place = around.then(read_place(element, self.compiler))
         childclass = _class(element, childclass)
-        elements = list(self._joints_in(element, place, childclass))
+        # one more than are read is too many already
+        elements = [*islice(self._joints_in(element, place, childclass), MOST_MOVING + 1)]
         for most, count, what in (
             (MOST_BODIES, len(self.places), "bodies; take out what does not move"),
             (
