@@ -5,14 +5,13 @@ report.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from ..harness.labels import product
 from ..history.regression.findings import WHY, Kind, Regressions, Step
 from .markdown import escaped, row
+from .page_parts import environment
 from .regression_labels import LONGEST, headline, loose_says, pairs, rows, step_says
 
 
@@ -23,14 +22,6 @@ def to_markdown(found: Regressions) -> str:
 
 def to_markup(found: Regressions) -> Markup:
     """The same as a part of an HTML page."""
-    here = FileSystemLoader(Path(__file__).parent)
-    environment = Environment(
-        loader=here,
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
     groups = [
         (
             kind,
@@ -41,7 +32,9 @@ def to_markup(found: Regressions) -> Markup:
         for kind in Kind
     ]
     return Markup(
-        environment.get_template("regressions.html").render(
+        environment()
+        .get_template("regressions.html")
+        .render(
             headline=headline(found),
             found=found,
             groups=[group for group in groups if group[2]],

@@ -84,8 +84,7 @@ def _with_mass(body: Body, number: int, mechanism: Mechanism) -> Body:
 
 
 def solved(case: Case, mechanism: Mechanism) -> Probe:
-    """Solve the loaded probe natively, by numpy: a mechanism that is solved once is not
-    compiled.
+    """Solve the loaded probe natively.
 
     Raises:
         SolveError: samples are missing.
