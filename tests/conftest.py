@@ -10,6 +10,7 @@ import pytest
 from kincheck.core import Joint
 from kincheck.core.caches import clear_caches
 from kincheck.core.cli import main as cli
+from kincheck.core.harness import provenance
 from kincheck.core.harness.provenance import truth_of
 
 from .support.fakes import Fake, crank
@@ -29,6 +30,16 @@ def no_recent_models():
     """What a test has changed holds for the models it makes."""
     yield
     clear_caches()
+
+
+@pytest.fixture(autouse=True, scope="session")
+def no_calibration():
+    """A run in a history takes the speed of the machine, longer than most tests take; its own test
+    has the function itself.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(provenance, "calibration", lambda: 0.02)
+        yield
 
 
 @pytest.fixture

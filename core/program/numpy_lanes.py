@@ -43,11 +43,6 @@ def _larger(a: Array, b: Array, size_a: Array, size_b: Array, out: Array) -> Non
     np.greater(np.absolute(a, size_a), np.absolute(b, size_b), out=out)
 
 
-def _where(m: Array, p: Array, q: Array, out: Array) -> None:
-    np.copyto(out, q)
-    np.copyto(out, p, where=m)
-
-
 def _largest(out: Array, values: Array) -> None:
     np.maximum.reduce(values, axis=0, out=out)
 
@@ -144,7 +139,7 @@ class NumpyLanes:
         times, block, functions = (
             program.times,
             self.block,
-            {**_UFUNCS, "where": _where, "before": self._before},
+            {**_UFUNCS, "before": self._before},
         )
         shape = self.lanes if times == 1 else (times, self.lanes)
         scratch = np.empty((2, self.lanes)) if times == 1 else np.empty((2, times, self.lanes))
@@ -172,6 +167,12 @@ class NumpyLanes:
             read = [place[x] for x in arguments]
             if op == "larger":
                 calls.append((_larger, (*read, *scratch, out)))
+            elif op == "where":  # every other operation where rows are chosen; two calls are
+                decision, chosen, otherwise = read  # quicker than one of Python around them
+                calls += [
+                    (np.copyto, (out, otherwise)),
+                    (np.putmask, (out, decision, chosen)),
+                ]
             else:
                 calls.append((functions[op], (*read, out)))
             for x in set(arguments):

@@ -7,6 +7,7 @@ import json
 import re
 import zlib
 from collections.abc import Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any, cast
 
@@ -39,8 +40,12 @@ LONG = 300
 """Characters of a message that the page shows at once; the rest unfolds."""
 
 
+@cache
 def environment(*folders: Path) -> Environment:
-    """Return the templates of these folders and of this one, with the filters of the macros."""
+    """Return the templates of these folders and of this one, with the filters of the macros.
+
+    Kept for the process: templates take longer to compile than to render.
+    """
     made = Environment(
         loader=FileSystemLoader([*folders, _HERE]),
         autoescape=True,

@@ -1,5 +1,5 @@
-"""The pytest plugin, in a repository of somebody else: pytest is run there, in a process of its
-own.
+"""The pytest plugin, in a repository of somebody else: pytest is run there, in this process, or in
+one of its own where imports and processes are tested.
 """
 
 import json
@@ -11,6 +11,8 @@ from codecs import BOM_UTF8
 
 import kincheck.core
 import pytest
+from kincheck.core.cli import pytest_plugin
+from kincheck.core.harness.record import Outcome, Record
 
 from ..support.case_texts import BASE, INLINE, edited
 
@@ -28,39 +30,57 @@ def repository(tmp_path):
     return tmp_path
 
 
-def pytest_there(repository, *argv):
-    """What pytest says there, and its exit status."""
-    command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "-rs", *argv]
+QUIET = ("-p", "no:cacheprovider", "-p", "no:faulthandler", "-rs")
+
+
+@pytest.fixture
+def pytest_there(repository, monkeypatch, capsys):
+    """Run pytest in the repository; return its text and its exit status."""
+    monkeypatch.chdir(repository)
+
+    def run(*argv):
+        capsys.readouterr()
+        status = pytest.main([*QUIET, *argv])
+        return "".join(capsys.readouterr()), status
+
+    return run
+
+
+def pytest_alone(repository, *argv):
+    """Run pytest in the repository and in a process; return its text and its exit status."""
+    command = [sys.executable, "-m", "pytest", *QUIET, *argv]
     done = subprocess.run(command, cwd=repository, capture_output=True, text=True, check=False)
     return done.stdout + done.stderr, done.returncode
 
 
-def test_case_files_are_tests_of_every_engine(repository):
-    out, status = pytest_there(repository, "--kincheck", "--collect-only", "-q")
+def test_case_files_are_tests_of_every_engine(pytest_there):
+    out, status = pytest_there("--kincheck", "--collect-only", "-q")
     assert status == 0, out
     assert re.findall(r"^(\S+)::(\S+)$", out, re.MULTILINE) == [
         ("slider.toml", name) for name in ENGINES
     ]
 
 
-def test_a_printed_id_runs_that_case_with_that_engine(repository):
+def test_a_printed_id_runs_that_case_with_that_engine(repository, pytest_there):
     folder = repository / "of.dots"
     folder.mkdir()
     (folder / "my.slider.toml").write_text(BASE + INLINE)
-    out, status = pytest_there(repository, "--kincheck", "--kincheck-engine", "native", "-v")
+    out, status = pytest_there("--kincheck", "--kincheck-engine", "native", "-v")
     assert status == 0, out
     printed = re.findall(r"^(\S+::\S+) PASSED", out, re.MULTILINE)
     assert sorted(printed) == ["of.dots/my.slider.toml::native", "slider.toml::native"]
     for each in printed:
-        out, status = pytest_there(repository, "--kincheck", "-v", each)
+        out, status = pytest_there("--kincheck", "-v", each)
         assert status == 0, out
         assert re.findall(r"^(\S+::\S+) PASSED", out, re.MULTILINE) == [each]
         assert "1 passed" in out
 
 
-def test_an_engine_passes_and_a_wrong_reference_fails_with_the_worst_sample(repository):
+def test_an_engine_passes_and_a_wrong_reference_fails_with_the_worst_sample(
+    repository, pytest_there
+):
     (repository / "wrong.toml").write_text(edited(('name = "slider"', 'name = "wrong"')) + WRONG)
-    out, status = pytest_there(repository, "--kincheck", "--kincheck-engine", "native")
+    out, status = pytest_there("--kincheck", "--kincheck-engine", "native")
     assert status == 1
     assert "1 failed, 1 passed" in out
     assert re.search(r"wrong.toml: native: fail: .*tip_x.* velocity .* against closed_form", out), (
@@ -69,30 +89,36 @@ def test_an_engine_passes_and_a_wrong_reference_fails_with_the_worst_sample(repo
     assert "Traceback" not in out
 
 
-def test_what_is_not_judged_is_skipped_and_says_so(repository):
+def test_what_is_not_judged_is_skipped_and_says_so(repository, pytest_there):
     (repository / "slider.toml").write_text(BASE)
-    out, status = pytest_there(repository, "--kincheck", "--kincheck-engine", "native")
+    out, status = pytest_there("--kincheck", "--kincheck-engine", "native")
     assert (status, "1 skipped" in out) == (0, True)
     assert re.search(r"SKIPPED.*: not judged: the case has no reference$", out, re.MULTILINE), out
 
 
-SOLVED = """
-import kincheck.core.cli.pytest_plugin as plugin
-from kincheck.core.harness.record import Outcome, Record
+@pytest.fixture
+def bad_engines(monkeypatch):
+    """Engines that solve nothing, each with an outcome of its own."""
+    outcomes = {"native": "crashed", "mujoco": "unavailable", "pinocchio": "unsupported"}
 
-def solved(case, engine):
-    outcome = {"native": "crashed", "mujoco": "unavailable", "pinocchio": "unsupported"}[engine.name]
-    known = {"case": case.name, "truth": "closed_form", "mode": "projection", "loop": "python", "version": None}
-    return Record(**known, engine=engine.name, outcome=Outcome(outcome), message=f"{engine.name} cannot")
+    def solved(case, engine):
+        return Record(
+            case=case.name,
+            truth="closed_form",
+            mode="projection",
+            loop="python",
+            version=None,
+            engine=engine.name,
+            outcome=Outcome(outcomes[engine.name]),
+            message=f"{engine.name} cannot",
+        )
 
-plugin._solved = solved
-"""  # noqa: E501
+    monkeypatch.setattr(pytest_plugin, "_solved", solved)
 
 
-def test_what_becomes_of_each_outcome(repository):
-    (repository / "conftest.py").write_text(SOLVED)
+def test_what_becomes_of_each_outcome(bad_engines, pytest_there):
     rest = [f"--deselect=slider.toml::{name}" for name in ENGINES[3:]]
-    out, status = pytest_there(repository, "--kincheck", *rest)
+    out, status = pytest_there("--kincheck", *rest)
     assert status == 1
     assert "1 failed, 2 skipped, 4 deselected" in out
     assert "slider.toml: native: crashed: native cannot" in out
@@ -100,10 +126,9 @@ def test_what_becomes_of_each_outcome(repository):
     assert "unsupported: pinocchio cannot" in out
 
 
-def test_an_engine_that_is_asked_for_must_be_there(repository):
-    (repository / "conftest.py").write_text(SOLVED)
+def test_an_engine_that_is_asked_for_must_be_there(bad_engines, pytest_there):
     out, status = pytest_there(
-        repository, "--kincheck", "--kincheck-engine", "mujoco", "--kincheck-engine", "pinocchio"
+        "--kincheck", "--kincheck-engine", "mujoco", "--kincheck-engine", "pinocchio"
     )
     assert status == 1
     assert "1 failed, 1 skipped" in out
@@ -114,13 +139,13 @@ def test_a_simulator_is_run_in_a_process_of_its_own(repository):
     pytest.importorskip("mujoco")
     here = "def pytest_sessionfinish():\n    import sys\n    assert 'mujoco' not in sys.modules\n"
     (repository / "conftest.py").write_text(here)
-    out, status = pytest_there(repository, "--kincheck", "--kincheck-engine", "mujoco")
+    out, status = pytest_alone(repository, "--kincheck", "--kincheck-engine", "mujoco")
     assert (status, "1 passed" in out) == (0, True), out
 
 
-def test_a_file_that_makes_no_sense_is_an_error_with_its_message(repository):
+def test_a_file_that_makes_no_sense_is_an_error_with_its_message(repository, pytest_there):
     (repository / "broken.json").write_text('{"schema": "kincheck-case/7", "name": "a"}')
-    out, status = pytest_there(repository, "--kincheck", "--kincheck-engine", "native")
+    out, status = pytest_there("--kincheck", "--kincheck-engine", "native")
     assert status == 2
     assert "broken.json: schema: " in out
     assert "kincheck-case/7" in out
@@ -136,8 +161,8 @@ def test_a_file_that_makes_no_sense_is_an_error_with_its_message(repository):
         (["--kincheck-engine", "native"], "--kincheck-engine: give --kincheck too"),
     ],
 )
-def test_options_that_make_no_sense_are_refused(repository, argv, message):
-    out, status = pytest_there(repository, *argv)
+def test_options_that_make_no_sense_are_refused(pytest_there, argv, message):
+    out, status = pytest_there(*argv)
     assert status == 4
     assert message in out
 
@@ -148,7 +173,7 @@ def test_without_the_option_nothing_is_collected_and_nothing_heavy_loaded(reposi
     (repository / "test_light.py").write_text(
         light + "    assert 'kincheck.core.cli.pytest_plugin' in sys.modules\n"
     )
-    out, status = pytest_there(repository, "-p", "no:hypothesispytest")
+    out, status = pytest_alone(repository, "-p", "no:hypothesispytest")
     assert status == 0, out
     assert "1 passed" in out
 
@@ -159,7 +184,7 @@ def test_every_public_name_is_found_though_none_is_loaded_at_first():
         kincheck.core.nothing  # noqa: B018
 
 
-def test_case_files_are_found_however_they_are_written(repository):
+def test_case_files_are_found_however_they_are_written(repository, pytest_there):
     """The schema anywhere in a line of JSON, behind a byte order mark, or in a file with capital
     letters.
     """
@@ -167,6 +192,6 @@ def test_case_files_are_found_however_they_are_written(repository):
     (repository / "sorted.json").write_text(json.dumps(dict(sorted(case.items()))))
     (repository / "marked.toml").write_bytes(BOM_UTF8 + (BASE + INLINE).encode())
     (repository / "LOUD.TOML").write_text(BASE + INLINE)
-    out, _ = pytest_there(repository, "--kincheck", "--collect-only", "-q")
+    out, _ = pytest_there("--kincheck", "--collect-only", "-q")
     assert all(name in out for name in ("sorted.json", "marked.toml", "LOUD.TOML", "slider.toml"))
     assert not any(name in out for name in ("data.json", "pyproject.toml"))

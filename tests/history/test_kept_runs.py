@@ -21,7 +21,7 @@ from ..harness.test_workers import timeless
 from ..support.fakes import crank
 
 ROOT = Path(__file__).parents[2]
-MOMENTS = int(os.environ.get("KINCHECK_DRILL", "2"))
+MOMENTS = int(os.environ.get("KINCHECK_DRILL", "1"))
 """At which a run is killed: KINCHECK_DRILL=50 for the full drill."""
 
 

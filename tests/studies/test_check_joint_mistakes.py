@@ -202,12 +202,18 @@ MISTAKES = {
 }
 
 
-@pytest.mark.parametrize("mistake", MISTAKES)
-def test_mistakes_are_caught(mistake, monkeypatch):
-    """One specimen and few poses find them; the two dear checks run where they must find one."""
-    check, make = MISTAKES[mistake]
+@pytest.fixture
+def few(monkeypatch):
+    """One specimen, few starts of Newton's iteration, and few aims of the walks from their ends."""
     monkeypatch.setattr(checking, "SPECIMENS", 1)
     monkeypatch.setattr(checking, "STARTS", 10)
+    monkeypatch.setattr("kincheck.core.studies.joint_check.branches.AIMS", 4)
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_mistakes_are_caught(mistake, few, monkeypatch):
+    """Few poses find them; the two dear checks run where they must find one."""
+    check, make = MISTAKES[mistake]
     if not check.startswith("loop"):
         monkeypatch.setattr(checking, "loops", lambda tested, engines, failing=(): [])
     if check != "spurious branches":
@@ -226,18 +232,18 @@ def test_a_joint_without_rows_is_told_what_is_missing():
     )
 
 
-def test_the_base_of_a_mistake_is_sound():
+def test_the_base_of_a_mistake_is_sound(few):
     """The machinery of these tests makes no mistakes by itself."""
-    assert check_joint(mistaken(Revolute, p.Dot11)).passed
-    assert check_joint(mistaken(ConstantVelocity, p.ConstantVelocity)).passed
+    assert check_joint(mistaken(Revolute, p.Dot11), samples=8).passed
+    assert check_joint(mistaken(ConstantVelocity, p.ConstantVelocity), samples=8).passed
 
 
-def test_a_wrong_equivalent_is_caught(in_folder):
+def test_a_wrong_equivalent_is_caught(few, in_folder):
     right = load_joint("pin_in_slot:PinInSlot")
 
     def equivalent(self):
         return [], [Spherical(f"{self.name}_ball", self.i, self.j, self.point)]
 
-    report = check_joint(mistaken(right, equivalent=equivalent))
+    report = check_joint(mistaken(right, equivalent=equivalent), samples=8)
     assert report.failures == ("loop: native, equivalent",), report
     assert "2 degrees of freedom" in report["loop: native, equivalent"].message

@@ -70,11 +70,20 @@ def test_a_missing_engine_is_no_obstacle_and_its_remedy_is_named(
     assert "not installed: pip install 'pin>=" in line
 
 
+# Slow to import, and none takes part.
+OTHERS = (
+    *("mujoco", "pinocchio", "exudyn", "pydrake", "dartpy", "opensim"),
+    *("pandas", "xarray", "matplotlib", "distributed", "pyarrow", "openpyxl"),
+)
+
+
 def test_an_llvmlite_that_cannot_be_loaded_leaves_the_work_to_numpy(tmp_path):
     """Its package is there, and its library is not; nothing that it made before is kept here."""
     for file, text in (("__init__.py", ""), ("binding.py", 'raise OSError("no libllvmlite.so")')):
         (tmp_path / "llvmlite").mkdir(exist_ok=True)
         (tmp_path / "llvmlite" / file).write_text(text)
+    for name in OTHERS:
+        (tmp_path / f"{name}.py").touch()
     here = {**os.environ, "PYTHONPATH": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path)}
     ran = subprocess.run(
         [

@@ -64,7 +64,10 @@ def test_joints_between_fixed_bodies_are_named_and_in_no_engine(tmp_path, capsys
     bolted = replace(case.mechanism, joints=[*bolts, *case.mechanism.joints])
     file.write_text(case_text(replace(case, mechanism=bolted)))
     assert load(file).mechanism == bolted
-    assert main(["run", str(file), "--explain", "--json", str(tmp_path / "out.json")]) == 0
+    assert (
+        main(["run", str(file), "--explain", "--jobs", "0", "--json", str(tmp_path / "out.json")])
+        == 0
+    )
     assert (
         "  joints between fixed bodies, which hold at the design: left out: bolt, stay"
         in capsys.readouterr().out.splitlines()

@@ -39,6 +39,14 @@ def test_sound_joints_pass(name):
     assert found(Joint.registry[name]) == dict.fromkeys(CHECKS, Verdict.PASS)
 
 
+@pytest.fixture
+def traced_anew(monkeypatch):
+    """Programs are traced with the mistake of the test, not taken from the cache on disk."""
+    monkeypatch.setattr(
+        "kincheck.core.kinematics.compiled.program_cache.kept", lambda content, make: make()
+    )
+
+
 def planted(monkeypatch, change):
     """Change force and moment of the joint under test."""
     right = equations.ForceEquations.reaction
@@ -50,14 +58,14 @@ def planted(monkeypatch, change):
     monkeypatch.setattr(equations.ForceEquations, "reaction", wrong)
 
 
-def test_a_moment_about_a_free_axis_is_found(monkeypatch):
+def test_a_moment_about_a_free_axis_is_found(monkeypatch, traced_anew):
     """That of a hinge: the reaction works as it turns."""
     axis = unit(AXIS)
     planted(monkeypatch, lambda force, moment: (force, moment + (force @ axis) * axis))
     assert {"no work", "acts and reacts"} <= {*failing(Revolute)}
 
 
-def test_a_reaction_that_balances_no_body_is_found(monkeypatch):
+def test_a_reaction_that_balances_no_body_is_found(monkeypatch, traced_anew):
     """It does no work on a ball's freedoms, but is too small."""
     planted(monkeypatch, lambda force, moment: (0.99 * force, moment))
     assert failing(Spherical) == ["acts and reacts"]
@@ -80,7 +88,7 @@ def test_what_is_arbitrary_must_not_matter(scaled, check):
     assert check in failing(mistaken(Spherical, scaled=scaled))
 
 
-def test_forces_that_depend_on_the_order_are_found(monkeypatch):
+def test_forces_that_depend_on_the_order_are_found(monkeypatch, traced_anew):
     right = equations.ForceEquations.reaction
 
     def by_number(self, joint, multipliers):
@@ -91,7 +99,7 @@ def test_forces_that_depend_on_the_order_are_found(monkeypatch):
     assert "order" in failing(Spherical)
 
 
-def test_a_wrong_sign_of_gravity_is_found(monkeypatch):
+def test_a_wrong_sign_of_gravity_is_found(monkeypatch, traced_anew):
     right = equations.inertial
     monkeypatch.setattr(equations, "inertial", lambda body, at, g: right(body, at, -g))
     assert "power" in failing(Spherical)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from kincheck.adapters import engine
 from kincheck.core import solve
+from kincheck.core.caches import clear_caches
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.io.case_writer import case_text
 from kincheck.core.errors import KincheckError, SolveError
@@ -18,7 +19,7 @@ from kincheck.core.studies.stress.families.base import as_case
 from kincheck.core.studies.stress.families.dimensions import crank_rocker
 from kincheck.core.studies.stress.families.planar import any_plane, four_bar
 from kincheck.core.studies.stress.reproducers import judge as judge_file
-from kincheck.core.studies.stress.run import specimen, stress
+from kincheck.core.studies.stress.run import specimen, specimens, stress
 from kincheck.core.studies.stress.shrink import fewer_samples, reduced, rounded
 from kincheck.core.studies.stress.solving import interpreted, once
 from kincheck.core.studies.stress.truth.reference_motion import Reach, followed
@@ -253,7 +254,7 @@ def test_errors_do_not_grow_over_a_thousand_turns():
 
 def test_nothing_nearly_singular_is_silently_wrong_without_machine_code():
     found, _ = stress(
-        [FAMILIES["singular"]], [interpreted(NATIVE)], samples=60, seed=0, prove=False
+        [FAMILIES["singular"]], [interpreted(NATIVE)], samples=24, seed=0, prove=False
     )
     assert found.cells[0].samples[Verdict.SILENTLY_WRONG] == 0
 
@@ -350,9 +351,12 @@ def test_what_cannot_be_proved_is_counted(monkeypatch):
 
 def test_the_family_of_starts_finds_a_start_that_rounding_decides(monkeypatch):
     """A tolerance of zero is the old rule: rounded and typed motions then start elsewhere."""
+    made = specimens(FAMILIES["starts"], 1, 240)  # once, with their references
+    monkeypatch.setattr("kincheck.core.studies.stress.run.specimens", lambda *_: made)
     found, _ = stress([FAMILIES["starts"]], [NATIVE], samples=240, seed=1, prove=False)
     assert found.cells[0].samples[Verdict.SILENTLY_WRONG] == 0
     assert found.cells[0].samples[Verdict.RIGHT] > 200
     monkeypatch.setattr("kincheck.core.kinematics.compiled.motion_start.TYPED", 0.0)
+    clear_caches()
     found, _ = stress([FAMILIES["starts"]], [NATIVE], samples=240, seed=1, prove=False)
     assert found.cells[0].samples[Verdict.SILENTLY_WRONG] > 20

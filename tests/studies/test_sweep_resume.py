@@ -15,12 +15,13 @@ from .test_sweep_study import TIP
 from .test_vary import HEAD, vary
 
 POINTS = {"ball": {"at": "ball", "sigma": 1.0}}
-VARIANTS, CHUNK = 640, 64
+VARIANTS, CHUNK = 384, 64
+CHECK = ("--check", "native:0.01")
 
 
-@pytest.fixture
-def arguments(tmp_path):
-    file = tmp_path / "hardpoints.json"
+@pytest.fixture(scope="module")
+def arguments(tmp_path_factory):
+    file = tmp_path_factory.mktemp("study") / "hardpoints.json"
     file.write_text(json.dumps({**HEAD, "mode": "monte_carlo", "hardpoints": POINTS}))
     return [
         "sweep",
@@ -34,6 +35,17 @@ def arguments(tmp_path):
         "--jobs",
         "1",
     ]
+
+
+@pytest.fixture(scope="module")
+def whole(arguments, tmp_path_factory):
+    """The results of a sweep that was never stopped, and of one with a check."""
+    folders = []
+    for check in ((), CHECK):
+        folders.append(tmp_path_factory.mktemp("whole"))
+        assert main([*arguments, "--out", str(folders[-1]), *check]) == 0
+        assert not (folders[-1] / "sweep.part").exists()
+    return folders
 
 
 @pytest.fixture
@@ -60,14 +72,13 @@ def numbers(folder):
     return {key: value for key, value in found.items() if key not in ("run", "measured")}
 
 
-@pytest.mark.parametrize("chunks", [1, 5, 9])
-def test_a_sweep_that_is_taken_up_has_the_same_bits(arguments, tmp_path, capsys, stop, chunks):
-    whole, out = tmp_path / "whole", tmp_path / "out"
-    assert main([*arguments, "--out", str(whole), "--check", "native:0.01"]) == 0
-    assert not (whole / "sweep.part").exists()
-    capsys.readouterr()
+@pytest.mark.parametrize("chunks", [1, 3, 5])
+def test_a_sweep_that_is_taken_up_has_the_same_bits(
+    arguments, whole, tmp_path, capsys, stop, chunks
+):
+    (_, whole), out = whole, tmp_path / "out"
     stop(chunks)
-    assert main([*arguments, "--out", str(out), "--check", "native:0.01"]) == 130
+    assert main([*arguments, "--out", str(out), *CHECK]) == 130
     told, said = capsys.readouterr()
     part = f"{chunks * CHUNK} of {VARIANTS}"
     assert f"{part} variants of mcpherson_strut, partial: the sweep was stopped" in told
@@ -83,7 +94,7 @@ def test_a_sweep_that_is_taken_up_has_the_same_bits(arguments, tmp_path, capsys,
     stop(None)
     original = Ready.chunk
     Ready.chunk = lambda self, k: solved.append(k) or original(self, k)
-    assert main([*arguments, "--out", str(out), "--check", "native:0.01", "--resume"]) == 0
+    assert main([*arguments, "--out", str(out), *CHECK, "--resume"]) == 0
     assert solved == [*range(chunks, VARIANTS // CHUNK)]
     assert numbers(out) == numbers(whole)
     assert (out / "envelope.csv").read_bytes() == (whole / "envelope.csv").read_bytes()
@@ -147,10 +158,9 @@ def test_the_part_of_another_sweep_is_not_gone_on_with_and_stays(
 
 @pytest.mark.parametrize("lost", [1, 40, 20_000])
 def test_a_part_that_was_cut_off_or_damaged_is_used_as_far_as_it_is_whole(
-    arguments, tmp_path, stop, lost
+    arguments, whole, tmp_path, stop, lost
 ):
-    whole, out = tmp_path / "whole", tmp_path / "out"
-    assert main([*arguments, "--out", str(whole)]) == 0
+    (whole, _), out = whole, tmp_path / "out"
     stop(4)
     assert main([*arguments, "--out", str(out)]) == 130
     part = out / "sweep.part"

@@ -222,16 +222,19 @@ def test_a_grid_is_swept_as_a_whole(tmp_path):
         sweep_designs(case, vary(tmp_path, case, tip=TIP))
 
 
+VARIANTS = 24
+
+
 def test_variants_without_a_solution_are_counted_and_named(tmp_path):
     """A rod too short or too long for the crank to go round; each is what `solve` makes of it, NaN
     for what is not there.
     """
     case = without_forces(load("rssr"))
     variation = vary(tmp_path, case, rod={"at": "joints.rod.length", "half_width": 3500.0})
-    study = Study(case, variation, 60, 1)
-    found = sweep_designs(case, variation, samples=60, seed=1, jobs=2)
+    study = Study(case, variation, VARIANTS, 1)
+    found = sweep_designs(case, variation, samples=VARIANTS, seed=1, jobs=2)
     n, missing = len(case.sweep.values), {}
-    for variant in range(60):
+    for variant in range(VARIANTS):
         try:
             own = solve(study.of_variant(variant).mechanism, "crank", case.sweep.change)
             missing[variant] = n - int(own.solved.sum())
@@ -240,15 +243,17 @@ def test_variants_without_a_solution_are_counted_and_named(tmp_path):
     assert {each.variant: each.samples for each in found.failed} == {
         k: count for k, count in missing.items() if count
     }
-    assert 5 < found.unsolved == len(found.failed) < 55
+    assert 2 < found.unsolved == len(found.failed) < VARIANTS - 2
     assert {n} < {each.samples for each in found.failed}
     assert all(
         "cannot be followed beyond" in each.message or "does not close" in each.message
         for each in found.failed
     )
-    assert sum(60 - count for count in found.outputs["rocker_pin_y"].count) == sum(missing.values())
+    assert sum(VARIANTS - count for count in found.outputs["rocker_pin_y"].count) == sum(
+        missing.values()
+    )
     assert None not in found.outputs["rocker_pin_y"].mean
-    later = Ready.of(Study(case, variation, 300, 1)).chunk(1).unsolved
+    later = Ready.of(Study(case, variation, 128, 1)).chunk(1).unsolved
     assert later
     assert {each.variant for each in later} <= set(range(64, 128))
 

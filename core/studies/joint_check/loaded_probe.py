@@ -84,8 +84,7 @@ def _with_mass(body: Body, number: int, mechanism: Mechanism) -> Body:
 
 
 def solved(case: Case, mechanism: Mechanism) -> Probe:
-    """Solve the loaded probe natively, by numpy: a mechanism that is solved once is not
-    compiled.
+    """Solve the loaded probe natively.
 
     Raises:
         SolveError: samples are missing.
@@ -93,7 +92,7 @@ def solved(case: Case, mechanism: Mechanism) -> Probe:
     path: Path = case.sweep.path
     names = tuple(body.name for body in mechanism.moving)
     forces = [joint.name for joint in mechanism.joints] + [case.sweep.driver]
-    solver = NativeSolver(compiled=False).prepare(mechanism, path, bodies=names, forces=forces)
+    solver = NativeSolver().prepare(mechanism, path, bodies=names, forces=forces)
     found = solver(TOL)
     if not found.solved.all() or found.forces is None:
         raise SolveError(f"the probe with masses cannot be solved: {found.message}")

@@ -95,9 +95,10 @@ def walk(
         np.ones(start.shape[1]),
         np.zeros((joint.columns, start.shape[1])),
     )
+    matrix, at_design = joint.exact(start), joint.exact(design(joint, 1))
     for _ in range(steps):
         here = states[-1]
-        step, matrix = np.zeros((joint.columns, here.shape[1])), joint.exact(here)
+        step = np.zeros((joint.columns, here.shape[1]))
         step[columns] = aims(here, last)[columns]
         step[columns] -= min_norm(matrix, np.einsum("lmn,nl->ml", matrix, step), columns)
         last, step = step, share * step
@@ -107,9 +108,11 @@ def walk(
             np.linalg.norm(there - off, axis=0)
             <= LARGEST_CORRECTION * np.linalg.norm(step, axis=0) + SETTLED
         )
-        good = (taken <= 6) & near & regular(joint, there, columns)
+        ahead = joint.exact(there)
+        good = (taken <= 6) & near & _regular(ahead, at_design, columns)
         share = np.where(good, np.minimum(1.0, 2.0 * share), 0.5 * share)
         states.append(np.where(good, there, here))
+        matrix = np.where(good[:, None, None], ahead, matrix)
     return states
 
 
@@ -129,12 +132,15 @@ def regular(joint: TracedJoint, state: Array, columns: slice = slice(None)) -> M
     """Return which lanes have neither nearly dependent nor nearly zero rows, relative to
     the design position.
     """
-    at_design = joint.exact(design(joint, 1))[:, :, columns]
-    size = np.linalg.norm(at_design, axis=2, keepdims=True)
+    return _regular(joint.exact(state), joint.exact(design(joint, 1)), columns)
+
+
+def _regular(matrix: Array, at_design: Array, columns: slice) -> Mask:
+    size = np.linalg.norm(at_design[:, :, columns], axis=2, keepdims=True)
     size = np.where(size > 0.0, size, 1.0)
     return np.asarray(
-        _smallest(joint.exact(state)[:, :, columns] / size)
-        > NEARLY_SINGULAR * _smallest(at_design / size)
+        _smallest(matrix[:, :, columns] / size)
+        > NEARLY_SINGULAR * _smallest(at_design[:, :, columns] / size)
     )
 
 
