@@ -16,7 +16,7 @@ from ...algebra import Vec3
 from ...case.case import Case, Quantity, without_forces
 from ...case.held import require_no_held
 from ...case.measures import ForceMeasure
-from ...case.rotation import counted
+from ...case.measures.turns import counted
 from ...case.variation.modes import Mode
 from ...case.variation.sampling import Stream, generator
 from ...case.variation.variation import Variation
@@ -205,9 +205,8 @@ class Ready:
         # unknown numbers are NaN, and every result of them is NaN
         with np.errstate(all="ignore"):
             case = self.study.case
-            path = case.sweep.path
             moved = without_forces(case).outputs
-            jets = {o.name: counted(o.of(at, design), o.period, path) for o in moved}
+            jets = {o.name: counted(case, o, o.of(at, design)) for o in moved}
             for k, row in enumerate(self.study.rows):
                 if isinstance(row.output, ForceMeasure):
                     assert forces is not None  # the case asks for them
