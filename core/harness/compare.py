@@ -68,7 +68,7 @@ def output_series(
         jet = output.of(
             at, {name: _standing(case.mechanism.point(name).position) for name in output.points}
         )
-        jet = counted(case, output, jet)
+        jet = counted(case.mechanism, case.sweep.path, output, jet)
     solved = trajectory.solved
     position, *rates = (
         np.where(solved & np.isfinite(values), values, np.nan) for values in (jet.x, jet.v, jet.a)

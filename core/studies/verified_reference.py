@@ -241,7 +241,7 @@ def _counted(case: Case, output: Quantity, jet: Jet, proved: Sequence[int]) -> J
     if not output.period:
         return jet
     x, v = (np.asarray(each).astype(np.float64) for each in (jet.x, jet.v))
-    count = turns_of(case, output, x, v, np.array(proved))
+    count = turns_of(case.mechanism, case.sweep.path, output, x, v, np.array(proved))
     whole = 2 * flint().arb.pi()  # of a period, which is a whole turn
     return jet + np.array([Exact(int(n) * whole) for n in count], dtype=object)
 

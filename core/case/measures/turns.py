@@ -9,27 +9,31 @@ from numpy.typing import NDArray
 
 from ...jet import Jet
 from ...kinematics import followed_angle, in_doubt, near_design
+from ...mechanism.mechanism import Mechanism
+from ...mechanism.motions import Path
 from ...trajectory import Array
-from ..case import Case, Quantity
+from ..quantity import Quantity
 from ..rotation import turns
 from .joint import JointAngle
 
 
-def counted(case: Case, output: Quantity, angle: Jet) -> Jet:
+def counted(mechanism: Mechanism, path: Path, output: Quantity, angle: Jet) -> Jet:
     """Return an output that is an angle but for whole turns with its turns since design; any other
     output as it is.
 
     Args:
+        path: of the samples.
         angle: samples along the first axis.
     """
     if not output.period:
         return angle
-    count = turns_of(case, output, angle.x, angle.v)
+    count = turns_of(mechanism, path, output, angle.x, angle.v)
     return Jet(angle.x + output.period * count, angle.v, angle.a)
 
 
 def turns_of(
-    case: Case,
+    mechanism: Mechanism,
+    path: Path,
     output: Quantity,
     x: Array,
     v: Array,
@@ -42,9 +46,8 @@ def turns_of(
 
     Args:
         x, v: value and rate, samples along the first axis; NaN if unknown.
-        samples: indices of these among the samples of the sweep.
+        samples: indices of these among the samples of the path.
     """
-    mechanism, path = case.mechanism, case.sweep.path
     part = replace(path, times=path.times[samples])
     count = turns(x, v, output.period, part)
     assert isinstance(output, JointAngle)
