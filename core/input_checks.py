@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from numbers import Complex
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -96,9 +96,22 @@ def require_positive(who: str, what: str, number: Any) -> None:
         raise SolveError(f"{who}: {what} is {number!r}, expected a positive number")
 
 
-def no_such(who: str, what: str, name: str, known: Sequence[str]) -> SolveError:
-    """Return the error for an unknown name."""
+def no_such(who: str, what: str, name: Any, known: Sequence[str]) -> SolveError:
+    """Return the error for an unknown name, or for another thing in place of a name."""
+    if not isinstance(name, str):
+        return SolveError(f"{who}: {what} is {name!r}, expected a name; known: {', '.join(known)}")
     return SolveError(f"{who}: {unknown(what, name, known)}")
+
+
+def names_of(who: str, what: str, given: Any) -> tuple[str, ...]:
+    """Return a list of names as a tuple.
+
+    Raises:
+        SolveError: it is one name alone, whose letters are no names, or no list.
+    """
+    if isinstance(given, str) or not isinstance(given, Iterable):
+        raise SolveError(f"{who}: {what} is {given!r}, expected a list of names")
+    return tuple(cast("Iterable[str]", given))
 
 
 def real(who: str, what: str, given: Any, expected: str) -> Array:

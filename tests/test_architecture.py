@@ -82,7 +82,7 @@ IMPORTS = {
         "kinematics/compiled kinematics/continuation"
     ),
     "kinematics": (
-        ". program mechanism kinematics/formulation kinematics/forces "
+        ". primitives program joints mechanism kinematics/formulation kinematics/forces "
         "kinematics/structure kinematics/compiled kinematics/assembly "
         "kinematics/continuation kinematics/verified kinematics/by_components "
         "kinematics/sparse kinematics/diagnosis"
@@ -90,7 +90,7 @@ IMPORTS = {
     "case/models/hardpoints/templates": "joints mechanism",
     "case": ". joints mechanism kinematics",
     "case/suspension": ". mechanism case",
-    "case/measures": ". joints mechanism case",
+    "case/measures": ". joints mechanism kinematics case",
     "case/io": ". joints mechanism kinematics case case/suspension case/measures",
     "case/models/hardpoints": (
         ". joints mechanism case/models/hardpoints/templates case case/suspension case/io"
@@ -109,7 +109,7 @@ IMPORTS = {
     "studies/variation": ". joints mechanism kinematics case case/io",
     "studies/stress/truth": ". program joints mechanism kinematics case case/measures",
     "studies/stress/families": ". joints mechanism case case/measures case/io studies/stress/truth",
-    "studies": ". program joints mechanism kinematics case case/io harness report",
+    "studies": ". program joints kinematics case case/measures case/io harness report",
     "studies/joint_check": (
         ". primitives program joints mechanism kinematics case case/measures case/io "
         "harness studies"

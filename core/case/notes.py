@@ -15,7 +15,8 @@ def notes(case: Case) -> list[str]:
     Numbers are in the units of the case's file.
     """
     written = LENGTHS[case.length_unit].written
-    joints = [note for joint in case.mechanism.joints for note in joint.notes]
+    parts = (*case.mechanism.joints, *case.mechanism.couplers)
+    joints = [note for part in parts for note in part.notes]
     said = [note.within(written) if isinstance(note, Phrase) else note for note in joints]
     said += [*case.assembly, *size_notes(case), *_closure_notes(case)]
     return [*said, *_reference_notes(case)]

@@ -50,7 +50,7 @@ def euler_parameters(x: Vec3, y: Vec3) -> list[Jet]:
 def rotation_vector(e: Sequence[Jet]) -> list[Jet]:
     """Return axis times angle [rad] of Euler parameters, for angles of -2 pi to 2 pi.
 
-    Within a degree of a whole turn, where the axis is hardly known, it is NaN.
+    Within a degree of a whole turn the axis is hardly known, and the vector is NaN.
     """
     e0, *along = e
     square = along[0] * along[0] + along[1] * along[1] + along[2] * along[2]
@@ -72,20 +72,10 @@ def rotation_vector(e: Sequence[Jet]) -> list[Jet]:
     return [factor * each for each in along]
 
 
-def counted(angle: Jet, period: float, path: Path) -> Jet:
-    """Return an angle known but for multiples of the period with its turns along the path.
-
-    It stays as it is if the period is zero.
-    """
-    if not period:
-        return angle
-    return Jet(angle.x + period * turns(angle.x, angle.v, period, path), angle.v, angle.a)
-
-
 def turns(x: Array, v: Array, period: float, path: Path) -> Array:
     """Return the whole number of periods to add to values known but for a multiple of the period.
 
-    From sample to sample in time the change is the one nearest to what the velocities tell; without
+    From sample to sample in time the change is the one nearest to that by the velocities; without
     velocities, the smallest. Time zero is the design and has the value zero, unless the path starts
     elsewhere: then the sample nearest to it has the smallest value.
 

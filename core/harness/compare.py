@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 from ..algebra import Vec3
 from ..case.case import HELD_BUT, ORDERS, Case, Quantity, Series, pace
 from ..case.measures import ForceMeasure
-from ..case.rotation import counted
+from ..case.measures.turns import counted
 from ..errors import CaseError
 from ..jet import Jet
 from ..mechanism.mechanism import Vector
@@ -68,7 +68,7 @@ def output_series(
         jet = output.of(
             at, {name: _standing(case.mechanism.point(name).position) for name in output.points}
         )
-        jet = counted(jet, output.period, case.sweep.path)
+        jet = counted(case.mechanism, case.sweep.path, output, jet)
     solved = trajectory.solved
     position, *rates = (
         np.where(solved & np.isfinite(values), values, np.nan) for values in (jet.x, jet.v, jet.a)

@@ -6,10 +6,11 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar, Self
 
-from ..errors import MechanismError
+from ..errors import MechanismError, Phrase
 from ..input_checks import held, plain, require_finite
 from .base import Kind, register
 
@@ -76,6 +77,11 @@ class Coupler(ABC):
 
     def __str__(self) -> str:
         return f"joint {self.name!r} ({self.type})"
+
+    @property
+    def notes(self) -> Sequence[str | Phrase]:
+        """Remarks on its numbers for a reader of results: intended, or a mistake."""
+        return ()
 
     def scaled(self, factor: float) -> Self:
         """The same coupler with all lengths multiplied by the factor."""

@@ -4,10 +4,11 @@ between two joints.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Self
 
-from ..errors import MechanismError
+from ..errors import MechanismError, Phrase
 from ..input_checks import plain, require_finite
 from .coupler import Coupler
 
@@ -64,6 +65,18 @@ class Polynomial(Coupler):
         return replace(
             self,
             coefficients=tuple(c * driven / driving**k for k, c in enumerate(self.coefficients)),
+        )
+
+    @property
+    def notes(self) -> Sequence[str | Phrase]:
+        offset = self.coefficients[0]
+        if not offset:
+            return ()
+        turns = self.freedoms[0] == "rotation"
+        found = (f"{offset:.10g} rad",) if turns else (offset,)
+        how = "assembled from there, so the design position is another than the given one"
+        return (
+            Phrase(f"{self}: {self.joints[0]!r} begins at ", *found, f", zero as given: {how}"),
         )
 
     @property

@@ -10,6 +10,7 @@ Solve:
     trace              a motion by its arc length, beyond lock-ups of a driver
     assemble           a closed pose from an estimate
     find_assemblies    all closed poses
+    followed_angle     the angle of a joint with its turns, followed from the design
     NativeSolver       settings of the solver; makes a mechanism ready for a path (`prepare`) or for
                        many designs (`prepare_designs`), and tells the size of its programs
 
@@ -73,6 +74,8 @@ if TYPE_CHECKING:
     from .diagnosis.rank import NamedRow as NamedRow
     from .diagnosis.rank import Ranks as Ranks
     from .diagnosis.rank import Violation as Violation
+    from .followed_angles import in_doubt as in_doubt
+    from .followed_angles import near_design as near_design
     from .forces.reactions import forces_of as forces_of
     from .forces.reactions import with_forces as with_forces
     from .formulation.acceptance_criteria import LONGEST_TURN as LONGEST_TURN
@@ -98,6 +101,8 @@ if TYPE_CHECKING:
     from .prepared_designs import PreparedDesigns as PreparedDesigns
     from .program_size import ProgramSize as ProgramSize
     from .solver_selection import Solver as Solver
+    from .solver_selection import followed_angle as followed_angle
+    from .solver_selection import follower as follower
     from .structure.driver_count import degrees_of_freedom as degrees_of_freedom
     from .structure.driver_count import require_driven as require_driven
     from .structure.reduction import largest_residual as largest_residual
@@ -130,6 +135,7 @@ _NAMES = {
     "diagnosis.instantaneous_screws": "Screw describe_screws",
     "diagnosis.position_gradients": "Gradient",
     "diagnosis.rank": "Blocked ComponentCount Dependency NamedRow Ranks Violation",
+    "followed_angles": "in_doubt near_design",
     "forces.reactions": "forces_of with_forces",
     "formulation.acceptance_criteria": "LONGEST_TURN ROUNDING continued continuous regular_between",
     "formulation.cartesian": "COLUMNS Cartesian",
@@ -140,7 +146,7 @@ _NAMES = {
     "one_design": "solve",
     "prepared_designs": "PreparedDesigns",
     "program_size": "ProgramSize",
-    "solver_selection": "Solver",
+    "solver_selection": "Solver followed_angle follower",
     "structure.driver_count": "degrees_of_freedom require_driven",
     "structure.reduction": "largest_residual reduce_rows",
     "verified.exact": "Exact Reading as_decimal as_double",

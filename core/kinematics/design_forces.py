@@ -27,7 +27,7 @@ from .design_batch import Variants, solve_variants, variant_of
 from .force_solver import motion_only
 from .forces.reactions import forces_of
 from .forces.wanted import WantedForces
-from .solver_selection import IRREDUCIBLE, prepare
+from .solver_selection import IRREDUCIBLE, follower, prepare
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +132,13 @@ class DesignForces:
         route = self._bodies
         found = solve_variants(route, geometry, tol)
         return [
-            forces_of(mechanism, path, _motion(route.model, found, k), names)
+            forces_of(
+                mechanism,
+                path,
+                _motion(route.model, found, k),
+                names,
+                follower(mechanism, path, found.solved[:, k]),
+            )
             for k, mechanism in enumerate(each)
         ]
 

@@ -12,6 +12,7 @@ from ..trajectory import Trajectory
 from .compiled.request import Request
 from .compiled.samples import Route
 from .continuation.sweep import follow
+from .followed_angles import Prepare, follower
 
 Solver = Callable[[float], Trajectory]
 """Solves what it was made for, to a tolerance."""
@@ -25,8 +26,14 @@ def motion_only(mechanism: Mechanism, request: Request) -> Request:
     return replace(request, bodies=moving, order=2, forces=None)
 
 
-def by_motion(mechanism: Mechanism, request: Request, path: Path, motion: Solver) -> Solver:
-    """Return a solver for forces from the motion of all bodies, if any are wanted."""
+def by_motion(
+    mechanism: Mechanism, request: Request, path: Path, motion: Solver, prepare: Prepare
+) -> Solver:
+    """Return a solver for forces from the motion of all bodies, if any are wanted.
+
+    Args:
+        prepare: makes the mechanism ready for further samples, to count turns of joints.
+    """
     wanted = request.forces
     if wanted is None:
         return motion
@@ -34,7 +41,13 @@ def by_motion(mechanism: Mechanism, request: Request, path: Path, motion: Solver
     from .forces.reactions import with_forces
 
     names = {*wanted.joints, *wanted.drivers, *wanted.elements}
-    return lambda tol: with_forces(mechanism, path, motion(tol), names, request.bodies)
+
+    def solve(tol: float) -> Trajectory:
+        found = motion(tol)
+        follow = follower(prepare, mechanism, path, found.solved)
+        return with_forces(mechanism, path, found, names, request.bodies, follow)
+
+    return solve
 
 
 def by_program(
@@ -42,6 +55,7 @@ def by_program(
     request: Request,
     path: Path,
     route: Callable[[Request], Route],
+    prepare: Prepare,
 ) -> Solver:
     """Return a solver by a program of the whole mechanism, with the forces wanted.
 
@@ -50,13 +64,14 @@ def by_program(
 
     Args:
         route: makes a request ready for the path.
+        prepare: as for `by_motion`.
     """
     if request.forces is None:
         return partial(follow, route(request))
 
     def again(tol: float) -> Trajectory:
         motion = partial(follow, route(motion_only(mechanism, request)))
-        return by_motion(mechanism, request, path, motion)(tol)
+        return by_motion(mechanism, request, path, motion, prepare)(tol)
 
     from .compiled.traced_forces import can_trace  # most motions are without forces
 

@@ -82,10 +82,14 @@ class NativeSolver:
             return prepare(mechanism, request, path)
         if self.method is Method.ONE_PROGRAM:
             return by_program(
-                mechanism, request, path, lambda each: Route(compile_model(mechanism, each), path)
+                mechanism,
+                request,
+                path,
+                lambda each: Route(compile_model(mechanism, each), path),
+                prepare,
             )
         motion = motion_only(mechanism, request)
-        return by_motion(mechanism, request, path, self._large(mechanism, motion, path))
+        return by_motion(mechanism, request, path, self._large(mechanism, motion, path), prepare)
 
     def _large(self, mechanism: Mechanism, request: Request, path: Path) -> Solver:
         # few mechanisms are so large: the others need not wait for the import

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..driving import Driving
 from ..errors import SolveError
-from ..input_checks import finite, no_such, real
+from ..input_checks import finite, names_of, no_such, real
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.motions import Motion, Path, Ramp, as_changes
 from ..trajectory import Array, Trajectory
@@ -123,7 +123,12 @@ def asked(
     Raises:
         SolveError: an argument makes no sense; the message begins with the caller's name.
     """
-    wanted = tuple(point.name for point in mechanism.points) if points is None else tuple(points)
+    wanted = (
+        tuple(point.name for point in mechanism.points)
+        if points is None
+        else names_of(who, "points", points)
+    )
+    bodies = names_of(who, "bodies", bodies)
     values = real(who, "values", values, "one driver value for each sample")
     problem = _problem(driver, values, motions, rate, order, tol)
     if problem:
@@ -147,7 +152,7 @@ def asked(
             f"{who}: rate is {rate}: no number is the time of the values then; give a larger one"
         )
     path = Path({**as_changes(motions, design), driver: Ramp(float(rate))}, times, design)
-    return path, Request(tuple(path.motions), wanted, tuple(bodies), int(order), Style(style))
+    return path, Request(tuple(path.motions), wanted, bodies, int(order), Style(style))
 
 
 def _problem(

@@ -22,6 +22,7 @@ from ..caches import keep_last
 from ..errors import SolveError
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.motions import Path
+from . import followed_angles
 from .compiled.motion_start import start_of
 from .compiled.program_cache import is_builtin
 from .compiled.request import Request
@@ -51,8 +52,14 @@ def prepare(mechanism: Mechanism, request: Request, path: Path) -> Solver:
         known = is_builtin(mechanism) and path.is_builtin
         make = (_recent_large if known else _large)(mechanism, motion_only(mechanism, request))
         if make:
-            return by_motion(mechanism, request, path, make(path))
-    return by_program(mechanism, request, path, lambda each: recent_route(mechanism, each, path))
+            return by_motion(mechanism, request, path, make(path), prepare)
+    return by_program(
+        mechanism, request, path, lambda each: recent_route(mechanism, each, path), prepare
+    )
+
+
+followed_angle = partial(followed_angles.followed_angle, prepare)
+follower = partial(followed_angles.follower, prepare)
 
 
 def start_notes(mechanism: Mechanism, request: Request, path: Path, tol: float) -> list[str]:

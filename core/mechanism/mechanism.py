@@ -14,7 +14,7 @@ from functools import cached_property
 from typing import Any
 
 from ..errors import MechanismError, Phrase, unknown
-from ..input_checks import require_finite, triple
+from ..input_checks import held, require_finite, triple
 from ..joints.base import Joint, Kind, unit
 from ..joints.coupler import Coupler
 from ..joints.gap import gap
@@ -44,6 +44,17 @@ class Point:
         require_finite(who, self.position, Kind.POSITION.value)
 
 
+KINDS: Mapping[str, type] = {
+    "bodies": Body,
+    "joints": Joint,
+    "points": Point,
+    "drivers": Driver,
+    "couplers": Coupler,
+    "forces": ForceElement,
+}
+"""Members of a mechanism, and the class of each."""
+
+
 @dataclass(frozen=True)
 class Mechanism:
     """A named set of bodies, joints, points, drivers and loads.
@@ -70,9 +81,18 @@ class Mechanism:
     forces: Sequence[ForceElement] = field(default=())
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "joints", (*self.joints, *self.grounded))
-        for what in ("bodies", "joints", "points", "drivers", "couplers", "forces"):
-            object.__setattr__(self, what, tuple(getattr(self, what)))
+        if self.grounded:
+            object.__setattr__(self, "joints", (*self.joints, *self.grounded))
+        for what, kind in KINDS.items():
+            who = f"mechanism {self.name!r}: {what}"
+            members = held(who, getattr(self, what), None, f"a list, each a {kind.__name__}")
+            for each in members:
+                if not isinstance(each, kind):
+                    raise MechanismError(
+                        f"{who} has {each!r}, expected a {kind.__name__}; check the order of the"
+                        " arguments"
+                    )
+            object.__setattr__(self, what, members)
             _unique(what, [each.name for each in getattr(self, what)])
         if any(body.name == GROUND for body in self.bodies):
             raise MechanismError(

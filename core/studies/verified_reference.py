@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -18,7 +17,7 @@ import numpy as np
 from ..algebra import Vec3
 from ..case.case import HELD_BUT, Case, Quantity
 from ..case.io.reference_file import ProvedSeries, Reference, Sample
-from ..case.rotation import turns
+from ..case.measures.turns import turns_of
 from ..jet import Jet
 from ..kinematics import (
     Drives,
@@ -29,9 +28,9 @@ from ..kinematics import (
     UnprovedError,
     as_decimal,
     as_double,
+    follower,
     prove,
 )
-from ..mechanism.motions import Path
 from ..program.ball_executor import Ball, flint, precision
 from ..trajectory import Array
 from ..version import VERSION
@@ -83,6 +82,7 @@ def prove_case(
         bits,
         tol,
         {name for output in case.outputs for name in output.forces},
+        follower,
     )
     with precision(bits):
         values: dict[str, Sequence[Column]] = {}
@@ -182,7 +182,7 @@ def _values(case: Case, output: Quantity, found: Proofs, numbers: str) -> Sequen
         design[name] = Vec3(*(_jet([x], [still], [still]) for x in position))
     columns: list[list[Ball | None]] = [[None] * len(found.samples) for _ in range(3)]
     if proved:
-        jet = _counted(output, output.of(at, design), case.sweep.path, proved)
+        jet = _counted(case, output, output.of(at, design), proved)
         for column, values in zip(columns, (jet.x, jet.v, jet.a), strict=True):
             for k, value in zip(
                 proved,
@@ -236,12 +236,12 @@ def _sample(
     )
 
 
-def _counted(output: Quantity, jet: Jet, path: Path, proved: Sequence[int]) -> Jet:
+def _counted(case: Case, output: Quantity, jet: Jet, proved: Sequence[int]) -> Jet:
     """Return an angle with its turns along the path."""
     if not output.period:
         return jet
     x, v = (np.asarray(each).astype(np.float64) for each in (jet.x, jet.v))
-    count = turns(x, v, output.period, replace(path, times=path.times[proved]))
+    count = turns_of(case.mechanism, case.sweep.path, output, x, v, np.array(proved))
     whole = 2 * flint().arb.pi()  # of a period, which is a whole turn
     return jet + np.array([Exact(int(n) * whole) for n in count], dtype=object)
 

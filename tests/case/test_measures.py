@@ -29,7 +29,7 @@ from kincheck.core.case.notes import notes
 from kincheck.core.harness.compare import output_series
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.run import run
-from kincheck.core.joints import Cylindrical, Fixed, Revolute
+from kincheck.core.joints import Cylindrical, Fixed, Polynomial, Revolute
 from kincheck.core.mechanism.drivers import JointAngle as AngleDriver
 from kincheck.core.mechanism.drivers import JointDisplacement as DisplacementDriver
 from kincheck.core.mechanism.mechanism import Body, Mechanism, Point
@@ -325,3 +325,31 @@ def test_a_coordinate_that_is_driven_is_no_result_of_a_closure():
 
 def test_an_open_chain_has_no_closure_to_depend_on():
     assert notes(with_all_motions(arm([0.0, 1.0]))) == []
+
+
+def test_a_coupler_that_moves_the_design_is_told():
+    """In the file's unit; a coupler through zero is not."""
+    for coefficients, told in (
+        ((0.2, 0.5), ["'lever' begins at 0.2 rad, zero as given"]),
+        ((0.0, 0.5), []),
+    ):
+        case = arm([0.0])
+        levers = [
+            Revolute("lever", "ground", "lever", (3.0, 0.0, 0.0), AXIS),
+            Cylindrical("slide", "ground", "rack", (5.0, 0.0, 0.0), AXIS),
+        ]
+        knee = Polynomial("knee", ("lever", "hinge"), coefficients)
+        cam = Polynomial(
+            "cam", ("slide", "hinge"), coefficients, freedoms=("translation", "rotation")
+        )
+        mechanism = replace(
+            case.mechanism,
+            bodies=(*case.mechanism.bodies, Body("lever"), Body("rack")),
+            joints=(*case.mechanism.joints, *levers),
+            couplers=(knee, cam),
+        )
+        found = notes(replace(case, mechanism=mechanism, length_unit="mm"))
+        wanted = [*told, *(["'slide' begins at 200 mm, zero as given"] if told else [])]
+        begins = [note for note in found if "begins" in note]
+        assert len(begins) == len(wanted)
+        assert all(text in note for text, note in zip(wanted, begins, strict=True))

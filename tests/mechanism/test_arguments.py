@@ -11,6 +11,7 @@ from kincheck.core import (
     Body,
     Distance,
     JointAngle,
+    Mechanism,
     MechanismError,
     Point,
     Revolute,
@@ -149,3 +150,32 @@ def test_numbers_that_may_change_are_read_at_each_call(loops):
         np.testing.assert_allclose(found.points["hand"].position, expected, rtol=0.0, atol=1e-15)
         rate *= 4.0
         numbers[0] = 3.0
+
+
+def test_one_name_is_no_list_of_names():
+    for who, what, call in (
+        ("solve", "points", lambda: solve(mcpherson(), "stroke", VALUES, points="ball")),
+        ("solve", "bodies", lambda: solve(mcpherson(), "stroke", VALUES, bodies="lca")),
+        (
+            "solve_designs",
+            "points",
+            lambda: solve_designs(mcpherson(), "stroke", VALUES, BALL, points="ball"),
+        ),
+        ("trace", "points", lambda: trace(mcpherson(), "stroke", points="ball")),
+        ("solve", "driver", lambda: solve(mcpherson(), None, VALUES)),
+        ("trace", "driver", lambda: trace(mcpherson(), None)),
+    ):
+        with pytest.raises(SolveError, match=f"^{who}: {what} is .*, expected a "):
+            call()
+
+
+def test_members_of_a_mechanism_are_of_their_kind():
+    body, hinge = Body("arm"), Revolute("hinge", "ground", "arm", (0, 0, 0), (0, 0, 1))
+    for bodies, joints, found in (
+        ([hinge], [body], "bodies has Revolute"),
+        ("arm", [hinge], "bodies is 'arm', expected a list"),
+        ([body], [hinge, None], "joints has None, expected a Joint"),
+        ([body], hinge, "joints is Revolute"),
+    ):
+        with pytest.raises(MechanismError, match=f"^mechanism 'm': {found}"):
+            Mechanism("m", bodies, joints)

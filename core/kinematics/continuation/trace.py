@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from ...errors import SolveError
-from ...input_checks import no_such, require_positive
+from ...input_checks import names_of, no_such, require_positive
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path, Ramp
 from ...trajectory import Array
@@ -85,7 +85,7 @@ def trace(
     for name, given in (("length", length), ("longest", longest), ("tol", tol)):
         require_positive("trace", name, given)
     there = [point.name for point in mechanism.points]
-    wanted = tuple(there if points is None else points)
+    wanted = names_of("trace", "points", there if points is None else points)
     for name in wanted:
         if name not in there:
             raise no_such("trace", "point", name, there)

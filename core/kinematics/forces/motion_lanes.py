@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -20,6 +20,11 @@ from ..formulation.constraints import frames
 from ..formulation.formulation import Acceleration
 from ..formulation.state_vectors import displaced
 from .demand import Applied, BodyStates, at_work
+
+Follow: TypeAlias = Callable[[str, Array, Array], Array]
+"""Returns the angle of a joint with all its turns, of its name, its angle counted by rates and its
+rate at the solved samples [rad, rad/s].
+"""
 
 
 class MotionLanes:
@@ -38,7 +43,10 @@ class MotionLanes:
         SolveError: the motion lacks a body or its accelerations.
     """
 
-    def __init__(self, mechanism: Mechanism, path: Path, motion: Trajectory) -> None:
+    def __init__(
+        self, mechanism: Mechanism, path: Path, motion: Trajectory, follow: Follow | None = None
+    ) -> None:
+        self._follow = follow
         self.mechanism, self.frame = mechanism, frames(mechanism)
         solved = motion.solved
         self.times: Array = path.times[solved]
@@ -83,7 +91,7 @@ class MotionLanes:
         """Return the angle of a joint over the samples [rad], continuous, zero at design.
 
         The angle of a driven joint, or of a joint geared to one, is exact. Other angles follow the
-        rates from the sample nearest to the design; this sample must be within half a turn of it.
+        rates from the sample nearest to the design, and `follow` corrects their turns.
         """
         known = self._driven.get((name, "rotation"))
         if known is not None:
@@ -101,9 +109,10 @@ class MotionLanes:
         turned = angle.copy()
         turned[1:] += 2.0 * np.pi * np.cumsum(jumps)
         nearest = float(turned[int(np.argmin(np.abs(self.times[order])))])
-        continuous = np.empty(self.n)
+        continuous, rates = np.empty(self.n), np.empty(self.n)
         continuous[order] = turned - 2.0 * np.pi * round(nearest / (2.0 * np.pi))
-        return continuous
+        rates[order] = rate
+        return self._follow(name, continuous, rates) if self._follow else continuous
 
     @cached_property
     def _driven(self) -> Mapping[tuple[str, str], Array]:

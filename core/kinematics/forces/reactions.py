@@ -18,7 +18,7 @@ from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path
 from ...trajectory import Array, Trajectory
 from .force_rows import ForceRows
-from .motion_lanes import MotionLanes
+from .motion_lanes import Follow, MotionLanes
 from .power import powers
 from .wanted import wanted_forces
 
@@ -33,9 +33,10 @@ def with_forces(
     motion: Trajectory,
     names: Collection[str] | None = None,
     bodies: Collection[str] = (),
+    follow: Follow | None = None,
 ) -> Trajectory:
     """Return a solved motion with its forces and only the named bodies; see `forces_of`."""
-    found = forces_of(mechanism, path, motion, names)
+    found = forces_of(mechanism, path, motion, names, follow)
     return Trajectory(
         motion.points,
         motion.solved,
@@ -50,7 +51,11 @@ def with_forces(
 
 
 def forces_of(
-    mechanism: Mechanism, path: Path, motion: Trajectory, names: Collection[str] | None = None
+    mechanism: Mechanism,
+    path: Path,
+    motion: Trajectory,
+    names: Collection[str] | None = None,
+    follow: Follow | None = None,
 ) -> Forces:
     """Return the forces of a solved motion.
 
@@ -59,13 +64,14 @@ def forces_of(
         path: drivers' path followed by the motion.
         motion: motion of all moving bodies, with accelerations.
         names: names of joints, drivers and force elements; by default all.
+        follow: counts the turns of joints with torsional springs; by default their rates do.
 
     Raises:
         SolveError: a name is unknown, or the motion lacks a body.
     """
     wanted = wanted_forces(mechanism, names)
     solved = motion.solved
-    lanes = MotionLanes(mechanism, path, motion)
+    lanes = MotionLanes(mechanism, path, motion, follow)
     lines = ForceRows(lanes)
     step = max(1, AT_ONCE // max(1, lines.count * lines.formulation.unknowns))
     parts = [lines.solve(slice(k, k + step)) for k in range(0, max(1, lanes.n), step)]

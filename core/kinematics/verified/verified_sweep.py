@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from time import perf_counter
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...mechanism.loads import TorsionSpringDamper
 from ...mechanism.mechanism import Mechanism
@@ -19,7 +20,7 @@ from ..compiled.motion_start import start_of
 from ..compiled.request import Request
 from ..continuation.row_exchange import chosen_at
 from ..continuation.sweep import sweep
-from ..forces.motion_lanes import MotionLanes
+from ..forces.motion_lanes import Follow, MotionLanes
 from ..forces.reactions import with_forces
 from ..forces.wanted import WantedForces, wanted_forces
 from ..formulation.cartesian import Cartesian
@@ -64,6 +65,7 @@ def prove(
     bits: int,
     tol: float,
     forces: Collection[str] = (),
+    follower: Callable[[Mechanism, Path, NDArray[np.bool_]], Follow] | None = None,
 ) -> Proofs:
     """Prove the samples of a path.
 
@@ -74,6 +76,7 @@ def prove(
         bits: working precision.
         tol: of the native solution; see `solve`.
         forces: names of joints, drivers and force elements whose forces to enclose.
+        follower: makes what counts the turns of torsional springs at the solved samples.
 
     Raises:
         SolveError: as `solve`.
@@ -92,8 +95,9 @@ def prove(
         zero = Fraction(0)
         still = [(zero, zero, zero)] * len(native.solved)
         drives = {each.name: drives.get(each.name, still) for each in mechanism.drivers}
-        angles = _angles(mechanism, path, native)
-        native = with_forces(mechanism, path, native, forces, native.bodies)
+        follow = follower(mechanism, path, native.solved) if follower else None
+        angles = _angles(mechanism, path, native, follow)
+        native = with_forces(mechanism, path, native, forces, native.bodies, follow)
     poses = _states(mechanism, native, path.times, start_of(mechanism, path).time)
     samples: list[Enclosure | UnprovedError] = []
     seconds: list[float] = []
@@ -134,14 +138,14 @@ def prove(
     return Proofs(samples, seconds, native, solved, redundant, others)
 
 
-def _angles(mechanism: Mechanism, path: Path, native: Trajectory) -> Array:
+def _angles(mechanism: Mechanism, path: Path, native: Trajectory, follow: Follow | None) -> Array:
     """Return the native angles of the joints of torsional springs [rad], shape (n, joints)."""
     joints = dict.fromkeys(
         each.joint for each in mechanism.forces if isinstance(each, TorsionSpringDamper)
     )
     found = np.full((len(native.solved), len(joints)), np.nan)
     if joints:
-        lanes = MotionLanes(mechanism, path, native)
+        lanes = MotionLanes(mechanism, path, native, follow)
         found[native.solved] = np.stack([lanes.angle(name) for name in joints], axis=1)
     return found
 

@@ -16,7 +16,7 @@ from ...algebra import Vec3
 from ...case.case import Case, Quantity, without_forces
 from ...case.held import require_no_held
 from ...case.measures import ForceMeasure
-from ...case.rotation import counted
+from ...case.measures.turns import counted
 from ...errors import KincheckError
 from ...jet import Jet
 from ...kinematics import ForcesOfDesigns, NativeSolver, PreparedDesigns, Variants, placed
@@ -141,6 +141,7 @@ class Ready:
 
     study: Study
     designs: PreparedDesigns
+    path: Path
 
     @staticmethod
     def of(study: Study) -> Ready:
@@ -156,11 +157,11 @@ class Ready:
         designs = solver.prepare_designs(
             case.mechanism, case.sweep.path, varied, without_forces(case).points, case.forces
         )
-        return Ready(study, designs)
+        return Ready(study, designs, case.sweep.path)
 
     def along(self, path: Path) -> Ready:
         """Return the same model on another path of the same drivers."""
-        return Ready(self.study, self.designs.along(path))
+        return Ready(self.study, self.designs.along(path), path)
 
     @property
     def lanes(self) -> int:
@@ -204,10 +205,9 @@ class Ready:
         values = np.empty((len(self.study.rows), *found.solved.shape))
         # unknown numbers are NaN, and every result of them is NaN
         with np.errstate(all="ignore"):
-            case = self.study.case
-            path = case.sweep.path
+            case, path = self.study.case, self.path
             moved = without_forces(case).outputs
-            jets = {o.name: counted(o.of(at, design), o.period, path) for o in moved}
+            jets = {o.name: counted(case.mechanism, path, o, o.of(at, design)) for o in moved}
             for k, row in enumerate(self.study.rows):
                 if isinstance(row.output, ForceMeasure):
                     assert forces is not None  # the case asks for them
