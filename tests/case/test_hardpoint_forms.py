@@ -71,7 +71,10 @@ FORMS = {
     "blanks": ("car.txt", "name x [mm] y [mm] z [mm]\n" + lines("{}   {}  {} {}")),
     "blanks, no head": ("car.dat", lines("  {}   {}  {} {}")),
     "SolidWorks": ("car.txt", axes('"{}_{}" = {}mm')),
-    "MATLAB": ("car.m", "clear\n% units: mm\n" + lines("front.{} = [{} {}, {}]; % [mm]")),
+    "MATLAB": (
+        "car.m",
+        "clear\n% units: mm\n" + lines("front.{} = [{} {}, {}]; % [mm]") + "d = 18; % [in]",
+    ),
     "MATLAB, left and right": (
         "car.m",
         lines("hp.left.{} = [{}, {}, {}];") + lines("hp.right.{} = [{}, {}, {}];", RIGHT),
