@@ -29,7 +29,7 @@ _LAST = ("position", "pos", "coordinates", "coords", "coord", "location", "loc",
 _NAMES = ("name", "id", "label", "point")
 # Three numbers that are no place.
 _NO_PLACE = re.compile(
-    r"(?:.+_)?(?:spin_axis|axis|direction|normal|vector|rotation|orientation|rpy|inertia|euler\w*)"
+    r"axis|(?:.+_)?(?:spin_axis|direction|normal|vector|rotation|orientation|rpy|inertia|euler\w*)"
 )
 
 
