@@ -8,6 +8,7 @@ from dataclasses import replace
 import pytest
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
+from kincheck.core.case.models.hardpoints.templates import TEMPLATES
 from kincheck.core.errors import CaseError
 
 from .test_hardpoint_dialects import POINTS, comma, table
@@ -71,7 +72,10 @@ FORMS = {
     "blanks": ("car.txt", "name x [mm] y [mm] z [mm]\n" + lines("{}   {}  {} {}")),
     "blanks, no head": ("car.dat", lines("  {}   {}  {} {}")),
     "SolidWorks": ("car.txt", axes('"{}_{}" = {}mm')),
-    "MATLAB": ("car.m", "clear\n% units: mm\n" + lines("front.{} = [{} {}, {}]; % [mm]")),
+    "MATLAB": (
+        "car.m",
+        "clear\n% units: mm\n" + lines("front.{} = [{} {}, {}]; % [mm]") + "d = 18; % [in]",
+    ),
     "MATLAB, left and right": (
         "car.m",
         lines("hp.left.{} = [{}, {}, {}];") + lines("hp.right.{} = [{}, {}, {}];", RIGHT),
@@ -166,6 +170,15 @@ def test_a_direction_is_no_place(tmp_path):
     text = json.dumps({**NESTED, "wheel": NESTED["wheel"] | {"spin_axis": [0, 1, 0]}})
     case = load(written(tmp_path, "car.json", text), SAID)
     assert "wheel.spin_axis" in case.source
+
+
+def test_a_point_of_an_axis_is_a_place(tmp_path):
+    """Of the rocker, or of the wheel."""
+    points = {name: list(at) for name, at in TEMPLATES["pushrod_knuckle"].sample.items()}
+    file = written(tmp_path, "car.json", json.dumps({"points": points}))
+    case = load(file, Supplied("pushrod_knuckle", "m", "iso"))
+    assert "rocker_axis" in points
+    assert "left out: nothing" in case.source
 
 
 ROW = axes("{}_{},{}")

@@ -171,8 +171,8 @@ FAULTS = {
         table(points={name: tuple(x / 1000 for x in at) for name, at in POINTS.items()}),
         ["span", "metres declared as mm?"],
     ),
-    "no head at all": (table().partition("\n")[2], ["expected the head name,x,y,z"]),
-    "two tables": (table() + "\n" + table(), ["given before"]),
+    "no head at all": (table(row="{};1;{};{};{}").partition("\n")[2], ["expected the head"]),
+    "two tables": (table() + "\n" + table(), ["a second head", "keep one"]),
     "two dimensions": ("name;x;y\nwheel;1;2\n", ["expected the head name,x,y,z"]),
     "head of one letter": ("x\n1\n", ["expected the head name,x,y,z"]),
     "grouped or not": (

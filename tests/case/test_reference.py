@@ -148,7 +148,9 @@ def test_units_of_columns(tmp_path: Path, kind: str, at: str):
     case = load_case(write(tmp_path, base + BY_FILE))
     assert case.sweep.values.tolist() == [-0.1, 0.0, 0.1]
     assert case.reference["tip_x"].position.tolist() == [1.4, 1.5, 1.6]
-    assert case.reference["tip_x"].velocity.tolist() == [2.0, 2.0, 2.0]
+    velocity = case.reference["tip_x"].velocity
+    assert velocity is not None
+    assert velocity.tolist() == [2.0, 2.0, 2.0]
     assert case.origin
     assert case.origin.units == {"push": "mm", "tip_x": "mm"}
 

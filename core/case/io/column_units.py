@@ -28,9 +28,10 @@ _OTHER_NAMES: Mapping[str, Sequence[str]] = {
     "rad": ("radian", "radians"),
     "deg": ("degree", "degrees", "°", "º"),
 }
-_NAMES: Mapping[str, str] = {
+UNIT_NAMES: Mapping[str, str] = {
     other: name for name, others in _OTHER_NAMES.items() for other in (name, *others)
 }
+"""Names of units of length and angle by their other names, in small letters."""
 _FURTHER: Mapping[str, tuple[float, _Powers]] = {
     "1": (1.0, _NONE),
     "-": (1.0, _NONE),
@@ -81,7 +82,7 @@ def read_unit(text: str) -> ColumnUnit | None:
         return None
     plain = text.strip().lower().replace("²", "^2").replace("³", "^3").replace(" per ", "/")
     plain = plain.replace("_per_", "/")
-    name = _NAMES.get(plain, plain)
+    name = UNIT_NAMES.get(plain, plain)
     for known, powers in ((LENGTHS, _LENGTH), (ANGLES, _ANGLE)):
         if name in known:
             return ColumnUnit(name, powers, known[name].convert)
@@ -103,7 +104,7 @@ def read_unit(text: str) -> ColumnUnit | None:
 
 
 def _factor(name: str) -> tuple[float, _Powers] | None:
-    name = _NAMES.get(name, name)
+    name = UNIT_NAMES.get(name, name)
     if name in LENGTHS:
         return LENGTHS[name].size, _LENGTH
     if name in ANGLES:

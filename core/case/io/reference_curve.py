@@ -79,17 +79,17 @@ def with_curve(case: Case, file: Path, options: CurveOptions) -> tuple[Case, lis
     outputs = _with_accuracy(file, case.outputs, [*of], options.accuracy)
     convention, signs = _convention(outputs, [*of]), _signs(file, samples.signs, options.signs)
     if signs and convention not in ("", signs):
-        raise fault(
-            file,
-            "signs",
-            f"found {shown(signs)}, expected {convention!r} as in the case; turn columns with the"
-            f' opposite sign by {MAP} "COLUMN=-OUTPUT", and say --signs {convention}',
-        )
+        problem = f"found {shown(signs)}, expected {convention!r} as in the case; turn columns with"
+        advice = f' the opposite sign by {MAP} "COLUMN=-OUTPUT", and say --signs {convention}'
+        raise fault(file, "signs", problem + advice)
     bare = [text for text in samples.columns if not unit_of_head(file, "", text, known)[1]]
     driven = np.array([unit(row[0]) for _, row in samples.rows])
     if samples.columns[0] in bare:
         _require_size(samples, unit, driven, case)
-    values = _own_samples(file, driven) if options.own_samples else case.sweep.values
+    values = driven if options.own_samples else case.sweep.values
+    if len(values) > MOST_SAMPLES:
+        problem = f"found {len(values)} rows, expected {MOST_SAMPLES} at most"
+        raise fault(file, "--at-reference", f"{problem}; thin them out")
     origin = Origin((options.citation or "").strip(), file.name, sha256(file))
     series, origin = compared(
         samples, Columns(unit, driver, of), outputs, values, origin, options.own_samples
@@ -235,17 +235,6 @@ def _require_size(samples: Samples, unit: Unit, driven: Array, case: Case) -> No
         f" write the unit into the head, {samples.columns[0]} [{small}], or say {MAP}"
         f' "{samples.columns[0]}={sweep.driver} [{small}]"',
     )
-
-
-def _own_samples(file: Path, values: Array) -> Array:
-    """Return the samples of the curve as the sweep's."""
-    if len(values) > MOST_SAMPLES:
-        raise fault(
-            file,
-            "",
-            f"found {len(values)} rows, expected {MOST_SAMPLES} at most; thin them out",
-        )
-    return values
 
 
 def _notes(

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from ....errors import MOST_NAMED, remedy, shortened
 from ...io.document import fault, shown
-from .table import Hardpoint, HardpointTable, number
+from .table import Hardpoint, HardpointTable, number, twice
 
 BLOCK = "[HARDPOINT]"
 COLUMNS = ("hardpoint_name", "symmetry", "x_value", "y_value", "z_value")
@@ -67,12 +67,7 @@ def read_adams(file: Path, text: str) -> HardpointTable:
             elif symmetry == RIGHT:
                 right += 1
             elif name in points:
-                raise fault(
-                    file,
-                    where,
-                    f"{name}: given before, in {points[name].where}, expected once; remove one of"
-                    " them",
-                )
+                raise twice(file, where, name, points[name].where)
             else:
                 points[name] = point
     if not points:

@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ...io.document import fault, shown
+from ...io.document import fault
 from ...units import LENGTHS
-from .forms import is_number
+from .forms import axis_of, is_number, one_unit
 from .rows import remark
 from .table import HardpointTable, length_name
 from .tree import Leaf, table_of
@@ -80,25 +80,15 @@ def read_assignments(
             value, unit = scalar[1], scalar[2] or ""
         if comment and (stated := _UNIT.search(comment[0])):
             unit = unit or stated[1]
-        point = isinstance(value, list) or is_number(value)
-        if point and length_name(unit) in LENGTHS:
+        last = keys[-1] if keys else ""
+        coordinate = is_number(value) and (axis_of(last) or last.lower() in ("x", "y", "z"))
+        if (isinstance(value, list) or coordinate) and length_name(unit) in LENGTHS:
             units.setdefault(length_name(unit), where)
         found.append(Leaf(keys or ("",), value, f"{where} ({'.'.join(keys)})"))
-    if len(units) > 1:
-        (first, _), (other, where) = [*units.items()][:2]
-        raise fault(
-            file,
-            where,
-            f"found {shown(other)}, and {shown(first)} above, expected one unit; write all"
-            " coordinates in one",
-        )
+    unit = one_unit(file, units)
     facts = [Leaf((key,), value, key) for key, value in said.items()]
-    facts += [Leaf(("unit",), unit, "unit") for unit in units if "unit" not in said]
-    if units and length_name(said.get("unit", next(iter(units)))) not in units:
-        raise fault(
-            file,
-            next(iter(units.values())),
-            f"found {shown(next(iter(units)))}, and {said['unit']} in a comment, expected one"
-            " unit; correct either",
-        )
+    if unit and length_name(said.get("unit", unit)) != unit:
+        problem = f"found {unit}, and {said['unit']} in a comment, expected one unit"
+        raise fault(file, units[unit], f"{problem}; correct either")
+    facts += [Leaf(("unit",), unit, "unit")] if unit and "unit" not in said else []
     return table_of(file, "Assigned", [*found, *facts], wanted, left_out)

@@ -5,14 +5,14 @@ name and three numbers. They become rows below such a head.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from ...io.column_units import split_head
 from ...io.document import decimal, fault, shown
 from ...io.workbook import Cell, Row
 from ...units import LENGTHS
-from .table import length_name
+from .table import length_name, twice
 from .templates import ROLES
 from .templates.base import compact
 
@@ -77,25 +77,13 @@ def _coordinates(file: Path, rows: Sequence[Row]) -> tuple[Sequence[Row], int] |
             )
         place = points.setdefault(name, {})
         if axis in place:
-            raise fault(
-                file,
-                where,
-                f"{name} {axis}: given before, in {place[axis][0]}, expected once; remove one of"
-                " them",
-            )
+            raise twice(file, where, f"{name} {axis}", place[axis][0])
         place[axis] = (where, values[0])
         if unit:
             units.setdefault(length_name(unit), where)
     if len(found) - len(others) < FEWEST or not any(len(place) == 3 for place in points.values()):
         return None
-    if len(units) > 1:
-        (first, _), (other, where) = [*units.items()][:2]
-        raise fault(
-            file,
-            where,
-            f"found {shown(other)}, and {shown(first)} above, expected one unit; write all"
-            " coordinates in one",
-        )
+    unit = one_unit(file, units) or _unit_above(others)
     body: list[Row] = []
     for name, place in points.items():
         if len(place) == 3:
@@ -106,9 +94,27 @@ def _coordinates(file: Path, rows: Sequence[Row]) -> tuple[Sequence[Row], int] |
             raise fault(file, where, f"found {name} without {missing}, expected all three; add it")
         else:
             others += [(where, [f"{name} {axis}"]) for axis, (where, _) in place.items()]
-    unit = next(iter(units), "") or _unit_above(others)
     head = ["name", *(f"{axis} [{unit}]" if unit else axis for axis in "xyz")]
     return [*others, ("the head", head), *body], len(others)
+
+
+def one_unit(file: Path, units: Mapping[str, str]) -> str:
+    """Return the only unit; empty without any.
+
+    Args:
+        units: places of coordinates by their unit.
+
+    Raises:
+        CaseError: there are several units.
+    """
+    for first, (other, where) in zip(units, [*units.items()][1:], strict=False):
+        raise fault(
+            file,
+            where,
+            f"found {shown(other)}, and {shown(first)} above, expected one unit; write all"
+            " coordinates in one",
+        )
+    return next(iter(units), "")
 
 
 def _coordinate(cells: Sequence[Cell]) -> tuple[str, str, list[Cell], str] | None:

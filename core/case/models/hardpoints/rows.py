@@ -19,7 +19,7 @@ from ...io.workbook import Cell, Row
 from ...units import LENGTHS
 from .forms import with_head
 from .head import HEAD, Head, as_head, turned, upright, written
-from .table import Hardpoint, HardpointTable, length_name, number
+from .table import Hardpoint, HardpointTable, length_name, number, twice
 from .templates import ROLES
 from .templates.base import compact
 
@@ -153,11 +153,7 @@ def _points(
                 f"found the name {name!r}, expected printable characters; name the point",
             )
         if name in lines:
-            raise fault(
-                file,
-                where,
-                f"{name}: given before, in {lines[name]}, expected once; remove one of them",
-            )
+            raise twice(file, where, name, lines[name])
         lines[name] = where
         places.append(
             (

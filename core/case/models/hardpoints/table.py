@@ -12,28 +12,10 @@ from pathlib import Path
 
 from ....errors import CaseError, remedy
 from ....mechanism.mechanism import Vector
+from ...io.column_units import UNIT_NAMES
 from ...io.document import decimal, fault, shown, usable
 from ...sizes import SUSPENSIONS
 from ...units import LENGTHS, Unit, plain
-
-_UNIT_NAMES: Mapping[str, str] = {
-    "meter": "m",
-    "metre": "m",
-    "millimeter": "mm",
-    "millimetre": "mm",
-    "centimeter": "cm",
-    "centimetre": "cm",
-    "meters": "m",
-    "metres": "m",
-    "millimeters": "mm",
-    "millimetres": "mm",
-    "centimeters": "cm",
-    "centimetres": "cm",
-    "in": "inch",
-    "inches": "inch",
-    "ft": "foot",
-    "feet": "foot",
-}
 
 _DIRECTIONS: Mapping[str, tuple[int, float]] = {
     "forward": (0, 1.0),
@@ -95,6 +77,13 @@ class HardpointTable:
     left_out: Sequence[str] = ()
     static_toe: float = 0.0
     static_camber: float = 0.0
+
+
+def twice(file: Path, where: str, name: str, before: str) -> CaseError:
+    """Return the error of a point or coordinate that a file gives again."""
+    return fault(
+        file, where, f"{name}: given before, in {before}, expected once; remove one of them"
+    )
 
 
 def number(file: Path, where: str, text: object, sign: str = ".") -> float:
@@ -210,7 +199,7 @@ def _unit(table: HardpointTable, said: str | None) -> str:
 def length_name(text: str) -> str:
     """Return the name of a unit in `LENGTHS`; for another text, the text in small letters."""
     name = text.strip().lower()
-    return _UNIT_NAMES.get(name, name)
+    return UNIT_NAMES.get(name, name)
 
 
 def _axes(table: HardpointTable, said: str | None) -> list[tuple[int, float]]:

@@ -21,7 +21,7 @@ from .chrono import without_comments
 from .forms import FEWEST, axis_of, is_number
 from .hub import wheel_points
 from .sections import Keys, chosen_points
-from .table import Hardpoint, HardpointTable, is_axes, length_name, number
+from .table import Hardpoint, HardpointTable, is_axes, length_name, number, twice
 from .templates import ROLES, TEMPLATES
 from .templates.base import compact, normal
 
@@ -29,7 +29,7 @@ _LAST = ("position", "pos", "coordinates", "coords", "coord", "location", "loc",
 _NAMES = ("name", "id", "label", "point")
 # Three numbers that are no place.
 _NO_PLACE = re.compile(
-    r"(?:.+_)?(?:spin_axis|axis|direction|normal|vector|rotation|orientation|rpy|inertia|euler\w*)"
+    r"axis|(?:.+_)?(?:spin_axis|direction|normal|vector|rotation|orientation|rpy|inertia|euler\w*)"
 )
 
 
@@ -144,11 +144,7 @@ def table_of(
     found: dict[str, Hardpoint] = {}
     for keys, name in chosen.items():
         if name in found:
-            raise fault(
-                file,
-                points[keys].where,
-                f"{name}: given before, in {found[name].where}, expected once; remove one of them",
-            )
+            raise twice(file, points[keys].where, name, found[name].where)
         found[name] = points[keys]
     values = {leaf.keys: leaf.value for leaf in others}
     millimetres = length_name(facts.get("unit", "")) == "mm"
@@ -183,12 +179,7 @@ def _points(file: Path, tree: Sequence[Leaf]) -> tuple[dict[Keys, Hardpoint], li
                 place = place[:-1] if last in _LAST and len(place) > 1 else place
                 before = single.setdefault(place, {}).setdefault(axis, leaf)
                 if before is not leaf:
-                    raise fault(
-                        file,
-                        leaf.where,
-                        f"{'.'.join(place)} {axis}: given before, in {before.where}, expected once;"
-                        " remove one of them",
-                    )
+                    raise twice(file, leaf.where, f"{'.'.join(place)} {axis}", before.where)
                 continue
         others.append(leaf)
     for keys, found in single.items():
@@ -209,12 +200,7 @@ def _points(file: Path, tree: Sequence[Leaf]) -> tuple[dict[Keys, Hardpoint], li
 
 def _add(file: Path, points: dict[Keys, Hardpoint], keys: Keys, point: Hardpoint) -> None:
     if keys in points:
-        raise fault(
-            file,
-            point.where,
-            f"{'.'.join(keys)}: given before, in {points[keys].where}, expected once; remove one of"
-            " them",
-        )
+        raise twice(file, point.where, f"{'.'.join(keys)}", points[keys].where)
     points[keys] = point
 
 
