@@ -72,7 +72,12 @@ class PinocchioNewton:
         self.joints = {name: k for k, name in enumerate(self.model.names)}
         self.state = pin.neutral(self.model)
         hinges = [each for each in assembled.tree.chain if each.type in ("hinge", "slide")]
-        self.move({each.name: each.value for each in hinges if each.name in self.joints})
+        known = {each.name: each.value for each in hinges if each.name in self.joints}
+        for name, value in known.items():  # Newton's steps from zero might end elsewhere
+            joint = self.model.joints[self.joints[name]]
+            here = [value] if joint.nq == 1 else [np.cos(value), np.sin(value)]
+            self.state[joint.idx_q : joint.idx_q + joint.nq] = here
+        self.move(known)
 
     def move(self, targets: Mapping[str, float]) -> None:
         """Close all pairs with joints at given coordinates [rad or m]."""

@@ -32,8 +32,10 @@ from .naive import A
 SPAN, SAMPLES = 0.1, 9
 SUBSTEP = 0.02
 """Longest step between poses of the oracle, so that it stays on its branch [rad or m]."""
+CLOSED = 1e-9
+"""Residual of a closed oracle, unless the file's digits leave more [m or rad]."""
 COLUMNS = (
-    *("Model", "Freedoms", "Bodies, joints", "Closures", "Left out", "Samples"),
+    *("Model", "Freedoms", "Bodies, joints", "Closures", "Left out", "Solved, compared"),
     *("Largest difference [m]", "[rad]", "Residual"),
 )
 
@@ -97,14 +99,14 @@ def compared(file: Path, drive: str = "") -> Sequence[str]:
     mechanism = case.mechanism
     names = tuple(body.name for body in mechanism.moving)
     found = NativeSolver(order=0).prepare(mechanism, case.sweep.path, bodies=names)(1e-12)
-    differences = _differences(file, found, case, driving, assembled)
+    reached, differences = _differences(file, found, case, driving, assembled)
     left_out = re.sub(r"[a-z]+: [a-z]+ \(\d+\),? ?", "", case.source.split(LEFT_OUT)[1])
     return (
         str(dof),
         f"{len(mechanism.moving)}, {len(mechanism.joints)}",
         str(len(assembled.equalities)),
         left_out.strip(", ") or "nothing",
-        f"{int(found.solved.sum())} of {len(found.solved)}",
+        f"{int(found.solved.sum())}, {reached} of {SAMPLES}",
         *(f"{each:.0e}" for each in differences),
     )
 
@@ -140,29 +142,44 @@ def posed(file: Path, supplied: Supplied) -> tuple[Case, Driving, Assembled]:
 
 
 def _differences(file, found, case, driving, assembled):
-    """Return the largest differences [m] and [rad], and the oracle's residual."""
+    """Return the number of samples that both reach, the largest differences there [m, rad], and the
+    oracle's residual.
+    """
     oracle = _oracle(file, assembled, driving)
     ((swept, values),) = driving.driven.items()
     held = {name: assembled.tree.joints[name].value for name in driving.held}
     start, at = oracle.state, assembled.tree.joints[swept].value
-    far = turned = residual = 0.0
+    closed = max(CLOSED, 10.0 * assembled.digits.tolerance)
+    reached, worst = 0, np.zeros(3)
     for side in (1.0, -1.0):
         oracle.state, last = start, at
         for k in sorted(range(len(values)), key=lambda k: abs(values[k] - at)):
-            if (values[k] - at) * side < 0.0:
+            # the start itself belongs to one side
+            if (values[k] - at) * side < 0.0 or (values[k] == at and side < 0.0):
                 continue
             steps = int(np.ceil(abs(values[k] - last) / SUBSTEP)) + 1
             for value in np.linspace(last, values[k], steps):
                 oracle.move({**held, swept: value})
             last = values[k]
-            residual = max(residual, oracle.residual)
-            for name, motion in found.bodies.items() if found.solved[k] else ():
-                if name in assembled.tree.massless or (place := oracle.body(name)) is None:
-                    continue
-                turn = A(motion.p[k]) @ place[1].T - np.eye(3)
-                far = max(far, float(np.abs(motion.r[k] - place[0]).max()))
-                turned = max(turned, float(np.abs(turn).max()))
-    return far, turned, residual
+            if oracle.residual > closed:  # where the mechanism locks
+                break
+            if not found.solved[k]:
+                continue
+            reached += 1
+            worst = np.maximum(worst, [*_apart(found, k, oracle, assembled), oracle.residual])
+    return reached, worst
+
+
+def _apart(found, k, oracle, assembled):
+    """Return the largest distance of a sample's bodies [m], and the largest turn between them."""
+    far = turned = 0.0
+    for name, motion in found.bodies.items():
+        if name in assembled.tree.massless or (place := oracle.body(name)) is None:
+            continue
+        turn = A(motion.p[k]) @ place[1].T - np.eye(3)
+        far = max(far, float(np.abs(motion.r[k] - place[0]).max()))
+        turned = max(turned, float(np.abs(turn).max()))
+    return far, turned
 
 
 def _oracle(file, assembled, driving):
