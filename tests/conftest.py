@@ -17,6 +17,8 @@ from .support.fakes import Fake, crank
 # For the workers of pytest-xdist, which inherit it: two threads each on two processors wait for
 # each other, and a matrix of 150 rows takes ten times as long.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# Processes that tests start keep their bytecode, as those of users do: each would compile its own.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 os.environ.pop("COLUMNS", None)  # pytest-xdist sets it for its workers; logs have their own width
 
 NATIVE = Fake("native")
