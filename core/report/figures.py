@@ -81,7 +81,7 @@ def output_figure(
     truth: OutputSeries | None,
     band: tuple[OutputSeries, float] | None,
 ) -> Figure:
-    """All engines' positions against the driver, over the reference.
+    """Return all engines' positions against the driver, over the reference.
 
     Args:
         curves: the engines and their outputs; at least one.
@@ -190,7 +190,7 @@ def _flat_range(
 
 
 def band_is_thin(standard: OutputSeries, tolerance: float) -> bool:
-    """Whether the tolerance band would be hidden behind the line."""
+    """Return whether the tolerance band would be hidden behind the line."""
     known = [v for v in standard.position if v is not None]
     return not known or 2 * tolerance < THIN * (max(known) - min(known))
 
