@@ -101,7 +101,6 @@ IMPORTS = {
     "harness": (
         ". program/llvm joints mechanism kinematics case case/suspension case/measures case/io"
     ),
-    "harness/reporting": "",
     "harness/workers": ". harness",
     "history": ". case case/io harness",
     "history/regression": ". case case/io harness history",

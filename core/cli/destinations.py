@@ -54,7 +54,7 @@ class Destinations:
 
     @property
     def wanted(self) -> bool:
-        """Whether any destination is wanted."""
+        """Return whether any destination is wanted."""
         return any(getattr(self, each.name) is not None for each in fields(self))
 
     def problems(self, names: Sequence[str] = REPORT, history: Path | None = None) -> list[str]:

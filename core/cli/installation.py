@@ -109,7 +109,7 @@ class Examination(msgspec.Struct, frozen=True):
 
     @property
     def able(self) -> bool:
-        """Whether nothing essential is missing and the native engine passes the self-check."""
+        """Return whether nothing essential is missing and the self-check passes."""
         return self.check.outcome == Outcome.PASS and not any(
             part.essential and part.problem for part in self.parts
         )

@@ -49,8 +49,8 @@ class Evidence(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def sound(self) -> bool:
-        """Whether agreement with the reference can validate: its source is cited, and is outside
-        kincheck.
+        """Return whether agreement with the reference can validate: its source is cited, and is
+        outside kincheck.
         """
         return bool(self.citation and self.sha256) and not self.own
 

@@ -102,7 +102,7 @@ class Failure:
 
     @property
     def harmful(self) -> bool:
-        """Whether something broke; the process may then be in any state."""
+        """Return whether something broke; the process may then be in any state."""
         return self.outcome.bad
 
 

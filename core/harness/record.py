@@ -35,7 +35,7 @@ class Outcome(StrEnum):
 
     @property
     def bad(self) -> bool:
-        """Whether the pair ran and went wrong. A missing engine or feature is no fault."""
+        """Return whether the pair ran and went wrong. A missing engine or feature is no fault."""
         return self not in (
             Outcome.PASS,
             Outcome.UNJUDGED,
@@ -45,7 +45,7 @@ class Outcome(StrEnum):
 
     @property
     def judged(self) -> bool:
-        """Whether an answer was compared with a standard."""
+        """Return whether an answer was compared with a standard."""
         return self in (Outcome.PASS, Outcome.FAIL)
 
     @property
@@ -107,12 +107,12 @@ class Deviations(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def sound(self) -> bool:
-        """Whether nothing is out of tolerance, lost or contradicted."""
+        """Return whether nothing is out of tolerance, lost or contradicted."""
         return self.within and not self.lost and not self.contradicted
 
     @property
     def within(self) -> bool:
-        """Whether every compared quantity is within tolerance."""
+        """Return whether every compared quantity is within tolerance."""
         return all(each.within for _, each in self.items())
 
     def items(self) -> list[tuple[str, Deviation]]:
@@ -189,7 +189,7 @@ class Record(RecordTable, msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def validated(self) -> bool:
-        """Whether the pair passed and every output was judged against a cited reference from
+        """Return whether the pair passed and every output was judged against a cited reference from
         outside kincheck.
         """
         judged = [deviations.position for deviations in self.errors.values()]
@@ -204,7 +204,7 @@ class Record(RecordTable, msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def compared(self) -> bool:
-        """Whether any output was compared with a standard."""
+        """Return whether any output was compared with a standard."""
         return any(deviations.items() for deviations in self.errors.values())
 
 

@@ -88,7 +88,7 @@ class Drawing:
 
     @property
     def layers(self) -> list[str]:
-        """What can be switched on and off."""
+        """Return the names of the layers that the page switches on and off."""
         there = {"wheels": self.wheels, "forces": self.arrows}
         return ["names", "frames", "paths", *(name for name, each in there.items() if each)]
 
@@ -164,7 +164,7 @@ class _Draughtsman:
         return number, center, spin, wheel.up, wheel.radius
 
     def _from_design(self, frame: int) -> float:
-        """How far the bodies are from the design position [m + -], to compare frames by."""
+        """Return the distance of the bodies from the design position [m + -], to compare frames."""
         posed = [body for body in self.bodies if body.r]
         return sum(
             math.dist(each.r[frame], each.origin) + math.dist(each.p[frame], each.euler_parameters)
@@ -266,6 +266,6 @@ def _middle(points: Sequence[Vec3]) -> tuple[float, float, float]:
 
 
 def _in_body(body: SceneBody, a: Vec3) -> tuple[float, float, float]:
-    """A vector given globally at the design, in the body's frame."""
+    """Return a vector given globally at the design, in the body's frame."""
     x, y, z = a + rotation_less_identity(quat(body.euler_parameters).conjugate()) @ a
     return x, y, z

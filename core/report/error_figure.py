@@ -89,8 +89,8 @@ def error_figure(
 
 
 def log_axis(title: str, low: float, high: float) -> tuple[Figure, float]:
-    """A log axis for errors, and its lowest line: the floor, on which the page draws errors of
-    exactly zero.
+    """Return a log axis for errors, and its lowest line: the floor, on which the page draws errors
+    of exactly zero.
 
     Args:
         low, high: the smallest and the largest value, both above zero.

@@ -88,8 +88,8 @@ def trend_figures(history: Sequence[Past], styles: Mapping[str, Style]) -> dict[
 
 
 def ticked_axis(title: str, values: Sequence[float]) -> Figure:
-    """A log axis for values above zero, with ticks at 1, 2 and 5 of every decade; over many decades
-    at 1 alone.
+    """Return a log axis for values above zero, with ticks at 1, 2 and 5 of every decade; over many
+    decades at 1 alone.
     """
     span = max(values, default=1.0) / min(values, default=1.0)
     return {
@@ -148,8 +148,8 @@ def _floored(figure: Figure) -> Figure:
 
 
 def _styles(engines: Iterable[str], styles: Mapping[str, Style]) -> list[Style]:
-    """A style for each engine: the page's, or one after those for an engine the page's run did not
-    have.
+    """Return a style for each engine: the page's, or one after those for an engine missing from the
+    page's run.
     """
     drawn: list[Style] = []
     for name in dict.fromkeys(engines):

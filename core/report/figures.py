@@ -81,7 +81,7 @@ def output_figure(
     truth: OutputSeries | None,
     band: tuple[OutputSeries, float] | None,
 ) -> Figure:
-    """All engines' positions against the driver, over the reference.
+    """Return all engines' positions against the driver, over the reference.
 
     Args:
         curves: the engines and their outputs; at least one.
@@ -153,23 +153,25 @@ def output_figure(
         "hoverformat": ".9g",
         "zeroline": True,
     }
+    if band is not None:
+        value_axis |= _flat_range([series.position for _, series in curves], *band, scale)
+    return {"data": traces, "layout": layout_over(axis, value_axis)}
+
+
+def layout_over(axis: Axis, value_axis: Figure) -> Figure:
+    """Return the layout of curves over a driver; its axis is upright where `axis.up` says so."""
     moved_axis: Figure = {
         "title": {"text": axis.title},
         "hoverformat": ".6~g",
         "zeroline": True,
     } | ticks(axis)
-    if band is not None:
-        value_axis |= _flat_range([series.position for _, series in curves], *band, scale)
     if axis.up < 0:
         moved_axis["autorange"] = "reversed"
-    sides = (
-        {"xaxis": value_axis, "yaxis": moved_axis}
-        if axis.up
-        else {"xaxis": moved_axis, "yaxis": value_axis}
-    )
+    moved, value = ("y", "x") if axis.up else ("x", "y")
     return {
-        "data": traces,
-        "layout": {**sides, "hovermode": "y unified" if axis.up else "x unified"},
+        f"{moved}axis": moved_axis,
+        f"{value}axis": value_axis,
+        "hovermode": f"{moved} unified",
     }
 
 
@@ -188,7 +190,7 @@ def _flat_range(
 
 
 def band_is_thin(standard: OutputSeries, tolerance: float) -> bool:
-    """Whether the tolerance band would be hidden behind the line."""
+    """Return whether the tolerance band would be hidden behind the line."""
     known = [v for v in standard.position if v is not None]
     return not known or 2 * tolerance < THIN * (max(known) - min(known))
 

@@ -9,6 +9,7 @@ from ..harness.compare import describe
 from ..harness.labels import UNMADE, notes, suspects
 from ..harness.record import Deviations, Outcome, Record, Results
 
+COUNTS = {"tests": "testcase", "failures": "failure", "errors": "error", "skipped": "skipped"}
 FORBIDDEN = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """What XML 1.0 cannot hold, not even escaped; a simulator's message may."""
 
@@ -54,18 +55,18 @@ def to_junit(results: Results) -> bytes:
             ElementTree.SubElement(suite, "system-out").text = FORBIDDEN.sub(
                 "\ufffd", "\n".join(said)
             )
-        for count, tag in (
-            ("tests", "testcase"),
-            ("failures", "failure"),
-            ("errors", "error"),
-            ("skipped", "skipped"),
-        ):
-            suite.set(count, str(sum(1 for _ in suite.iter(tag))))
+        count_tests(suite)
     ElementTree.indent(root)
     for element in root.iter():
         for key, text in element.attrib.items():
             element.set(key, FORBIDDEN.sub("\ufffd", text))
     return ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
+
+
+def count_tests(suite: ElementTree.Element) -> None:
+    """Write the numbers of a suite's tests, failures, errors and skipped tests into it."""
+    for count, tag in COUNTS.items():
+        suite.set(count, str(sum(1 for _ in suite.iter(tag))))
 
 
 def _test(

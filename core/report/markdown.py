@@ -24,11 +24,11 @@ def escaped(text: str) -> str:
 
 
 def code(name: str) -> str:
-    """A name as code, in which nothing but a bar can be escaped."""
+    """Return a name as code, in which nothing but a bar can be escaped."""
     shown = visible(name).replace("`", "'").replace("|", "\\|")
     return f"`{shown}`"
 
 
 def row(cells: Iterable[str]) -> str:
-    """A row of a table."""
+    """Return a row of a table."""
     return f"| {' | '.join(cells)} |"

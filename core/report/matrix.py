@@ -117,7 +117,7 @@ def _laid_out(results: Results) -> tuple[list[str], dict[str, dict[str, Record]]
 
 
 def _reading(results: Results) -> str:
-    """How to read the cells."""
+    """Return a sentence on how to read the cells."""
     standards = sorted(
         {
             each.against

@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 
 from ..harness.record import Results
 from ..history.regression.findings import Finding, Kind, Regressions
-from .junit import FORBIDDEN, to_junit
+from .junit import FORBIDDEN, count_tests, to_junit
 
 
 def to_regression_junit(results: Results, found: Regressions) -> bytes:
@@ -35,13 +35,7 @@ def to_regression_junit(results: Results, found: Regressions) -> bytes:
             )
         _fail(tests[place, name], finding)
     for suite in suites.values():
-        for count, tag in (
-            ("tests", "testcase"),
-            ("failures", "failure"),
-            ("errors", "error"),
-            ("skipped", "skipped"),
-        ):
-            suite.set(count, str(sum(1 for _ in suite.iter(tag))))
+        count_tests(suite)
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
 

@@ -26,7 +26,7 @@ def trends(history: History) -> dict[str, list[Past]]:
 
 
 def run_name(row: RunRow) -> str:
-    """A run on an axis: its date, and its number, for there may be several a minute."""
+    """Return a run on an axis: its date, and its number, for there may be several a minute."""
     return f"{row.started[:16].replace('T', ' ')} #{row.id}"
 
 

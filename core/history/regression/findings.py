@@ -34,7 +34,7 @@ class Kind(StrEnum):
 
     @property
     def regression(self) -> bool:
-        """Whether a pair is worse than before."""
+        """Return whether a pair is worse than before."""
         return self in REGRESSIONS
 
 
@@ -233,8 +233,8 @@ class Regressions(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def regressed(self) -> bool:
-        """Whether a pair is worse than before or missing; without a run to compare with, whether
-        any pair is bad.
+        """Return whether a pair is worse than before or missing; without a run to compare with,
+        whether any pair is bad.
         """
         return bool(self.regressions) or (self.against is None and bool(self.failing))
 

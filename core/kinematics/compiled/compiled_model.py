@@ -68,11 +68,10 @@ def recent_model(mechanism: Mechanism, request: Request) -> Model:
     )
 
 
-class Model:
-    """The programs of a mechanism and the lanes they run on.
+class Model(Tracing):
+    """The traced programs of a mechanism, with the lanes that they run on.
 
     Attributes:
-        plan, vectors, state, prescribed, sampled, rows, blocks, selection, frame: see `Tracing`.
         programs, slots: of the plan.
         geometry: slots of all varied places.
         kept: number of rows kept of a sample.
@@ -81,13 +80,10 @@ class Model:
     """
 
     def __init__(self, mechanism: Mechanism, request: Request, tracing: Tracing) -> None:
-        self.mechanism, self.request, self.plan = mechanism, request, tracing.plan
-        self.selection, self.frame, self.blocks = tracing.selection, tracing.frame, tracing.blocks
+        super().__init__(**vars(tracing))
+        self.mechanism, self.request = mechanism, request
         self.programs, self.slots = self.plan.programs, self.plan.slots
-        self.vectors, self.sampled, self.rows = tracing.vectors, tracing.sampled, tracing.rows
-        self.state, self.prescribed = tracing.state, tracing.prescribed
-        self._geometry = tracing.geometry
-        self.geometry, self.kept = slots_of(self.vectors, self._geometry), len(self.plan.kept)
+        self.geometry, self.kept = slots_of(self.vectors, self.varied), len(self.plan.kept)
         compiled = self.request.compiled and available()
         self._code = LlvmCode(self.plan) if compiled else None
         self.bound = ThreadCache()
@@ -226,7 +222,7 @@ class Model:
         return (closure <= CLOSED) & (branch > 0.0)
 
     def _solve_design(self) -> Array:
-        geometry = np.array([number for value in self._geometry.values() for number in value])
+        geometry = np.array([number for value in self.varied.values() for number in value])
         found = self.standing(geometry[:, None])[:, 0]
         if np.isnan(found).any():
             closure = float(self.executor(1).get([self.slots["closure"]])[0, 0])

@@ -46,7 +46,7 @@ class Tracing:
         plan: the programs, the slots of a lane, and the loops over the programs.
         vectors: name of a vector -> its slots.
         state: name of a vector of the state -> its value at design.
-        geometry: name of a varied place -> its values at design.
+        varied: name of a varied place -> its values at design.
         prescribed: name of a vector of a prescribed body's motion -> its value at rest at design.
         sampled: slots with a given value at every sample: the time, and five numbers of each moving
             driver.
@@ -57,7 +57,7 @@ class Tracing:
     plan: Plan
     vectors: Mapping[str, Sequence[int]]
     state: Mapping[str, Sequence[float]]
-    geometry: Mapping[str, Sequence[float]]
+    varied: Mapping[str, Sequence[float]]
     prescribed: Mapping[str, Sequence[float]]
     sampled: Sequence[int]
     rows: Mapping[str, slice]

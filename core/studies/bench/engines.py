@@ -185,8 +185,8 @@ def _measure_work(
     add: Callable[[str, Sequence[Any]], object],
     begin: Callable[[str], Callable[[float], object]],
 ) -> None:
-    """A case's work and precision, its floors, and the native engine in detail: all in the same
-    rounds.
+    """Measure a case's work and precision, its floors, and the native engine in detail: all in the
+    same rounds.
     """
     entering: dict[tuple[str, str], Contestant] = {}
     for engine in engines:

@@ -78,7 +78,7 @@ def take_turns(
 
 
 def _calls(work: Work) -> int:
-    """How often to call it in a turn, warm."""
+    """Return the number of warm calls in a turn."""
     return max(1, math.ceil(TURN / warmed(work)))
 
 

@@ -159,7 +159,7 @@ def measure_sizes(engines: Sequence[Engine], tol: float, rounds: int) -> list[Si
 def _solved(
     family: str, engine: Engine, ladder: Sequence[int], tol: float
 ) -> Iterator[tuple[Size, Contestant | None]]:
-    """An engine's chains or rings, the shortest first, solved and not yet timed."""
+    """Return an engine's chains or rings, the shortest first, solved and not yet timed."""
     slow = ""
     for loops in ladder:
         case = chain(loops) if family == CHAIN else circle(loops)

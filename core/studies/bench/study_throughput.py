@@ -100,7 +100,7 @@ def _side_by_side(work: Callable[[], object], jobs: int) -> float:
 
 
 def _every_hardpoint(case: Case) -> Variation:
-    """All points and lengths by themselves, as in batches."""
+    """Return all points and lengths by themselves, as in batches."""
     known, scale = places(case.mechanism), SCATTER * size(case)
     varied = [name for name, kind in kinds(case.mechanism).items() if kind is not Kind.DIRECTION]
     coordinates = [

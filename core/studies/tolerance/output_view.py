@@ -31,7 +31,7 @@ class OutputView:
     limit: Capability | None
 
     def shown(self, value: float | None) -> str:
-        """A value in display units."""
+        """Return a value in display units."""
         return scaled_number(self.scale, value)
 
     @property

@@ -10,7 +10,7 @@ from typing import Any
 from ...harness.labels import notes, output_label, signs
 from ...harness.record import Outcome, Record
 from ...report.axis import Axis, driver_axis
-from ...report.figures import Figure
+from ...report.figures import Figure, layout_over
 from ...report.page_parts import environment, figure_parts
 from ...unit_text import with_unit
 from .histogram_figure import LIMIT, histogram_figure
@@ -203,18 +203,7 @@ def envelope_figure(view: OutputView, axis: Axis, *, about_nominal: bool) -> Fig
         output_label(view.name) + (" less nominal" if about_nominal else ""), view.unit
     )
     value_axis: Figure = {"title": {"text": what}, "hoverformat": ".5g"}
-    moved_axis: Figure = {"title": {"text": axis.title}, "hoverformat": ".6~g"}
-    if axis.up < 0:
-        moved_axis["autorange"] = "reversed"
-    sides = (
-        {"xaxis": value_axis, "yaxis": moved_axis}
-        if axis.up
-        else {"xaxis": moved_axis, "yaxis": value_axis}
-    )
-    return {
-        "data": traces,
-        "layout": {**sides, "hovermode": "y unified" if axis.up else "x unified"},
-    }
+    return {"data": traces, "layout": layout_over(axis, value_axis)}
 
 
 def tornado_figure(view: OutputView) -> Figure:

@@ -1,1 +1,0 @@
-"""Address of the report before version 0.2; `kincheck.core.report` has it now."""
