@@ -102,6 +102,7 @@ IMPORTS = {
         ". program/llvm joints mechanism kinematics case case/suspension case/measures case/io"
     ),
     "harness/workers": ". harness",
+    "harness/reporting": "",
     "history": ". case case/io harness",
     "history/regression": ". case case/io harness history",
     "report": ". joints mechanism case case/io harness history history/regression",

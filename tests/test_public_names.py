@@ -123,3 +123,13 @@ def test_type_checkers_see_no_function_for_any_name(path):
     """It would hide every misspelt name from them."""
     syntax = ast.parse((ROOT / path).read_text(encoding="utf-8"))
     assert "__getattr__" not in {getattr(node, "name", "") for node in syntax.body}
+
+
+def test_addresses_of_earlier_readmes_go_on_working():
+    """The README named them before version 0.2."""
+    from kincheck.core.harness import check_joint
+    from kincheck.core.harness.reporting.table import print_table
+    from kincheck.core.report import table
+
+    assert check_joint is kincheck.core.check_joint
+    assert print_table is table.print_table

@@ -1,8 +1,6 @@
-"""Mechanism: bodies, points, joints and drivers as data. Validation of names and shapes, no
-numerics.
+"""Mechanism: bodies, points, joints and drivers as data, names and shapes checked, no numerics.
 
-All points and axes are global coordinates at the design position, SI units, as in a table of
-hardpoints.
+All points and axes are global, at the design position, in SI units, as in a table of hardpoints.
 """
 
 from __future__ import annotations

@@ -20,8 +20,8 @@ from kincheck.core.report.matrix import print_matrix, to_markdown
 from kincheck.core.report.report import write_report
 from kincheck.core.report.table import print_table
 
+from ..studies.test_vary import HEAD
 from ..support.suspension_files import STRUT, TABLE, loaded, unreferenced
-from .test_vary import HEAD
 
 SIGNS = (
     "ISO 8855 (x forward, y left, z up); front right wheel; forward is [-1, 0, 0] and up [0, 0, 1]"
