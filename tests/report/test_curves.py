@@ -94,7 +94,7 @@ def test_the_page_offers_the_curves_of_each_case(made, tmp_path, monkeypatch):
     write_report(results, file := tmp_path / "page.html")
     page = file.read_text()
     found = offered(page)
-    assert 'data-curves="case-0" data-file="rssr.csv"' in page
+    assert 'data-curves="case-0" data-file="rssr.csv"' in " ".join(page.split())
     for anchor, record in zip(found, results.records, strict=True):
         assert {row["case"] for row in rows(found[anchor])} == {record.case}
         assert found[anchor] == curves.csv_of(results, record.case)

@@ -1,5 +1,5 @@
-"""Address of `print_table` that the README named before version 0.2; scripts that import it go on
-working. `kincheck.core.report.table` has it now.
+"""Old address of `print_table`, for scripts written after the README of versions before 0.2; see
+`kincheck.core.report.table`.
 """
 
 from importlib import import_module
