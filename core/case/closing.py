@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 
-from ..errors import CaseError
+from ..errors import MechanismError
 from ..joints import Joint
 from ..kinematics import NativeSolver, degrees_of_freedom, largest_residual, reduce_rows
 from .case import Case
@@ -24,7 +24,7 @@ def within_digits(case: Case, tolerance: float, why: str, carrying: Collection[s
         carrying: joints with all their rows, as long as others can close the loops.
 
     Raises:
-        CaseError: the rows are redundant at the start, but do not hold along the motion.
+        MechanismError: the rows are redundant at the start, but do not hold along the motion.
         SolveError: the mechanism does not close, or its drivers do not move it.
     """
     found = reduce_rows(case.mechanism, tolerance, carrying)
@@ -43,8 +43,8 @@ def within_digits(case: Case, tolerance: float, why: str, carrying: Collection[s
         return replace(less, assembly=(*case.assembly, note))
     if _driven(case):  # no digits: beside a singular pose
         return case
-    raise CaseError(
-        f"case {case.name!r}: rows of {names} are redundant at the start within {tolerance:.3g} m"
+    raise MechanismError(
+        f"rows of {names} are redundant at the start within {tolerance:.3g} m"
         f" ({why}), but along the motion they are off by up to {left:.3g} m, expected"
         f" {found.limit:.3g} m at most; start farther from a singular pose, or give"
         " another tolerance by --closure"

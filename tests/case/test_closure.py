@@ -132,5 +132,6 @@ def test_rows_that_do_not_hold_along_the_motion_are_no_digits(tmp_path):
     """A hinge that is tilted by a hundredth opens by as much as it turns."""
     file = four_bar(tmp_path, "[closure]\ntolerance = 2e-3\n")
     file.write_text(file.read_text().replace("[1e-06, 0.0, 1.0]", "[0.01, 0.0, 1.0]"))
-    with pytest.raises(CaseError, match=r"along the motion they are off by up to 0\.0"):
+    with pytest.raises(CaseError, match=r"along the motion they are off by up to 0\.0") as refused:
         load_case(file)
+    assert str(refused.value).startswith(f"{file}: closure: rows of ")

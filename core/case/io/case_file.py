@@ -83,7 +83,8 @@ def load_case(path: str | Path, closure: float | None = None) -> Case:
     case = _with_outputs(
         file, keys, replace(case, length_unit=length.name, angle_unit=angle.name), length, by_unit
     )
-    case = _within_digits(case, typed(file, "closure", keys.closure, ClosureKeys), closure)
+    with explained(file, "closure", length):
+        case = _within_digits(case, typed(file, "closure", keys.closure, ClosureKeys), closure)
     if columns is None:
         return case
     if keys.truth in (None, Truth.CONSENSUS_ONLY):

@@ -160,7 +160,8 @@ def _case(
     case = Case(file.stem, source, Truth.CONSENSUS_ONLY, mechanism, sweep, (), assembly=model.notes)
     dof = degrees_of_freedom(mechanism)
     if dof != len(drivers) or not model.exact:
-        case = within_digits(case, digits.tolerance, digits.why, [*tree.joints])
+        with explained(file):
+            case = within_digits(case, digits.tolerance, digits.why, [*tree.joints])
         dof = degrees_of_freedom(case.mechanism)
     if dof != len(drivers):
         raise fault(
