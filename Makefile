@@ -11,14 +11,11 @@ UV := $(shell command -v uv 2>/dev/null)
 run: .venv/ready
 	$(BIN)/kincheck run mcpherson_strut --out report
 
-# Named plugins: of those that pytest finds by itself it rewrites all modules, in each process. Here those are all of kincheck.
-PLUGINS := --disable-plugin-autoload -p xdist.plugin -p _hypothesis_pytestplugin -p kincheck.core.cli.pytest_plugin
-
 test: .venv/ready
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright
-	$(BIN)/pytest $(PLUGINS) --numprocesses auto --dist worksteal
+	$(BIN)/pytest --numprocesses auto --dist worksteal
 
 # Pages, figures and reference pages; a warning is an error.
 docs: .venv/docs
