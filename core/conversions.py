@@ -76,7 +76,7 @@ def to_figure(data: Dataset, names: Sequence[str], title: str) -> Any:
     x = data.coords[data.x]
     for each, name in zip(axes, shown, strict=True):
         for column, values in curves[name].items():
-            across = values.reshape(len(values), -1)
+            across = values.reshape(len(values), math.prod(values.shape[1:]))
             lines = each.plot(x.values, across, label=column.removeprefix(f"{name}."))
             for line in lines[1:]:  # one colour and one entry in the legend for all of a column
                 line.set(color=lines[0].get_color(), label=None)

@@ -71,6 +71,21 @@ class SolveError(KincheckError, RuntimeError):
         self.kind = kind
 
 
+def with_article(noun: str) -> str:
+    """Return a noun with its indefinite article: a joint, an output, a universal joint."""
+    vowel = noun[:1].lower() in {*"aeiou"} and not noun.lower().startswith("uni")
+    return f"{'an' if vowel else 'a'} {noun}"
+
+
+def number_of(count: int, one: str, several: str = "") -> str:
+    """Return a number of things: 1 case, 2 cases.
+
+    Args:
+        several: the plural, by default with an s.
+    """
+    return f"{count} {one if count == 1 else several or f'{one}s'}"
+
+
 def unknown(what: str, name: str, known: Iterable[str]) -> str:
     """Return the message for an unknown name of a kind, with a remedy."""
     return f"there is no {what} {name!r}; {remedy(name, known)}"

@@ -9,6 +9,8 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from .errors import number_of
+
 Array: TypeAlias = NDArray[np.float64]
 
 # The null space of redundant rows is orthonormal to round-off over the smallest singular value,
@@ -104,6 +106,7 @@ def no_forces_at(times: Array) -> str:
     if not times.size:
         return ""
     return (
-        f"no forces at {times.size} samples, the first at time {float(times[0]):.9g}: the pose is"
-        " singular, and rigid bodies determine no finite force there; leave these samples out"
+        f"no forces at {number_of(times.size, 'sample')}, the first at time"
+        f" {float(times[0]):.9g}: the pose is singular, and rigid bodies determine no finite force"
+        " there; leave these samples out"
     )

@@ -9,7 +9,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from .errors import MechanismError, SolveError, unknown
+from .errors import MechanismError, SolveError, brief, unknown, with_article
 from .failures import FailureKind
 from .trajectory import Array
 
@@ -88,6 +88,15 @@ def held(who: str, value: Any, count: int | None, expected: str) -> tuple[Any, .
     if found is None or count not in (None, len(found)) or isinstance(value, str):
         raise MechanismError(f"{who} is {value!r}, expected {expected}")
     return found
+
+
+def require_kind(who: str, what: str, given: Any, kind: type) -> None:
+    """Raise SolveError unless an argument is of a class."""
+    if not isinstance(given, kind):
+        raise SolveError(
+            f"{who}: {what} is {brief(repr(given))}, expected {with_article(kind.__name__)}; check"
+            " the order of the arguments"
+        )
 
 
 def require_positive(who: str, what: str, number: Any) -> None:

@@ -71,7 +71,7 @@ def _diagram(label: str, below: str, x: NDArray[Any], columns: Mapping[str, NDAr
     lines = [
         (name, line)
         for name, values in columns.items()
-        for line in values.reshape(len(values), -1).T
+        for line in values.reshape(len(values), math.prod(values.shape[1:])).T
     ]
     drawn = lines[:MOST_LINES]
     every = np.array([line for _, line in drawn])

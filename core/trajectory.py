@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from .dataset import Dataset, Variable
 from .driving import Driving, in_words
+from .errors import number_of
 from .failures import FailureKind
 from .forces import Forces
 from .tabular import Tabular
@@ -170,7 +171,8 @@ class Trajectory(Tabular):
     def summary(self) -> str:
         """Return the driver's range, the samples and points, and why samples are missing."""
         count, reached = len(self.solved), int(self.solved.sum())
-        samples = f"{count} samples" if reached == count else f"{reached} of {count} samples"
+        samples = number_of(count, "sample")
+        samples = samples if reached == count else f"{reached} of {samples}"
         points = f"points {', '.join(shown(self.points)) or 'none'}"
         found = [in_words(self.drive), samples, points, f"residual {self.residual:.1e}"]
         return ", ".join(filter(None, [*found, self.message]))

@@ -97,7 +97,7 @@ IMPORTS = {
     ),
     "case/models/mjcf": ". joints mechanism kinematics case case/io",
     "case/models/robots": ". joints mechanism case/io case/models/mjcf",
-    "case/models": "case case/io case/models/hardpoints case/models/mjcf case/models/robots",
+    "case/models": ". case case/io case/models/hardpoints case/models/mjcf case/models/robots",
     "harness": (
         ". program/llvm joints mechanism kinematics case case/suspension case/measures case/io"
     ),

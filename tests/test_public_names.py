@@ -133,3 +133,30 @@ def test_addresses_of_earlier_readmes_go_on_working():
 
     assert check_joint is kincheck.core.check_joint
     assert print_table is table.print_table
+
+
+@pytest.mark.parametrize("given", [None, "four_bar", kincheck.Mechanism])
+@pytest.mark.parametrize(
+    "function",
+    [
+        lambda given: kincheck.solve(given, "crank", [0.1]),
+        lambda given: kincheck.solve_designs(given, "crank", [0.1], {}),
+        lambda given: kincheck.trace(given, "crank"),
+        lambda given: kincheck.assemble(given, {}),
+        lambda given: kincheck.find_assemblies(given, {}),
+    ],
+    ids=["solve", "solve_designs", "trace", "assemble", "find_assemblies"],
+)
+def test_another_thing_than_a_mechanism_is_told(function, given, request):
+    with pytest.raises(kincheck.SolveError, match=r"mechanism is .*, expected a Mechanism") as told:
+        function(given)
+    assert str(told.value).startswith(request.node.callspec.id.split("-")[0])
+
+
+@pytest.mark.parametrize("given", [None, 3])
+def test_another_thing_than_a_class_or_an_engine_is_told(given):
+    with pytest.raises(kincheck.KincheckError, match=f"joint_class is {given}, expected a class"):
+        kincheck.check_joint(given)
+    for function in (kincheck.check_engine, lambda engine: kincheck.run("rssr", [engine])):
+        with pytest.raises(kincheck.KincheckError, match=f"{given} is no engine: name, mode, loop"):
+            function(given)

@@ -199,3 +199,14 @@ def test_nothing_solved_is_shown_too():
     assert found.to_dict()["data_vars"]["y"]["data"] == [None] * 3
     pytest.importorskip("matplotlib")
     assert to_figure(found.data, (), "").axes
+
+
+def test_a_motion_without_samples_tells_itself():
+    motion = kincheck.solve(rssr(), "turn", [])
+    assert "0 samples" in repr(motion)
+    assert "<table>" in motion._repr_html_()
+
+
+def test_one_is_counted_in_the_singular(results):
+    assert repr(results["Results"]) == "<Results: 1 case, 1 engine, 1 pass>"
+    assert ", 1 sample, " in repr(kincheck.solve(rssr(), "turn", [0.0]))

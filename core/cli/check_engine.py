@@ -7,6 +7,7 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from ..errors import KincheckError
+from .engine_loading import made
 from .registry import House, Status
 from .run_options import TOL
 from .verbosity import add_verbosity
@@ -55,14 +56,18 @@ def examined(engine: str | Engine, house: House) -> Report:
     """Return the report on an engine, or on the engine of a name or at MODULE:CLASS.
 
     Raises:
-        KincheckError: there is no such engine.
+        KincheckError: there is no such engine, or a member of the engine protocol is missing.
     """
     from ..harness.standard import STANDARD
     from ..report.progress import progress
     from ..studies.engine_check.check_engine import check_engine
 
     problems = list[str]()
-    found = house.find_engines([engine], problems) if isinstance(engine, str) else [engine]
+    found = (
+        house.find_engines([engine], problems)
+        if isinstance(engine, str)
+        else [made(repr(engine), engine)]
+    )
     if problems:
         raise KincheckError("\n".join(problems))
     cases = {word: house.case(name) for word, name in TOPOLOGIES.items()}

@@ -86,6 +86,7 @@ def _report(options: argparse.Namespace, house: House) -> int:
     from ..history.store import Store
     from ..report.regression_report import regressions
     from ..report.regression_summary import to_markdown
+    from ..report.regression_text import print_regressions
     from .destinations import Destinations
 
     if problems := Destinations.of(options).problems(OUT, options.history):
@@ -101,12 +102,13 @@ def _report(options: argparse.Namespace, house: House) -> int:
         found = regressions(
             subject, against, reason, store, missing_is_failure=options.missing_is_failure
         )
-        text = to_markdown(found)
-        print(
-            text.partition("\n")[0].removeprefix("## ") + "\n" if options.quiet else text,
-            end="",
-            file=sys.stderr if options.json == "-" else sys.stdout,
-        )
+        file = sys.stderr if options.json == "-" else sys.stdout
+        if file.isatty() and not options.quiet:
+            print_regressions(found, file)
+        else:
+            text = to_markdown(found)
+            headline = text.partition("\n")[0].removeprefix("## ") + "\n"
+            print(headline if options.quiet else text, end="", file=file)
         _write(options, subject, found, store, problems)
         problems += store.damage if store is not None else []
     complain(problems)

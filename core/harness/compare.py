@@ -34,11 +34,12 @@ from ..algebra import Vec3
 from ..case.case import HELD_BUT, ORDERS, Case, Quantity, Series, pace
 from ..case.measures import ForceMeasure
 from ..case.measures.turns import counted
-from ..errors import CaseError
+from ..errors import CaseError, number_of
 from ..jet import Jet
 from ..mechanism.mechanism import Vector
 from ..trajectory import PER_TIME, QUANTITIES, Array, PointMotion, Trajectory
 from ..unit_text import motion_word, value_text
+from . import labels
 from .record import Deviation, Deviations, OutputSeries
 
 NO_VALUE = "has no value at"
@@ -171,39 +172,41 @@ def deviations(
             for name, series in standards
             if getattr(series, quantity) is not None
         ]
-        compared[quantity] = None
+        compared[quantity], word = None, motion_word(quantity, output.unit)
         if order and force:
             continue  # forces have no rates
         if order >= output.orders:
-            reasons.append(f"{quantity}: takes a derivative more than engines give")
+            reasons.append(f"{word}: takes a derivative more than engines give")
         elif values is None:
-            reasons.append(f"{quantity}: the engine gives none")
+            reasons.append(f"{word}: the engine gives none")
         elif not known:
-            names = " and ".join(name for name, _ in standards)
+            names = " and ".join(labels.against(name) for name, _ in standards)
             reasons.append(
-                f"{quantity}: {names} gives none"
+                f"{word}: {names} gives none"
                 if names
-                else f"{quantity}: there is nothing to compare with"
+                else f"{word}: there is nothing to compare with"
             )
         else:
             name, reference, uncertainty = known[0]
+            shown = labels.against(name)
             compared[quantity] = off = deviation(
                 values, reference, output.atol * beat**order, output.rtol, name, uncertainty
             )
             lost = int((np.isfinite(reference) & ~np.isfinite(values)).sum()) if complete else 0
+            many = number_of(lost, "sample")
             if lost and (order or found.possible):
                 compared[quantity] = off and msgspec.structs.replace(off, within=False)
-                reasons.append(f"{quantity}: {lost} samples without a value where {name} has one")
+                reasons.append(f"{word}: {many} without a value where {shown} has one")
                 losses += lost
             elif not (order or found.possible):
                 inputs = "forces" if force else "velocities to make it of"
-                reasons.append(f"{quantity}: the engine gives no {inputs}")
+                reasons.append(f"{word}: the engine gives no {inputs}")
             elif off is None:
-                none = f"{quantity}: no sample is known to both the engine and {name}"
+                none = f"{word}: no sample is known to both the engine and {shown}"
                 reasons.append(found.reason or none)
             alone = np.isfinite(values) & ~np.isfinite(reference) & ~unreached
             if off is not None and (count := int(alone.sum())):
-                reasons.append(f"{quantity}: {name} {NO_VALUE} {count} of {len(values)} samples")
+                reasons.append(f"{word}: {shown} {NO_VALUE} {count} of {len(values)} samples")
     contradicted = int((unreached & np.isfinite(found.position)).sum())
     if contradicted:
         reasons.append(
@@ -240,8 +243,8 @@ def deviation(
     """
     if values.shape != reference.shape:
         raise CaseError(
-            f"{against} has shape {reference.shape}, expected {values.shape}: one number for each"
-            " sample of the sweep"
+            f"{labels.against(against)} has shape {reference.shape}, expected {values.shape}: one"
+            " number for each sample of the sweep"
         )
     both = np.isfinite(values) & np.isfinite(reference)
     if not both.any():
@@ -280,13 +283,13 @@ def describe(
     Args:
         unit: unit of the output.
     """
-    word = motion_word(quantity, unit)
+    word, standard = motion_word(quantity, unit), labels.against(worst.against)
     if worst.max_abs <= worst.tolerance:
-        return f"{output}: {word} has no value at samples where {worst.against} has one"
+        return f"{output}: {word} has no value at samples where {standard} has one"
     unit += PER_TIME[QUANTITIES.index(quantity)]
     off, tolerance = (value_text(f"{size:.3g}", unit) for size in (worst.max_abs, worst.tolerance))
     return (
         f"{output}: {word} is off by {off} at sample {worst.worst_step}"
         f" ({driver} = {values[worst.worst_step]:.9g}), tolerance {tolerance},"
-        f" against {worst.against}"
+        f" against {standard}"
     )

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
 from ..case.case import PER_TRAVEL, Truth
+from ..errors import number_of
 from ..trajectory import PER_TIME, QUANTITIES
 from ..unit_text import unit_text
 from .record import Outcome, Record, Results
@@ -84,7 +85,7 @@ def unread(run: Mapping[str, Any]) -> str:
 
 def unread_count(count: int) -> str:
     """Return the phrase for a number of unreadable cases."""
-    return f"{count} {'case' if count == 1 else 'cases'} could not be read"
+    return f"{number_of(count, 'case')} could not be read"
 
 
 def motion_unit(unit: str, motion: str) -> str:

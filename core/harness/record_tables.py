@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..dataset import Dataset, Variable
+from ..errors import number_of
 from ..tabular import Tabular
 from ..trajectory import PER_TIME, QUANTITIES
 
@@ -59,7 +60,8 @@ class ResultsTable(Tabular):
         engines = {each.engine for each in self.records}
         counts = Counter(each.outcome.shown for each in self.records)
         outcomes = [f"{count} {name}" for name, count in counts.items()]
-        return ", ".join([f"{len(cases)} cases", f"{len(engines)} engines", *outcomes])
+        whole = [number_of(len(cases), "case"), number_of(len(engines), "engine")]
+        return ", ".join([*whole, *outcomes])
 
     def dataset(self) -> Dataset:
         """Return outcome, errors and time of every record. An error is the largest ratio of an

@@ -11,7 +11,7 @@ from ..case.case import TIME, Case
 from ..case.units import ANGLES, LENGTHS, SECOND, Unit
 from ..errors import shortened
 from ..trajectory import PER_TIME, QUANTITIES, Array
-from ..unit_text import value_text
+from ..unit_text import motion_word, value_text
 from .compare import deviation, pace
 from .evidence import Explanation, Suspect
 from .record import Deviation, Deviations, OutputSeries, Record
@@ -98,7 +98,7 @@ def _difference(case: Case, worst: _Off) -> str:
     )
     off = value_text(_number(worst.deviation.max_abs), worst.held.unit)
     tolerance = value_text(_number(worst.deviation.tolerance), worst.held.unit)
-    held = f"{QUANTITIES[worst.order]}, tolerance {tolerance}"
+    held = f"{motion_word(QUANTITIES[worst.order], worst.held.unit)}, tolerance {tolerance}"
     return f"the reference differs by {off} at {at} of output {worst.output} ({held})"
 
 

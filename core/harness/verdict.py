@@ -16,6 +16,7 @@ from ..unit_text import value_text
 from .compare import NO_VALUE, describe, deviations
 from .engine import Engine, bounds_error
 from .execution import Answer
+from .labels import against
 from .record import Deviation, Deviations, Outcome
 from .standard import STANDARD, Standard, known
 
@@ -147,7 +148,7 @@ def _reached_elsewhere(case: Case, answer: Answer, native: Standard) -> str:
         (STANDARD, native.outputs.values()),
     ):
         if count := int((unsolved & known(series, samples)).sum()):
-            return f"; {name} has values at {count} of the others"
+            return f"; {against(name)} has values at {count} of the others"
     return ""
 
 

@@ -8,6 +8,7 @@ from kincheck.core import KincheckError
 from kincheck.core.case.case import Case
 from kincheck.core.case.io.reader_options import NOTHING, Supplied
 from kincheck.core.cli.check_engine import examined
+from kincheck.core.cli.engine_loading import made
 from kincheck.core.cli.main import house
 from kincheck.core.cli.run_options import TOL
 from kincheck.core.harness import run as running
@@ -54,7 +55,8 @@ def run(
             and 0 if every engine may run in this process.
 
     Raises:
-        KincheckError: a case cannot be read, or there is no engine of a name.
+        KincheckError: a case cannot be read, there is no engine of a name, or a member of the
+            engine protocol is missing.
     """
     known, problems = house(), list[str]()
     named = known.cases() if cases is None else _several(cases)
@@ -62,7 +64,11 @@ def run(
     every = known.simulations if mode == "simulate" else known.engines
     team = list[Engine]()
     for each in every if engines is None else _several(engines):
-        team += known.find_engines([each], problems, mode) if isinstance(each, str) else [each]
+        team += (
+            known.find_engines([each], problems, mode)
+            if isinstance(each, str)
+            else [made(repr(each), each)]
+        )
     if problems:
         raise KincheckError("\n".join(problems))
     solver, _ = solver_for(team, jobs)

@@ -16,7 +16,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SolveError
+from ..errors import SolveError, number_of
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.motions import Path
 from ..program import ITERATIONS, Executor
@@ -130,8 +130,8 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
         kept[:, doubted, k], solved[doubted, k] = np.nan, False
         near = route.path.where(float(route.path.times[route.by_time][doubted.argmax()]))
         refused = (
-            f"refused at {doubted.sum()} samples so near a singular pose that residuals leave them"
-            f" uncertain, as at {near}; "
+            f"refused at {number_of(doubted.sum(), 'sample')} so near a singular pose that"
+            f" residuals leave them uncertain, as at {near}; "
         )
         messages[k] = "; ".join(
             filter(

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..dataset import Dataset, Variable
 from ..driving import Driving, in_words
-from ..errors import SolveError
+from ..errors import SolveError, number_of
 from ..input_checks import no_such, real
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.motions import Motion
@@ -50,8 +50,12 @@ class Designs(Tabular):
     def summary(self) -> str:
         """Return the driver's range, the designs, the samples and points."""
         count, samples = self.solved.shape
-        designs = f"{count} designs of {samples} samples"
-        missing = f"{len(self.messages)} designs miss samples" if self.messages else ""
+        designs = f"{number_of(count, 'design')} of {number_of(samples, 'sample')}"
+        missing = (
+            f"{number_of(len(self.messages), 'design')} with missing samples"
+            if self.messages
+            else ""
+        )
         points = f"points {', '.join(self.points) or 'none'}"
         return ", ".join(filter(None, [in_words(self.drive), designs, points, missing]))
 

@@ -61,7 +61,7 @@ def in_doubt(x: Array, v: Array, times: Array) -> bool:
     Args:
         x, v: angle with its turns [rad] and its rate, samples along the first axis; NaN if unknown.
     """
-    known = np.isfinite(x).reshape(len(x), -1).any(axis=1)
+    known = np.isfinite(x).any(axis=tuple(range(1, x.ndim)))
     order = np.flatnonzero(known)[np.argsort(times[known], kind="stable")]
     t, x, v = times[order].reshape(-1, *(1,) * (x.ndim - 1)), x[order], v[order]
     # nothing contradicts what is unknown

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..driving import Driving
 from ..errors import SolveError
-from ..input_checks import finite, names_of, no_such, real
+from ..input_checks import finite, names_of, no_such, real, require_kind
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.motions import Motion, Path, Ramp, as_changes
 from ..trajectory import Array, Trajectory
@@ -123,6 +123,7 @@ def asked(
     Raises:
         SolveError: an argument makes no sense; the message begins with the caller's name.
     """
+    require_kind(who, "mechanism", mechanism, Mechanism)
     wanted = (
         tuple(point.name for point in mechanism.points)
         if points is None

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
-from ..errors import MechanismError, Phrase, unknown
+from ..errors import MechanismError, Phrase, unknown, with_article
 from ..input_checks import held, require_finite, triple
 from ..joints.base import Joint, Kind, unit
 from ..joints.coupler import Coupler
@@ -82,13 +82,12 @@ class Mechanism:
         if self.grounded:
             object.__setattr__(self, "joints", (*self.joints, *self.grounded))
         for what, kind in KINDS.items():
-            who = f"mechanism {self.name!r}: {what}"
-            members = held(who, getattr(self, what), None, f"a list, each a {kind.__name__}")
+            who, one = f"mechanism {self.name!r}: {what}", with_article(kind.__name__)
+            members = held(who, getattr(self, what), None, f"a list, each {one}")
             for each in members:
                 if not isinstance(each, kind):
                     raise MechanismError(
-                        f"{who} has {each!r}, expected a {kind.__name__}; check the order of the"
-                        " arguments"
+                        f"{who} has {each!r}, expected {one}; check the order of the arguments"
                     )
             object.__setattr__(self, what, members)
             _unique(what, [each.name for each in getattr(self, what)])

@@ -244,7 +244,8 @@ class Path:
 
     def values(self, t: Array) -> Array:
         """Return the moving drivers' values from the design at times t, shape (drivers, n)."""
-        return np.array([motion.at(t)[0] for motion in self.motions.values()]).reshape(-1, len(t))
+        found = np.array([motion.at(t)[0] for motion in self.motions.values()])
+        return found.reshape(len(self.motions), len(t))
 
     def covers(self, t: float) -> bool:
         """Return whether all motions include time t, up to its rounding."""

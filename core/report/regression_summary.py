@@ -8,6 +8,7 @@ from collections.abc import Iterator
 
 from markupsafe import Markup
 
+from ..errors import number_of
 from ..harness.labels import product
 from ..history.regression.findings import WHY, Kind, Regressions, Step
 from .markdown import escaped, row
@@ -83,10 +84,8 @@ def _lines(found: Regressions) -> Iterator[str]:
         yield ""
     if found.loose:
         lines = loose_says(found.loose)
-        yield from (
-            f"<details><summary>Tolerances that could be tightened ({len(lines)} cases)</summary>",
-            "",
-        )
+        title = f"Tolerances that could be tightened ({number_of(len(lines), 'case')})"
+        yield from (f"<details><summary>{title}</summary>", "")
         yield from (f"- {escaped(line)}" for line in lines)
         yield from ("", "</details>", "")
 

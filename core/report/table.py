@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from itertools import groupby
 from typing import Any, TextIO
 
@@ -15,6 +15,7 @@ from ..case.io.escape import visible
 from ..harness.labels import against, motion_unit, notes, signs, suspects, unread, unsound
 from ..harness.record import Deviation, Outcome, Record, Results
 from ..trajectory import QUANTITIES
+from ..unit_text import motion_word
 from . import terminal
 
 COLOURS = {
@@ -30,7 +31,6 @@ HEADS = (
     *(f">error\n{motion_unit(LENGTH, quantity)}" for quantity in QUANTITIES),
     ">us/step",
 )
-OUTPUT_HEADS = ("output", *(f">{quantity}" for quantity in QUANTITIES), "unit")
 
 
 def print_table(results: Results, file: TextIO) -> None:
@@ -64,14 +64,15 @@ def print_outputs(results: Results, file: TextIO) -> None:
         for record in results.records
         for name in record.errors
     ]
-    table = terminal.columns("case", "engine", *OUTPUT_HEADS)
+    heads = _output_heads({cells[-1].plain for _, cells in rows})
+    table = terminal.columns("case", "engine", *heads)
     for names, cells in rows:
         table.add_row(*(Text(visible(each)) for each in names), *cells)
     if table.natural_width(console, console.options) <= console.width:
         console.print(table)
     else:
         titled = [(" · ".join(names), "", cells) for names, cells in rows]
-        _print_below_titles(titled, OUTPUT_HEADS, console)
+        _print_below_titles(titled, heads, console)
     for record in results.records:
         for reason, outputs in _missing(record).items():
             line = f"–: {record.case} · {record.engine}: {', '.join(outputs)}: {reason}"
@@ -79,8 +80,17 @@ def print_outputs(results: Results, file: TextIO) -> None:
     print_table(results, file)
 
 
+def _output_heads(units: Collection[str]) -> tuple[str, ...]:
+    """Return the heads of the table of outputs in these units; among forces, which have no
+    position, the first number of every output is its value.
+    """
+    words = {motion_word(QUANTITIES[0], unit) for unit in units} or {QUANTITIES[0]}
+    first = words.pop() if len(words) == 1 else "value"
+    return ("output", *(f">{head}" for head in (first, *QUANTITIES[1:])), "unit")
+
+
 def _of_output(record: Record, name: str) -> tuple[Text, ...]:
-    """Return the cells of `OUTPUT_HEADS`."""
+    """Return the cells of `_output_heads`."""
     errors = record.errors[name]
     unit = record.outputs[name].unit if name in record.outputs else LENGTH
     cells = (_of_tolerance(getattr(errors, quantity)) for quantity in QUANTITIES)

@@ -21,6 +21,10 @@ BROKEN = {
         ("atol = 1e-9", "atol = 1e-9\nqqq = 1"),
         ["outputs.tip_x.qqq", "unknown key", "remove it"],
     ),
+    "unknown output": (
+        ("[outputs.tip_x]\n", '[outputs.tip_x]\ntype = "cambr"\n'),
+        ["outputs.tip_x.type", "'cambr', expected an output type; did you mean 'camber'?"],
+    ),
     "wrong schema": (
         ("kincheck-case/1", "kincheck-case/9"),
         ["schema", "kincheck-case/9", 'expected "kincheck-case/1"'],

@@ -125,7 +125,7 @@ def test_a_shorter_reference_is_compared_where_it_is(tmp_path):
     assert case.origin.grid == "rows for 8 of 21 samples"
     record = judged(case)
     assert record.outcome is Outcome.PASS
-    assert "third_party_data has no value at 13 of 21 samples" in record.message
+    assert "third-party data has no value at 13 of 21 samples" in record.message
     wrong = curve(np.linspace(-1.0, 1.0, 21)[3:18:2])
     wrong[2] = (wrong[2][0], wrong[2][1] + 1e-3, wrong[2][2])
     failed = judged(case_of(tmp_path, wrong, form="{:.17g}"))

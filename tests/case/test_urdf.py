@@ -1,6 +1,7 @@
 """URDF with loops: links stand and move as Pinocchio, which reads the file itself, says they do."""
 
 import json
+import math
 from pathlib import Path
 
 import numpy as np
@@ -334,3 +335,27 @@ def test_entities_are_refused(tmp_path: Path):
     file = robot(tmp_path, '<!DOCTYPE r [<!ENTITY a "b">]>' + FOUR_BAR)
     with pytest.raises(CaseError, match="found <!DOCTYPE>, expected none"):
         load(file, DRIVE)
+
+
+AXES = ["3 4 0", "0.33 0 0.9439809320108114", "0 -0.6 0.8", "1e100 0 0", "2 3 6"]
+
+
+@pytest.mark.parametrize("axis", AXES)
+def test_an_axis_is_divided_by_its_length_once_or_kept(axis: str, tmp_path: Path):
+    numbers = [float(each) for each in axis.split()]
+    length = math.hypot(*numbers)
+    unit = abs(length - 1.0) < 1e-15
+    expected = tuple(numbers if unit else [each / length for each in numbers])
+    text = (
+        '<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="revolute">'
+        f'<parent link="a"/><child link="b"/><axis xyz="{axis}"/></joint></robot>'
+    )
+    case = load(robot(tmp_path, text), Supplied(drive=("j:0:1",)))
+    assert case.mechanism.joint("j").axis == expected
+    file = tmp_path / "model.xml"
+    file.write_text(
+        '<mujoco><worldbody><body name="b"><geom size="0.1"/>'
+        f'<joint name="j" axis="{axis}"/></body></worldbody></mujoco>'
+    )
+    case = load(file, Supplied(drive=("j:0:1",)))
+    assert case.mechanism.joint("j").axis == expected

@@ -58,6 +58,7 @@ def test_quiet_and_verbose(kincheck_main, capsys):
     assert kincheck_main("run", "crank", "-v", engines=[RIGHT]) == 0
     out = capsys.readouterr().out
     assert re.search(r"crank +native +x +\S+ of \S+ +\S+ of", out)
+    assert re.search(r"^case +engine +output +position +velocity", out, re.MULTILINE)
     assert kincheck_main("list", "-q", engines=[RIGHT]) == 0
     assert capsys.readouterr().out.split() == ["crank", "crank_two", "native"]
 

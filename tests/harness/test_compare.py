@@ -97,7 +97,7 @@ def test_only_samples_both_have_are_compared():
 
 
 def test_a_reference_of_another_length_is_refused_not_broadcast():
-    with pytest.raises(CaseError, match=r"closed_form has shape \(1,\), expected \(4,\)"):
+    with pytest.raises(CaseError, match=r"closed form has shape \(1,\), expected \(4,\)"):
         deviation(REFERENCE, np.zeros(1), 1e-9, 0.0, "closed_form")
 
 
@@ -171,7 +171,7 @@ def test_each_quantity_takes_the_first_standard_that_has_it():
         ("acceleration", "native"),
     ]
     alone = deviations(case, case.outputs[0], case.reference["x"], [("closed_form", positions)])
-    assert alone.reason == "velocity: closed_form gives none; acceleration: closed_form gives none"
+    assert alone.reason == "velocity: closed form gives none; acceleration: closed form gives none"
     nothing = deviations(case, case.outputs[0], case.reference["x"], [])
     assert nothing.items() == []
     assert "position: there is nothing to compare with" in nothing.reason
@@ -187,7 +187,7 @@ def test_no_common_sample_is_null_with_a_reason():
         [("closed_form", unknown)],
     )
     assert found.position is None
-    assert "position: no sample is known to both the engine and closed_form" in found.reason
+    assert "position: no sample is known to both the engine and closed form" in found.reason
 
 
 @pytest.mark.parametrize("complete", [True, False])
@@ -202,9 +202,9 @@ def test_a_sample_without_a_value_is_out_of_tolerance_where_all_were_solved(comp
     assert found.position.within
     assert found.velocity.within is not complete
     if complete:
-        assert found.reason == "velocity: 1 samples without a value where closed_form has one"
+        assert found.reason == "velocity: 1 sample without a value where closed form has one"
         said = describe("x", "velocity", found.velocity, "angle", [0.0] * SAMPLES)
-        assert said == "x: velocity has no value at samples where closed_form has one"
+        assert said == "x: velocity has no value at samples where closed form has one"
     # what the standard does not have either is no loss
     assert deviations(
         case, case.outputs[0], holed, [("closed_form", holed)], complete=True
@@ -217,7 +217,7 @@ def test_a_deviation_is_described_by_output_quantity_sample_driver_and_tolerance
     assert (
         said
         == "half_track_change: velocity is off by 0.004 m/s at sample 2 (stroke = 0.1), tolerance"
-        " 0.001 m/s, against closed_form"
+        " 0.001 m/s, against closed form"
     )
 
 
@@ -258,7 +258,7 @@ def test_an_output_without_any_value_fails_where_all_samples_were_solved(complet
         == f"1 of 1 comparisons {'has outputs without a value' if complete else 'lacks samples'}"
     )
     assert (
-        f"x: position: {SAMPLES} samples without a value where closed_form has one"
+        f"x: position: {SAMPLES} samples without a value where closed form has one"
         in record.message
     ) is complete
     failed = ElementTree.fromstring(to_junit(results)).findall(".//testcase[failure]")

@@ -97,7 +97,7 @@ def test_a_reference_without_a_value_says_nothing():
         )
     native, fake = pair(solution, solution, case)
     assert [native.outcome, fake.outcome] == [Outcome.PASS, Outcome.PASS]
-    assert "not judged: position: closed_form has no value at 2 of 9 samples; " in fake.message
+    assert "not judged: position: closed form has no value at 2 of 9 samples; " in fake.message
     # native refuses what the reference does not have
     _, fake = pair(reaching(range(7)), solution, case)
     assert (fake.outcome, "values at 2 of 9 samples that native cannot reach" in fake.message) == (

@@ -322,4 +322,4 @@ def test_a_reference_without_any_value_judges_nothing():
     case.reference.update(dict.fromkeys(("x", "y"), Series(unknown, unknown, unknown)))
     (record,) = run([case], [RIGHT], tol=TOL).records
     assert record.outcome is Outcome.UNJUDGED
-    assert "position: no sample is known to both the engine and closed_form" in record.message
+    assert "position: no sample is known to both the engine and closed form" in record.message

@@ -139,7 +139,7 @@ def test_junit_has_a_test_case_per_case_engine_and_output():
         (
             "failure",
             (
-                "7 of 9 samples solved: cannot be followed beyond 0.5; closed_form has values at 2"
+                "7 of 9 samples solved: cannot be followed beyond 0.5; closed form has values at 2"
                 " of the others"
             ),
         )

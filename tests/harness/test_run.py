@@ -68,7 +68,7 @@ def test_the_sign_of_an_output_matters():
     assert (
         record.message
         == f"y: position is off by {math.sin(1.0):.3g} m at sample 0 (angle = -1), tolerance 1e-09"
-        " m, against closed_form"
+        " m, against closed form"
     )
     assert record.errors["x"].position.within
 
@@ -82,7 +82,7 @@ def test_a_relative_error_of_a_millionth_is_caught_and_named(quantity, unit, tol
     assert record.outcome is Outcome.FAIL
     assert f"{quantity} is off by" in record.message
     assert (
-        f"tolerance {tolerance} {unit}, against closed_form (worst of 2 quantities out of"
+        f"tolerance {tolerance} {unit}, against closed form (worst of 2 quantities out of"
         " tolerance)" in record.message
     )
 
@@ -173,7 +173,7 @@ def test_missing_samples_fail_and_the_others_are_kept_and_compared():
     assert record.outcome is Outcome.FAIL
     assert (
         record.message
-        == "7 of 9 samples solved: cannot be followed beyond 0.5; closed_form has values at 2 of"
+        == "7 of 9 samples solved: cannot be followed beyond 0.5; closed form has values at 2 of"
         " the others"
     )
     assert (record.solved, record.samples) == (7, 9)
@@ -230,7 +230,7 @@ def test_nothing_solved_is_a_failure_without_numbers():
     record = record_of(Fake(answer=answer))
     assert (
         record.message
-        == "0 of 9 samples solved: the engine does not say why; ask it to; closed_form has values"
+        == "0 of 9 samples solved: the engine does not say why; ask it to; closed form has values"
         " at 9 of the others"
     )
     assert (record.residual_max, record.iterations, record.errors["x"].position) == (
@@ -306,7 +306,7 @@ def test_what_the_reference_lacks_is_compared_with_the_native_engine():
         "native",
     ]
     assert [each.against for _, each in fake.errors["y"].items()] == ["native"] * 3
-    missing = "velocity: closed_form gives none; acceleration: closed_form gives none"
+    missing = "velocity: closed form gives none; acceleration: closed form gives none"
     assert (native.outcome, native.message) == (
         Outcome.PASS,
         f"not judged: x: {missing}; y: the reference does not have it",
@@ -326,7 +326,7 @@ def test_an_output_that_has_no_value_where_the_reference_has_one_is_no_pass(monk
     record, missing = record_of(Fake()), record_of(Fake(answer=partial))
     assert record.outcome is Outcome.FAIL
     assert record.message.startswith(
-        "x: position has no value at samples where closed_form has one"
+        "x: position has no value at samples where closed form has one"
     )
     assert "has no value" not in missing.message
 
@@ -339,7 +339,7 @@ def test_only_truths_from_elsewhere_validate(truth):
 def test_a_reference_that_does_not_fit_is_an_error_not_a_pass():
     case = crank()
     case.reference["x"] = Series(np.zeros(1))
-    assert "closed_form has shape (1,), expected (9,)" in record_of(Fake(), case).message
+    assert "closed form has shape (1,), expected (9,)" in record_of(Fake(), case).message
 
 
 def test_progress_hears_of_every_record():

@@ -9,6 +9,7 @@ from kincheck.core.harness.record import Outcome
 from kincheck.core.history.regression.findings import Regressions
 from kincheck.core.history.store import Store
 from kincheck.core.report.regression_junit import to_regression_junit
+from kincheck.core.report.regression_labels import headline, rows
 from kincheck.core.report.regression_summary import to_markdown
 
 from ..support.nights import changed, keep, nights, records, reported, times, worse
@@ -86,3 +87,21 @@ def test_markdown_takes_foreign_text_as_text_and_folds_what_is_alike(path):
         in text
     )
     assert text.startswith("## run 2 against run 1 (last green): 4 new failures\n")
+
+
+def test_a_terminal_shows_tables_without_marks(path, capsys, monkeypatch):
+    nights(path, 6)
+    keep(path, changed(records(), **worse(20.0), message="<script> | *x*"))
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
+    monkeypatch.setenv("TERM", "dumb")  # no colours
+    monkeypatch.setenv("COLUMNS", "200")
+    assert main.main(["report", "--history", str(path)]) == 1
+    shown = capsys.readouterr().out
+    for mark in ("<details>", "<summary>", "## ", "| ", "**", "&lt;"):
+        assert mark not in shown
+    found = reported(path)
+    assert shown.startswith(headline(found))
+    for row in rows(found.findings):
+        assert row.engine in shown
+        assert row.where in shown
+        assert " ".join(row.what.split()) in " ".join(shown.split())

@@ -7,6 +7,8 @@ import pytest
 from kincheck import cases
 from kincheck.core import solve
 from kincheck.core.errors import SolveError
+from kincheck.core.kinematics import NativeSolver
+from kincheck.core.mechanism.motions import Path, Ramp
 
 from ..oracles import naive, newton_euler
 from ..support.loads import loaded, pushes, solved
@@ -126,3 +128,19 @@ def test_directions_count_where_axes_do_not():
     assert found.determined() == (2, 1, 3)
     assert all(np.isnan(found.along(axis)).all() for axis in np.eye(3))
     assert np.isfinite(found.along(turn[:, 0])).all()
+
+
+@pytest.mark.parametrize(("values", "tol"), [([], 1e-12), ([0.1, 0.2], 1e-18)])
+def test_a_motion_without_a_solved_sample_has_forces_without_values(values, tol):
+    path = Path({"crank": Ramp(1.0)}, np.array(values))
+    mechanism, solver = cases.load("four_bar").mechanism, NativeSolver(compiled=False)
+    found = solver.prepare(mechanism, path, forces=["crank", "coupler_pin"])(tol)
+    assert not found.solved.any()
+    assert found.forces.power.shape == (len(values),)
+    for each in (
+        found.forces.power,
+        found.forces.drivers["crank"],
+        found.forces.joints["coupler_pin"].force,
+    ):
+        assert len(each) == len(values)
+        assert np.isnan(each).all()

@@ -194,7 +194,7 @@ def test_what_residuals_leave_uncertain_beside_a_singular_pose_is_refused(short,
     assert found.solved.tolist() == [solved]
     if not solved:
         assert (
-            "refused at 1 samples so near a singular pose that residuals leave the pose or its"
+            "refused at 1 sample so near a singular pose that residuals leave the pose or its"
             " rates uncertain" in found.message
         )
         return

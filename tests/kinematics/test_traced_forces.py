@@ -129,7 +129,7 @@ def test_no_forces_at_a_singular_pose():
     assert found.solved.all()
     assert not by_program(found)
     assert np.isnan(found.forces.drivers["turn"]).tolist() == (turn == BRANCH).tolist()
-    assert "no forces at 1 samples" in found.message
+    assert "no forces at 1 sample" in found.message
 
 
 def test_samples_beyond_a_lock_up_have_no_forces():

@@ -312,7 +312,7 @@ def test_samples_that_are_nearly_singular_are_refused():
     assert np.isnan(found.points["end"].position[:, 2:]).all()
     for message in found.messages.values():
         assert "cannot be followed beyond turn = 1.8707" in message
-        assert "; refused at 1 samples" in message
+        assert "; refused at 1 sample" in message
         assert "as at turn = 1.87069633" in message
 
 

@@ -1,7 +1,14 @@
 """Names and numbers of reports in words."""
 
+import io
+
+import msgspec
 import pytest
+from kincheck.core.errors import number_of, with_article
 from kincheck.core.harness.labels import number, output_label
+from kincheck.core.report.table import print_outputs
+
+from ..support.made_up import results
 
 
 def test_outputs_are_labelled_in_words() -> None:
@@ -25,3 +32,41 @@ def test_outputs_are_labelled_in_words() -> None:
 )
 def test_numbers_are_short_and_a_dash_is_no_zero(value: float | None, text: str) -> None:
     assert number(value) == text
+
+
+@pytest.mark.parametrize(
+    ("units", "head"), [(("m", "rad"), "position"), (("N", "m"), "value"), (("N", "N m"), "value")]
+)
+def test_a_force_has_a_value_and_no_position(units: tuple[str, str], head: str) -> None:
+    found = results()
+    record = found.records[0]
+    outputs = {
+        name: msgspec.structs.replace(series, unit=unit)
+        for unit, (name, series) in zip(units, record.outputs.items(), strict=True)
+    }
+    made = msgspec.structs.replace(
+        found, records=[msgspec.structs.replace(record, outputs=outputs)]
+    )
+    page = io.StringIO()
+    print_outputs(made, page)
+    heads = next(line for line in page.getvalue().splitlines() if line.startswith("case"))
+    assert heads.split() == ["case", "engine", "output", head, "velocity", "acceleration", "unit"]
+
+
+@pytest.mark.parametrize(
+    ("noun", "text"),
+    [
+        ("joint", "a joint"),
+        ("output", "an output"),
+        ("ForceElement", "a ForceElement"),
+        ("universal joint", "a universal joint"),
+        ("unknown joint", "an unknown joint"),
+    ],
+)
+def test_a_noun_has_its_article(noun: str, text: str) -> None:
+    assert with_article(noun) == text
+
+
+def test_one_thing_is_singular() -> None:
+    assert [number_of(k, "case") for k in (0, 1, 2)] == ["0 cases", "1 case", "2 cases"]
+    assert number_of(2, "assembly", "assemblies") == "2 assemblies"

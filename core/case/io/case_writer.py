@@ -11,7 +11,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from ...errors import LONGEST_NAME, CaseError, brief
+from ...errors import LONGEST_NAME, CaseError, brief, with_article
 from ...joints import Coupler
 from ...mechanism.body import Body
 from ...mechanism.motions import Absolute, Motion, Table
@@ -108,8 +108,8 @@ def _from_design(motion: Motion, design: float) -> Motion:
         return motion.motion
     if not isinstance(motion.motion, Table):
         raise CaseError(
-            f"a {motion.motion.type} motion of values that are {motion.design!r} at design,"
-            f" expected {design!r} as in a case file; give a table"
+            f"{with_article(motion.motion.type)} motion of values that are {motion.design!r} at"
+            f" design, expected {design!r} as in a case file; give a table"
         )
     return replace(motion.motion, values=tuple(x - shift for x in motion.motion.values))
 

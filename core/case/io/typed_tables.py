@@ -9,7 +9,7 @@ from typing import Annotated, Any, TypeVar, cast, get_args, get_origin
 
 import msgspec
 
-from ...errors import remedy, similar
+from ...errors import remedy, similar, with_article
 from .document import fault, join, shown
 
 _Struct = TypeVar("_Struct", bound=msgspec.Struct)
@@ -40,14 +40,14 @@ def class_of(file: Path, key: str, what: str, value: object, known: Mapping[str,
         raise fault(
             file,
             join(key, "type"),
-            f"missing, expected a {what} type; add it, one of {', '.join(known)}",
+            f"missing, expected {with_article(what)} type; add it, one of {', '.join(known)}",
         )
     name = table["type"]
     if not isinstance(name, str) or name not in known:
         raise fault(
             file,
             join(key, "type"),
-            f"found {shown(name)}, expected a {what} type; {remedy(str(name), known)}",
+            f"found {shown(name)}, expected {with_article(what)} type; {remedy(str(name), known)}",
         )
     return known[name]
 

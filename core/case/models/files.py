@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ...errors import with_article
 from ..case import Case
 from ..io.case_file import LARGEST_FILE, load_case
 from ..io.document import fault, parse, read_text
@@ -98,8 +99,8 @@ def load(file: Path, supplied: Supplied = NOTHING) -> Case:
             raise fault(
                 file,
                 f"--{option}",
-                f"found for a {kind}, which takes {known}; leave it out, or name this file by"
-                " itself",
+                f"found for {with_article(kind)}, which takes {known}; leave it out, or name this"
+                " file by itself",
             )
     if kind == CASE:
         return load_case(file, supplied.closure)

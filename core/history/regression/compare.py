@@ -207,19 +207,18 @@ def _errors(now: Record, before: Record) -> Iterator[Finding]:
             if a is None or b is None:
                 continue
             about: dict[str, Any] = {"output": output, "motion": motion}
+            base = now.outputs[output].unit if output in now.outputs else ""
+            word = motion_word(motion, base)
             if a.tolerance != b.tolerance:
-                told = f"{output} {motion}: {number(a.tolerance)} → {number(b.tolerance)}"
+                told = f"{output} {word}: {number(a.tolerance)} → {number(b.tolerance)}"
                 yield finding_of(
                     Kind.TOLERANCE, now, told, before=a.tolerance, now=b.tolerance, **about
                 )
             # what is out of tolerance is a failure, and named there
             if b.within and a.against == b.against and drifted(a.max_abs, b.max_abs, b.tolerance):
-                unit = (
-                    motion_unit(now.outputs[output].unit, motion) if output in now.outputs else ""
-                )
+                unit = motion_unit(base, motion) if base else ""
                 times = f"×{number(b.max_abs / a.max_abs)}, " if a.max_abs else ""
                 size = f"{number(a.max_abs)} → {value_text(number(b.max_abs), unit)}"
-                word = motion_word(motion, unit)
                 told = f"{output} {word} error {size} ({times}tolerance {number(b.tolerance)})"
                 ratio = b.max_abs / a.max_abs if a.max_abs else None
                 yield finding_of(

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from ...harness.labels import number
 from ...harness.record import Record
 from ...trajectory import QUANTITIES
+from ...unit_text import motion_word
 from .compare import by_pair, same_samples, values_of
 from .findings import Finding, Kind, finding_of
 from .run_selection import Subject
@@ -93,8 +94,9 @@ def _gone(now: Record, before: Record) -> Iterator[Finding]:
                     if new is None
                     else new.reason or "no reason is given"
                 )
+                word = motion_word(motion, old.unit)
                 told = (
-                    f"{output} {motion} has no value at {len(gone)} of {len(had)} samples that had"
+                    f"{output} {word} has no value at {len(gone)} of {len(had)} samples that had"
                     f" one, first at {first}: {why}"
                 )
                 yield finding_of(Kind.GONE, now, told, output=output, motion=motion)

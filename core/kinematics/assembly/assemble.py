@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...dataset import Dataset, Variable
-from ...errors import SolveError
-from ...input_checks import no_such, real, require_positive
+from ...errors import SolveError, number_of
+from ...input_checks import no_such, real, require_kind, require_positive
 from ...mechanism.mechanism import Mechanism
 from ...primitives.base import Pose
 from ...program import NumpyExecutor, Plan, Program, program
@@ -70,7 +70,8 @@ class Assembled(Tabular):
     def summary(self) -> str:
         """Return how many estimates ended in an assembly."""
         count, closed = len(self.converged), int(self.converged.sum())
-        return f"{closed} of {count} estimates closed, {int(self.spurious.sum())} spurious"
+        ended = f"{closed} of {number_of(count, 'estimate')} closed"
+        return f"{ended}, {int(self.spurious.sum())} spurious"
 
     def dataset(self) -> Dataset:
         """Return the outcome of each estimate and the poses of its bodies."""
@@ -133,6 +134,7 @@ def require_named(
     who: str, mechanism: Mechanism, bodies: Iterable[str], drivers: Iterable[str]
 ) -> None:
     """Raise SolveError unless there are moving bodies and drivers of these names."""
+    require_kind(who, "mechanism", mechanism, Mechanism)
     for what, names, known in (
         ("moving body", bodies, mechanism.moving),
         ("driver", drivers, mechanism.drivers),

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ...algebra import Quat, quat, vec
 from ...dataset import Dataset, Variable
+from ...errors import number_of
 from ...input_checks import require_positive
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.topology import spanning_tree
@@ -84,7 +85,8 @@ class Assemblies(Tabular):
     def summary(self) -> str:
         """Return the number of assemblies and of starts."""
         ended = f"{self.lost} without closure, {self.spurious} spurious"
-        return f"{len(self.found)} assemblies from {self.starts} starts ({ended})"
+        found = number_of(len(self.found), "assembly", "assemblies")
+        return f"{found} from {number_of(self.starts, 'start')} ({ended})"
 
     def dataset(self) -> Dataset:
         """Return the numbers and the poses of the assemblies."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...dataset import Dataset, Variable
+from ...errors import number_of
 from ...tabular import Tabular
 from ...trajectory import Array
 from .singularity import Singularity
@@ -70,10 +71,10 @@ class Curve(Tabular):
         """Return the driver's range, the number of poses, and the singular ones."""
         low, high = self.values.min(initial=np.inf), self.values.max(initial=-np.inf)
         kinds = [each.kind for each in self.events]
-        events = [f"{kinds.count(kind)} {kind}s" for kind in dict.fromkeys(kinds)]
+        events = [number_of(kinds.count(kind), kind) for kind in dict.fromkeys(kinds)]
         span = f"{self.driver} from {low:.6g} to {high:.6g} {self.unit}".rstrip()
         shape = "closed" if self.closed else "open"
-        return ", ".join(filter(None, [span, f"{len(self.arc)} poses", shape, *events]))
+        return ", ".join(filter(None, [span, number_of(len(self.arc), "pose"), shape, *events]))
 
     def dataset(self) -> Dataset:
         """Return driver, points and distance from singularity over the length of the curve."""

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from ...errors import SolveError
-from ...input_checks import names_of, no_such, require_positive
+from ...input_checks import names_of, no_such, require_kind, require_positive
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path, Ramp
 from ...trajectory import Array
@@ -74,6 +74,7 @@ def trace(
         SolveError: drivers and degrees of freedom do not match, the mechanism does not close at the
             design position, or an argument is invalid.
     """
+    require_kind("trace", "mechanism", mechanism, Mechanism)
     if driver not in (drivers := [each.name for each in mechanism.drivers]):
         require_driven(mechanism)
         raise no_such("trace", "driver", driver, drivers)

@@ -81,7 +81,9 @@ def forces_of(
     efforts = {each.name: lines.effort(each, multipliers, null) for each in mechanism.drivers}
     elements = {name: each.amount + np.zeros(lanes.n) for name, each in lanes.applied.items()}
     every = powers(mechanism, lanes.at, lanes.applied, efforts, lanes.rates)
-    table: Array = np.array([each + np.zeros(lanes.n) for each in every]).reshape(-1, lanes.n)
+    # its shape is given: without a mass, or without a solved sample, the list alone has none
+    table: Array = np.array([each + np.zeros(lanes.n) for each in every])
+    table = table.reshape(len(every), lanes.n)
     spread = _Spread(solved, singular)
     return Forces(
         {

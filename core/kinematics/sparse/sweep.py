@@ -11,6 +11,7 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
+from ...errors import number_of
 from ...failures import FailureKind, PoseFailure
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path, outwards
@@ -201,7 +202,8 @@ class _Sweep:
                 "so near a singular pose that residuals leave the pose or its rates uncertain,"
                 f" {where}"
             )
-            self.messages.append(f"refused at {len(self.refused)} samples {why}; keep away from it")
+            many = number_of(len(self.refused), "sample")
+            self.messages.append(f"refused at {many} {why}; keep away from it")
             self.failures.append(FailureKind.UNCERTAIN)
 
     def _by_better_rows(self, here: Stand, path: Path) -> Stand:

@@ -23,6 +23,7 @@ import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import groupby
+from typing import Any
 
 import numpy as np
 
@@ -93,6 +94,11 @@ def check_joint(
     Raises:
         SpecimenError: no specimen can be made.
     """
+    given: Any = joint_class  # not known yet to be one
+    if not isinstance(given, type):
+        raise joint_specimens.SpecimenError(
+            f"check_joint: joint_class is {given!r}, expected a class of joints"
+        )
     rng = np.random.default_rng(seed)
     own = specimens is not None or hasattr(joint_class, "specimens")
     offered = (

@@ -12,6 +12,7 @@ import numpy as np
 
 from ...case.units import ANGLES, LENGTHS, in_units
 from ...dataset import Dataset, Variable
+from ...errors import number_of
 from ...harness.record import Outcome
 from ...report.axis import DRIVER_UNITS
 from ...tabular import Tabular
@@ -182,9 +183,12 @@ class SweepResults(Tabular, msgspec.Struct, frozen=True, kw_only=True):
 
     def summary(self) -> str:
         """Return the case, the mode, and the numbers of variants and of unsolved variants."""
-        found = f"{self.case}, {self.mode}, {self.partial or self.samples} variants"
+        variants = (
+            f"{self.partial} variants" if self.partial else number_of(self.samples, "variant")
+        )
+        found = f"{self.case}, {self.mode}, {variants}"
         missing = f"{self.unsolved} without a solution somewhere" if self.unsolved else ""
-        return ", ".join(filter(None, [found, f"{len(self.outputs)} outputs", missing]))
+        return ", ".join(filter(None, [found, number_of(len(self.outputs), "output"), missing]))
 
     def dataset(self) -> Dataset:
         """Return the envelope of every output over the driver [units of the output]."""

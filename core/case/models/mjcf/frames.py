@@ -5,6 +5,7 @@ sequence.
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -108,12 +109,24 @@ class Place:
 
 
 HERE = Place()
+ROUND_OFF = 2.0 * sys.float_info.epsilon
+"""Error of the length of a unit vector by the rounding of its components."""
 
 
 def unit_quaternion(q: Quat) -> Quat:
     """The quaternion at length one; composing many would let it drift."""
     length = math.sqrt(sum(e * e for e in q))
-    return Quat(q.e0 / length, (1.0 / length) * q.e)
+    return quat([e / length for e in q])
+
+
+def unit_vector(numbers: Sequence[float]) -> Vec3:
+    """The direction of three numbers, length one; unchanged if they have it to the last digit, so
+    that a file keeps its own numbers. Not for zero.
+    """
+    length = math.hypot(*numbers)
+    if abs(length - 1.0) <= ROUND_OFF:
+        return vec(numbers)
+    return vec([each / length for each in numbers])
 
 
 def coordinates(a: Vec3) -> Vector:
@@ -132,7 +145,7 @@ def read_place(element: Element, compiler: Compiler) -> Place:
     if "fromto" in element.attributes:  # of a site; its z axis points from the second to the first
         numbers = element.numbers("fromto", (6,))
         first, second = vec(numbers[:3]), vec(numbers[3:])
-        axis = _nonzero(element, "fromto", (*(first - second),))
+        axis = _direction(element, "fromto", (*(first - second),))
         return Place(0.5 * (first + second), _z_towards(axis))
     at = vec(element.numbers("pos", (3,), (0.0, 0.0, 0.0)))
     given = [name for name in ORIENTATION if name in element.attributes]
@@ -148,15 +161,15 @@ def _orientation(element: Element, name: str, compiler: Compiler) -> Quat:
     if name == "euler":
         return euler_turn(numbers, compiler)
     if name == "quat":
-        _nonzero(element, name, numbers)
+        _require_nonzero(element, name, numbers)
         return unit_quaternion(quat(numbers))
     if name == "axisangle":
-        return _about(_nonzero(element, name, numbers[:3]), compiler.angle(numbers[3]))
+        return _about(_direction(element, name, numbers[:3]), compiler.angle(numbers[3]))
     if name == "zaxis":
-        return _z_towards(_nonzero(element, name, numbers))
-    x = _nonzero(element, name, numbers[:3])
+        return _z_towards(_direction(element, name, numbers))
+    x = _direction(element, name, numbers[:3])
     y = vec(numbers[3:])
-    y = _nonzero(element, name, (*(y - (x @ y) * x),))
+    y = _direction(element, name, (*(y - (x @ y) * x),))
     return of_axes(x, y, cross(x, y))
 
 
@@ -169,17 +182,18 @@ def euler_turn(angles: Sequence[float], compiler: Compiler) -> Quat:
     return found
 
 
-def _nonzero(element: Element, name: str, numbers: Sequence[float]) -> Vec3:
-    """The direction of numbers, length one; of a quaternion, of its last three, which is not
-    used.
-    """
-    length = math.sqrt(sum(each * each for each in numbers))
-    if length < 1e-10:  # as MuJoCo has it: shorter axes point anywhere
+def _require_nonzero(element: Element, name: str, numbers: Sequence[float]) -> None:
+    if math.hypot(*numbers) < 1e-10:  # as MuJoCo has it: shorter axes point anywhere
         raise element.fault(
             f"{name}: found axes of no direction, expected ones that span a frame; correct the"
             " attribute"
         )
-    return (1.0 / length) * vec(numbers[-3:])
+
+
+def _direction(element: Element, name: str, numbers: Sequence[float]) -> Vec3:
+    """The direction of three numbers, length one."""
+    _require_nonzero(element, name, numbers)
+    return unit_vector(numbers)
 
 
 def _about(axis: Vec3, angle: float) -> Quat:
@@ -218,4 +232,4 @@ def of_axes(x: Vec3, y: Vec3, z: Vec3) -> Quat:
 
 def joint_axis(element: Element) -> Vec3:
     """The axis of a joint in its body's frame, length one; z unless given."""
-    return _nonzero(element, "axis", element.numbers("axis", (3,), (0.0, 0.0, 1.0)))
+    return _direction(element, "axis", element.numbers("axis", (3,), (0.0, 0.0, 1.0)))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ....algebra import quat, vec
-from ....errors import remedy
+from ....errors import remedy, with_article
 from ...io.document import decimal, fault, shown, usable
 from .attributes import KNOWN
 from .elements import Element
@@ -124,8 +124,8 @@ def _value(
     if len(numbers) != expected or not all(map(usable, numbers)):
         what = f"{expected} finite number" + "s" * (expected > 1)
         problem = (
-            f"found {shown(' '.join(texts))} for {joint.name!r}, a {joint.type} joint, expected"
-            f" {what}; correct it"
+            f"found {shown(' '.join(texts))} for {joint.name!r}, {with_article(joint.type)} joint,"
+            f" expected {what}; correct it"
         )
         raise key.fault(f"qpos: {problem}") if key else fault(file, "--start", problem)
     if expected == 1:

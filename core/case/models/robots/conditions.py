@@ -19,6 +19,7 @@ from ....errors import CaseError, remedy
 from ....joints.base import triad
 from ....mechanism.mechanism import Vector
 from ...io.document import shown
+from ..mjcf.frames import unit_vector
 from .robot import Connection, Coupling, Described, Loop, Mimic, Move, Robot, Rod
 
 # Rounding of exported numbers, relative to the size of the numbers.
@@ -128,10 +129,9 @@ class _Group:
         if along is None:
             raise self.fault("found a condition without x, expected a direction")
         found = self.robot.links[self.link(along.link)].direction(vec(along.direction))
-        length = math.sqrt(found @ found)
-        if not length > 0.0:
+        if not math.hypot(*found) > 0.0:
             raise self.fault("found a direction of length zero, expected an axis")
-        return (1.0 / length) * found
+        return unit_vector([*found])
 
     def require_zero(self, residual: float, scale: float) -> None:
         """Refuse a condition with a residual in the zero pose."""

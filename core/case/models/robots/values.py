@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Sequence
 
-from ....algebra import Quat, Vec3, X, Y, Z, vec
-from ....errors import remedy, similar
+from ....algebra import Quat, Vec3, X, Y, Z
+from ....errors import remedy, similar, with_article
 from ...io.document import decimal, shown, usable
 from ..mjcf.elements import Element
+from ..mjcf.frames import unit_vector
 
 # Two words are alike if a typing error makes one of the other.
 ALIKE = 0.75
@@ -29,10 +30,9 @@ def direction(element: Element, numbers: Sequence[float]) -> Vec3:
     Raises:
         CaseError: they are zero.
     """
-    length = math.hypot(*numbers)
-    if length < 1e-10:  # as in MJCF: shorter axes point anywhere
+    if math.hypot(*numbers) < 1e-10:  # as in MJCF: shorter axes point anywhere
         raise element.fault("xyz: found zero, expected the direction of an axis; correct it")
-    return (1.0 / length) * vec(numbers)
+    return unit_vector(numbers)
 
 
 def numbers_of(
@@ -101,5 +101,8 @@ def named(element: Element, key: str, name: str, known: Collection[str], what: s
         CaseError: it is not.
     """
     if name not in known:
-        raise element.fault(f"{key}: found {shown(name)}, expected a {what}; {remedy(name, known)}")
+        expected = with_article(what)
+        raise element.fault(
+            f"{key}: found {shown(name)}, expected {expected}; {remedy(name, known)}"
+        )
     return name
