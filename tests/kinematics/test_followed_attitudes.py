@@ -103,10 +103,20 @@ def test_engines_without_velocities_give_the_same():
     np.testing.assert_allclose(found(swept(values), order=0), wanted, rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize("values", [[0.25, 0.5, 0.0], [0.5, 0.6, 5.0]])
-def test_short_steps_of_the_driver_may_be_long_ones_of_the_body(values):
-    """A wheel that turns 30 times as fast as its driver, by the samples alone and followed."""
-    values = np.array(values)
+QUARTER = np.array([0.0, 0.25])
+
+
+@pytest.mark.parametrize(
+    "sweep",
+    [
+        Sweep("turn", np.array([0.25, 0.5, 0.0])),
+        Sweep("turn", np.array([0.5, 0.6, 5.0])),
+        # the rates at both ends tell 12 of 15 radians
+        Sweep("time", QUARTER, motions={"turn": Sine(0.48, 1.0, 0.0)}),
+    ],
+)
+def test_short_steps_of_the_driver_may_be_long_ones_of_the_body(sweep):
+    """A wheel that turns 32 times as fast as its driver, by the samples alone and followed."""
     output = Orientation("wheel", 1e-9, 0.0, "test", "wheel", Component.E0)
     mechanism = Mechanism(
         "gear",
@@ -117,12 +127,11 @@ def test_short_steps_of_the_driver_may_be_long_ones_of_the_body(values):
         ],
         [],
         [JointAngle("turn", "drive")],
-        couplers=[Gear("mesh", ("drive", "spin"), 1.0 / 30.0)],
+        couplers=[Gear("mesh", ("drive", "spin"), 1.0 / 32.0)],
     )
-    sweep = Sweep("turn", values)
     of = replace(case(sweep), mechanism=with_markers(mechanism, [output]), outputs=(output,))
-    np.testing.assert_allclose(np.abs(found(of)[0]), np.abs(np.cos(15.0 * values)), atol=1e-9)
-    np.testing.assert_allclose(found(of)[0], np.cos(15.0 * values), rtol=0, atol=1e-9)
+    turned = sweep.motions["turn"].at(QUARTER)[0] if sweep.motions else sweep.values
+    np.testing.assert_allclose(found(of)[0], np.cos(16.0 * turned), rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("start", [4.0, -7.0, 11.0])
