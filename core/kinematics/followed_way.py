@@ -68,7 +68,8 @@ def near_design(mechanism: Mechanism, path: Path) -> bool:
     if not len(times):
         return True
     start = start_of(mechanism, path)
-    if start.lead and _way(mechanism, start.lead, np.array([0.0, 1.0])).max() > NEAR:
+    # turns are read from samples as if the design were at time zero
+    if not start.stands or start.time != 0.0:
         return False
     return bool(_way(mechanism, path, _sorted(path, start.time)).max(initial=0.0) <= NEAR)
 

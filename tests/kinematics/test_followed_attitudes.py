@@ -113,6 +113,8 @@ QUARTER = np.array([0.0, 0.25])
         Sweep("turn", np.array([0.5, 0.6, 5.0])),
         # the rates at both ends tell 12 of 15 radians
         Sweep("time", QUARTER, motions={"turn": Sine(0.48, 1.0, 0.0)}),
+        # a short way of the driver from the design to the start
+        Sweep("time", QUARTER, motions={"turn": Sine(0.2, 1.0, -math.pi / 2)}),
     ],
 )
 def test_short_steps_of_the_driver_may_be_long_ones_of_the_body(sweep):
