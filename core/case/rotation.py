@@ -1,5 +1,5 @@
 """Rotations of bodies by the directions of their markers: Euler parameters, rotation vectors, and
-the turns of an angle along a sweep.
+the turns of an angle or of a body along a sweep.
 """
 
 from __future__ import annotations
@@ -10,13 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..algebra import Vec3, cross
+from ..algebra import Vec3, cross, quat
 from ..jet import Jet, arctan2, sqrt
+from ..kinematics import DOUBTFUL, agreement
 from ..mechanism.motions import Path
 from ..trajectory import Array
 
-# Samples whose |e0| differs by less are as near to the design as each other.
-_AS_NEAR = 1e-6
 # Below this square of |e| = sin(angle / 2) a series is exact in double precision, and a quotient by
 # |e| loses digits.
 _SMALL, _TERMS = 1e-3, 7
@@ -28,10 +27,9 @@ _WHOLE = 1e-4
 def euler_parameters(x: Vec3, y: Vec3) -> list[Jet]:
     """Return e0..e3 of the rotation from the global x and y axes to the unit vectors x and y.
 
-    The largest of e0..e3 is found by a root and the others by division by it, so that none is
-    singular. The parameters and their negatives are the same rotation: the sign is continuous from
-    sample to sample, along the first axis, and e0 is positive at the first of the samples nearest
-    to the design attitude.
+    The parameters and their negatives are the same rotation, and either is returned; `signs` tells
+    which along a sweep. The largest of e0..e3 is found by a root and the others by division by it,
+    so that none is singular.
     """
     z = cross(x, y)
     products: list[list[Jet]] = [  # 4 e_i e_j
@@ -42,9 +40,32 @@ def euler_parameters(x: Vec3, y: Vec3) -> list[Jet]:
     ]
     largest = np.argmax([_floats(products[k][k]) for k in range(4)], axis=0)
     own = sqrt(_select(largest, [products[k][k] for k in range(4)]))
-    found = [_select(largest, products[i]) / (2.0 * own) for i in range(4)]
-    sign = _signs(np.array([_floats(each) for each in found]))
-    return [sign * each for each in found]
+    return [_select(largest, products[i]) / (2.0 * own) for i in range(4)]
+
+
+def smallest(e: Sequence[Jet]) -> list[Jet]:
+    """Return the Euler parameters of the same rotation with e0 not negative, for one up to half a
+    turn.
+    """
+    return signed(np.where(floats(e)[0] < 0.0, -1.0, 1.0), e)
+
+
+def signed(sign: Array, e: Sequence[Jet]) -> list[Jet]:
+    """Return Euler parameters with another sign at the samples."""
+    return [sign * each for each in e]
+
+
+def floats(e: Sequence[Jet]) -> Array:
+    """Return the values of jets as doubles, shape (4, n, ...)."""
+    return np.array([_floats(each) for each in e])
+
+
+def angular_velocity(e: Sequence[Jet]) -> Array:
+    """Return the angular velocity of Euler parameters as doubles [rad/s], global axes, shape
+    (3, n, ...); NaN if unknown.
+    """
+    rates = np.array([np.asarray(each.v).astype(np.float64) for each in e])
+    return np.array([*(2.0 * (quat(rates) * quat(floats(e)).conjugate()).e)])
 
 
 def rotation_vector(e: Sequence[Jet]) -> list[Jet]:
@@ -100,6 +121,39 @@ def turns(x: Array, v: Array, period: float, path: Path) -> Array:
     return found
 
 
+def signs(e: Array, rate: Array, path: Path) -> tuple[Array, bool]:
+    """Return the signs of Euler parameters of the same rotations, shape (n, ...), and whether the
+    angular velocities leave one in doubt.
+
+    They are chosen like `turns`: from sample to sample in time the rotation is the one nearest to
+    that by the angular velocities; without these, the smallest.
+
+    Args:
+        e: Euler parameters, either sign, shape (4, n, ...); NaN if unknown.
+        rate: angular velocity [rad/s], shape (3, n, ...); NaN if unknown.
+    """
+    order = np.argsort(path.times, kind="stable")
+    t, e, rate = path.times[order], e[:, order], rate[:, order]
+    t = np.broadcast_to(t.reshape(-1, *(1,) * (e.ndim - 2)), e.shape[1:])
+    known = np.isfinite(e.sum(axis=0))
+    before = _known_before(known)
+    last, rate_there = (np.take_along_axis(each, before[None], 1) for each in (e, rate))
+    change = quat(e) * quat(last).conjugate()
+    mean = 0.5 * (rate + rate_there)
+    agrees = agreement(change, mean, t - np.take_along_axis(t, before, 0))
+    # nothing contradicts what is unknown
+    doubt = bool((np.isfinite(mean.sum(axis=0)) & (np.abs(agrees) < DOUBTFUL)).any())
+    sign = np.cumprod(np.where(agrees < 0.0, -1.0, 1.0), axis=0)
+    nearest = np.argsort(np.abs(path.times[order]), kind="stable")
+    first = nearest[np.argmax(known[nearest], axis=0)][None]
+    e0, rate0 = (np.take_along_axis(each, first[None], 1) for each in (e, rate))
+    since = np.take_along_axis(t, first, 0) * float(_through_design(path))
+    own = np.where(agreement(quat(e0), rate0, since) < 0.0, -1.0, 1.0)
+    found = np.empty(sign.shape)
+    found[order] = sign * np.take_along_axis(sign, first, 0) * own
+    return found, doubt
+
+
 def _through_design(path: Path) -> bool:
     """Return whether all drivers have their design values at time zero."""
     return path.covers(0.0) and bool(np.allclose(path.values(np.zeros(1)), 0.0, atol=1e-9))
@@ -114,19 +168,6 @@ def _known_before(known: NDArray[np.bool_]) -> NDArray[np.int64]:
     indices = np.arange(len(known)).reshape(-1, *(1,) * (known.ndim - 1))
     last = np.maximum.accumulate(np.where(known, indices, 0), axis=0)
     return np.concatenate([last[:1], last[:-1]])
-
-
-def _signs(e: Array) -> Array:
-    """Return the signs, shape (n, ...), that make e0..e3, shape (4, n, ...), continuous."""
-    if e.ndim < 2:
-        return np.where(e[0] < 0.0, -1.0, 1.0)
-    before = _known_before(np.isfinite(e.sum(axis=0)))
-    product = (e * np.take_along_axis(e, before[None], 1)).sum(axis=0)
-    sign = np.cumprod(np.where(product < 0.0, -1.0, 1.0), axis=0)
-    near = np.nan_to_num(np.abs(e[0]), nan=-1.0)
-    first = np.argmax(near >= near.max(axis=0) - _AS_NEAR, axis=0)[None]
-    own = np.where(np.take_along_axis(sign * e[0], first, 0) < 0.0, -1.0, 1.0)
-    return np.asarray(sign * own, dtype=np.float64)
 
 
 def _floats(jet: Jet) -> Array:

@@ -66,10 +66,8 @@ def output_series(
     at = {name: _moving(trajectory.points[name]) for name in output.points}
     # unknown values are NaN, and so is everything computed from them
     with np.errstate(all="ignore"):
-        jet = output.of(
-            at, {name: _standing(case.mechanism.point(name).position) for name in output.points}
-        )
-        jet = counted(case.mechanism, case.sweep.path, output, jet)
+        design = {name: _standing(case.mechanism.point(name).position) for name in output.points}
+        jet = counted(case.mechanism, case.sweep.path, output, at, design)
     solved = trajectory.solved
     position, *rates = (
         np.where(solved & np.isfinite(values), values, np.nan) for values in (jet.x, jet.v, jet.a)

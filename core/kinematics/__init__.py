@@ -11,6 +11,7 @@ Solve:
     assemble           a closed pose from an estimate
     find_assemblies    all closed poses
     followed_angle     the angle of a joint with its turns, followed from the design
+    followed_attitude  the attitude of a body with its turns, followed from the design
     NativeSolver       settings of the solver; makes a mechanism ready for a path (`prepare`) or for
                        many designs (`prepare_designs`), and tells the size of its programs
 
@@ -75,7 +76,9 @@ if TYPE_CHECKING:
     from .diagnosis.rank import Ranks as Ranks
     from .diagnosis.rank import Violation as Violation
     from .followed_angles import in_doubt as in_doubt
-    from .followed_angles import near_design as near_design
+    from .followed_attitudes import DOUBTFUL as DOUBTFUL
+    from .followed_attitudes import agreement as agreement
+    from .followed_way import near_design as near_design
     from .forces.reactions import forces_of as forces_of
     from .forces.reactions import with_forces as with_forces
     from .formulation.acceptance_criteria import LONGEST_TURN as LONGEST_TURN
@@ -102,6 +105,7 @@ if TYPE_CHECKING:
     from .program_size import ProgramSize as ProgramSize
     from .solver_selection import Solver as Solver
     from .solver_selection import followed_angle as followed_angle
+    from .solver_selection import followed_attitude as followed_attitude
     from .solver_selection import follower as follower
     from .structure.driver_count import degrees_of_freedom as degrees_of_freedom
     from .structure.driver_count import require_driven as require_driven
@@ -135,7 +139,9 @@ _NAMES = {
     "diagnosis.instantaneous_screws": "Screw describe_screws",
     "diagnosis.position_gradients": "Gradient",
     "diagnosis.rank": "Blocked ComponentCount Dependency NamedRow Ranks Violation",
-    "followed_angles": "in_doubt near_design",
+    "followed_angles": "in_doubt",
+    "followed_attitudes": "DOUBTFUL agreement",
+    "followed_way": "near_design",
     "forces.reactions": "forces_of with_forces",
     "formulation.acceptance_criteria": "LONGEST_TURN ROUNDING continued continuous regular_between",
     "formulation.cartesian": "COLUMNS Cartesian",
@@ -146,7 +152,7 @@ _NAMES = {
     "one_design": "solve",
     "prepared_designs": "PreparedDesigns",
     "program_size": "ProgramSize",
-    "solver_selection": "Solver followed_angle follower",
+    "solver_selection": "Solver followed_angle followed_attitude follower",
     "structure.driver_count": "degrees_of_freedom require_driven",
     "structure.reduction": "largest_residual reduce_rows",
     "verified.exact": "Exact Reading as_decimal as_double",

@@ -1,58 +1,24 @@
-"""The angle of a joint with its turns, followed along the way of the drivers from the design.
-
-A pose gives an angle but for whole turns, and samples far apart do not tell how many lie between
-them. The drivers' way is then solved at further samples, so near to each other that the rates tell.
-"""
+"""The angle of a joint with its turns, followed along the way of the drivers from the design."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import replace
-from typing import Any, TypeAlias
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..algebra import IDENTITY, ZERO, angle_about, quat, vec
-from ..caches import keep_last
-from ..errors import SolveError
 from ..joints.base import unit
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.motions import Path
 from ..primitives.base import Pose
 from ..trajectory import Array, Trajectory
-from .compiled.motion_start import start_of
-from .compiled.request import Request
+from .followed_way import DOUBT, Prepare, followed, near_design
 from .forces.motion_lanes import Follow
-from .formulation.constraints import size_of
-
-Prepare: TypeAlias = Callable[[Mechanism, Request, Path], Callable[[float], Trajectory]]
-"""Makes a mechanism ready to be solved along a path, to a tolerance."""
 
 TURN = 2.0 * math.pi
-# Way of the drivers between two samples [rad, or half the mechanism's size]: as far as angles are
-# read from the samples alone, and in the parts of longer ways, finer from one try to the next.
-NEAR, PARTS = 0.5, (0.25, 0.05, 0.01)
-# A change that differs from what the rates tell by more might be another number of turns [rad].
-DOUBT = 0.5 * math.pi
-# More samples than these would take long, and such a sweep has passed no joint's turn unseen.
-MOST = 200_000
-# Places between two samples where the drivers' way is measured.
-AMONG = 8
-TOL = 1e-9
-"""Residual of the further samples: only whole turns are read from them."""
-
-
-def near_design(mechanism: Mechanism, path: Path) -> bool:
-    """Return whether the drivers go from the design to all samples in short steps."""
-    times = path.times[np.isfinite(path.times)]
-    if not len(times):
-        return True
-    start = start_of(mechanism, path)
-    if start.lead and _way(mechanism, start.lead, np.array([0.0, 1.0])).max() > NEAR:
-        return False
-    return bool(_way(mechanism, path, _sorted(path, start.time)).max(initial=0.0) <= NEAR)
 
 
 def in_doubt(x: Array, v: Array, times: Array) -> bool:
@@ -70,15 +36,9 @@ def in_doubt(x: Array, v: Array, times: Array) -> bool:
 
 def followed_angle(prepare: Prepare, mechanism: Mechanism, path: Path, joint: str) -> Array | None:
     """Return a joint's angle [rad] at the samples of a path, zero at design, turns counted on the
-    way from there; shape (n,), NaN if a sample is not reached or its turns are in doubt.
-
-    None if the native solver has no solution of the mechanism.
-
-    Args:
-        prepare: makes the mechanism ready for a path.
+    way from there; shape (n,). See `followed`.
     """
-    # motions of other classes may change, or have no hash
-    return (_recent if path.is_builtin else _finer)(prepare, mechanism, path, joint)
+    return followed(prepare, mechanism, path, _OfJoint(joint))
 
 
 def follower(
@@ -96,75 +56,45 @@ def follower(
     return follow
 
 
-def _finer(prepare: Prepare, mechanism: Mechanism, path: Path, joint: str) -> Array | None:
-    found: Array | None = None
-    for part in PARTS:
-        try:
-            found, sure = _followed(prepare, mechanism, path, joint, part)
-        except SolveError:
-            return None
-        if sure:
-            break
-    return found
+@dataclass(frozen=True)
+class _OfJoint:
+    """The angle of a joint, shape ()."""
 
+    joint: str
 
-_recent = keep_last(32)(_finer)
+    @property
+    def at_design(self) -> Array:
+        """Zero."""
+        return np.zeros(())
 
+    def bodies(self, mechanism: Mechanism) -> tuple[str, ...]:
+        """Return its two, or the one that moves."""
+        moving = {body.name for body in mechanism.moving}
+        return tuple(name for name in mechanism.joint(self.joint).bodies if name in moving)
 
-def _followed(
-    prepare: Prepare, mechanism: Mechanism, path: Path, joint: str, part: float
-) -> tuple[Array, bool]:
-    """Return the angles by further samples, and whether no number of turns is in doubt."""
-    start = start_of(mechanism, path)
-    times = _divided(mechanism, path, _sorted(path, start.time), part)
-    # the samples first: they decide where the motion starts
-    fine = replace(path, times=np.concatenate([path.times, times]))
-    motion = _motion(prepare, mechanism, fine, joint)
-    taken = motion.details.get("start", {"time": 0.0, "lead": {}})
-    at_start, sure = 0.0, True
-    if any(taken["lead"].values()):
-        lead = path.lead_in(taken["time"])
-        lead = replace(lead, times=_divided(mechanism, lead, np.array([0.0, 1.0]), part))
-        angle, sure = _counted(
-            mechanism, lead.times, joint, _motion(prepare, mechanism, lead, joint), 0, 0
-        )
-        at_start = float(angle[-1])
-    found, certain = _counted(mechanism, fine.times, joint, motion, taken["time"], at_start)
-    return found[: len(path.times)], sure and certain
-
-
-def _motion(prepare: Prepare, mechanism: Mechanism, path: Path, joint: str) -> Trajectory:
-    moving = {body.name for body in mechanism.moving}
-    bodies = tuple(name for name in mechanism.joint(joint).bodies if name in moving)
-    request = Request(tuple(path.motions), (), bodies, 1)
-    return prepare(mechanism, request, path)(TOL)
-
-
-def _counted(
-    mechanism: Mechanism, times: Array, joint: str, motion: Trajectory, start: float, at: float
-) -> tuple[Array, bool]:
-    """Return the angle at each sample, counted both ways from its value at the start, and whether
-    no change is in doubt.
-    """
-    found = np.full(len(times), np.nan)
-    reached = np.flatnonzero(motion.solved)
-    order = reached[np.argsort(times[reached], kind="stable")]
-    if not len(order):
-        return found, True
-    angle, rate = _angle(mechanism, joint, motion)
-    t, x = times[order], angle[order]
-    change, expected = np.diff(x), _gone(rate[order], t)
-    change += TURN * np.rint((expected - change) / TURN)
-    smallest = change - TURN * np.rint(change / TURN)
-    doubtful = np.abs(expected - change) > DOUBT
-    # rates have no bound towards a fold, but short steps change little
-    change[doubtful] = np.where(np.abs(smallest) > DOUBT, np.nan, smallest)[doubtful]
-    first = int(np.argmin(np.abs(t - start)))
-    counted = np.full(len(order), x[first] + TURN * np.rint((at - x[first]) / TURN))
-    counted[first + 1 :] += np.cumsum(change[first:])
-    counted[:first] -= np.cumsum(change[:first][::-1])[::-1]
-    found[order] = counted
-    return found, not doubtful.any()
+    def counted(
+        self, mechanism: Mechanism, times: Array, motion: Trajectory, start: float, at: Array
+    ) -> tuple[Array, bool]:
+        """Return the angle with its turns; see `Followed`."""
+        found = np.full(len(times), np.nan)
+        reached = np.flatnonzero(motion.solved)
+        order = reached[np.argsort(times[reached], kind="stable")]
+        if not len(order):
+            return found, True
+        angle, rate = _angle(mechanism, self.joint, motion)
+        t, x = times[order], angle[order]
+        change, expected = np.diff(x), _gone(rate[order], t)
+        change += TURN * np.rint((expected - change) / TURN)
+        smallest = change - TURN * np.rint(change / TURN)
+        doubtful = np.abs(expected - change) > DOUBT
+        # rates have no bound towards a fold, but short steps change little
+        change[doubtful] = np.where(np.abs(smallest) > DOUBT, np.nan, smallest)[doubtful]
+        first = int(np.argmin(np.abs(t - start)))
+        counted = np.full(len(order), x[first] + TURN * np.rint((at - x[first]) / TURN))
+        counted[first + 1 :] += np.cumsum(change[first:])
+        counted[:first] -= np.cumsum(change[:first][::-1])[::-1]
+        found[order] = counted
+        return found, not doubtful.any()
 
 
 def _angle(mechanism: Mechanism, joint: str, motion: Trajectory) -> tuple[Array, Array]:
@@ -188,35 +118,3 @@ def _angle(mechanism: Mechanism, joint: str, motion: Trajectory) -> tuple[Array,
 def _gone(rate: Array, times: Array) -> Array:
     """Return the changes between samples that the rates tell [rad]."""
     return 0.5 * (rate[1:] + rate[:-1]) * np.diff(times, axis=0)
-
-
-def _sorted(path: Path, start: float) -> Array:
-    """Return the times of samples and start, increasing."""
-    return np.unique([start, *path.times]) if path.covers(start) else np.unique(path.times)
-
-
-def _way(mechanism: Mechanism, path: Path, times: Array) -> Array:
-    """Return the way of the drivers between increasing times [rad, or half the mechanism's size]:
-    the longest of any driver, shape (n - 1,).
-    """
-    if len(times) < 2 or not path.motions:
-        return np.zeros(max(len(times) - 1, 0))
-    turning = [mechanism.driver(name).turns for name in path.motions]
-    scale = np.where(turning, 1.0, 0.5 * size_of(mechanism))
-    share = np.linspace(0.0, 1.0, AMONG + 1)
-    between = times[:-1, None] + np.diff(times)[:, None] * share
-    values = path.values(between.ravel()).reshape(len(scale), *between.shape)
-    ways: Array = np.abs(np.diff(values, axis=-1)).sum(axis=-1) / scale[:, None]
-    return ways.max(axis=0)
-
-
-def _divided(mechanism: Mechanism, path: Path, times: Array, part: float) -> Array:
-    """Return increasing times with further ones between them, so that drivers go a part at most."""
-    parts = np.ceil(_way(mechanism, path, times) / part).clip(1.0)
-    if parts.sum() > MOST:
-        parts = np.ceil(parts * (MOST / parts.sum()))
-    pieces: list[Array] = [
-        np.linspace(low, high, int(count), endpoint=False)
-        for low, high, count in zip(times[:-1], times[1:], parts, strict=True)
-    ]
-    return np.concatenate([*pieces, times[-1:]])

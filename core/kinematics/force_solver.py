@@ -12,7 +12,8 @@ from ..trajectory import Trajectory
 from .compiled.request import Request
 from .compiled.samples import Route
 from .continuation.sweep import follow
-from .followed_angles import Prepare, follower
+from .followed_angles import follower
+from .followed_way import Prepare
 
 Solver = Callable[[float], Trajectory]
 """Solves what it was made for, to a tolerance."""

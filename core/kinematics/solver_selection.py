@@ -22,7 +22,7 @@ from ..caches import keep_last
 from ..errors import SolveError
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.motions import Path
-from . import followed_angles
+from . import followed_angles, followed_attitudes
 from .compiled.motion_start import start_of
 from .compiled.program_cache import is_builtin
 from .compiled.request import Request
@@ -59,6 +59,7 @@ def prepare(mechanism: Mechanism, request: Request, path: Path) -> Solver:
 
 
 followed_angle = partial(followed_angles.followed_angle, prepare)
+followed_attitude = partial(followed_attitudes.followed_attitude, prepare)
 follower = partial(followed_angles.follower, prepare)
 
 

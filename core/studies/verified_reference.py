@@ -17,7 +17,8 @@ import numpy as np
 from ..algebra import Vec3
 from ..case.case import HELD_BUT, Case, Quantity
 from ..case.io.reference_file import ProvedSeries, Reference, Sample
-from ..case.measures.turns import turns_of
+from ..case.measures import Orientation
+from ..case.measures.turns import oriented, turns_of
 from ..jet import Jet
 from ..kinematics import (
     Drives,
@@ -182,7 +183,7 @@ def _values(case: Case, output: Quantity, found: Proofs, numbers: str) -> Sequen
         design[name] = Vec3(*(_jet([x], [still], [still]) for x in position))
     columns: list[list[Ball | None]] = [[None] * len(found.samples) for _ in range(3)]
     if proved:
-        jet = _counted(case, output, output.of(at, design), proved)
+        jet = _counted(case, output, at, design, proved)
         for column, values in zip(columns, (jet.x, jet.v, jet.a), strict=True):
             for k, value in zip(
                 proved,
@@ -236,8 +237,17 @@ def _sample(
     )
 
 
-def _counted(case: Case, output: Quantity, jet: Jet, proved: Sequence[int]) -> Jet:
-    """Return an angle with its turns along the path."""
+def _counted(
+    case: Case,
+    output: Quantity,
+    at: Mapping[str, Vec3],
+    design: Mapping[str, Vec3],
+    proved: Sequence[int],
+) -> Jet:
+    """Return an output, an angle or an orientation with its turns along the path."""
+    if isinstance(output, Orientation):
+        return oriented(case.mechanism, case.sweep.path, output, at, design, np.array(proved))
+    jet = output.of(at, design)
     if not output.period:
         return jet
     x, v = (np.asarray(each).astype(np.float64) for each in (jet.x, jet.v))

@@ -13,7 +13,7 @@ from kincheck.core import solve
 from kincheck.core.caches import clear_caches
 from kincheck.core.case.case import Output
 from kincheck.core.case.markers import with_markers
-from kincheck.core.case.measures import JointAngle
+from kincheck.core.case.measures import Component, JointAngle, Orientation
 from kincheck.core.studies.tolerance import streaming_totals as room
 from kincheck.core.studies.tolerance.gradients import gradients
 from kincheck.core.studies.tolerance.reduce import QUANTILES, merged, nothing, quantiles
@@ -155,17 +155,19 @@ def test_gradients_are_the_closed_form(tmp_path):
 def test_variants_of_a_coarse_sweep_count_the_turns_of_the_nominal_one(tmp_path):
     """At the samples and at design, where gradients are read too."""
     output = JointAngle("turned", 1e-9, 0.0, "test", "pivot")
+    attitude = Orientation("e0", 1e-9, 0.0, "test", "arm", Component.E0)
     case, values = crank(), np.array([0.0, 20.0, 61.0])
     case = replace(
         case,
-        mechanism=with_markers(case.mechanism, [output]),
+        mechanism=with_markers(case.mechanism, [output, attitude]),
         sweep=replace(case.sweep, values=values),
-        outputs=(output,),
+        outputs=(output, attitude),
         reference={},
     )
     ready = Ready.of(Study(case, vary(tmp_path, case, tip={"at": "tip", "sigma": 1}), 1, 0))
     rows, *_ = ready.values(np.full((3, 2), 1e-3))
-    np.testing.assert_allclose(rows[0], values[:, None] + np.zeros(2), rtol=0, atol=1e-12)
+    wanted = np.array([values, np.cos(0.5 * values)])[:, :, None] + np.zeros(2)
+    np.testing.assert_allclose(rows, wanted, rtol=0, atol=1e-12)
     found = gradients(ready)
     assert not np.abs(found.along).max() > 1e-9
     assert not np.abs(found.design).max() > 1e-9

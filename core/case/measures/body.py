@@ -10,7 +10,7 @@ from ...algebra import Vec3, X, Y
 from ...jet import Jet
 from ...mechanism.mechanism import Mechanism, Point
 from ..quantity import MARKER
-from ..rotation import euler_parameters, rotation_vector
+from ..rotation import euler_parameters, rotation_vector, smallest
 from .base import Measure, coordinates, length, place_on, reach_of
 
 
@@ -30,7 +30,8 @@ class Component(StrEnum):
 class Orientation(Measure):
     """Rotation of a body since design: of its rotation vector or Euler parameters, global axes.
 
-    The rotation vector is axis times angle, up to a whole turn.
+    The rotation vector is axis times angle, up to a whole turn. Turns are followed from the design,
+    so that a rotation by more than half a turn is not taken for the one the other way round.
     """
 
     type = "orientation"
@@ -58,10 +59,17 @@ class Orientation(Measure):
         return [Point(name, self.body, coordinates(tip)) for name, tip in marked]
 
     def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
-        """Return the component, [rad] or [-]."""
+        """Return the component of the smallest rotation, [rad] or [-]."""
+        return self.component_of(smallest(self.parameters(at, design)))
+
+    def parameters(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> list[Jet]:
+        """Return Euler parameters of the rotation since design, either sign."""
         place, *tips = self.points
         x, y = ((1.0 / length(design, place, tip)) * (at[tip] - at[place]) for tip in tips)
-        e = euler_parameters(x, y)
+        return euler_parameters(x, y)
+
+    def component_of(self, e: Sequence[Jet]) -> Jet:
+        """Return the component of a rotation given by its Euler parameters, [rad] or [-]."""
         if self.unit == "1":
             return e[int(self.component[1])]
         return rotation_vector(e)["xyz".index(self.component)]

@@ -207,7 +207,7 @@ class Ready:
         with np.errstate(all="ignore"):
             case, path = self.study.case, self.path
             moved = without_forces(case).outputs
-            jets = {o.name: counted(case.mechanism, path, o, o.of(at, design)) for o in moved}
+            jets = {o.name: counted(case.mechanism, path, o, at, design) for o in moved}
             for k, row in enumerate(self.study.rows):
                 if isinstance(row.output, ForceMeasure):
                     assert forces is not None  # the case asks for them
