@@ -1,5 +1,5 @@
 """Slips: simple mistakes in a reference, tried on the whole series: sign, unit, offset, order of
-samples, exchanged columns.
+samples, exchanged columns, another definition of the output.
 
 A slip is reported only if its correction brings the reference within the tolerance and is
 significant. Insignificant are: a sign of a series of zeros, an offset of a constant series, and any
@@ -9,8 +9,9 @@ change of two samples.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
@@ -68,7 +69,7 @@ class Uncertain:
     half: Array | None = None
 
     def changed(self, change: Callable[[Array], Array]) -> Uncertain:
-        """Return the reference after a linear change of its values and samples."""
+        """Return the reference after a change of its values and samples, linear about each half."""
         if self.half is None:
             return Uncertain(change(self.values))
         half = np.abs(change(self.half) - change(np.zeros_like(self.half)))
@@ -99,7 +100,8 @@ class Slip:
         return self.difference / self.tolerance if self.tolerance else 0.0
 
 
-_Change = tuple[str, Callable[[Array], Array]]
+NamedChange: TypeAlias = tuple[str, Callable[[Array], Array]]
+"""A change in words, and its function of the reference's values."""
 
 
 def slips(
@@ -108,6 +110,7 @@ def slips(
     others: Mapping[str, Held],
     *,
     offsets: bool = True,
+    definitions: Sequence[NamedChange] = (),
 ) -> list[Slip]:
     """Return all single changes to make the reference fit; if there are none, all pairs of changes.
 
@@ -116,34 +119,44 @@ def slips(
         reference: reference of the same output, out of tolerance, shape (n,).
         others: values of the other outputs, by name, possibly confused with this one.
         offsets: whether a constant may be added; False for derivatives.
+        definitions: changes from other definitions of the output to that of the engines.
     """
     if not isinstance(reference, Uncertain):
         reference = Uncertain(reference)
-    return list(_single(held, reference, others, offsets)) or list(
-        _pairs(held, reference, others, offsets)
-    )
+    given = held, reference, others, offsets, definitions
+    return list(_single(*given)) or list(_pairs(*given))
 
 
 def _single(
-    held: Held, reference: Uncertain, others: Mapping[str, Held], offsets: bool
+    held: Held,
+    reference: Uncertain,
+    others: Mapping[str, Held],
+    offsets: bool,
+    definitions: Sequence[NamedChange],
 ) -> Iterator[Slip]:
+    yield from _fitting(held, reference, definitions, "")
     yield from _fitting(held, reference, _scales(), "", constant=True)
     yield from _fitting(held, reference, _moves(held, reference, offsets), "")
     yield from _exchanged(reference, others, "")
 
 
 def _pairs(
-    held: Held, reference: Uncertain, others: Mapping[str, Held], offsets: bool
+    held: Held,
+    reference: Uncertain,
+    others: Mapping[str, Held],
+    offsets: bool,
+    definitions: Sequence[NamedChange],
 ) -> Iterator[Slip]:
     both = [(f"{OTHER_SIGN} and times {name}", _times(-factor)) for name, factor in FACTORS.items()]
     yield from _fitting(held, reference, both, "", constant=True)
     for words, change in _scales():
         changed = reference.changed(change)
+        yield from _fitting(held, changed, definitions, f"{words} and ")
         yield from _fitting(held, changed, _moves(held, changed, offsets), f"{words} and ")
     yield from _exchanged(reference.changed(_times(-1.0)), others, f"{OTHER_SIGN} ")
 
 
-def _scales() -> list[_Change]:
+def _scales() -> list[NamedChange]:
     return [
         (OTHER_SIGN, _times(-1.0)),
         *((f"times {name}", _times(factor)) for name, factor in FACTORS.items()),
@@ -154,7 +167,7 @@ def _times(factor: float) -> Callable[[Array], Array]:
     return lambda x: factor * x
 
 
-def _moves(held: Held, reference: Uncertain, offsets: bool) -> Iterator[_Change]:
+def _moves(held: Held, reference: Uncertain, offsets: bool) -> Iterator[NamedChange]:
     off = held.values - reference.values
     known = np.isfinite(off)
     if offsets and known.any():
@@ -176,7 +189,7 @@ def _moves(held: Held, reference: Uncertain, offsets: bool) -> Iterator[_Change]
 def _fitting(
     held: Held,
     reference: Uncertain,
-    changes: Iterator[_Change] | list[_Change],
+    changes: Iterator[NamedChange] | Sequence[NamedChange],
     before: str,
     *,
     constant: bool = False,

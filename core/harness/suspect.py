@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from ..case.case import TIME, Case
+from ..case.suspension import Camber, Toe, camber_of_front_view
 from ..case.units import ANGLES, LENGTHS, SECOND, Unit
 from ..errors import shortened
 from ..trajectory import PER_TIME, QUANTITIES, Array
@@ -15,7 +17,7 @@ from ..unit_text import motion_word, value_text
 from .compare import deviation, pace
 from .evidence import Explanation, Suspect
 from .record import Deviation, Deviations, OutputSeries, Record
-from .slips import Held, Slip, Uncertain, slips
+from .slips import Held, NamedChange, Slip, Uncertain, slips
 
 # Most outputs explained in a sentence; further ones are counted.
 MOST_EXPLAINED = 12
@@ -207,7 +209,13 @@ def _explained(
                 for other, held in every[each.order].items()
                 if other != name and units[other] == units[name]
             }
-            all_slips = slips(each.held, each.reference, others, offsets=each.order == 0)
+            all_slips = slips(
+                each.held,
+                each.reference,
+                others,
+                offsets=each.order == 0,
+                definitions=_definitions(case, each, others),
+            )
             fitting[each] = {slip.change: slip for slip in all_slips}
         common = [
             words
@@ -230,6 +238,22 @@ def _explained(
         left += [f"{name} ({', '.join(unexplained)})"] if unexplained else []
     left += names[MOST_EXPLAINED:]
     return [_explanation(*key, members) for key, members in found.items()], left
+
+
+def _definitions(case: Case, off: _Off, others: Mapping[str, Held]) -> list[NamedChange]:
+    """Return the changes from other definitions of an output: of camber, if toe is known too."""
+    camber = next(output for output in case.outputs if output.name == off.output)
+    if not isinstance(camber, Camber) or off.order:
+        return []
+    return [
+        (
+            f"taken as the camber seen from the front, with tan(seen) cos({toe.name}) ="
+            f" tan({camber.name}),",
+            partial(camber_of_front_view, toe=others[toe.name].values),
+        )
+        for toe in case.outputs
+        if isinstance(toe, Toe) and toe.vehicle == camber.vehicle and toe.name in others
+    ]
 
 
 def _explanation(

@@ -47,6 +47,17 @@ def test_a_loop_agrees_with_mujoco_and_others_are_refused_or_skipped(tmp_path: P
     assert refused.cells[1].startswith("refused: ")
 
 
+def test_a_loop_in_an_included_file_is_found_once(tmp_path: Path):
+    whole = FOUR_BAR.replace("</mujoco>", '<include file="parts/loop.xml"/></mujoco>')
+    start, end = whole.index("<equality>"), whole.index("</equality>") + len("</equality>")
+    (tmp_path / "parts").mkdir()
+    loop = f"<mujocoinclude>{whole[start:end]}</mujocoinclude>"
+    (tmp_path / "parts" / "loop.xml").write_text(loop)
+    (tmp_path / "bars.xml").write_text(whole[:start] + whole[end:])
+    (row,) = public_robots.rows_of([tmp_path])
+    assert (row.cells[0], row.cells[3]) == ("bars.xml", "1")
+
+
 def test_a_paired_urdf_agrees_with_pinocchio(tmp_path: Path):
     pytest.importorskip("pinocchio")
     pytest.importorskip("yaml")

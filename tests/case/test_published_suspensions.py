@@ -195,3 +195,18 @@ def test_by_the_command_line(tmp_path, explorer):
     rows = [row for row in csv.DictReader(out.read_text().splitlines()) if row["output"] == "toe"]
     toe = [float(row["position"]) for row in rows]
     assert toe == pytest.approx(explorer["toe"][::20], abs=1e-13)
+
+
+def test_the_published_camber_by_the_command_line(tmp_path, published, capsys):
+    """Compared as it stands, the camber is off, and the message states its other definition."""
+    sweep = tmp_path / "sweep.csv"
+    rows = zip(*(published[name] for name in ("wheel_travel", "toe_angle", "camber")), strict=True)
+    lines = [",".join(f"{value:.12g}" for value in row) for row in rows]
+    sweep.write_text("\n".join(["Wheel Travel [mm],Toe [deg],Camber [deg]", *lines]))
+    options = ["--travel=-0.04:0.12:41", "--rack=-0.04:0.04", "--wheel-radius", str(RADIUS)]
+    options += ["--accuracy", "toe=1e-5 deg", "--accuracy", "camber=1e-5 deg"]
+    file = str(DATA / "wishbone_explorer.csv")
+    assert main(["run", file, "--engine", "native", "--reference", str(sweep), *options]) == 1
+    said = " ".join(capsys.readouterr().out.split())
+    seen = "taken as the camber seen from the front, with tan(seen) cos(toe) = tan(camber)"
+    assert f"camber (position): the reference {seen}, fits within" in said

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from kincheck.core.case.case import Series
+from kincheck.core.case.suspension import camber_of_front_view
 from kincheck.core.harness.record import Outcome, from_json, to_json
 from kincheck.core.harness.run import run
 from kincheck.core.harness.slips import FACTORS, Held, slips
@@ -189,6 +190,20 @@ def test_pairs_are_tried_where_nothing_alone_fits():
     assert words(WAVY, -other.values, {"z": other}) == [
         "with the other sign taken as that of output z"
     ]
+
+
+def test_another_definition_is_tried_with_other_signs_and_units():
+    toe = 0.3 * S
+    seen = np.arctan(np.tan(WAVY) / np.cos(toe))
+    definitions = [("taken as another", lambda x: camber_of_front_view(x, toe))]
+
+    def named(reference):
+        return [each.change for each in slips(held(WAVY), reference, {}, definitions=definitions)]
+
+    assert named(seen) == ["taken as another"]
+    assert "with the other sign and taken as another" in named(-seen)
+    assert "times pi/180 and taken as another" in named(np.degrees(seen))
+    assert named(np.arctan(np.tan(WAVY) / np.cos(2.0 * toe))) == []
 
 
 def test_a_shift_by_one_sample_is_found_both_ways():

@@ -76,13 +76,21 @@ def rows_of(paths: Sequence[Path], drive: str = "") -> Iterator[Row]:
 
 
 def _has_loops(file: Path) -> bool:
-    text = file.read_text(errors="replace")
     if file.suffix == ".urdf":
         return file.with_suffix(".yaml").exists()
+    text = _text(file, file.parent)
     return (
-        "<mujoco" in text
+        re.match(r"(<[?!].*?>|\s)*<mujoco[\s>]", text, re.DOTALL) is not None
         and re.search(r"<(connect|weld|joint|tendon)\s[^>]*(1=)", text) is not None
     )
+
+
+def _text(file: Path, folder: Path) -> str:
+    """Return the text of a model and of the files that it includes from its folder."""
+    text = file.read_text(errors="replace")
+    included = re.findall(r'<include\s+file\s*=\s*"([^"]+)"', text)
+    files = [folder / name for name in included if (folder / name).is_file()]
+    return "".join([text, *(_text(each, folder) for each in files if each != file)])
 
 
 def compared(file: Path, drive: str = "") -> Sequence[str]:

@@ -10,16 +10,20 @@ from .axle import AxleOutput
 from .base import Rate, SuspensionOutput, own_keys
 from .per_travel import PerTravel
 from .vehicle import Axle, Convention, Reaction, Side, Vehicle
+from .wheel import Camber, Toe, camber_of_front_view
 
 __all__ = [
     "Axle",
     "AxleOutput",
+    "Camber",
     "Convention",
     "PerTravel",
     "Rate",
     "Reaction",
     "Side",
     "SuspensionOutput",
+    "Toe",
     "Vehicle",
+    "camber_of_front_view",
     "own_keys",
 ]

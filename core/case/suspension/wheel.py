@@ -5,8 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
+import numpy as np
+
 from ...algebra import Vec3
 from ...jet import Jet, arctan2, sqrt
+from ...trajectory import Array
 from .base import Attitude, Change
 from .corner import Corner
 from .vehicle import Axle, Convention
@@ -84,6 +87,19 @@ class Camber(Attitude):
         """Return the camber [rad], by its tangent: a sine near one has lost half its digits."""
         s = corner.spin
         return arctan2(-s.z, sqrt(s.x * s.x + s.y * s.y))
+
+
+def camber_of_front_view(seen: Array, toe: Array) -> Array:
+    """Return `Camber` [rad], shape (n,), from the camber that is seen along the vehicle's x axis.
+
+    Some programs give that one. In corner axes its tangent is -s_z / s_y, that of `Camber` is
+    -s_z / sqrt(s_x^2 + s_y^2), and cos(toe) = s_y / sqrt(s_x^2 + s_y^2).
+
+    Args:
+        seen: the camber that is seen [rad], shape (n,).
+        toe: the toe-in [rad], shape (n,).
+    """
+    return np.arctan(np.tan(seen) * np.cos(toe))
 
 
 @dataclass(frozen=True)
