@@ -144,7 +144,8 @@ def test_a_lane_that_cannot_be_reached_is_reported_alike():
     assert messages[0] == messages[1]
 
 
-def test_code_in_use_stays_after_clearing_the_caches():
+def test_code_in_use_stays_after_clearing_the_caches(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))  # no machine code of another test's
     mechanism, path = four_bar(), np.linspace(0.0, 1.0, 5)
     driver, point = mechanism.drivers[0].name, mechanism.points[0].name
     model = compile_model(mechanism, Request((driver,), (point,)))
