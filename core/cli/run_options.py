@@ -180,7 +180,7 @@ def _add_curve_options(run: argparse.ArgumentParser) -> None:
 
 
 def curve_options(options: argparse.Namespace) -> CurveOptions:
-    """Return what the options state of a measured curve."""
+    """Return the options of a measured curve."""
     from ..case.io.reference_curve import CurveOptions
 
     return CurveOptions(

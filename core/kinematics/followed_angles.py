@@ -31,7 +31,7 @@ def in_doubt(x: Array, v: Array, times: Array) -> bool:
     order = np.flatnonzero(known)[np.argsort(times[known], kind="stable")]
     t, x, v = times[order].reshape(-1, *(1,) * (x.ndim - 1)), x[order], v[order]
     # nothing contradicts what is unknown
-    return bool((np.abs(_gone(v, t) - np.diff(x, axis=0)) > DOUBT).any())
+    return bool((np.abs(_expected_change(v, t) - np.diff(x, axis=0)) > DOUBT).any())
 
 
 def followed_angle(prepare: Prepare, mechanism: Mechanism, path: Path, joint: str) -> Array | None:
@@ -83,7 +83,7 @@ class _OfJoint:
             return found, True
         angle, rate = _angle(mechanism, self.joint, motion)
         t, x = times[order], angle[order]
-        change, expected = np.diff(x), _gone(rate[order], t)
+        change, expected = np.diff(x), _expected_change(rate[order], t)
         change += TURN * np.rint((expected - change) / TURN)
         smallest = change - TURN * np.rint(change / TURN)
         doubtful = np.abs(expected - change) > DOUBT
@@ -115,6 +115,6 @@ def _angle(mechanism: Mechanism, joint: str, motion: Trajectory) -> tuple[Array,
     return angle_about(axis, i.conjugate() * j) + still, rate + still
 
 
-def _gone(rate: Array, times: Array) -> Array:
+def _expected_change(rate: Array, times: Array) -> Array:
     """Return the changes between samples that the rates tell [rad]."""
     return 0.5 * (rate[1:] + rate[:-1]) * np.diff(times, axis=0)
