@@ -42,8 +42,7 @@ def test_kept_inputs_are_read_or_refused(name: str):
 def test_changed_seeds_are_read_or_refused(name: str):
     rng, seeds = random.Random(1), READERS[name].seeds()
     changed = [READERS[name].mutate(rng.choice(seeds), rng) for _ in range(CHANGES)]
-    # some changes find nothing to change in a seed
-    assert sum(each not in seeds for each in changed) > CHANGES // 4
+    assert sum(each not in seeds for each in changed) > CHANGES // 2
     for each in changed:
         READERS[name].one(each)
 

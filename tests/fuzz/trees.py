@@ -182,7 +182,8 @@ def _scalar(value: Any) -> str:
 def changed_xml(data: bytes, rng: random.Random, words: tuple[str, ...]) -> bytes:
     """XML with one element or attribute changed. Raises ValueError where it is none."""
     try:
-        root = ElementTree.fromstring(data)
+        # names with a prefix that is not declared, as SDF files have them, are no XML
+        root = ElementTree.fromstring(re.sub(rb"<(/?\w+):", rb"<\1..", data))
     except (ElementTree.ParseError, LookupError) as error:
         raise ValueError from error
     parents = [each for each in root.iter() if len(each)]
@@ -215,7 +216,8 @@ def changed_xml(data: bytes, rng: random.Random, words: tuple[str, ...]) -> byte
                 element.set(rng.choice(words), text)
     else:
         element.set(rng.choice(words), rng.choice(texts))
-    return re.sub(rb"&#\d+;", b"?", ElementTree.tostring(root))
+    text = re.sub(rb"<(/?\w+)\.\.", rb"<\1:", ElementTree.tostring(root))
+    return re.sub(rb"&#\d+;", b"?", text)
 
 
 def changed_lines(data: bytes, rng: random.Random, words: tuple[str, ...]) -> bytes:
