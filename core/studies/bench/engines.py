@@ -12,7 +12,7 @@ from typing import Any, Literal
 import msgspec
 
 from ...case.case import Case, without_forces
-from ...errors import KincheckError
+from ...errors import KincheckError, number_of
 from ...harness.engine import Engine
 from ...harness.native_engine import NativeEngine
 from ...harness.provenance import THREADS, circumstances
@@ -203,7 +203,7 @@ def _measure_work(
         work["levels", native_breakdown.ALONE] = native_breakdown.loops_alone(case, tol)
     if peak is not None:
         work["peak", ""] = peak
-    told = begin(f"{case.name}: {len(work)} contestants, {rounds} rounds")
+    told = begin(f"{case.name}: {number_of(len(work), 'contestant')}, {number_of(rounds, 'round')}")
     seconds = take_turns(work, rounds, told)
     timed = {key: each.timed(seconds.get(key)) for key, each in entering.items()}
     entries = [entry for (kind, _), entry in timed.items() if kind != "levels"]

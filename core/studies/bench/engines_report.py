@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ...errors import number_of
 from ...harness.labels import against, motion_unit, number
 from ...harness.standard import STANDARD
 from ...report.sections import Report, Section
@@ -38,7 +39,7 @@ def report(found: Bench) -> Report:
         ),
         f"load {number(run['load_before'])} before, {number(run['load_after'])} after",
         f"linear algebra threads: {run['linear_algebra_threads']}",
-        f"{found.rounds} rounds",
+        number_of(found.rounds, "round"),
     ]
     sections: list[Section] = []
     for case, mode, entries in entries_of(found):
