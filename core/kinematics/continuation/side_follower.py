@@ -138,19 +138,19 @@ class Marcher:
                 range(len(self.departure)), self.departure[:, None]
             )
         self.kept, self.solved = self.track.begin(), self.every.copy()
-        self.visit, self.visited = visit, dict[int, Array]()
+        self.visit = visit
+        self.visited: dict[int, Array] = {}
         self.low = low if self.model.selection.dropped else 0.0
         reached = [0] * len(self.counts) if visit else self.track.run()
-        ends: list[End] = []
+        ends: tuple[End, ...] = ()
         if reached != self.counts:
-            ends = [
-                end for side, at in enumerate(reached) if (end := self._side(side, at)) is not None
-            ]
+            found = (self._side(side, at) for side, at in enumerate(reached))
+            ends = tuple(end for end in found if end is not None)
         kept, solved, back = self.kept, self.solved, self.route.back
         del self.kept, self.solved  # they are whose they are given to
         if back is not AS_THEY_ARE:
             kept, solved = kept[:, back], solved[back]
-        return March(kept, self.track.worst.tolist(), solved, tuple(ends), self.visited)
+        return March(kept, self.track.worst.tolist(), solved, ends, self.visited)
 
     def _side(self, number: int, at: int) -> End | None:
         """Follow one side, after `at` samples, to its last sample; return its end if it ends

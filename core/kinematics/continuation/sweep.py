@@ -45,7 +45,7 @@ def follow(route: Route, tol: float) -> Trajectory:
 
 def _follow(route: Route, tol: float) -> Trajectory:
     model, rows, found, message = route.model, route.model.rows, march(route, tol, low=LOW), ""
-    failures: Sequence[FailureKind] = found.failures
+    failures: Sequence[FailureKind] = found.failures if found.ends else ()
     closure, leftover, sigma = found.worst
     largest = math.inf if model.selection.dropped else None
     findings: Mapping[str, Any] = {}
