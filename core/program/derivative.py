@@ -55,7 +55,7 @@ def jacobian(tape: Tape, values: Sequence[Scalar], inputs: Sequence[Traced]) -> 
     for number, node in enumerate(tuple(tape.nodes)):
         read = operands(node)
         if any(gradients.get(k) for k in read):
-            weights = _weights(node[0], Traced(tape, number), *(Traced(tape, k) for k in read))
+            weights = _weights(node[0], tape.scalars[number], *(tape.scalars[k] for k in read))
             gradients[number] = _sum(
                 zip(weights, (gradients.get(k, {}) for k in read), strict=True)
             )

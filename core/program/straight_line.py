@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from ..algebra import Scalar
-from .tape import LEAVES, Node, Tape, Traced, operands
+from .tape import LEAVES, Node, Tape, operands
 
 FLOPS = frozenset(
     {"+", "-", "*", "/", "neg", "sqrt", "sin", "cos", "abs", "min", "max", "larger", "where"}
@@ -72,10 +72,11 @@ def program(
         if number not in live:
             live[number] = node = tape.nodes[number] if prepared is None else prepared.node(number)
             waiting += operands(node)
-    position = {number: k for k, number in enumerate(sorted(live))}
+    order = sorted(live)
+    position = dict(zip(order, range(len(order)), strict=True))
     nodes = tuple(
         node if node[0] in LEAVES else (node[0], *[position[x] for x in operands(node)])
-        for _, node in sorted(live.items())
+        for node in map(live.__getitem__, order)
     )
     return Program(name, nodes, {slot: position[number] for slot, number in wanted.items()}, times)
 
@@ -118,7 +119,7 @@ class Prepared:
         return program(
             "prepare",
             self.tape,
-            {slot: Traced(self.tape, number) for number, slot in self._kept.items()},
+            {slot: self.tape.scalars[number] for number, slot in self._kept.items()},
         )
 
     def _is_fixed(self, number: int) -> bool:

@@ -35,20 +35,28 @@ groups if a group has fewer lanes.
 
 
 class Tape:
-    """The list of operations traced so far."""
+    """The list of operations traced so far.
+
+    Attributes:
+        nodes: the operations.
+        scalars: their results; each operation has one scalar, so equal scalars are identical.
+    """
 
     def __init__(self) -> None:
         self.nodes: list[Node] = []
-        self._known: dict[Node, int] = {}
+        self.scalars: list[Traced] = []
+        self._known: dict[Node, Traced] = {}
 
     def node(self, *node: str | float) -> Traced:
         """Return the scalar of an operation; an equal operation is recorded only once."""
         key: Node = node  # type: ignore[assignment]
-        number = self._known.get(key)
-        if number is None:
-            number = self._known[key] = len(self.nodes)
+        scalar = self._known.get(key)
+        if scalar is None:
+            opposite = self.scalars[int(key[1])] if key[0] == "neg" else None
+            scalar = self._known[key] = Traced(self, len(self.nodes), opposite)
             self.nodes.append(key)
-        return Traced(self, number)
+            self.scalars.append(scalar)
+        return scalar
 
     def input(self, slot: int) -> Traced:
         """Return the value of a slot at run time."""
@@ -64,13 +72,19 @@ class Tape:
 
 
 class Traced:
-    """A scalar with a value at run time only."""
+    """A scalar with a value at run time only; a tape makes it.
 
-    __slots__ = ("number", "tape")
+    Attributes:
+        number: of its operation on the tape.
+        opposite: the x of a scalar -x; None for other scalars.
+    """
 
-    def __init__(self, tape: Tape, number: int) -> None:
+    __slots__ = ("number", "opposite", "tape")
+
+    def __init__(self, tape: Tape, number: int, opposite: Traced | None) -> None:
         self.tape = tape
         self.number = number
+        self.opposite = opposite
 
     def __add__(self, b: Scalar) -> Scalar:
         return _add(self, b)
@@ -98,8 +112,8 @@ class Traced:
         return _scale("/", a, self)
 
     def __neg__(self) -> Scalar:
-        negated = self._negated
-        return self.tape.node("neg", self.number) if negated is None else negated
+        opposite = self.opposite
+        return self.tape.node("neg", self.number) if opposite is None else opposite
 
     def sqrt(self) -> Scalar:
         """Return the square root."""
@@ -110,21 +124,15 @@ class Traced:
         """Return p if |a| > |b|, else q."""
         return where_larger(a, b, p, q)
 
-    @property
-    def _negated(self) -> Traced | None:
-        """The x of a scalar -x; None for other scalars."""
-        op, *operands = self.tape.nodes[self.number]
-        return Traced(self.tape, int(operands[0])) if op == "neg" else None
-
 
 def _same(a: Scalar, b: Scalar) -> bool:
-    return isinstance(a, Traced) and isinstance(b, Traced) and a.number == b.number
+    return a is b and isinstance(a, Traced)
 
 
 def _opposite(a: Scalar) -> Scalar | None:
     """Return -a if a has a minus sign, else None."""
     if isinstance(a, Traced):
-        return a._negated  # pyright: ignore[reportPrivateUsage]
+        return a.opposite
     return -a if a < 0.0 else None
 
 
