@@ -7,12 +7,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ...errors import remedy
 from ...mechanism.mechanism import Vector
 from ..case import PER_TRAVEL, Case, Output, Quantity, size
 from ..measures import Measure
 from .coordinates import AXES
-from .document import fault, join, shown
+from .document import fault, join, unknown_name
 from .measures import read_measure
 from .reference import is_derivative
 from .reference_columns import Convert
@@ -71,11 +70,7 @@ def _coordinate(
 ) -> Output:
     output = typed(file, key, value, OutputKeys)
     if output.point not in keys.points:
-        raise fault(
-            file,
-            join(key, "point"),
-            f"found {shown(output.point)}, expected a point; {remedy(output.point, keys.points)}",
-        )
+        raise unknown_name(file, join(key, "point"), output.point, keys.points, "a point")
     match output.component, output.direction:
         case str(axis), None:
             direction = AXES[axis]

@@ -21,7 +21,7 @@ from pathlib import Path
 from ...trajectory import QUANTITIES, Array
 from ..case import Origin, Quantity, Series
 from ..units import Unit
-from .document import fault, sha256, shown
+from .document import fault, shown
 from .reference_columns import (
     DERIVATIVES,
     Columns,
@@ -38,6 +38,7 @@ from .reference_samples import (
     beside,
     inline,
     only_beside,
+    sha256,
 )
 from .reference_table import from_table
 from .workbook import WORKBOOKS

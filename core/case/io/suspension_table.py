@@ -12,12 +12,11 @@ import msgspec
 from msgspec import Meta
 
 from ...algebra import vec
-from ...errors import remedy
 from ...mechanism.mechanism import Mechanism, Vector
 from ..case import Case
 from ..suspension import Axle, Convention, Reaction, Side, Vehicle
 from ..units import Unit
-from .document import fault, join, shown
+from .document import fault, join, shown, unknown_name
 from .reference_columns import Convert
 from .schema import Flag, Number, Numbers3, Text
 from .travel_driver import travel_driver
@@ -192,7 +191,7 @@ def check_point(file: Path, key: str, name: str, mechanism: Mechanism) -> None:
     """Refuse a name without a point."""
     known = [point.name for point in mechanism.points]
     if name not in known:
-        raise fault(file, key, f"found {shown(name)}, expected a point; {remedy(name, known)}")
+        raise unknown_name(file, key, name, known, "a point")
 
 
 def _check_side(file: Path, key: str, vehicle: Vehicle, mechanism: Mechanism, length: Unit) -> None:

@@ -9,8 +9,8 @@ from typing import Annotated, Any, TypeVar, cast, get_args, get_origin
 
 import msgspec
 
-from ...errors import remedy, similar, with_article
-from .document import fault, join, shown
+from ...errors import similar, with_article
+from .document import fault, join, shown, unknown_name
 
 _Struct = TypeVar("_Struct", bound=msgspec.Struct)
 _Class = TypeVar("_Class", bound=type)
@@ -44,11 +44,7 @@ def class_of(file: Path, key: str, what: str, value: object, known: Mapping[str,
         )
     name = table["type"]
     if not isinstance(name, str) or name not in known:
-        raise fault(
-            file,
-            join(key, "type"),
-            f"found {shown(name)}, expected {with_article(what)} type; {remedy(str(name), known)}",
-        )
+        raise unknown_name(file, join(key, "type"), name, known, f"{with_article(what)} type")
     return known[name]
 
 

@@ -7,8 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from ....errors import remedy
-from ...io.document import fault, parse, read_text, shown
+from ...io.document import fault, parse, read_text, shown, unknown_name
 
 LARGEST_NAMES = 100_000
 
@@ -27,16 +26,12 @@ def read_own_names(file: Path, roles: Iterable[str], points: Iterable[str]) -> M
     known, found = [*points], dict[str, str]()
     for role, name in parse(file, text).items():
         if role not in roles:
-            raise fault(file, role, f"found {shown(role)}, expected a role; {remedy(role, roles)}")
+            raise unknown_name(file, role, role, roles, "a role")
         if not isinstance(name, str):
             raise fault(
                 file, role, f"found {shown(name)}, expected the name of a point; write it in quotes"
             )
         if name not in known:
-            raise fault(
-                file,
-                role,
-                f"found {shown(name)}, expected a point of the table; {remedy(name, known)}",
-            )
+            raise unknown_name(file, role, name, known, "a point of the table")
         found[role] = name
     return found

@@ -10,10 +10,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from ....errors import MOST_NAMED, brief, remedy, shortened, similar
+from ....errors import MOST_NAMED, brief, shortened, similar
 from ....mechanism.mechanism import Vector
 from ...case import Case, Truth
-from ...io.document import explained, fault, shown
+from ...io.document import explained, fault, shown, unknown_name
 from ...io.escape import visible
 from ...io.reader_options import LEFT_OUT, Supplied
 from .axle import one_wheel, whole_axle
@@ -83,11 +83,7 @@ def case_of_hardpoints(table: HardpointTable, supplied: Supplied) -> Case:
 def _template(table: HardpointTable, said: str | None) -> Template:
     known = {compact(name): each for each in TEMPLATES.values() for name in (each.name, *each.also)}
     if said is not None and compact(said) not in known:
-        raise fault(
-            table.file,
-            "--template",
-            f"found {shown(said)}, expected a template; {remedy(said, TEMPLATES)}",
-        )
+        raise unknown_name(table.file, "--template", said, TEMPLATES, "a template")
     names = ", ".join(TEMPLATES)
     if table.template is None:
         if said is None:
