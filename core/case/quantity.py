@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import Field, asdict, dataclass, fields
 from functools import reduce
 from operator import add
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 from ..algebra import Vec3
 from ..jet import Jet
@@ -75,8 +76,83 @@ class Quantity(Protocol):
         ...
 
 
+HIDDEN: Mapping[str, Any] = {"hidden": True}
+"""Metadata of a field that the table of an output in a case file does not give."""
+
+
+class PoseQuantity:
+    """Properties of a quantity of the pose, see `Quantity`, unless its class has others."""
+
+    @property
+    def forces(self) -> tuple[str, ...]:
+        """None: it is a motion."""
+        return ()
+
+    @property
+    def orders(self) -> int:
+        """Value, rate and second rate."""
+        return ORDERS
+
+    @property
+    def period(self) -> float:
+        """Zero: each value is a pose of its own."""
+        return 0.0
+
+    @property
+    def signs(self) -> str:
+        """Empty: only the case's own axes apply."""
+        return ""
+
+    def markers(self, mechanism: Mechanism) -> Sequence[Point]:
+        """Return nothing: it reads points of the mechanism alone."""
+        return ()
+
+
+class TypedQuantity(PoseQuantity, ABC):
+    """A quantity with a type in case files; a subclass with a type registers itself.
+
+    Attributes:
+        type: name in case files.
+        measure: SI unit: m, rad, or 1.
+        positive: meaning of a positive value.
+        registry: classes by type.
+    """
+
+    type: ClassVar[str]
+    measure: ClassVar[str]
+    positive: ClassVar[str]
+    registry: ClassVar[dict[str, Any]]
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        if "type" in cls.__dict__:
+            cls.registry[cls.type] = cls
+
+    @property
+    def unit(self) -> str:
+        """Unit of the type."""
+        return self.measure
+
+    @property
+    def sense(self) -> str:
+        """Meaning of a positive value, in words."""
+        return f"positive: {self.positive}"
+
+    @abstractmethod
+    def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
+        """Return the quantity over the samples; see `Quantity.of`."""
+
+
+def own_keys(cls: type[Any]) -> list[Field[Any]]:
+    """Return the fields of a typed quantity beyond the common ones, which case files give."""
+    common = ("name", "atol", "rtol", "why")
+    return [
+        each for each in fields(cls) if each.name not in common and not each.metadata.get("hidden")
+    ]
+
+
 @dataclass(frozen=True)
-class Output:
+class Output(PoseQuantity):
     """A plain output: a point's coordinate along a direction.
 
     Attributes:
@@ -94,38 +170,14 @@ class Output:
     unit: str = "m"
 
     @property
-    def orders(self) -> int:
-        """Position, velocity and acceleration."""
-        return 3
-
-    @property
-    def period(self) -> float:
-        """Zero: each value is a pose of its own."""
-        return 0.0
-
-    def markers(self, mechanism: Mechanism) -> Sequence[Point]:
-        """Return nothing: it reads a point of the mechanism."""
-        return ()
-
-    @property
     def sense(self) -> str:
         """Empty: the direction states it."""
-        return ""
-
-    @property
-    def signs(self) -> str:
-        """Empty: only the case's own axes apply."""
         return ""
 
     @property
     def points(self) -> tuple[str, ...]:
         """The point."""
         return (self.point,)
-
-    @property
-    def forces(self) -> tuple[str, ...]:
-        """None: it is a motion."""
-        return ()
 
     @property
     def facts(self) -> Mapping[str, Any]:

@@ -17,7 +17,8 @@ from ...mechanism.body import Body
 from ...mechanism.motions import Absolute, Motion, Table
 from ...trajectory import Array
 from ..case import MARKER, TIME, Case, Output
-from ..measures import Measure, key_of, own_keys
+from ..measures import Measure, key_of
+from ..quantity import own_keys
 from ..suspension import PerTravel, SuspensionOutput
 from .class_keys import own_fields
 from .coordinates import AXES

@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 
+from ....algebra import triple
 from ....case.case import Case, Quantity
 from ....case.markers import with_markers
 from ....case.measures import DriverEffort, ElementForce, ForceMeasure, JointForce, JointMoment
@@ -24,7 +25,7 @@ from ....mechanism.loads import (
 )
 from ....mechanism.mechanism import GROUND, Mechanism
 from ....mechanism.motions import Motion, Sine
-from .base import Family, Rng, Specimen, as_case, bodies, direction, power, triple
+from .base import Family, Rng, Specimen, as_case, bodies, direction, power
 from .dimensions import crank_rocker
 from .loops import Builder
 from .planar import any_plane, four_bar

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from ....algebra import triple
 from ....errors import MechanismError
 from ....joints import AxialJoint, Coupler, Gear, Joint, Kind, RackPinion
 from ....mechanism.drivers import Driver, JointAngle, JointDisplacement, PointCoordinate
@@ -23,7 +24,7 @@ from ....mechanism.motions import Motion, Sine
 from ....trajectory import Array
 from ..truth.conditions import conditions
 from ..truth.evaluation import Evaluator, Poses
-from .base import Family, Rng, Specimen, as_case, bodies, direction, triple
+from .base import Family, Rng, Specimen, as_case, bodies, direction
 
 LARGEST = 30
 # Joint types for the tree, and for the closures. Types with five freedoms carry no body.

@@ -9,12 +9,13 @@ from functools import partial
 
 import numpy as np
 
+from ....algebra import triple
 from ....case.case import TIME
 from ....joints import RackPinion, Revolute, Translational
 from ....mechanism.drivers import PointCoordinate
 from ....mechanism.mechanism import GROUND, Body, Mechanism, Point
 from ....mechanism.motions import Absolute, Motion, Sine
-from .base import Family, Rng, Specimen, as_case, triple
+from .base import Family, Rng, Specimen, as_case
 from .loops import Builder
 from .planar import any_plane, flat_plane
 
