@@ -22,7 +22,15 @@ from .column_units import required_unit, unit_of_head
 from .curve_columns import MAP, Target, match, read_stated
 from .document import decimal, fault, shown, unknown_name
 from .reference import compared
-from .reference_columns import Column, Columns, Convert, column_of, driver_unit, known_columns
+from .reference_columns import (
+    Column,
+    Columns,
+    Convert,
+    column_of,
+    driver_unit,
+    known_columns,
+    require_positions,
+)
 from .reference_samples import Samples, sha256
 from .reference_table import from_table
 from .schema import MOST_SAMPLES
@@ -139,13 +147,7 @@ def _columns(
             found = replace(found, convert=_opposite(found.convert))
         of[target.name] = replace(found, unit=words)
     for name in of:
-        stem = name.removesuffix(".velocity").removesuffix(".acceleration")
-        if stem not in of:
-            raise fault(
-                samples.file,
-                samples.header,
-                f"found {name!r} alone, expected its positions too; add the column {stem!r}",
-            )
+        require_positions(samples, name, of)
     return unit, of
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
@@ -12,11 +11,12 @@ import msgspec
 from msgspec import Meta
 
 from ...algebra import vec
-from ...mechanism.mechanism import Mechanism, Vector
+from ...mechanism.mechanism import Mechanism
 from ..case import Case
 from ..suspension import Axle, Convention, Reaction, Side, Vehicle
 from ..units import Unit
 from .document import fault, join, shown, unknown_name
+from .in_si import direction
 from .reference_columns import Convert
 from .schema import Flag, Number, Numbers3, Text
 from .travel_driver import travel_driver
@@ -113,7 +113,9 @@ def read_suspension(
         CaseError: invalid axes, unknown points or drivers, or a wheel on the wrong side.
     """
     keys, mechanism = typed(file, "suspension", value, SuspensionKeys), case.mechanism
-    forward, up = (_direction(file, name, getattr(keys, name)) for name in ("forward", "up"))
+    forward, up = (
+        direction(file, join("suspension", name), getattr(keys, name)) for name in ("forward", "up")
+    )
     if abs(vec(forward) @ vec(up)) > SQUARE:
         found = (
             f"found {shown(keys.up)}, which is not at right angles to forward ="
@@ -174,17 +176,6 @@ def _kingpin(
         problem = "found beside kingpin, expected one of them; remove the other"
         raise fault(file, join(key, "kingpin_links"), problem)
     return keys.kingpin or rods
-
-
-def _direction(file: Path, key: str, found: Vector) -> Vector:
-    if not any(found):
-        raise fault(
-            file,
-            join("suspension", key),
-            "found zero, expected a direction; give one of any other length",
-        )
-    long = math.hypot(*found)
-    return found[0] / long, found[1] / long, found[2] / long
 
 
 def check_point(file: Path, key: str, name: str, mechanism: Mechanism) -> None:

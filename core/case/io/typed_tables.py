@@ -10,10 +10,25 @@ from typing import Annotated, Any, TypeVar, cast, get_args, get_origin
 import msgspec
 
 from ...errors import similar, with_article
-from .document import fault, join, shown, unknown_name
+from .document import fault, join, parse, read_text, shown, unknown_name
 
 _Struct = TypeVar("_Struct", bound=msgspec.Struct)
 _Class = TypeVar("_Class", bound=type)
+
+
+def read_tables(file: Path, limit: int, why_limit: str, schema: str) -> dict[str, Any]:
+    """Return the tables of a file of at most `limit` bytes and of this schema.
+
+    Raises:
+        CaseError: the file cannot be read, or has another schema or none.
+    """
+    tables = parse(file, read_text(file, limit, why_limit))
+    if tables.get("schema") != schema:
+        found = shown(tables["schema"]) if "schema" in tables else "none"
+        raise fault(
+            file, "schema", f'found {found}, expected "{schema}"; write schema = "{schema}"'
+        )
+    return tables
 
 
 def as_table(file: Path, key: str, value: object) -> dict[str, Any]:

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from ...case.case import Case
-from ...case.io.document import fault, join, parse, read_text, shown
-from ...case.io.typed_tables import typed
+from ...case.io.document import fault, join, shown
+from ...case.io.typed_tables import read_tables, typed
 from ...joints import Kind
 from ...mechanism.drivers import PointCoordinate
 from ...trajectory import Array
@@ -37,14 +37,8 @@ def read_variation(path: str | Path, case: Case) -> Variation:
             file, key and remedy.
     """
     file = Path(path)
-    tables = parse(
-        file, read_text(file, LARGEST_FILE, "hardpoints and their tolerances need far less")
-    )
-    if tables.get("schema") != SCHEMA:
-        found = shown(tables["schema"]) if "schema" in tables else "none"
-        raise fault(
-            file, "schema", f'found {found}, expected "{SCHEMA}"; write schema = "{SCHEMA}"'
-        )
+    advice = "hardpoints and their tolerances need far less"
+    tables = read_tables(file, LARGEST_FILE, advice, SCHEMA)
     return _Reader(file, typed(file, "", tables, VaryKeys), case).variation()
 
 

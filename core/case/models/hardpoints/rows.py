@@ -19,7 +19,7 @@ from ...io.workbook import Cell, Row
 from ...units import LENGTHS
 from .forms import with_head
 from .head import HEAD, Head, as_head, turned, upright, written
-from .table import Hardpoint, HardpointTable, length_name, number, twice
+from .table import Hardpoint, HardpointTable, length_name, number, require_name, twice
 from .templates import ROLES
 from .templates.base import compact
 
@@ -146,12 +146,7 @@ def _points(
     lines: dict[str, str] = {}
     for where, (cell, *cells) in body:
         name = written([cell])
-        if not name or not name.isprintable():
-            raise fault(
-                file,
-                where,
-                f"found the name {name!r}, expected printable characters; name the point",
-            )
+        require_name(file, where, name)
         if name in lines:
             raise twice(file, where, name, lines[name])
         lines[name] = where

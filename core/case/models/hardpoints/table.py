@@ -86,6 +86,14 @@ def twice(file: Path, where: str, name: str, before: str) -> CaseError:
     )
 
 
+def require_name(file: Path, where: str, name: str) -> None:
+    """Refuse a name of a point that cannot be printed, or none."""
+    if not name or not name.isprintable():
+        raise fault(
+            file, where, f"found the name {name!r}, expected printable characters; name the point"
+        )
+
+
 def number(file: Path, where: str, text: object, sign: str = ".") -> float:
     """Return a coordinate.
 

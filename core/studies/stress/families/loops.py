@@ -8,7 +8,7 @@ motions shows this. The reference is followed from the design.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import MISSING, fields
 from functools import partial
 from typing import Any
@@ -49,12 +49,8 @@ class Loops(Family):
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
         """Return a loop, driven far enough to meet a dead centre in every second specimen."""
-        while True:
-            count = bodies(rng, LARGEST)
-            found = Builder(rng, count).built()
-            if found is not None:
-                break
-        mechanism, reach = found
+        mechanism, reach = random_mechanism(rng, lambda: bodies(rng, LARGEST))
+        count = len(mechanism.bodies)
         motions: dict[str, Motion] = {d.name: Sine(0.1 * reach, 0.7) for d in mechanism.drivers[1:]}
         values = np.linspace(-reach, reach, samples)
         return Specimen(
@@ -62,6 +58,18 @@ class Loops(Family):
             partial(as_case, mechanism, mechanism.drivers[0].name, values, motions=motions),
             facts=(("bodies", count),),
         )
+
+
+def random_mechanism(rng: Rng, count: Callable[[], int], most: int = 2) -> tuple[Mechanism, float]:
+    """Return a random mechanism that can be closed, and the reach of its drivers.
+
+    Args:
+        count: returns a number of bodies.
+        most: largest number of drivers.
+    """
+    while (found := Builder(rng, count(), most).built()) is None:
+        pass
+    return found
 
 
 class Builder:
