@@ -1,10 +1,12 @@
-"""Quantities to compare: functions of the motion of points, and the plain coordinate of a point."""
+"""Quantities to compare: functions of the motion of points, the plain coordinate of a point, and
+the points that they add to a mechanism.
+"""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import Field, asdict, dataclass, fields
+from dataclasses import Field, asdict, dataclass, fields, replace
 from functools import reduce
 from operator import add
 from typing import Any, ClassVar, Protocol
@@ -191,3 +193,11 @@ class Output(PoseQuantity):
         each = zip(self.direction, at[self.point], design[self.point], strict=True)
         moved = [(along, x - start if self.relative else x) for along, x, start in each if along]
         return reduce(add, [x if along == 1.0 else along * x for along, x in moved])
+
+
+def with_markers(mechanism: Mechanism, outputs: Sequence[Quantity]) -> Mechanism:
+    """Return the mechanism with the points that outputs read beyond its own."""
+    added = {point.name: point for output in outputs for point in output.markers(mechanism)}
+    known = {point.name for point in mechanism.points}
+    new = [point for name, point in added.items() if name not in known]
+    return replace(mechanism, points=[*mechanism.points, *new]) if new else mechanism

@@ -10,7 +10,7 @@ from ...joints import Kind
 from ...mechanism.dimension import ACCELERATION
 from ...mechanism.mechanism import Body, Mechanism, Point
 from ..case import Case, Truth, size
-from ..markers import with_markers
+from ..quantity import with_markers
 from ..units import ANGLES, LENGTHS, Unit
 from .coordinates import with_all_coordinates
 from .document import explained, fault, join, shown

@@ -209,10 +209,7 @@ def sweep_designs(
         },
         effects=result_tables.effect_table(study, found.effects),
         unsolved=found.failures,
-        failed=[
-            results.Failed(variant=each.variant, samples=each.samples, message=each.message)
-            for each in found.unsolved
-        ],
+        failed=found.unsolved,
         retried=found.retried,
         check_engine=check.engine.name if check else None,
         checked=checked,

@@ -10,8 +10,8 @@ import numpy as np
 
 from ....algebra import triple
 from ....case.case import Case, Quantity
-from ....case.markers import with_markers
 from ....case.measures import DriverEffort, ElementForce, ForceMeasure, JointForce, JointMoment
+from ....case.quantity import with_markers
 from ....joints import Joint, Revolute
 from ....mechanism.body import Body, Inertia
 from ....mechanism.drivers import JointAngle

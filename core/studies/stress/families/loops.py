@@ -9,7 +9,7 @@ motions shows this. The reference is followed from the design.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import MISSING, fields
+from dataclasses import MISSING, fields, replace
 from functools import partial
 from typing import Any
 
@@ -257,9 +257,4 @@ class Builder:
         driven = [d.point for d in found.drivers if isinstance(d, PointCoordinate)]
         shown = {*driven, *(f"p_{body.name}" for body in self.bodies[-3:])}
         points = [point for point in found.points if point.name in shown]
-        return (
-            Mechanism(
-                found.name, found.bodies, found.joints, points, found.drivers, found.couplers
-            ),
-            reach,
-        )
+        return replace(found, points=points), reach
