@@ -10,24 +10,22 @@ from __future__ import annotations
 import pickle
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from ...case.case import TIME, Case
+from ...case.case import Case
 from ...case.joint_probe import probe, probes
 from ...harness.engine import Engine, may_run_here
 from ...harness.engine_versions import versions
 from ...harness.execution import Answer, Attempt, Attempts, Pair, Solver, here
-from ...harness.record import Outcome, OutputSeries, Record
+from ...harness.record import Outcome, Record
 from ...harness.resource_limits import Limits
 from ...harness.run import Progress, run
 from ...harness.workers.pool import in_workers
 from ...joints import Revolute
-from ...trajectory import QUANTITIES, Array
 from ..findings import Finding, Report, Verdict
-from ..joint_check.loop import WEIGHTS, differences
+from .rates import rates
 from .unknown_joint import UnknownJoint
 
 MODES = ("projection", "simulate")
@@ -35,9 +33,6 @@ LOOPS = ("python", "simulator", "compiled")
 REACH = np.linspace(-3.0, 3.0, 61)
 """Angles of the probe of a revolute joint [rad]: rods lock it at -1.8 and 2.4."""
 AGREE_WHY = "largest error over the tolerance of its output"
-NOISE = 1e-9
-"""Error of the compared values, over their largest one: a thousand times the residual tolerance."""
-RATES_WHY = "over what the differences change by as their step is doubled"
 SAME_WHY = "the same bits from a new model, in another process and order"
 VERDICTS = {
     Outcome.PASS: Verdict.PASS,
@@ -202,53 +197,3 @@ def _difference(one: Attempt, other: Attempt) -> float:
                 off = np.abs(a - b)
                 worst = max(worst, float(np.nanmax(off, initial=0.0)) or np.inf)
     return worst
-
-
-def rates(solved: Sequence[tuple[Case, Record]]) -> Iterator[Finding]:
-    """Yield the worst defect of velocity and of acceleration over all cases.
-
-    Only uniform sweeps of one driver count: others have motions with corners.
-    """
-    for before, after in pairwise(QUANTITIES):
-        worst, where, compared = 0.0, "", 0
-        for case, record in solved:
-            dt = _step(case)
-            if dt is None or record.solved != record.samples:
-                continue
-            for name, output in record.outputs.items():
-                share = _share(output, before, after, dt)
-                compared += share is not None
-                if share is not None and share > worst:
-                    worst, where = share, f"{case.name}: {name}"
-        if not compared:
-            yield Finding(f"rates: {after}", Verdict.SKIP, message="the engine gives none")
-            continue
-        verdict = Verdict.PASS if worst <= 1.0 else Verdict.FAIL
-        told = "" if worst <= 1.0 else f"is not the rate of its {before}"
-        yield Finding(f"rates: {after}", verdict, worst, 1.0, RATES_WHY, row=where, message=told)
-
-
-def _step(case: Case) -> float | None:
-    """Return the time between samples [s]; None if the sweep is short, uneven or of several."""
-    steps = np.diff(case.sweep.path.times)
-    if case.sweep.driver == TIME or case.sweep.motions or len(steps) < 3 * len(WEIGHTS):
-        return None
-    even = np.allclose(steps, steps[0], rtol=1e-9, atol=0.0)
-    return float(steps[0]) if even else None
-
-
-def _share(output: OutputSeries, before: str, after: str, dt: float) -> float | None:
-    """Return the defect of a rate over its limit; None if there is nothing to compare."""
-    values, found = getattr(output, before), getattr(output, after)
-    if values is None or found is None or None in values or None in found:
-        return None
-    position, rate = np.array(values, dtype=np.float64), np.array(found, dtype=np.float64)
-    slopes, coarse = differences(position, dt), differences(position[::2], 2.0 * dt)
-    noise = NOISE * (float(np.abs(position).max()) + abs(dt)) / abs(dt)
-    limit = float(np.abs(coarse - _beside(slopes, coarse)).max()) + noise
-    return float(np.abs(slopes - rate[3:-3]).max()) / limit
-
-
-def _beside(slopes: Array, coarse: Array) -> Array:
-    """Return the fine differences at the samples of the coarse ones."""
-    return slopes[3::2][: len(coarse)]
