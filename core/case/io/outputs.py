@@ -12,8 +12,7 @@ from .coordinates import AXES
 from .document import fault, join, unknown_name
 from .in_si import direction
 from .measures import read_measure
-from .reference import is_derivative
-from .reference_columns import Convert
+from .reference_columns import DERIVATIVES, Convert
 from .schema import COORDINATE, CaseKeys, OutputKeys
 from .tolerance import tolerance
 from .typed_tables import as_table, class_of, typed
@@ -45,7 +44,7 @@ def _output(
     units: Mapping[str, Convert],
 ) -> Quantity:
     key = join("outputs", name)
-    if is_derivative(name) or name.endswith(PER_TRAVEL):
+    if name.endswith((*DERIVATIVES, PER_TRAVEL)):
         raise fault(
             file,
             key,

@@ -48,11 +48,6 @@ PROVED = ".json"
 CHOICE = 'sheet = "NAME" in [reference]'
 
 
-def is_derivative(name: str) -> bool:
-    """Return whether a column of this name holds a velocity or acceleration."""
-    return name.endswith(DERIVATIVES)
-
-
 def read_grid(case_file: Path, keys: ReferenceKeys, driver: Unit) -> Sequence[float]:
     """Return the driver values of a reference [SI].
 

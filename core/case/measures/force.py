@@ -10,7 +10,7 @@ from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 
@@ -44,7 +44,6 @@ class ForceMeasure(Measure):
         turns: whether the value is a torque or moment.
     """
 
-    of_what: ClassVar[str]
     measure = NEWTON
 
     turns: bool = field(default=False, kw_only=True, metadata=HIDDEN)
