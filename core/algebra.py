@@ -79,6 +79,12 @@ def vec(values: Sequence[Scalar]) -> Vec3:
     return Vec3(x, y, z)
 
 
+def triple(a: Iterable[Any]) -> tuple[float, float, float]:
+    """Return a vector of numbers as descriptions of mechanisms have it."""
+    x, y, z = map(float, a)
+    return x, y, z
+
+
 def cross(a: Vec3, b: Vec3) -> Vec3:
     """Return the vector product a x b."""
     return Vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)

@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...core.algebra import triple
 from ...core.joints import AxialJoint, Distance, Joint, Spherical, Translational, Universal
 from ...core.joints.base import triad, unit
 from ...core.mechanism.drivers import Driver, JointDisplacement, PointCoordinate
@@ -50,7 +51,7 @@ def jointed(mechanism: Mechanism, *, rods: bool = False) -> Mechanism:
             bodies += [Body(name, point.position) for name in names]
             for below, name, axis in zip((GROUND, *names), names, (h, f, g), strict=False):
                 joints.append(
-                    Translational(name, below, name, point=point.position, axis=_vector(axis))
+                    Translational(name, below, name, point=point.position, axis=triple(axis))
                 )
             joints.append(
                 Spherical(f"{driver.name}: ball", names[-1], point.body, point=point.position)
@@ -95,9 +96,4 @@ def cross_of(mechanism: Mechanism, body: str, along: Iterable[float]) -> tuple[V
         np.array([*triad((*d.tolist(),))[0]]),
     )
     second = np.cross(d, first)
-    return _vector(first), _vector(second / np.linalg.norm(second))
-
-
-def _vector(a: Iterable[float]) -> Vector:
-    x, y, z = map(float, a)
-    return x, y, z
+    return triple(first), triple(second / np.linalg.norm(second))

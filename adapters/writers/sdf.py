@@ -10,10 +10,11 @@ cross and a ball. Drake has constraints in discrete plants only.
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
+from ...core.algebra import triple
 from ...core.errors import KincheckError
 from ...core.joints.base import unit
 from ...core.mechanism.body import Body
@@ -108,7 +109,7 @@ class _Model:
         (i, j), (P, Q), length = tie.links, tie.points, tie.length
         assert length is not None
         along = np.array([*unit([b - a for a, b in zip(P, Q, strict=True)])])
-        end = _vector(np.array(P) + length * along)
+        end = triple(np.array(P) + length * along)
         names = [f"{tie.name}.first", f"{tie.name}.second"]
         links = [f"{names[0]}.link", f"{tie.name}.rod"]
         axes = cross_of(self.mechanism, i, along)
@@ -165,7 +166,7 @@ class _Model:
                 self.model, "drake:ball_constraint", name=f"{tie.name}.tie{k or ''}"
             )
             for side, link, P in zip("AB", tie.links, tie.points, strict=True):
-                point = _vector(np.array(P) + offset)
+                point = triple(np.array(P) + offset)
                 end = "P" if side == "A" else "Q"
                 _text(element, f"drake:ball_constraint_body_{side}", link)
                 name = f"drake:ball_constraint_p_{side}{end}"
@@ -225,8 +226,3 @@ def _text(
     parent: ET.Element, tag: str, text: str, options: Mapping[str, str] | None = None
 ) -> None:
     ET.SubElement(parent, tag, dict(options or {})).text = text
-
-
-def _vector(a: Iterable[float] | Sequence[float]) -> Vector:
-    x, y, z = map(float, a)
-    return x, y, z

@@ -1,12 +1,15 @@
-"""Quantities to compare: functions of the motion of points, and the plain coordinate of a point."""
+"""Quantities to compare: functions of the motion of points, the plain coordinate of a point, and
+the points that they add to a mechanism.
+"""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import Field, asdict, dataclass, fields, replace
 from functools import reduce
 from operator import add
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 from ..algebra import Vec3
 from ..jet import Jet
@@ -75,8 +78,83 @@ class Quantity(Protocol):
         ...
 
 
+HIDDEN: Mapping[str, Any] = {"hidden": True}
+"""Metadata of a field that the table of an output in a case file does not give."""
+
+
+class PoseQuantity:
+    """Properties of a quantity of the pose, see `Quantity`, unless its class has others."""
+
+    @property
+    def forces(self) -> tuple[str, ...]:
+        """None: it is a motion."""
+        return ()
+
+    @property
+    def orders(self) -> int:
+        """Value, rate and second rate."""
+        return ORDERS
+
+    @property
+    def period(self) -> float:
+        """Zero: each value is a pose of its own."""
+        return 0.0
+
+    @property
+    def signs(self) -> str:
+        """Empty: only the case's own axes apply."""
+        return ""
+
+    def markers(self, mechanism: Mechanism) -> Sequence[Point]:
+        """Return nothing: it reads points of the mechanism alone."""
+        return ()
+
+
+class TypedQuantity(PoseQuantity, ABC):
+    """A quantity with a type in case files; a subclass with a type registers itself.
+
+    Attributes:
+        type: name in case files.
+        measure: SI unit: m, rad, or 1.
+        positive: meaning of a positive value.
+        registry: classes by type.
+    """
+
+    type: ClassVar[str]
+    measure: ClassVar[str]
+    positive: ClassVar[str]
+    registry: ClassVar[dict[str, Any]]
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        if "type" in cls.__dict__:
+            cls.registry[cls.type] = cls
+
+    @property
+    def unit(self) -> str:
+        """Unit of the type."""
+        return self.measure
+
+    @property
+    def sense(self) -> str:
+        """Meaning of a positive value, in words."""
+        return f"positive: {self.positive}"
+
+    @abstractmethod
+    def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
+        """Return the quantity over the samples; see `Quantity.of`."""
+
+
+def own_keys(cls: type[Any]) -> list[Field[Any]]:
+    """Return the fields of a typed quantity beyond the common ones, which case files give."""
+    common = ("name", "atol", "rtol", "why")
+    return [
+        each for each in fields(cls) if each.name not in common and not each.metadata.get("hidden")
+    ]
+
+
 @dataclass(frozen=True)
-class Output:
+class Output(PoseQuantity):
     """A plain output: a point's coordinate along a direction.
 
     Attributes:
@@ -94,38 +172,14 @@ class Output:
     unit: str = "m"
 
     @property
-    def orders(self) -> int:
-        """Position, velocity and acceleration."""
-        return 3
-
-    @property
-    def period(self) -> float:
-        """Zero: each value is a pose of its own."""
-        return 0.0
-
-    def markers(self, mechanism: Mechanism) -> Sequence[Point]:
-        """Return nothing: it reads a point of the mechanism."""
-        return ()
-
-    @property
     def sense(self) -> str:
         """Empty: the direction states it."""
-        return ""
-
-    @property
-    def signs(self) -> str:
-        """Empty: only the case's own axes apply."""
         return ""
 
     @property
     def points(self) -> tuple[str, ...]:
         """The point."""
         return (self.point,)
-
-    @property
-    def forces(self) -> tuple[str, ...]:
-        """None: it is a motion."""
-        return ()
 
     @property
     def facts(self) -> Mapping[str, Any]:
@@ -139,3 +193,11 @@ class Output:
         each = zip(self.direction, at[self.point], design[self.point], strict=True)
         moved = [(along, x - start if self.relative else x) for along, x, start in each if along]
         return reduce(add, [x if along == 1.0 else along * x for along, x in moved])
+
+
+def with_markers(mechanism: Mechanism, outputs: Sequence[Quantity]) -> Mechanism:
+    """Return the mechanism with the points that outputs read beyond its own."""
+    added = {point.name: point for output in outputs for point in output.markers(mechanism)}
+    known = {point.name for point in mechanism.points}
+    new = [point for name, point in added.items() if name not in known]
+    return replace(mechanism, points=[*mechanism.points, *new]) if new else mechanism

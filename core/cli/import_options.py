@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterable
+from dataclasses import fields
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..case.io.reader_options import LEFT_OUT, Supplied
 from ..report.progress import complain
@@ -158,27 +159,9 @@ def return_cases(options: argparse.Namespace) -> None:
 
 def supplied(options: argparse.Namespace) -> Supplied:
     """Return the facts supplied by options."""
-    return Supplied(
-        options.template,
-        options.units,
-        options.axes,
-        options.travel,
-        (*options.drive,),
-        (*options.hold,),
-        options.names,
-        options.wheel_radius,
-        options.wheelbase,
-        options.axle,
-        options.closure,
-        options.hold_rest,
-        (*options.start,),
-        options.rack,
-        options.sheet,
-        options.position,
-        options.cg_height,
-        options.brake_share,
-        options.drive_share,
-    )
+    given: dict[str, Any] = {each.name: getattr(options, each.name) for each in fields(Supplied)}
+    given |= {name: (*given[name],) for name in ("drive", "hold", "start")}
+    return Supplied(**given)
 
 
 def tell_left_out(cases: Iterable[Case]) -> None:

@@ -19,7 +19,7 @@ def _case() -> dict[str, Any]:
 
 
 def _variation() -> dict[str, Any]:
-    from ..studies.variation.json_schema import variation_schema
+    from ..studies.variation.variation_schema import variation_schema
 
     return variation_schema()
 

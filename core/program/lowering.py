@@ -8,6 +8,7 @@ numbers to the last bit.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 from .straight_line import Program
 from .tape import LEAVES, Node, operands
@@ -50,12 +51,8 @@ def lowered(program: Program) -> Program:
             sizes.add(k)
         place[k] = len(found)
         found.append(node if op in LEAVES else (op, *[place[x] for x in read]))
-    return Program(
-        program.name,
-        tuple(found),
-        {slot: place[k] for slot, k in program.outputs.items()},
-        program.times,
-    )
+    outputs = {slot: place[k] for slot, k in program.outputs.items()}
+    return replace(program, nodes=tuple(found), outputs=outputs)
 
 
 def counts(size: int, *uses: Iterable[int]) -> list[int]:

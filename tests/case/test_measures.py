@@ -14,7 +14,6 @@ from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.io.case_writer import case_text
 from kincheck.core.case.io.coordinates import with_all_coordinates, with_all_motions
 from kincheck.core.case.io.reader_options import Supplied
-from kincheck.core.case.markers import with_markers
 from kincheck.core.case.measures import (
     Angle,
     Component,
@@ -26,6 +25,7 @@ from kincheck.core.case.measures import (
 )
 from kincheck.core.case.models.files import load
 from kincheck.core.case.notes import notes
+from kincheck.core.case.quantity import with_markers
 from kincheck.core.harness.compare import output_series
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.run import run

@@ -12,7 +12,7 @@ from kincheck.core.case.io import workbook
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.io.reader_options import LEFT_OUT
 from kincheck.core.case.models.files import load
-from kincheck.core.case.models.hardpoints import spreadsheet
+from kincheck.core.case.models.hardpoints import rows as hardpoint_rows
 from kincheck.core.cli.main import main
 from kincheck.core.errors import CaseError
 from kincheck.core.harness.record import Outcome
@@ -161,7 +161,7 @@ FAULTS = {
 
 @pytest.mark.parametrize("kind", FAULTS)
 def test_faults(tmp_path, monkeypatch, kind):
-    monkeypatch.setattr(spreadsheet, "MOST_ROWS", 100)
+    monkeypatch.setattr(hardpoint_rows, "MOST_ROWS", 100)
     sheets, fragments = FAULTS[kind]
     file = book(tmp_path, sheets)
     with pytest.raises(CaseError) as caught:

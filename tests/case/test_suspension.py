@@ -13,7 +13,7 @@ from kincheck import cases
 from kincheck.adapters.native import Native
 from kincheck.core.case.case import Case, Output, Sweep, Truth
 from kincheck.core.case.io.suspension import with_slopes
-from kincheck.core.case.markers import with_markers
+from kincheck.core.case.quantity import with_markers
 from kincheck.core.case.suspension import (
     Axle,
     Convention,

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from kincheck.core import solve
 from kincheck.core.case.case import Case, Sweep, Truth
-from kincheck.core.case.markers import with_markers
 from kincheck.core.case.measures import JointAngle as Angle
+from kincheck.core.case.quantity import with_markers
 from kincheck.core.harness.compare import output_series
 from kincheck.core.joints import Cylindrical, Revolute, Spherical, Translational, Universal
 from kincheck.core.kinematics import (

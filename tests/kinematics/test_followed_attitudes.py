@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from kincheck.core.case.case import Case, Sweep, Truth
-from kincheck.core.case.markers import with_markers
 from kincheck.core.case.measures import Component, Orientation
+from kincheck.core.case.quantity import with_markers
 from kincheck.core.harness.compare import output_series
 from kincheck.core.joints import Gear, Revolute
 from kincheck.core.kinematics import NativeSolver

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from kincheck.core.cli.main import main
 from kincheck.core.errors import KincheckError
+from kincheck.core.studies.tolerance.chunk import RowLimit, limit_counts
 from kincheck.core.studies.tolerance.histograms import sparkline
-from kincheck.core.studies.tolerance.limit_counts import RowLimit, limit_counts
 from kincheck.core.studies.tolerance.page import page
 from kincheck.core.studies.tolerance.sweep import sweep_designs
 from kincheck.core.studies.variation.limits import Limit

@@ -12,8 +12,8 @@ from kincheck.cases import load
 from kincheck.core import solve
 from kincheck.core.caches import clear_caches
 from kincheck.core.case.case import Output
-from kincheck.core.case.markers import with_markers
 from kincheck.core.case.measures import Component, JointAngle, Orientation
+from kincheck.core.case.quantity import with_markers
 from kincheck.core.studies.tolerance import streaming_totals as room
 from kincheck.core.studies.tolerance.gradients import gradients
 from kincheck.core.studies.tolerance.reduce import QUANTILES, merged, nothing, quantiles

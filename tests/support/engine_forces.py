@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from kincheck import adapters
 from kincheck.core.case.case import Case, Sweep, Truth
-from kincheck.core.case.markers import with_markers
 from kincheck.core.case.measures.force import (
     Axis,
     DriverEffort,
@@ -13,6 +12,7 @@ from kincheck.core.case.measures.force import (
     JointForce,
     JointMoment,
 )
+from kincheck.core.case.quantity import with_markers
 from kincheck.core.mechanism.loads import Force, SpringDamper, Torque, TorsionSpringDamper
 
 UNUSED = {"atol": 1.0, "rtol": 0.0, "why": "not judged here"}

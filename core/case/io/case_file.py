@@ -10,10 +10,10 @@ from ...joints import Kind
 from ...mechanism.dimension import ACCELERATION
 from ...mechanism.mechanism import Body, Mechanism, Point
 from ..case import Case, Truth, size
-from ..markers import with_markers
+from ..quantity import with_markers
 from ..units import ANGLES, LENGTHS, Unit
 from .coordinates import with_all_coordinates
-from .document import explained, fault, join, parse, read_text, shown
+from .document import explained, fault, join, shown
 from .driving import read_drivers, read_sweep
 from .in_si import geometry_in_si, load_in_si
 from .joints import read_joints
@@ -30,7 +30,7 @@ from .schema import (
     PointKeys,
     UnitsKeys,
 )
-from .typed_tables import as_table, typed
+from .typed_tables import as_table, read_tables, typed
 
 LARGEST_FILE = 4_000_000
 # Twice the bodies of the largest measured mechanism; the same limit for joints and points.
@@ -51,18 +51,8 @@ def load_case(path: str | Path, closure: float | None = None) -> Case:
             key and remedy.
     """
     file = Path(path)
-    tables = parse(
-        file,
-        read_text(
-            file, LARGEST_FILE, "a case holds hardpoints; samples belong into a reference file"
-        ),
-    )
-    if tables.get("schema") != SCHEMA:
-        found = shown(tables["schema"]) if "schema" in tables else "none"
-        raise fault(
-            file, "schema", f'found {found}, expected "{SCHEMA}"; write schema = "{SCHEMA}"'
-        )
-    keys = typed(file, "", tables, CaseKeys)
+    advice = "a case holds hardpoints; samples belong into a reference file"
+    keys = typed(file, "", read_tables(file, LARGEST_FILE, advice, SCHEMA), CaseKeys)
     for what in _PARTS:
         if (count := len(getattr(keys, what))) > MOST_PARTS:
             raise fault(

@@ -15,14 +15,15 @@ from ...errors import LONGEST_NAME, CaseError, brief, with_article
 from ...joints import Coupler
 from ...mechanism.body import Body
 from ...mechanism.motions import Absolute, Motion, Table
-from ...trajectory import Array
+from ...trajectory import QUANTITIES, Array
 from ..case import MARKER, TIME, Case, Output
-from ..measures import Measure, key_of, own_keys
+from ..measures import Measure, key_of
+from ..quantity import own_keys
 from ..suspension import PerTravel, SuspensionOutput
 from .class_keys import own_fields
 from .coordinates import AXES
 from .document import LONGEST_TEXT, SMALLEST
-from .reference_writer import reason_against, reference_table
+from .reference_columns import DERIVATIVES
 from .schema import SCHEMA
 from .suspension_writer import suspension_output, suspension_tables
 
@@ -211,3 +212,43 @@ def _value(value: Any) -> str:
         return repr(value)
     # the reader refuses smaller numbers; they are the round-off of zeros
     return repr(float(value) if abs(value) >= SMALLEST else 0.0)
+
+
+def reference_table(case: Case, driver_values: Array) -> Mapping[str, Any]:
+    """Return the keys of [reference]; empty without a reference, or if rows cannot hold it.
+
+    Args:
+        driver_values: swept values in the form of the file, shape (n,).
+    """
+    if reason_against(case):
+        return {}
+    columns = _columns(case)
+    known = np.isfinite(np.array([*columns.values()])).all(axis=0)
+    table = np.column_stack([driver_values, *columns.values()])[known]
+    keys = {"columns": ["driver", *columns], "rows": table.tolist()}
+    if case.origin and case.origin.citation and not case.origin.own:
+        keys["citation"] = case.origin.citation
+    return keys
+
+
+def reason_against(case: Case) -> str:
+    """Return the reason why rows cannot hold the reference of a case; empty if they can."""
+    if not case.reference:
+        return "there is none"
+    if any(series.uncertainty for series in case.reference.values()):
+        return "its values have uncertainties, from printed digits or interpolation"
+    known = np.isfinite(np.array([*_columns(case).values()]))
+    if (known != known[0]).any() or not known.any():
+        return "its outputs are known at different samples"
+    return ""
+
+
+def _columns(case: Case) -> dict[str, Array]:
+    """Return the columns of the known quantities, by name, shape (n,) each."""
+    found: dict[str, Array] = {}
+    for name, series in case.reference.items():
+        quantities: Sequence[Array | None] = [getattr(series, each) for each in QUANTITIES]
+        for ending, values in zip(("", *DERIVATIVES), quantities, strict=True):
+            if values is not None:
+                found[name + ending] = values
+    return found

@@ -14,7 +14,8 @@ from ...mechanism.loads import ELEMENTS, SpringDamper
 from ...mechanism.motions import Motion
 from .. import measures
 from ..measures import Measure
-from ..suspension import SuspensionOutput, own_keys
+from ..quantity import own_keys
+from ..suspension import SuspensionOutput
 from .class_keys import Described, kind_of, own_fields
 from .driving import DRIVERS
 
@@ -144,7 +145,7 @@ def _keys(cls: type[Described]) -> str:
 
 
 def _measure_keys(cls: type[Measure]) -> Iterator[str]:
-    for each in measures.own_keys(cls):
+    for each in own_keys(cls):
         key = measures.key_of(each)
         yield key if each.default is MISSING else f"({key})"
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 from ...mechanism.mechanism import Vector
 from ..case import Case, Output, Quantity, size
-from ..markers import with_markers
 from ..measures import Component, JointAngle, JointDisplacement, Orientation
+from ..quantity import with_markers
 from .tolerance import default
 
 AXES: Mapping[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}

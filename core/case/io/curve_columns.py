@@ -11,7 +11,7 @@ from pathlib import Path
 
 from ...errors import MOST_NAMED, brief, remedy, shortened
 from .column_units import split_head
-from .document import fault, shown
+from .document import fault, shown, unknown_name
 
 MAP = "--map"
 # Names for an output or a driver, in normal form. Names of sums and changes (track, total toe) are
@@ -73,11 +73,8 @@ def read_stated(
                 f' COLUMN="OUTPUT [UNIT]"; say {MAP} "Toe Angle=toe [deg]"',
             )
         if name != driver and name not in known:
-            raise fault(
-                file,
-                MAP,
-                f"found {shown(name)}, expected the driver {driver} or an output;"
-                f" {remedy(name, [driver, *known])}",
+            raise unknown_name(
+                file, MAP, name, [driver, *known], f"the driver {driver} or an output"
             )
         if head in stated or name in [target.name for target in stated.values()]:
             raise fault(

@@ -7,19 +7,18 @@ remedy.
 from __future__ import annotations
 
 import codecs
-import hashlib
 import json
 import math
 import re
 import reprlib
 import tomllib
 from collections import Counter
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, TypeAlias, cast
 
-from ...errors import LONGEST_NAME, CaseError, MechanismError
+from ...errors import LONGEST_NAME, CaseError, MechanismError, remedy
 from ..units import METRE, Unit
 from .escape import visible
 from .foreign import binary, foreign
@@ -99,6 +98,17 @@ def shown(value: object) -> str:
     return _short.repr(value)
 
 
+def unknown_name(
+    file: Path, key: str, name: object, known: Iterable[str], expected: str
+) -> CaseError:
+    """Return the error of a name that is none of the known ones.
+
+    Args:
+        expected: what it should name, for the message: "a point".
+    """
+    return fault(file, key, f"found {shown(name)}, expected {expected}; {remedy(str(name), known)}")
+
+
 def join(key: str, name: str) -> str:
     """Return the path of a key inside a table."""
     name = name if name.isprintable() and name else repr(name)
@@ -166,11 +176,6 @@ def read_text(file: Path, limit: int, why_limit: str, *, of_spreadsheet: bool = 
         raise fault(file, "", problem) from None
 
 
-def sha256(file: Path) -> str:
-    """Return the digest of a file, as `sha256sum` prints it."""
-    return hashlib.sha256(file.read_bytes()).hexdigest()
-
-
 def parse(file: Path, text: str) -> dict[str, Any]:
     """Return the tables of a TOML or JSON text.
 
@@ -193,15 +198,12 @@ def parse(file: Path, text: str) -> dict[str, Any]:
         data = json.loads(text, object_pairs_hook=_once) if is_json else tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         what = "nested too deeply" if isinstance(error, RecursionError) else str(error)
+        problem = f"not valid {'JSON' if is_json else 'TOML'}: {what}; correct the syntax"
         if what.startswith(_TOO_MANY_DIGITS):
-            raise fault(
-                file,
-                "",
-                "found an integer of thousands of digits, expected numbers of a size; correct it",
-            ) from None
-        raise fault(
-            file, "", f"not valid {'JSON' if is_json else 'TOML'}: {what}; correct the syntax"
-        ) from None
+            problem = (
+                "found an integer of thousands of digits, expected numbers of a size; correct it"
+            )
+        raise fault(file, "", problem) from None
     if not isinstance(data, dict):
         raise fault(
             file, "", f"found {shown(data)}, expected the keys of a case; write an object {{...}}"
@@ -251,20 +253,19 @@ def check_values(file: Path, tables: object) -> None:
     waiting: list[tuple[_Path, Any, int]] = [(None, tables, 0)]
     while waiting:
         path, value, depth = waiting.pop()
+        problem = ""
         if depth > DEEPEST:
             problem = (
                 f"nested more than {DEEPEST} deep, expected tables and rows of numbers; correct the"
                 " table"
             )
-            raise fault(file, _written(path), problem)
-        if isinstance(value, dict):
+        elif isinstance(value, dict):
             table = cast("dict[str, Any]", value)
             for name in table:
                 if not name or not name.isprintable() or len(name) > LONGEST_NAME:
                     expected = f"expected 1 to {LONGEST_NAME} printable characters"
-                    raise fault(
-                        file, _written(path), f"found the name {shown(name)}, {expected}; rename it"
-                    )
+                    problem = f"found the name {shown(name)}, {expected}; rename it"
+                    break
             waiting += [((path, name), each, depth + 1) for name, each in table.items()]
         elif isinstance(value, list):
             waiting += [
@@ -275,13 +276,11 @@ def check_values(file: Path, tables: object) -> None:
                 problem = (
                     f"found {shown(value)}, expected printable text; remove the control characters"
                 )
-                raise fault(file, _written(path), problem)
-            if len(value) > LONGEST_TEXT:
+            elif len(value) > LONGEST_TEXT:
                 problem = (
                     f"found a text of {len(value)} characters, expected {LONGEST_TEXT} at most;"
                     " shorten it"
                 )
-                raise fault(file, _written(path), problem)
         elif isinstance(value, int | float) and not usable(value):
             # omit the digits of a huge integer: Python refuses to print them
             found = "a huge integer" if isinstance(value, int) else repr(value)
@@ -289,6 +288,7 @@ def check_values(file: Path, tables: object) -> None:
                 f"found {found}, expected 0 or a finite number of {SMALLEST:g} to {LARGEST:g};"
                 " correct the number"
             )
+        if problem:
             raise fault(file, _written(path), problem)
 
 

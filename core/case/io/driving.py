@@ -9,7 +9,6 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from ...errors import remedy
 from ...mechanism.drivers import Driver, JointAngle, JointDisplacement, JointDriver, PointCoordinate
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import ROUNDED_TIME, Absolute, Measure, Motion
@@ -17,7 +16,7 @@ from ...trajectory import Array
 from ..case import TIME, Sweep
 from ..units import SECOND, Unit, plain
 from .class_keys import driver_keys, motion_keys, own_fields
-from .document import explained, fault, join, shown
+from .document import explained, fault, join, shown, unknown_name
 from .reference import read_grid
 from .reference_columns import Convert
 from .reference_samples import ReferenceKeys
@@ -173,11 +172,7 @@ def _check(
             raise fault(file, "sweep.rate", f"{problem}; remove it, or name the driver to sweep")
     elif sweep.driver not in drivers:
         known = [*drivers, TIME]
-        raise fault(
-            file,
-            "sweep.driver",
-            f"found {shown(sweep.driver)}, expected a driver; {remedy(sweep.driver, known)}",
-        )
+        raise unknown_name(file, "sweep.driver", sweep.driver, known, "a driver")
     elif sweep.driver in moved:
         problem = "found a motion of the swept driver, expected the sweep alone to move it"
         advice = f'remove it, or sweep time: driver = "{TIME}", start and stop in seconds'

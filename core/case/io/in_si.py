@@ -1,12 +1,16 @@
-"""Conversion of the numbers of a case file to SI."""
+"""Conversion of the numbers of a case file to SI, and of its directions to unit vectors."""
 
 from __future__ import annotations
 
+import math
+from pathlib import Path
 from typing import Any
 
 from ...joints import Kind
 from ...mechanism.dimension import Dimension
+from ...mechanism.mechanism import Vector
 from ..units import Unit
+from .document import fault
 
 
 def geometry_in_si(kind: Kind | None, value: Any, length: Unit) -> Any:
@@ -25,6 +29,19 @@ def geometry_in_si(kind: Kind | None, value: Any, length: Unit) -> Any:
             return tuple(tuple(map(length, each)) for each in value)
         case Kind.DIRECTION | Kind.DIRECTIONS | Kind.NUMBER | None:
             return value
+
+
+def direction(file: Path, key: str, found: Vector) -> Vector:
+    """Return the unit vector of a direction of a file.
+
+    Raises:
+        CaseError: it is zero.
+    """
+    if not any(found):
+        raise fault(file, key, "found zero, expected a direction; give one of any other length")
+    length = math.hypot(*found)
+    x, y, z = found
+    return x / length, y / length, z / length
 
 
 def load_in_si(dimension: Dimension, value: Any, length: Unit, angle: Unit) -> Any:

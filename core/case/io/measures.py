@@ -17,7 +17,8 @@ from msgspec import Meta
 from ...mechanism.loads import Torque, TorsionSpringDamper
 from ...mechanism.mechanism import Mechanism, Vector
 from ..case import Case, pace, size
-from ..measures import NAMES, ForceMeasure, Measure, key_of, own_keys
+from ..measures import NAMES, ForceMeasure, Measure, key_of
+from ..quantity import own_keys
 from .document import explained
 from .reference_columns import Convert
 from .schema import Flag, Text, ToleranceKeys

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ...errors import remedy
-from ...mechanism.mechanism import Vector
 from ..case import PER_TRAVEL, Case, Output, Quantity, size
 from ..measures import Measure
 from .coordinates import AXES
-from .document import fault, join, shown
+from .document import fault, join, unknown_name
+from .in_si import direction
 from .measures import read_measure
-from .reference import is_derivative
-from .reference_columns import Convert
+from .reference_columns import DERIVATIVES, Convert
 from .schema import COORDINATE, CaseKeys, OutputKeys
 from .tolerance import tolerance
 from .typed_tables import as_table, class_of, typed
@@ -47,7 +44,7 @@ def _output(
     units: Mapping[str, Convert],
 ) -> Quantity:
     key = join("outputs", name)
-    if is_derivative(name) or name.endswith(PER_TRAVEL):
+    if name.endswith((*DERIVATIVES, PER_TRAVEL)):
         raise fault(
             file,
             key,
@@ -71,22 +68,12 @@ def _coordinate(
 ) -> Output:
     output = typed(file, key, value, OutputKeys)
     if output.point not in keys.points:
-        raise fault(
-            file,
-            join(key, "point"),
-            f"found {shown(output.point)}, expected a point; {remedy(output.point, keys.points)}",
-        )
+        raise unknown_name(file, join(key, "point"), output.point, keys.points, "a point")
     match output.component, output.direction:
         case str(axis), None:
-            direction = AXES[axis]
+            along = AXES[axis]
         case None, (_, _, _) as found:
-            if not any(found):
-                raise fault(
-                    file,
-                    join(key, "direction"),
-                    "found zero, expected a direction; give one of any other length",
-                )
-            direction = _unit(found)
+            along = direction(file, join(key, "direction"), found)
         case component, _:
             what = (
                 "neither component nor direction"
@@ -102,13 +89,7 @@ def _coordinate(
     return Output(
         name,
         output.point,
-        direction,
+        along,
         output.relative,
         *tolerance(file, key, output, length, size(case)),
     )
-
-
-def _unit(direction: Vector) -> Vector:
-    length = math.hypot(*direction)
-    x, y, z = direction
-    return x / length, y / length, z / length

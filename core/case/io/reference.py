@@ -21,7 +21,7 @@ from pathlib import Path
 from ...trajectory import QUANTITIES, Array
 from ..case import Origin, Quantity, Series
 from ..units import Unit
-from .document import fault, sha256, shown
+from .document import fault, shown
 from .reference_columns import (
     DERIVATIVES,
     Columns,
@@ -38,6 +38,7 @@ from .reference_samples import (
     beside,
     inline,
     only_beside,
+    sha256,
 )
 from .reference_table import from_table
 from .workbook import WORKBOOKS
@@ -45,11 +46,6 @@ from .workbook import WORKBOOKS
 PROVED = ".json"
 """Suffix of the files of proved references."""
 CHOICE = 'sheet = "NAME" in [reference]'
-
-
-def is_derivative(name: str) -> bool:
-    """Return whether a column of this name holds a velocity or acceleration."""
-    return name.endswith(DERIVATIVES)
 
 
 def read_grid(case_file: Path, keys: ReferenceKeys, driver: Unit) -> Sequence[float]:

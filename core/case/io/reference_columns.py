@@ -7,7 +7,7 @@ unit: `toe [deg]`.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -170,7 +170,12 @@ def _check(
                 f" {remedy(name, known)}"
             )
             raise fault(samples.file, samples.header, problem)
-        stem = name.removesuffix(".velocity").removesuffix(".acceleration")
-        if stem not in counts:
-            problem = f"found {name!r} alone, expected its positions too; add the column {stem!r}"
-            raise fault(samples.file, samples.header, problem)
+        require_positions(samples, name, counts)
+
+
+def require_positions(samples: Samples, name: str, names: Collection[str]) -> None:
+    """Refuse a derivative without the column of its positions."""
+    stem = name.removesuffix(".velocity").removesuffix(".acceleration")
+    if stem not in names:
+        problem = f"found {name!r} alone, expected its positions too; add the column {stem!r}"
+        raise fault(samples.file, samples.header, problem)

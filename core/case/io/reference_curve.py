@@ -13,17 +13,25 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import MOST_NAMED, brief, remedy, shortened
+from ...errors import MOST_NAMED, brief, shortened
 from ...trajectory import Array
 from ..case import TIME, Case, Origin, Quantity, Truth
 from ..suspension import Convention
 from ..units import METRE, RADIAN, SECOND, Unit
 from .column_units import required_unit, unit_of_head
 from .curve_columns import MAP, Target, match, read_stated
-from .document import decimal, fault, sha256, shown
+from .document import decimal, fault, shown, unknown_name
 from .reference import compared
-from .reference_columns import Column, Columns, Convert, column_of, driver_unit, known_columns
-from .reference_samples import Samples
+from .reference_columns import (
+    Column,
+    Columns,
+    Convert,
+    column_of,
+    driver_unit,
+    known_columns,
+    require_positions,
+)
+from .reference_samples import Samples, sha256
 from .reference_table import from_table
 from .schema import MOST_SAMPLES
 
@@ -139,13 +147,7 @@ def _columns(
             found = replace(found, convert=_opposite(found.convert))
         of[target.name] = replace(found, unit=words)
     for name in of:
-        stem = name.removesuffix(".velocity").removesuffix(".acceleration")
-        if stem not in of:
-            raise fault(
-                samples.file,
-                samples.header,
-                f"found {name!r} alone, expected its positions too; add the column {stem!r}",
-            )
+        require_positions(samples, name, of)
     return unit, of
 
 
@@ -162,11 +164,7 @@ def _with_accuracy(
     for text in texts:
         name, _, right = (part.strip() for part in text.partition("="))
         if name not in units:
-            raise fault(
-                file,
-                "--accuracy",
-                f"found {shown(name)}, expected an output with a column; {remedy(name, units)}",
-            )
+            raise unknown_name(file, "--accuracy", name, units, "an output with a column")
         number, _, unit = right.partition(" ")
         try:
             found = decimal(number)
@@ -206,11 +204,7 @@ def _convention(outputs: Sequence[Any], compared: Sequence[str]) -> str:
 def _signs(file: Path, written: str, stated: str | None) -> str:
     """Return the convention of signs that the file or the user states; empty without any."""
     if stated is not None and stated not in list(Convention):
-        raise fault(
-            file,
-            "--signs",
-            f"found {shown(stated)}, expected a convention; {remedy(stated, [*Convention])}",
-        )
+        raise unknown_name(file, "--signs", stated, [*Convention], "a convention")
     if stated is not None and written not in ("", stated):
         raise fault(
             file,

@@ -14,7 +14,8 @@ import numpy as np
 
 from ...trajectory import QUANTITIES, Array
 from ..case import Case, Origin, Quantity, Series, Truth
-from .document import fault, read_text, sha256, shown
+from .document import fault, read_text, shown
+from .reference_samples import sha256
 
 LARGEST_FILE = 256_000_000
 # Twelve digits of a driver value, as for reference tables: a smaller error moves no output by as

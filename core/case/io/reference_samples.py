@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -159,6 +160,11 @@ def beside(case_file: Path, name: str) -> Path:
                 f"found {shown(name)}, but there is no such file; check the name",
             )
     return file
+
+
+def sha256(file: Path) -> str:
+    """Return the digest of a file, as `sha256sum` prints it."""
+    return hashlib.sha256(file.read_bytes()).hexdigest()
 
 
 def check_width(file: Path, where: str, found: int, columns: Sequence[str]) -> None:

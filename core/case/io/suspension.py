@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import MISSING
 from enum import StrEnum
 from functools import cache
 from pathlib import Path
@@ -12,7 +11,9 @@ from typing import Annotated, Any, get_type_hints
 import msgspec
 
 from ..case import Case, Quantity, size
-from ..suspension import AxleOutput, PerTravel, Side, SuspensionOutput, Vehicle, own_keys
+from ..quantity import own_keys
+from ..suspension import AxleOutput, PerTravel, Side, SuspensionOutput, Vehicle
+from .class_keys import key_of
 from .document import fault, join, shown
 from .reference_columns import Convert
 from .schema import Flag, Text, ToleranceKeys
@@ -32,10 +33,7 @@ def output_keys(cls: type[SuspensionOutput]) -> type[msgspec.Struct]:
     if not issubclass(cls, AxleOutput):
         keys.append(("side", Sides | None, None))
     for each in own_keys(cls):
-        shape = _shape_of(hints[each.name])
-        keys.append(
-            (each.name, shape) if each.default is MISSING else (each.name, shape, each.default)
-        )
+        keys.append(key_of(each, _shape_of(hints[each.name])))
     return msgspec.defstruct(
         cls.__name__, keys, bases=(ToleranceKeys,), kw_only=True, forbid_unknown_fields=True
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
@@ -12,12 +11,12 @@ import msgspec
 from msgspec import Meta
 
 from ...algebra import vec
-from ...errors import remedy
-from ...mechanism.mechanism import Mechanism, Vector
+from ...mechanism.mechanism import Mechanism
 from ..case import Case
 from ..suspension import Axle, Convention, Reaction, Side, Vehicle
 from ..units import Unit
-from .document import fault, join, shown
+from .document import fault, join, shown, unknown_name
+from .in_si import direction
 from .reference_columns import Convert
 from .schema import Flag, Number, Numbers3, Text
 from .travel_driver import travel_driver
@@ -114,7 +113,9 @@ def read_suspension(
         CaseError: invalid axes, unknown points or drivers, or a wheel on the wrong side.
     """
     keys, mechanism = typed(file, "suspension", value, SuspensionKeys), case.mechanism
-    forward, up = (_direction(file, name, getattr(keys, name)) for name in ("forward", "up"))
+    forward, up = (
+        direction(file, join("suspension", name), getattr(keys, name)) for name in ("forward", "up")
+    )
     if abs(vec(forward) @ vec(up)) > SQUARE:
         found = (
             f"found {shown(keys.up)}, which is not at right angles to forward ="
@@ -177,22 +178,11 @@ def _kingpin(
     return keys.kingpin or rods
 
 
-def _direction(file: Path, key: str, found: Vector) -> Vector:
-    if not any(found):
-        raise fault(
-            file,
-            join("suspension", key),
-            "found zero, expected a direction; give one of any other length",
-        )
-    long = math.hypot(*found)
-    return found[0] / long, found[1] / long, found[2] / long
-
-
 def check_point(file: Path, key: str, name: str, mechanism: Mechanism) -> None:
     """Refuse a name without a point."""
     known = [point.name for point in mechanism.points]
     if name not in known:
-        raise fault(file, key, f"found {shown(name)}, expected a point; {remedy(name, known)}")
+        raise unknown_name(file, key, name, known, "a point")
 
 
 def _check_side(file: Path, key: str, vehicle: Vehicle, mechanism: Mechanism, length: Unit) -> None:

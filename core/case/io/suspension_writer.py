@@ -8,7 +8,8 @@ from typing import Any
 
 from ...errors import CaseError
 from ..case import Case
-from ..suspension import AxleOutput, PerTravel, SuspensionOutput, Vehicle, own_keys
+from ..quantity import own_keys
+from ..suspension import AxleOutput, PerTravel, SuspensionOutput, Vehicle
 
 _OWN = ("wheel_center", "kingpin", "static_toe", "static_camber")
 """Attributes of a vehicle with a value for each wheel of an axle, in addition to the side."""

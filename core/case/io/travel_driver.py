@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ...errors import remedy
 from ...joints.base import unit
 from ...mechanism.drivers import PointCoordinate
 from ..case import Case
 from ..suspension import Rate, SuspensionOutput, Vehicle
-from .document import fault, join, shown
+from .document import fault, join, unknown_name
 
 # A driver's direction so nearly horizontal is no travel.
 LEVEL = 1e-8
@@ -39,11 +38,7 @@ def travel_driver(
         )
         named = next(of_wheel, None)
     elif named not in (names := [each.name for each in drivers]):
-        raise fault(
-            file,
-            join(key, "travel"),
-            f"found {shown(named)}, expected a driver; {remedy(named, names)}",
-        )
+        raise unknown_name(file, join(key, "travel"), named, names, "a driver")
     return named
 
 

@@ -9,11 +9,26 @@ from typing import Annotated, Any, TypeVar, cast, get_args, get_origin
 
 import msgspec
 
-from ...errors import remedy, similar, with_article
-from .document import fault, join, shown
+from ...errors import similar, with_article
+from .document import fault, join, parse, read_text, shown, unknown_name
 
 _Struct = TypeVar("_Struct", bound=msgspec.Struct)
 _Class = TypeVar("_Class", bound=type)
+
+
+def read_tables(file: Path, limit: int, why_limit: str, schema: str) -> dict[str, Any]:
+    """Return the tables of a file of at most `limit` bytes and of this schema.
+
+    Raises:
+        CaseError: the file cannot be read, or has another schema or none.
+    """
+    tables = parse(file, read_text(file, limit, why_limit))
+    if tables.get("schema") != schema:
+        found = shown(tables["schema"]) if "schema" in tables else "none"
+        raise fault(
+            file, "schema", f'found {found}, expected "{schema}"; write schema = "{schema}"'
+        )
+    return tables
 
 
 def as_table(file: Path, key: str, value: object) -> dict[str, Any]:
@@ -44,11 +59,7 @@ def class_of(file: Path, key: str, what: str, value: object, known: Mapping[str,
         )
     name = table["type"]
     if not isinstance(name, str) or name not in known:
-        raise fault(
-            file,
-            join(key, "type"),
-            f"found {shown(name)}, expected {with_article(what)} type; {remedy(str(name), known)}",
-        )
+        raise unknown_name(file, join(key, "type"), name, known, f"{with_article(what)} type")
     return known[name]
 
 

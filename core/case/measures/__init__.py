@@ -1,6 +1,6 @@
 """Measures: outputs of joints, bodies, pairs of points, and forces."""
 
-from .base import NAMES, Measure, key_of, own_keys
+from .base import NAMES, Measure, key_of
 from .body import Component, Orientation
 from .force import DriverEffort, ElementForce, ForceMeasure, JointForce, JointMoment
 from .joint import JointAngle, JointDisplacement
@@ -21,5 +21,4 @@ __all__ = [
     "Measure",
     "Orientation",
     "key_of",
-    "own_keys",
 ]

@@ -12,8 +12,8 @@ between markers on its bodies.
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping, Sequence
+from abc import abstractmethod
+from collections.abc import Iterable, Mapping
 from dataclasses import Field, dataclass, fields
 from typing import Any, ClassVar, Self
 
@@ -22,8 +22,8 @@ import numpy as np
 from ...algebra import Vec3, vec
 from ...errors import MechanismError, unknown
 from ...jet import Jet, sqrt
-from ...mechanism.mechanism import GROUND, Mechanism, Point, Vector
-from ..quantity import MARKER, ORDERS
+from ...mechanism.mechanism import GROUND, Mechanism
+from ..quantity import MARKER, TypedQuantity, own_keys
 
 NAMES: Mapping[str, str] = {
     "points": "point",
@@ -34,24 +34,16 @@ NAMES: Mapping[str, str] = {
     "force": "force",
 }
 """Keys that hold names, and the kind of what they name."""
-HIDDEN: Mapping[str, Any] = {"hidden": True}
-"""Metadata of a field that case files do not give: `Measure.bound` finds it in the mechanism."""
 
 
 @dataclass(frozen=True)
-class Measure(ABC):
+class Measure(TypedQuantity):
     """A quantity of the pose, in the unit `measure`.
 
     Attributes:
-        type: name in case files.
-        measure: SI unit: m, rad, or 1.
-        positive: meaning of a positive value.
         atol, rtol: an error is accepted up to atol [unit] + rtol * range of the reference.
     """
 
-    type: ClassVar[str]
-    measure: ClassVar[str]
-    positive: ClassVar[str]
     registry: ClassVar[dict[str, type[Measure]]] = {}
 
     name: str
@@ -59,45 +51,10 @@ class Measure(ABC):
     rtol: float
     why: str
 
-    def __init_subclass__(cls, **options: Any) -> None:
-        super().__init_subclass__(**options)
-        if "type" in cls.__dict__:
-            Measure.registry[cls.type] = cls
-
     @property
     @abstractmethod
     def points(self) -> tuple[str, ...]:
         """Names of the points it reads."""
-
-    @property
-    def forces(self) -> tuple[str, ...]:
-        """Names of the joints, drivers and force elements whose forces it reads."""
-        return ()
-
-    @property
-    def unit(self) -> str:
-        """Unit of the type."""
-        return self.measure
-
-    @property
-    def orders(self) -> int:
-        """Value, rate and second rate."""
-        return ORDERS
-
-    @property
-    def period(self) -> float:
-        """Zero: each value is a pose of its own."""
-        return 0.0
-
-    @property
-    def sense(self) -> str:
-        """Meaning of a positive value, in words."""
-        return f"positive: {self.positive}"
-
-    @property
-    def signs(self) -> str:
-        """Empty: only the case's own axes apply."""
-        return ""
 
     @property
     def facts(self) -> Mapping[str, Any]:
@@ -128,24 +85,6 @@ class Measure(ABC):
         """Return the measure with the facts it needs of the mechanism."""
         return self
 
-    def markers(self, mechanism: Mechanism) -> Sequence[Point]:
-        """Return the points it reads beyond those of the case."""
-        return ()
-
-    @abstractmethod
-    def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
-        """Return the measure over the samples; see `Quantity.of`."""
-
-
-def own_keys(cls: type[Measure]) -> list[Field[Any]]:
-    """Return the fields of a type beyond the common ones, which case files give."""
-    inherited = {each.name for each in fields(Measure)}
-    return [
-        each
-        for each in fields(cls)
-        if each.name not in inherited and not each.metadata.get("hidden")
-    ]
-
 
 def key_of(each: Field[Any]) -> str:
     """Return the key of a field in case files."""
@@ -160,12 +99,6 @@ def norm(a: Vec3) -> Jet:
 def length(design: Mapping[str, Vec3], start: str, end: str) -> Any:
     """Return the distance between two points at design [m]."""
     return norm(design[end] - design[start]).x
-
-
-def coordinates(place: Vec3) -> Vector:
-    """Return a place as three floats [m]."""
-    x, y, z = place
-    return float(x), float(y), float(z)
 
 
 def place_on(mechanism: Mechanism, body: str) -> Vec3:

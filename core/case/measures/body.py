@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-from ...algebra import Vec3, X, Y
+from ...algebra import Vec3, X, Y, triple
 from ...jet import Jet
 from ...mechanism.mechanism import Mechanism, Point
 from ..quantity import MARKER
 from ..rotation import euler_parameters, rotation_vector, smallest
-from .base import Measure, coordinates, length, place_on, reach_of
+from .base import Measure, length, place_on, reach_of
 
 
 class Component(StrEnum):
@@ -56,7 +56,7 @@ class Orientation(Measure):
         place, reach = place_on(mechanism, self.body), reach_of(mechanism)
         tips = (place, place + reach * X, place + reach * Y)
         marked = zip(self.points, tips, strict=True)
-        return [Point(name, self.body, coordinates(tip)) for name, tip in marked]
+        return [Point(name, self.body, triple(tip)) for name, tip in marked]
 
     def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
         """Return the component of the smallest rotation, [rad] or [-]."""

@@ -10,11 +10,11 @@ from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 
-from ...algebra import Vec3
+from ...algebra import Vec3, triple
 from ...errors import MechanismError, SolveError
 from ...forces import Forces
 from ...jet import Jet
@@ -22,8 +22,8 @@ from ...mechanism.drivers import JointDriver, PointCoordinate
 from ...mechanism.loads import Force, SpringDamper, Torque, TorsionSpringDamper
 from ...mechanism.mechanism import Mechanism, Point, Vector
 from ...trajectory import Array
-from ..quantity import MARKER
-from .base import HIDDEN, Measure, coordinates, place_on
+from ..quantity import HIDDEN, MARKER
+from .base import Measure, place_on
 
 NEWTON, NEWTON_METRE = "N", "N m"
 
@@ -44,7 +44,6 @@ class ForceMeasure(Measure):
         turns: whether the value is a torque or moment.
     """
 
-    of_what: ClassVar[str]
     measure = NEWTON
 
     turns: bool = field(default=False, kw_only=True, metadata=HIDDEN)
@@ -269,7 +268,7 @@ class ElementForce(ForceMeasure):
             return body, element.points[1]
         if isinstance(element, Force):
             return body, element.point
-        return body, coordinates(place_on(mechanism, body))
+        return body, triple(place_on(mechanism, body))
 
     def values(self, forces: Forces) -> Array:
         """Return the force [N or N m]."""
@@ -279,4 +278,4 @@ class ElementForce(ForceMeasure):
 def _joint_place(mechanism: Mechanism, name: str) -> tuple[str, Vector]:
     joint = mechanism.joint(name)
     known = joint.points_on(joint.j)
-    return joint.j, known[0] if known else coordinates(place_on(mechanism, joint.j))
+    return joint.j, known[0] if known else triple(place_on(mechanism, joint.j))

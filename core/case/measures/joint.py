@@ -7,13 +7,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from ...algebra import Vec3, vec
+from ...algebra import Vec3, triple, vec
 from ...errors import MechanismError
 from ...jet import Jet, arctan2
 from ...joints.base import triad
 from ...mechanism.mechanism import Mechanism, Point
 from ..quantity import MARKER
-from .base import Measure, coordinates, length, reach_of
+from .base import Measure, length, reach_of
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class _JointCoordinate(Measure):
             " axis": place + reach * h,
         }
         every = [
-            Point(self._marker(f"{which}{what}"), body, coordinates(tip))
+            Point(self._marker(f"{which}{what}"), body, triple(tip))
             for which, body in (("first", joint.i), ("second", joint.j))
             for what, tip in tips.items()
         ]

@@ -6,12 +6,12 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from ...algebra import Vec3, cross, vec
+from ...algebra import Vec3, cross, triple, vec
 from ...errors import MechanismError
 from ...jet import Jet, arctan2
 from ...mechanism.mechanism import Mechanism, Point, Vector
 from ..quantity import MARKER
-from .base import Measure, coordinates, norm, place_on, reach_of
+from .base import Measure, norm, place_on, reach_of
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class Angle(Measure):
         for body, along in zip(self.bodies, self.directions, strict=True):
             place, d = place_on(mechanism, body), vec(along)
             tip = place + (reach / math.sqrt(d @ d)) * d
-            found += [Point(next(names), body, coordinates(each)) for each in (place, tip)]
+            found += [Point(next(names), body, triple(each)) for each in (place, tip)]
         return found
 
     def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:

@@ -111,12 +111,37 @@ def load(file: Path, supplied: Supplied = NOTHING) -> Case:
             "found a file name with control characters, expected printable ones; rename the file",
         )
     if kind == MODEL:
-        from .xml_models import read_model
-
-        return read_model(file, _text(file), supplied)
+        return _model(file, _text(file), supplied)
     from .hardpoints.read import case_of_hardpoints
 
     return case_of_hardpoints(_hardpoints(file, kind, supplied), supplied)
+
+
+def _model(file: Path, text: str, supplied: Supplied) -> Case:
+    """Return the case of a model in XML: MJCF, URDF or SDF, whatever the file is called."""
+    from .mjcf.elements import parse_xml
+    from .mjcf.read import Document, case_of, read_mjcf
+
+    root = parse_xml(file, text)
+    match root.tag:
+        case "robot":
+            from .robots.urdf import read_urdf
+
+            robot = read_urdf(file, root)
+        case "sdf":
+            from .robots.sdf import read_sdf
+
+            robot = read_sdf(root)
+        case _:
+            return read_mjcf(file, root, supplied)
+    from .robots.as_mjcf import as_mjcf
+
+    name = root.attributes.get("name", file.stem)
+    beside = f" with {', '.join(robot.beside)}" if robot.beside else ""
+    described = f"{robot.format} {name!r} of {file.name}{beside}"
+    zero, closed = "its zero pose", not robot.paired
+    document = Document(described, as_mjcf(robot), root, robot.left_out, zero, closed)
+    return case_of(file, document, supplied)
 
 
 def _hardpoints(file: Path, kind: str, supplied: Supplied) -> HardpointTable:
@@ -124,7 +149,7 @@ def _hardpoints(file: Path, kind: str, supplied: Supplied) -> HardpointTable:
     from .hardpoints.adams import read_adams
     from .hardpoints.chrono import read_chrono
     from .hardpoints.plain import read_plain
-    from .hardpoints.spreadsheet import read_spreadsheet
+    from .hardpoints.rows import read_spreadsheet
     from .hardpoints.tree import read_tree
 
     if kind == WORKBOOK:

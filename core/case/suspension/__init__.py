@@ -7,7 +7,7 @@ from . import instant_axis as instant_axis
 from . import steering_axis as steering_axis
 from . import wheel as wheel
 from .axle import AxleOutput
-from .base import Rate, SuspensionOutput, own_keys
+from .base import Rate, SuspensionOutput
 from .per_travel import PerTravel
 from .vehicle import Axle, Convention, Reaction, Side, Vehicle
 from .wheel import Camber, Toe, camber_of_front_view
@@ -25,5 +25,4 @@ __all__ = [
     "Toe",
     "Vehicle",
     "camber_of_front_view",
-    "own_keys",
 ]

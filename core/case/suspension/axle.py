@@ -17,6 +17,7 @@ import numpy as np
 from ...algebra import Vec3
 from ...jet import Jet, arctan2, sqrt
 from ...trajectory import Array
+from ..quantity import HIDDEN
 from .base import SuspensionOutput, held
 from .corner import Corner
 from .vehicle import Side, Vehicle
@@ -41,7 +42,7 @@ class AxleOutput(SuspensionOutput):
     needs = ("wheel_radius",)
     reads = ("wheel_center", "spin_marker")
 
-    other: Vehicle = field(metadata={"key": False})
+    other: Vehicle = field(metadata=HIDDEN)
 
     @property
     def vehicles(self) -> tuple[Vehicle, ...]:

@@ -7,9 +7,9 @@ registers it: case files can name it at once, and `kincheck list --outputs` prin
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
@@ -19,6 +19,7 @@ from ...jet import Jet
 from ...mechanism.mechanism import Mechanism, Point
 from ...trajectory import Array
 from ..case import HELD_BUT
+from ..quantity import HIDDEN, TypedQuantity
 from .corner import Corner
 from .vehicle import Vehicle
 
@@ -28,39 +29,24 @@ STILL = 1e-3
 
 
 @dataclass(frozen=True)
-class SuspensionOutput(ABC):
+class SuspensionOutput(TypedQuantity):
     """A quantity of a wheel or an axle, judged, reported and compared like any other output.
 
     Attributes:
-        type: name in case files.
-        measure: unit: m, rad, or 1 for a ratio.
-        positive: meaning of a positive value, for all wheels and conventions.
         needs: vehicle attributes that are optional in general, but required here.
         reads: vehicle attributes with the names of the points it reads.
         atol, rtol: an error is accepted up to atol [unit] + rtol * range of the reference.
     """
 
-    type: ClassVar[str]
-    measure: ClassVar[str]
-    positive: ClassVar[str]
     needs: ClassVar[tuple[str, ...]] = ()
     reads: ClassVar[tuple[str, ...]]
     registry: ClassVar[dict[str, type[SuspensionOutput]]] = {}
 
     name: str
-    vehicle: Vehicle
+    vehicle: Vehicle = field(metadata=HIDDEN)
     atol: float
     rtol: float
     why: str
-
-    def __init_subclass__(cls, **options: Any) -> None:
-        super().__init_subclass__(**options)
-        if "type" in cls.__dict__:
-            SuspensionOutput.registry[cls.type] = cls
-
-    @abstractmethod
-    def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
-        """Return the output over the samples; see `Quantity.of`."""
 
     @property
     def points(self) -> tuple[str, ...]:
@@ -79,31 +65,6 @@ class SuspensionOutput(ABC):
     def vehicles(self) -> tuple[Vehicle, ...]:
         """The wheels that it is of."""
         return (self.vehicle,)
-
-    @property
-    def unit(self) -> str:
-        """Unit of the type."""
-        return self.measure
-
-    @property
-    def orders(self) -> int:
-        """Value, rate and second rate."""
-        return 3
-
-    @property
-    def sense(self) -> str:
-        """Meaning of a positive value for this wheel, in words."""
-        return f"positive: {self.positive}"
-
-    @property
-    def forces(self) -> tuple[str, ...]:
-        """None: it is a motion."""
-        return ()
-
-    @property
-    def period(self) -> float:
-        """Zero: each value is a pose of its own."""
-        return 0.0
 
     def markers(self, mechanism: Mechanism) -> Sequence[Point]:
         """Return the points on the wheel carrier that it reads beyond those of the case."""
@@ -220,13 +181,3 @@ def where_moving(quotient: Jet, corner: Corner, at: Mapping[str, Vec3]) -> Jet:
         return np.where(still, np.nan, values)
 
     return Jet(masked(quotient.x), masked(quotient.v), masked(quotient.a))
-
-
-def own_keys(cls: type[SuspensionOutput]) -> list[Any]:
-    """Return the fields of an output type beyond the common ones, which case files give."""
-    inherited = {each.name for each in fields(SuspensionOutput)}
-    return [
-        each
-        for each in fields(cls)
-        if each.name not in inherited and each.metadata.get("key", True)
-    ]

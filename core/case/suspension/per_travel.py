@@ -10,13 +10,14 @@ from ...algebra import Vec3
 from ...jet import Jet
 from ...mechanism.mechanism import Mechanism, Point
 from ..case import PER_TRAVEL
+from ..quantity import PoseQuantity
 from .base import SuspensionOutput, held, where_moving
 from .corner import Corner
 from .vehicle import Vehicle
 
 
 @dataclass(frozen=True)
-class PerTravel:
+class PerTravel(PoseQuantity):
     """The derivative of an output by wheel travel (jounce): the upward displacement of the wheel
     centre relative to the vehicle's body.
 
@@ -44,16 +45,6 @@ class PerTravel:
     def orders(self) -> int:
         """One less than those of the output; the value alone where other drivers are held."""
         return 1 if self.vehicle.travel else self.of_output.orders - 1
-
-    @property
-    def forces(self) -> tuple[str, ...]:
-        """None: it is a motion."""
-        return ()
-
-    @property
-    def period(self) -> float:
-        """Zero: each value is a pose of its own."""
-        return 0.0
 
     def markers(self, mechanism: Mechanism) -> Sequence[Point]:
         """Return the markers of the output."""

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from enum import StrEnum
 
-from ...algebra import Vec3, cross, vec
+from ...algebra import Vec3, cross, triple, vec
 from ...mechanism.mechanism import Vector
 from ..case import MARKER
 
@@ -145,7 +145,7 @@ class Vehicle:
         top = (1.0 / math.sqrt(top @ top)) * top
         sides = {self.spin_marker: s, self.top_marker: top}
         return {
-            name: _numbers(vec(center) + MARKER_DISTANCE * along) for name, along in sides.items()
+            name: triple(vec(center) + MARKER_DISTANCE * along) for name, along in sides.items()
         }
 
     @property
@@ -157,8 +157,3 @@ class Vehicle:
             f"{self.convention.words}; {where} wheel; forward is [{forward}] and up [{up}] in the"
             " case's axes"
         )
-
-
-def _numbers(a: Vec3) -> Vector:
-    x, y, z = a
-    return float(x), float(y), float(z)

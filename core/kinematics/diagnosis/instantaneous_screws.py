@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...algebra import Vec3, cross
+from ...algebra import Vec3, cross, triple
 from ...errors import shortened
 from ...mechanism.mechanism import Vector
 from ...primitives.base import Twist
@@ -106,7 +106,7 @@ def _screw(name: str, twist: Twist, at: Configuration, frame: Frames, fastest: f
     if turn <= STILL:
         size = _size(v)
         return Screw(
-            name, 0.0, _tuple((1.0 / size) * v), _tuple(frame.unit * origin), frame.unit * size
+            name, 0.0, triple((1.0 / size) * v), triple(frame.unit * origin), frame.unit * size
         )
     axis = (1.0 / turn) * w
     foot = origin + (1.0 / (turn * turn)) * cross(w, v)
@@ -114,19 +114,14 @@ def _screw(name: str, twist: Twist, at: Configuration, frame: Frames, fastest: f
     return Screw(
         name,
         turn,
-        _tuple(axis),
-        _tuple(frame.unit * foot),
+        triple(axis),
+        triple(frame.unit * foot),
         frame.unit * along if abs(along) > STILL else 0.0,
     )
 
 
 def _size(a: Vec3) -> float:
     return float(np.linalg.norm([*a]))
-
-
-def _tuple(a: Vec3) -> Vector:
-    x, y, z = a
-    return float(x), float(y), float(z)
 
 
 def _numbers(a: Sequence[float]) -> str:

@@ -9,6 +9,7 @@ path to the end (Hu, Parallel sequencing and assembly line problems, Operations 
 
 from __future__ import annotations
 
+from dataclasses import replace
 from heapq import heappop, heappush
 
 from ..straight_line import Program
@@ -71,9 +72,5 @@ def ordered(program: Program) -> Program:
         nodes[k] if nodes[k][0] in LEAVES else (nodes[k][0], *(place[x] for x in reads[k]))
         for k in order
     )
-    return Program(
-        program.name,
-        tuple(found),
-        {slot: place[k] for slot, k in program.outputs.items()},
-        program.times,
-    )
+    outputs = {slot: place[k] for slot, k in program.outputs.items()}
+    return replace(program, nodes=tuple(found), outputs=outputs)

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...case.case import MARKER, ORDERS, Case
 from ...case.notes import notes
-from ...errors import SolveError, shortened
+from ...errors import SolveError, number_of, shortened
 from ...harness.program_account import explain
 from ...kinematics import (
     Blocked,
@@ -208,13 +208,13 @@ def _verdict(
     reason.
     """
     dof, drivers = ranks.account.dof, len(ranks.mechanism.drivers)
-    count = f"{_counted(dof, 'degree', 'degrees')} of freedom, {_counted(drivers, 'driver')}"
+    count = f"{number_of(dof, 'degree', 'degrees')} of freedom, {number_of(drivers, 'driver')}"
     if ranks.contradictions:
         return f"the joints contradict each other: it does not close at the design ({count})"
     if ranks.blocked:
         names, free = freeing(ranks)
         remedy = f"; it moves without {_alternatives(names)}" if names else ""
-        more = f", which leaves {_counted(free, 'motion')} free" if names and free else ""
+        more = f", which leaves {number_of(free, 'motion')} free" if names and free else ""
         return f"over-constrained, a driver cannot move: {count}{remedy}{more}"
     if ranks.free:
         kind = "under-constrained" if dof > drivers else "singular at the design"
@@ -225,13 +225,9 @@ def _verdict(
         return f"the sweep cannot be followed: {reached} of {samples} samples reached ({count})"
     worst = max((p.condition for p in swept.poses), default=1.0)
     lost = f"{np.log10(worst):.0f} of 16 digits at most are lost to conditioning"
-    redundant = _counted(len(ranks.dependencies), "redundant row")
+    redundant = number_of(len(ranks.dependencies), "redundant row")
     told = f"; {forces}" if ranks.dependencies and forces is not None else ""
     return f"it can be solved: {count}, {redundant}; all samples reached; {lost}{told}"
-
-
-def _counted(number: int, one: str, several: str = "") -> str:
-    return f"{number} {one if number == 1 else several or f'{one}s'}"
 
 
 def _alternatives(names: list[str]) -> str:
@@ -282,7 +278,7 @@ def _remedy(ranks: Ranks) -> str:
     names, free = freeing(ranks)
     if not names:
         return "remove a driver or free the mechanism"
-    more = f", which leaves {_counted(free, 'motion')} free" if free else ""
+    more = f", which leaves {number_of(free, 'motion')} free" if free else ""
     return f"remove the driver, or take out {_alternatives(names)}{more}"
 
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from ...case.case import Case
 from ...case.io.tolerance import default
-from ...case.markers import with_markers
 from ...case.measures import DriverEffort, ForceMeasure, JointForce, JointMoment
+from ...case.quantity import with_markers
 from ...errors import SolveError
 from ...forces import Reaction
 from ...joints import Joint

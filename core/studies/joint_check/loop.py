@@ -52,7 +52,7 @@ def loops(
     try:
         case, native = _unlocked(tested)
     except Exception as error:  # any error of the joint's own code
-        yield Finding("loop", Verdict.FAIL, message=f"{type(error).__name__}: {error}")
+        yield _broken("loop", error)
         return
     solved = (
         f"{native.solved.sum()} of {len(native.solved)} samples solved, to"
@@ -79,9 +79,7 @@ def loops(
             yield _compared("loop: native, equivalent", other, _solved(other), reference)
     except Exception as error:
         other, without = None, "equivalent() fails, see native"
-        yield Finding(
-            "loop: native, equivalent", Verdict.FAIL, message=f"{type(error).__name__}: {error}"
-        )
+        yield _broken("loop: native, equivalent", error)
     if not engines:
         yield Finding("loop: simulators", Verdict.SKIP, message="no engines were given")
     for engine in engines:
@@ -94,7 +92,11 @@ def loops(
     try:
         yield from _forces(case, other or without, engines)
     except Exception as error:  # any error of the joint's own code
-        yield Finding("reaction", Verdict.FAIL, message=f"{type(error).__name__}: {error}")
+        yield _broken("reaction", error)
+
+
+def _broken(name: str, error: Exception) -> Finding:
+    return Finding(name, Verdict.FAIL, message=f"{type(error).__name__}: {error}")
 
 
 def _forces(case: Case, other: Case | str, engines: Sequence[Engine]) -> Iterator[Finding]:
@@ -201,7 +203,7 @@ def _simulated(
     except Exception as error:  # any error of the joint's own equivalent, or of an engine
         if isinstance(other, str):
             return Finding(name, Verdict.SKIP, message=other)
-        return Finding(name, Verdict.FAIL, message=f"{type(error).__name__}: {error}")
+        return _broken(name, error)
     chosen = case
     if reason is not None:
         if isinstance(other, str):
@@ -214,7 +216,7 @@ def _simulated(
         answer = engine.solve(engine.build(chosen), chosen, TOL)
         check(chosen, engine.name, answer)
     except Exception as error:  # any error of a simulator
-        return Finding(name, Verdict.FAIL, message=f"{type(error).__name__}: {error}")
+        return _broken(name, error)
     if chosen.forces and answer.forces is None:
         return Finding(name, Verdict.SKIP, message="the engine gives no forces")
     found = _compared(name, chosen, answer, reference)

@@ -7,8 +7,7 @@ from itertools import islice
 import numpy as np
 
 from ...trajectory import Array
-from .chunk import Chunk, Unsolved
-from .limit_counts import COUNTS
+from .chunk import COUNTS, Chunk, Unsolved
 from .reduce import merged, nothing
 from .study import Study
 

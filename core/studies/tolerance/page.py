@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +15,15 @@ from ...report.axis import Axis, driver_axis
 from ...report.figures import Figure, layout_over
 from ...report.page_parts import environment, figure_parts
 from ...unit_text import with_unit
-from .histogram_figure import LIMIT, histogram_figure
+from .histograms import Histogram
 from .limit_words import interval, limit_notes, percent
 from .output_view import DIGITS, OutputView, scaled_number
 from .results import Gradient, Numbers, SweepResults
 
 _HERE = Path(__file__).parent
 
+LIMIT: Figure = {"width": 1.5, "color": "#CC79A7", "dash": "8px,3px,2px,3px"}
+"""Look of a specification limit."""
 # Bars of a tornado diagram: the largest effects.
 MOST_BARS = 15
 
@@ -233,3 +237,41 @@ def tornado_figure(view: OutputView) -> Figure:
         "yaxis": {"type": "category"},
     }
     return {"data": traces, "layout": layout}
+
+
+def histogram_figure(
+    name: str, unit: str, scale: float, found: Histogram, limits: Mapping[str, float]
+) -> Figure:
+    """Return bars of the counts of variants by output value at one sample, with the limits.
+
+    Args:
+        scale: factor from SI to the unit.
+        limits: the limits by name [unit].
+    """
+    pairs = [*pairwise(scale * edge for edge in found.edges)]
+    bars: Figure = {
+        "type": "bar",
+        "x": [float(f"{0.5 * (low + high):.7g}") for low, high in pairs],
+        "y": found.counts,
+        "width": [float(f"{high - low:.7g}") for low, high in pairs],
+        "name": "variants",
+        "marker": {"color": "#0072B2"},
+        "uid": "bars",
+    }
+    lines: list[Figure] = [
+        {
+            "type": "scatter",
+            "mode": "lines",
+            "x": [limit, limit],
+            "y": [0, max(found.counts)],
+            "name": which,
+            "line": LIMIT,
+            "uid": which,
+        }
+        for which, limit in limits.items()
+    ]
+    sides: Figure = {
+        "xaxis": {"title": {"text": with_unit(output_label(name), unit)}, "hoverformat": ".5g"},
+        "yaxis": {"title": {"text": "variants"}, "rangemode": "tozero"},
+    }
+    return {"data": [bars, *lines], "layout": {**sides, "hovermode": "closest"}}

@@ -16,6 +16,7 @@ from ...errors import number_of
 from ...harness.record import Outcome
 from ...report.axis import DRIVER_UNITS
 from ...tabular import Tabular
+from .chunk import Unsolved
 from .conformance import Capability
 from .cross_check import Checked
 from .histograms import Histogram
@@ -114,14 +115,6 @@ class Effect(msgspec.Struct, frozen=True, kw_only=True):
     changes: dict[str, float | None]
 
 
-class Failed(msgspec.Struct, frozen=True, kw_only=True):
-    """A variant without a solution at some samples."""
-
-    variant: int
-    samples: int
-    message: str
-
-
 class SweepResults(Tabular, msgspec.Struct, frozen=True, kw_only=True):
     """The results of a study.
 
@@ -155,7 +148,7 @@ class SweepResults(Tabular, msgspec.Struct, frozen=True, kw_only=True):
     gradient_messages: dict[str, str] = {}
     effects: list[Effect] = []
     unsolved: int
-    failed: list[Failed]
+    failed: list[Unsolved]
     retried: int
     check_engine: str | None = None
     checked: list[Checked] = []

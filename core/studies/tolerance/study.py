@@ -25,8 +25,7 @@ from ...trajectory import PER_TIME, QUANTITIES, Array
 from ..variation.modes import Mode
 from ..variation.sampling import Stream, generator
 from ..variation.variation import Variation
-from .chunk import Chunk, Unsolved
-from .limit_counts import COUNTS, RowLimit, limit_counts
+from .chunk import COUNTS, Chunk, RowLimit, Unsolved, limit_counts
 from .streaming_totals import Totals
 
 # Variants solved together: enough to make the cost of the calls for their reduction negligible.

@@ -132,6 +132,16 @@ def sweep_designs(
             store.write(chunk)
     begin, cpu, earlier = perf_counter(), process_time(), found.done
     checked: list[cross_check.Checked] = []
+
+    def measured_so_far() -> dict[str, Any]:
+        return _measured(
+            study,
+            found.done - earlier,
+            jobs if source is None else None,
+            perf_counter() - begin,
+            process_time() - cpu,
+        )
+
     try:
         with closing((source or on_threads(ready, jobs))(study, found.chunks)) as chunks:
             for chunk in chunks:
@@ -150,13 +160,7 @@ def sweep_designs(
                         found.done - earlier,
                     )
                 )
-        measured = _measured(
-            study,
-            found.done - earlier,
-            jobs if source is None else None,
-            perf_counter() - begin,
-            process_time() - cpu,
-        )
+        measured = measured_so_far()
         if check is not None:
             checked = cross_check.check(
                 study, check.engine, check.solver, found.picked, check.tol, check.progress
@@ -166,13 +170,7 @@ def sweep_designs(
         if stopped is None or not found.done:
             raise
         stopped(reason)
-        measured = _measured(
-            study,
-            found.done - earlier,
-            jobs if source is None else None,
-            perf_counter() - begin,
-            process_time() - cpu,
-        )
+        measured = measured_so_far()
     slopes = gradients(ready)
     exact = (
         study.subset >= 1.0
@@ -211,10 +209,7 @@ def sweep_designs(
         },
         effects=result_tables.effect_table(study, found.effects),
         unsolved=found.failures,
-        failed=[
-            results.Failed(variant=each.variant, samples=each.samples, message=each.message)
-            for each in found.unsolved
-        ],
+        failed=found.unsolved,
         retried=found.retried,
         check_engine=check.engine.name if check else None,
         checked=checked,

@@ -3,25 +3,27 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from ...case.case import Case
-from ...case.io.document import fault, join, parse, read_text, shown
-from ...case.io.typed_tables import typed
+from ...case.io.document import fault, join, shown
+from ...case.io.typed_tables import read_tables, typed
+from ...errors import unknown
 from ...joints import Kind
 from ...mechanism.drivers import PointCoordinate
 from ...trajectory import Array
 from .coordinate_reader import CoordinateReader
-from .correlation_reader import read_correlations
+from .correlations import Correlation, problem_of
 from .file_units import FileUnits, unit_of_offsets
 from .limits import read_limits
+from .modes import Mode
 from .places import Geometry, PlaceError
 from .variation import Coordinate, Variation
-from .variation_schema import SCHEMA, HardpointKeys, LineKeys, VaryKeys, VaryUnits
+from .variation_schema import SCHEMA, CorrelationKeys, HardpointKeys, LineKeys, VaryKeys, VaryUnits
 
 LARGEST_FILE = 1_000_000
 # Case files give directions to about five digits; with a larger error, the direction is not along
@@ -37,14 +39,8 @@ def read_variation(path: str | Path, case: Case) -> Variation:
             file, key and remedy.
     """
     file = Path(path)
-    tables = parse(
-        file, read_text(file, LARGEST_FILE, "hardpoints and their tolerances need far less")
-    )
-    if tables.get("schema") != SCHEMA:
-        found = shown(tables["schema"]) if "schema" in tables else "none"
-        raise fault(
-            file, "schema", f'found {found}, expected "{SCHEMA}"; write schema = "{SCHEMA}"'
-        )
+    advice = "hardpoints and their tolerances need far less"
+    tables = read_tables(file, LARGEST_FILE, advice, SCHEMA)
     return _Reader(file, typed(file, "", tables, VaryKeys), case).variation()
 
 
@@ -196,3 +192,46 @@ class _Reader:
                     "hardpoints",
                     f"{problem}, expected relative = true; drive it so, or leave the point",
                 )
+
+
+def read_correlations(
+    file: Path, keys: VaryKeys, coordinates: Sequence[str]
+) -> tuple[Correlation, ...]:
+    """Return the correlations of the file.
+
+    Args:
+        coordinates: names of the varied coordinates.
+
+    Raises:
+        CaseError: nothing is drawn, a coordinate does not vary or is named twice, or a matrix is
+            no correlation matrix.
+    """
+    if keys.correlations and keys.mode is not Mode.MONTE_CARLO:
+        raise fault(
+            file,
+            "correlations",
+            f"found some, expected none, for {keys.mode} draws nothing; leave them out, or set mode"
+            ' = "monte_carlo"',
+        )
+    found: list[Correlation] = []
+    owners: dict[str, str] = {}
+    for name, table in keys.correlations.items():
+        key = join("correlations", name)
+        each = typed(file, key, table, CorrelationKeys)
+        for coordinate in each.coordinates:
+            if coordinate not in coordinates:
+                what = unknown("coordinate that varies", coordinate, coordinates)
+                raise fault(file, join(key, "coordinates"), what)
+            if (owner := owners.get(coordinate)) is not None:
+                raise fault(
+                    file,
+                    join(key, "coordinates"),
+                    f"found {coordinate!r} here and in correlations.{owner}, expected each"
+                    " coordinate once; write one matrix of all that correlate",
+                )
+            owners[coordinate] = name
+        if problem := problem_of(each.matrix, each.coordinates):
+            raise fault(file, join(key, "matrix"), problem)
+        rows = tuple(coordinates.index(one) for one in each.coordinates)
+        found.append(Correlation(rows, np.array(each.matrix, dtype=np.float64)))
+    return tuple(found)

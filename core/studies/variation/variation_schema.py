@@ -143,3 +143,16 @@ class CorrelationKeys(msgspec.Struct, forbid_unknown_fields=True):
     matrix: Annotated[
         list[list[float]], Meta(description="a matrix of correlations [[1, r], [r, 1]]")
     ]
+
+
+def variation_schema() -> dict[str, Any]:
+    """Return the schema of variation files."""
+    from ...case.io.json_schema import document_schema
+
+    tables = {
+        "hardpoints": HardpointKeys,
+        "lines": LineKeys,
+        "limits": LimitKeys,
+        "correlations": CorrelationKeys,
+    }
+    return document_schema(SCHEMA, VaryKeys, tables, {"units": VaryUnits})

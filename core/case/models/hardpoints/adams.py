@@ -14,7 +14,7 @@ from pathlib import Path
 
 from ....errors import MOST_NAMED, remedy, shortened
 from ...io.document import fault, shown
-from .table import Hardpoint, HardpointTable, number, twice
+from .table import Hardpoint, HardpointTable, number, require_name, twice
 
 BLOCK = "[HARDPOINT]"
 COLUMNS = ("hardpoint_name", "symmetry", "x_value", "y_value", "z_value")
@@ -98,10 +98,7 @@ def _row(file: Path, where: str, row: str, columns: tuple[str, ...]) -> tuple[st
         )
     cells = dict(zip(columns, fields, strict=True))
     name, symmetry = cells["hardpoint_name"], cells["symmetry"].lower()
-    if not name or not name.isprintable():
-        raise fault(
-            file, where, f"found the name {name!r}, expected printable characters; name the point"
-        )
+    require_name(file, where, name)
     if symmetry not in (*LEFT, RIGHT):
         raise fault(
             file,

@@ -7,14 +7,13 @@ from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 
-from ....errors import remedy
 from ....joints import Joint, Translational
 from ....mechanism.drivers import Driver, JointDisplacement, PointCoordinate
 from ....mechanism.mechanism import GROUND, Body, Mechanism, Point, Vector
 from ....mechanism.motions import Motion, Ramp
 from ...case import Sweep
 from ...io.coordinates import AXES
-from ...io.document import fault, shown
+from ...io.document import fault, unknown_name
 from ...suspension import Side
 from .templates.base import TIEROD_INNER, WHEEL_CENTER, Template
 from .travels import Travels
@@ -71,9 +70,7 @@ def whole_axle(
         MechanismError: the places do not fit the mechanism.
     """
     if said not in list(AxleMotion):
-        raise fault(
-            file, "--axle", f"found {shown(said)}, expected a motion; {remedy(said, [*AxleMotion])}"
-        )
+        raise unknown_name(file, "--axle", said, [*AxleMotion], "a motion")
     steered = bool(template.steered)
     if said == AxleMotion.STEER:
         _require_tie_rod(file, "--axle", said, template)

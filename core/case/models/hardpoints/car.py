@@ -6,8 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from ....errors import remedy
-from ...io.document import decimal, fault, shown
+from ...io.document import decimal, fault, shown, unknown_name
 from ...io.reader_options import Supplied
 from ...suspension import Axle
 
@@ -50,11 +49,7 @@ def read_car(file: Path, supplied: Supplied) -> Car:
     """
     position = supplied.position
     if position is not None and position not in list(Axle):
-        raise fault(
-            file,
-            "--position",
-            f"found {shown(position)}, expected an axle; {remedy(position, [*Axle])}",
-        )
+        raise unknown_name(file, "--position", position, [*Axle], "an axle")
     return Car(
         None if position is None else Axle(position),
         read_length(file, "wheelbase", supplied.wheelbase),

@@ -13,7 +13,7 @@ from ...io.coordinates import with_all_coordinates
 from ...io.document import fault
 from ...io.suspension import with_slopes
 from ...io.tolerance import default
-from ...markers import with_markers
+from ...quantity import with_markers
 from ...suspension import Convention, Side, SuspensionOutput, Vehicle
 from ...suspension.wheel import Place
 from .axle import STROKE, AxleMotion, name_of

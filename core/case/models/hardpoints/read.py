@@ -6,20 +6,19 @@ rack move.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from ....errors import MOST_NAMED, brief, remedy, shortened, similar
+from ....errors import MOST_NAMED, brief, shortened, similar
 from ....mechanism.mechanism import Vector
 from ...case import Case, Truth
-from ...io.document import explained, fault, shown
+from ...io.document import explained, fault, parse, read_text, shown, unknown_name
 from ...io.escape import visible
 from ...io.reader_options import LEFT_OUT, Supplied
 from .axle import one_wheel, whole_axle
 from .car import read_car
 from .default_outputs import wheel_of, with_suspension_outputs
-from .own_names import read_own_names
 from .table import HardpointTable, coordinate, placed, require_size, unit_of
 from .templates import TEMPLATES, Template
 from .templates.base import WHEEL_CONTACT, compact, side_of
@@ -32,6 +31,7 @@ ACROSS = 0.25
 # Cars have some tens of hardpoints at a corner. A far larger table is refused, and not searched for
 # missing names.
 MOST_POINTS = 10_000
+LARGEST_NAMES = 100_000
 
 
 def case_of_hardpoints(table: HardpointTable, supplied: Supplied) -> Case:
@@ -83,11 +83,7 @@ def case_of_hardpoints(table: HardpointTable, supplied: Supplied) -> Case:
 def _template(table: HardpointTable, said: str | None) -> Template:
     known = {compact(name): each for each in TEMPLATES.values() for name in (each.name, *each.also)}
     if said is not None and compact(said) not in known:
-        raise fault(
-            table.file,
-            "--template",
-            f"found {shown(said)}, expected a template; {remedy(said, TEMPLATES)}",
-        )
+        raise unknown_name(table.file, "--template", said, TEMPLATES, "a template")
     names = ", ".join(TEMPLATES)
     if table.template is None:
         if said is None:
@@ -129,7 +125,7 @@ def _filled(table: HardpointTable, template: Template, own: Path | None) -> dict
             by_left_name.setdefault(compact(plain), []).append(name)
     filled: dict[str, str] = {}
     if own is not None:
-        filled |= read_own_names(
+        filled |= _read_own_names(
             own, [role.name for role in (*template.roles, *template.optional)], table.points
         )
     for role in (*template.roles, *template.optional):
@@ -220,3 +216,28 @@ def _require_left_and_upright(
                 f"found {written(high, 2)}, not above {named[low]} with {written(low, 2)}, expected"
                 f" it above; {advice}",
             )
+
+
+def _read_own_names(file: Path, roles: Iterable[str], points: Iterable[str]) -> Mapping[str, str]:
+    """Return the names of points by role, for the roles in a file of `role = "own name"`.
+
+    Args:
+        roles: roles of the template.
+        points: names of the points of the table.
+
+    Raises:
+        CaseError: the file cannot be read, or a role or point is unknown.
+    """
+    text = read_text(file, LARGEST_NAMES, "it holds a name for each role of a template")
+    known, found = [*points], dict[str, str]()
+    for role, name in parse(file, text).items():
+        if role not in roles:
+            raise unknown_name(file, role, role, roles, "a role")
+        if not isinstance(name, str):
+            raise fault(
+                file, role, f"found {shown(name)}, expected the name of a point; write it in quotes"
+            )
+        if name not in known:
+            raise unknown_name(file, role, name, known, "a point of the table")
+        found[role] = name
+    return found

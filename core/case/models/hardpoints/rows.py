@@ -15,15 +15,17 @@ from pathlib import Path
 from ....errors import brief
 from ...io.decimal_sign import find_decimal_sign
 from ...io.document import fault, shown
-from ...io.workbook import Cell, Row
+from ...io.workbook import Cell, Row, one_sheet, read_sheets
 from ...units import LENGTHS
 from .forms import with_head
 from .head import HEAD, Head, as_head, turned, upright, written
-from .table import Hardpoint, HardpointTable, length_name, number, twice
+from .table import Hardpoint, HardpointTable, length_name, number, require_name, twice
 from .templates import ROLES
 from .templates.base import compact
 
 _UNIT = re.compile(r"[\[(]?\s*([a-z]+)\s*[\])]?", re.IGNORECASE)
+# Largest number of points on a sheet, and as many other rows.
+MOST_ROWS = 20_000
 _REMARK = re.compile(r"(#?)\s*(unit|axes|template)s?\s*[:=,]+\s*(.+)", re.IGNORECASE)
 
 
@@ -146,12 +148,7 @@ def _points(
     lines: dict[str, str] = {}
     for where, (cell, *cells) in body:
         name = written([cell])
-        if not name or not name.isprintable():
-            raise fault(
-                file,
-                where,
-                f"found the name {name!r}, expected printable characters; name the point",
-            )
+        require_name(file, where, name)
         if name in lines:
             raise twice(file, where, name, lines[name])
         lines[name] = where
@@ -217,3 +214,27 @@ def _complete(
             f" complete the row{comma}",
         )
     return [cells[k] for k in head.columns]
+
+
+def read_spreadsheet(file: Path, wanted: str | None) -> HardpointTable:
+    """Return the points by name.
+
+    Args:
+        wanted: name of the sheet; None for the only sheet with a table.
+
+    Raises:
+        CaseError: the file is no readable workbook, no sheet or several sheets have a head, or a
+            row is at odds with the head.
+    """
+    sheets = read_sheets(file, wanted, MOST_ROWS)
+    tables = [sheet for sheet in sheets if table_in(file, sheet.rows) is not None]
+    if sheets and not tables:
+        names = ", ".join(shown(sheet.name) for sheet in sheets)
+        raise fault(
+            file,
+            "",
+            f"found no head on the sheets {names}, expected {','.join(HEAD)}; write it above the"
+            " points",
+        )
+    sheet = one_sheet(file, tables, "--sheet NAME")
+    return read_rows(file, f"Sheet {shown(sheet.name)}:", sheet.rows, {})

@@ -10,10 +10,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ....errors import CaseError, remedy
+from ....errors import CaseError
 from ....mechanism.mechanism import Vector
 from ...io.column_units import UNIT_NAMES
-from ...io.document import decimal, fault, shown, usable
+from ...io.document import decimal, fault, shown, unknown_name, usable
 from ...sizes import SUSPENSIONS
 from ...units import LENGTHS, Unit, plain
 
@@ -84,6 +84,14 @@ def twice(file: Path, where: str, name: str, before: str) -> CaseError:
     return fault(
         file, where, f"{name}: given before, in {before}, expected once; remove one of them"
     )
+
+
+def require_name(file: Path, where: str, name: str) -> None:
+    """Refuse a name of a point that cannot be printed, or none."""
+    if not name or not name.isprintable():
+        raise fault(
+            file, where, f"found the name {name!r}, expected printable characters; name the point"
+        )
 
 
 def number(file: Path, where: str, text: object, sign: str = ".") -> float:
@@ -166,11 +174,7 @@ def unit_of(table: HardpointTable, said: str | None) -> Unit:
 def _unit(table: HardpointTable, said: str | None) -> str:
     written = None if table.unit is None else length_name(table.unit)
     if written is not None and written not in LENGTHS:
-        raise fault(
-            table.file,
-            "unit",
-            f"found {shown(table.unit)}, expected a length; {remedy(str(table.unit), LENGTHS)}",
-        )
+        raise unknown_name(table.file, "unit", table.unit, LENGTHS, "a length")
     if said is None:
         if written is None:
             raise fault(
@@ -182,11 +186,7 @@ def _unit(table: HardpointTable, said: str | None) -> str:
         return written
     name = length_name(said)
     if name not in LENGTHS:
-        raise fault(
-            table.file,
-            "--units",
-            f"found {shown(said)}, expected a length; {remedy(said, LENGTHS)}",
-        )
+        raise unknown_name(table.file, "--units", said, LENGTHS, "a length")
     if written not in (None, name):
         raise fault(
             table.file,

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from ....errors import remedy
 from ...io.document import shown
 from .attributes import KNOWN, ORIENTATION
 from .elements import Element
@@ -31,10 +30,7 @@ class Classes:
         """
         name = element.attributes.get("class", childclass)
         if name not in self.attributes:
-            raise element.fault(
-                f"class: found {shown(name)}, expected a default class;"
-                f" {remedy(name, self.attributes)}"
-            )
+            raise element.unknown_name("class", name, self.attributes, "a default class")
         return replace(
             element, attributes=_over(self.attributes[name].get(kind, {}), element.attributes)
         )

@@ -11,7 +11,7 @@ import numpy as np
 
 from ....errors import remedy
 from ....trajectory import Array
-from ...io.document import decimal, fault, shown
+from ...io.document import decimal, fault, shown, unknown_name
 from ...io.reader_options import Supplied
 from ...io.schema import MOST_SAMPLES
 from .tree import Tree
@@ -84,11 +84,7 @@ def read_driving(file: Path, tree: Tree, supplied: Supplied) -> Driving:
             fixed.append(name)
         else:
             known = [*tree.joints, *tree.free]
-            raise fault(
-                file,
-                "--hold",
-                f"found {shown(name)}, expected a joint or a free body; {remedy(name, known)}",
-            )
+            raise unknown_name(file, "--hold", name, known, "a joint or a free body")
     return Driving(driven, tuple(held), tuple(fixed))
 
 

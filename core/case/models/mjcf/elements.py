@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.parsers import expat
 
 from ....errors import CaseError, remedy
-from ...io.document import decimal, fault, shown, usable
+from ...io.document import decimal, fault, shown, unknown_name, usable
 
 # Robots are some ten bodies deep; what nests beyond this only exhausts the stack.
 DEEPEST = 200
@@ -44,6 +44,18 @@ class Element:
     def fault(self, problem: str) -> CaseError:
         """The error to raise: 'FILE: line N: <TAG> NAME: PROBLEM'."""
         return fault(self.file, str(self), problem)
+
+    def unknown_name(
+        self, key: str, name: object, known: Iterable[str], expected: str
+    ) -> CaseError:
+        """Return the error of a name that is none of the known ones; see `document`."""
+        return unknown_name(self.file, f"{self}: {key}", name, known, expected)
+
+    def repeated_name(self, name: str, these: str) -> CaseError:
+        """Return the error of a name that another one of these has."""
+        return self.fault(
+            f"name: found {shown(name)} again, expected a name of its own; rename one of {these}"
+        )
 
     def only(self, *tags: str) -> Iterator[Element]:
         """The elements of these tags in it."""
@@ -92,10 +104,7 @@ class Element:
         """Return an attribute with one of a few values."""
         found = self.attributes.get(name, default)
         if found not in known:
-            raise self.fault(
-                f"{name}: found {shown(found)}, expected one of {', '.join(known)};"
-                f" {remedy(found, known)}"
-            )
+            raise self.unknown_name(name, found, known, f"one of {', '.join(known)}")
         return found
 
 

@@ -8,9 +8,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from ....algebra import Quat, Vec3, quat, vec
-from ....errors import remedy
 from ....mechanism.mechanism import GROUND
-from ...io.document import shown
 from .attributes import KNOWN
 from .classes import MAIN
 from .elements import Element
@@ -107,10 +105,7 @@ def read_equalities(root: Element, tree: Tree) -> Iterator[Equality]:
                 continue
             name = element.attributes.get("name", f"{element.tag}{k}")
             if name in names:
-                raise element.fault(
-                    f"name: found {shown(name)} again, expected a name of its own; rename one of"
-                    " the equalities"
-                )
+                raise element.repeated_name(name, "the equalities")
             names.add(name)
             found = _READERS[element.tag](name, element, tree, tendons)
             if isinstance(found, Connect) and found.i == found.j == GROUND:
@@ -185,9 +180,7 @@ def _sum(element: Element, key: str, tree: Tree, tendons: _Tendons) -> dict[str,
     """Return the weights of the joints of a fixed tendon."""
     tendon = element.attributes.get(key, "")
     if tendon not in tendons:
-        raise element.fault(
-            f"{key}: found {shown(tendon)}, expected a tendon; {remedy(tendon, tendons)}"
-        )
+        raise element.unknown_name(key, tendon, tendons, "a tendon")
     found = tendons[tendon]
     if found.tag != "fixed":
         problem = (
@@ -217,9 +210,7 @@ def _rod(name: str, element: Element, tendon: Element, tree: Tree) -> Rod:
     for child in tendon.children:
         site = child.attributes.get("site", "")
         if site not in tree.sites:
-            raise child.fault(
-                f"site: found {shown(site)}, expected a site; {remedy(site, tree.sites)}"
-            )
+            raise child.unknown_name("site", site, tree.sites, "a site")
         ends.append(tree.sites[site])
     (i, here), (j, there) = ends
     apart = there.at - here.at
@@ -254,9 +245,7 @@ def _coefficients(element: Element) -> tuple[float, ...]:
 
 def _axial(element: Element, key: str, name: str | None, tree: Tree) -> str:
     if name not in tree.joints:
-        raise element.fault(
-            f"{key}: found {shown(name)}, expected a joint; {remedy(str(name), tree.joints)}"
-        )
+        raise element.unknown_name(key, name, tree.joints, "a joint")
     joint = tree.joints[name]
     if joint.type == "ball":
         raise element.fault(
@@ -274,9 +263,7 @@ def _bodies(element: Element, tree: Tree) -> tuple[str, str]:
     names = element.attributes["body1"], element.attributes.get("body2", WORLD)
     for key, name in zip(("body1", "body2"), names, strict=True):
         if name not in tree.places:
-            raise element.fault(
-                f"{key}: found {shown(name)}, expected a body; {remedy(name, tree.places)}"
-            )
+            raise element.unknown_name(key, name, tree.places, "a body")
     return names
 
 
@@ -285,9 +272,7 @@ def _sites(element: Element, tree: Tree) -> list[tuple[str, Place]]:
     for key in ("site1", "site2"):
         name = element.attributes.get(key, "")
         if name not in tree.sites:
-            raise element.fault(
-                f"{key}: found {shown(name)}, expected a site; {remedy(name, tree.sites)}"
-            )
+            raise element.unknown_name(key, name, tree.sites, "a site")
         found.append(tree.sites[name])
     return found
 

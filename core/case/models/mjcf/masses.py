@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -79,15 +79,8 @@ def weighed(body: Body, mass: Mass | None) -> Body | None:
         inertia = checked_inertia(body.name, six) if matrix.any() else None
     except MechanismError:
         return None
-    return Body(
-        body.name,
-        body.origin,
-        body.euler_parameters,
-        body.fixed,
-        mass.mass,
-        coordinates(mass.center),
-        inertia,
-    )
+    center = coordinates(mass.center)
+    return replace(body, mass=mass.mass, center_of_mass=center, inertia=inertia)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from ....algebra import quat, vec
 from ....errors import remedy, with_article
-from ...io.document import decimal, fault, shown, usable
+from ...io.document import decimal, fault, shown, unknown_name, usable
 from .attributes import KNOWN
 from .elements import Element
 from .frames import HERE, Place, unit_quaternion
@@ -72,9 +72,7 @@ def read_start(
         if not sign:
             raise fault(file, "--start", f"found {shown(each)}, expected {_FORM}; say the value")
         if name not in names:
-            raise fault(
-                file, "--start", f"found {shown(name)}, expected a joint; {remedy(name, names)}"
-            )
+            raise unknown_name(file, "--start", name, names, "a joint")
         if name in given:
             raise fault(file, "--start", f"found {shown(name)} twice; give one value")
         joint = tree.chain[names.index(name)]

@@ -141,10 +141,7 @@ class Tree:
         element.require_known(KNOWN["body"])
         name = element.attributes.get("name", self._unused(f"body{len(self.places)}"))
         if name in self.places:
-            raise element.fault(
-                f"name: found {shown(name)} again, expected a name of its own; rename one of the"
-                " bodies"
-            )
+            raise element.repeated_name(name, "the bodies")
         place = around.then(read_place(element, self.compiler))
         childclass = _class(element, childclass)
         # one more than are read is too many already
@@ -199,10 +196,7 @@ class Tree:
             last = k == len(elements) - 1
             name = element.attributes.get("name", body if len(elements) == 1 else f"{body}.{k + 1}")
             if name in self.joints or (kind == "free" and name in self.free):
-                raise element.fault(
-                    f"name: found {shown(name)} again, expected a name of its own; rename one of"
-                    " the joints"
-                )
+                raise element.repeated_name(name, "the joints")
             inner = body if last else self._unused(f"{body}.{name}")
             self.moving[inner] = place
             if not last:
@@ -263,10 +257,7 @@ class Tree:
         if name is None:
             return
         if name in self.sites:
-            raise element.fault(
-                f"name: found {shown(name)} again, expected a name of its own; rename one of the"
-                " sites"
-            )
+            raise element.repeated_name(name, "the sites")
         self.sites[name] = body, place.then(read_place(element, self.compiler))
 
 

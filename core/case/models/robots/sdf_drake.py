@@ -10,8 +10,7 @@ import math
 from collections.abc import Sequence
 
 from ....algebra import Vec3, X, cross, vec
-from ....errors import CaseError, remedy
-from ...io.document import shown
+from ....errors import CaseError
 from ..mjcf.elements import Element
 from ..mjcf.frames import Place, of_axes
 from .dynamics import strut_spring
@@ -87,7 +86,7 @@ def mimic_of(frames: Frames, short: Short, full: str, joint: Connection) -> Mimi
     if leader not in frames.joints:
         name = element.attributes.get("joint", "")
         known = [short(each) for each in frames.joints]
-        raise element.fault(f"joint: found {shown(name)}, expected a joint; {remedy(name, known)}")
+        raise element.unknown_name("joint", name, known, "a joint")
     if len(joint.moves) != 1 or joint.moves[0].kind == "ball":
         raise element.fault(
             f"{joint.name!r} has not one coordinate, expected a revolute or prismatic joint;"

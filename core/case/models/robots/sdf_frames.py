@@ -81,9 +81,7 @@ class Frames:
             raise element.fault(f"name: found {shown(name)}, expected a name of its own; give one")
         full = joined(scope, name)
         if full in self.found:
-            raise element.fault(
-                f"name: found {shown(name)} again, expected a name of its own; rename one of them"
-            )
+            raise element.repeated_name(name, "them")
         self.found[full] = Framed(element, scope, default, attached)
         return full
 

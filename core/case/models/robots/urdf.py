@@ -12,7 +12,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from ....algebra import IDENTITY, Vec3, X, vec
-from ....errors import remedy
 from ....joints.base import triad
 from ...io.document import shown
 from ..mjcf.elements import Element
@@ -94,10 +93,7 @@ def _links(robot: Robot) -> None:
     for element in robot.root.only("link"):
         name = required(element, "name")
         if name in robot.elements:
-            raise element.fault(
-                f"name: found {shown(name)} again, expected a name of its own; rename one of the"
-                " links"
-            )
+            raise element.repeated_name(name, "the links")
         if len(robot.elements) >= MOST_LINKS:
             raise element.fault(
                 f"found more than the {MOST_LINKS} links that are read, expected fewer; take out"
@@ -124,10 +120,7 @@ def _joints(robot: Robot) -> dict[str, Element]:
     for element in robot.root.only("joint"):
         name = required(element, "name")
         if name in found:
-            raise element.fault(
-                f"name: found {shown(name)} again, expected a name of its own; rename one of the"
-                " joints"
-            )
+            raise element.repeated_name(name, "the joints")
         require_children(element, IN_JOINT)
         child = _link(robot, element, "child")
         _link(robot, element, "parent")
@@ -258,10 +251,7 @@ def _constraint(robot: Robot, element: Element, default: str) -> Loop:
     name = element.attributes.get("name", default)
     kind = element.attributes.get("type", "").lower()
     if kind not in CLOSING:
-        raise element.fault(
-            f"type: found {shown(kind)}, expected one of {', '.join(CLOSING)};"
-            f" {remedy(kind, CLOSING)}"
-        )
+        raise element.unknown_name("type", kind, CLOSING, f"one of {', '.join(CLOSING)}")
     ends: list[str] = []
     places: list[Place] = []
     for tag, other in (("parent", "predecessor"), ("child", "successor")):

@@ -6,7 +6,7 @@ import math
 from collections.abc import Collection, Sequence
 
 from ....algebra import Quat, Vec3, X, Y, Z
-from ....errors import remedy, similar, with_article
+from ....errors import similar, with_article
 from ...io.document import decimal, shown, usable
 from ..mjcf.elements import Element
 from ..mjcf.frames import unit_vector
@@ -102,7 +102,5 @@ def named(element: Element, key: str, name: str, known: Collection[str], what: s
     """
     if name not in known:
         expected = with_article(what)
-        raise element.fault(
-            f"{key}: found {shown(name)}, expected {expected}; {remedy(name, known)}"
-        )
+        raise element.unknown_name(key, name, known, expected)
     return name

@@ -15,8 +15,7 @@ from pathlib import Path
 import msgspec
 
 from ....algebra import X
-from ....errors import remedy
-from ...io.document import fault, shown
+from ...io.document import fault, shown, unknown_name
 from ...io.yaml_document import parse_yaml
 from .robot import Connection, Described, Loop, Move, Robot
 
@@ -62,11 +61,8 @@ def read_pairs(file: Path, text: str) -> PairedFile:
     for kind in found.joint_type:
         if kind not in _TYPES and not _UNIVERSAL.fullmatch(kind):
             known = (*_TYPES, "UJOINT_XY")
-            raise fault(
-                file,
-                "joint_type",
-                f"found {shown(kind)}, expected {', '.join(known)}, or other axes;"
-                f" {remedy(kind, known)}",
+            raise unknown_name(
+                file, "joint_type", kind, known, f"{', '.join(known)}, or other axes"
             )
     for kind in found.type:
         if kind.lower() not in ("3d", "6d"):
@@ -95,11 +91,7 @@ def add_pairs(file: Path, pairs: PairedFile, robot: Robot) -> None:
     for names, kind in zip(pairs.closed_loop, pairs.type, strict=True):
         for name in names:
             if name not in frames:
-                raise fault(
-                    file,
-                    "closed_loop",
-                    f"found {shown(name)}, expected a link or joint; {remedy(name, frames)}",
-                )
+                raise unknown_name(file, "closed_loop", name, frames, "a link or joint")
         first, second = (frames[name] for name in names)
         places = robot.links[first], robot.links[second]
         title = f"{names[0]} = {names[1]}"

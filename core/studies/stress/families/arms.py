@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ....algebra import triple
 from ....joints import AxialJoint, Cylindrical, Fixed, Joint, Revolute, Screw, Translational
 from ....mechanism.drivers import Driver, JointAngle, JointDisplacement
 from ....mechanism.mechanism import GROUND, Body, Mechanism, Point
@@ -16,7 +17,7 @@ from ..truth.evaluation import Poses
 from ..truth.long_double import PI, Real, extended, unit
 from ..truth.reference_motion import Motion as Closed
 from ..truth.reference_motion import closed
-from .base import Family, Rng, Specimen, as_case, bodies, direction, triple
+from .base import Family, Rng, Specimen, as_case, bodies, direction
 
 KINDS: Sequence[type[Joint]] = (Revolute, Revolute, Translational, Cylindrical, Screw, Fixed)
 LARGEST = 30

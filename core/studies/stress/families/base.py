@@ -5,7 +5,7 @@ refusals.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -113,12 +113,6 @@ def as_case(
     return with_all_coordinates(
         Case(mechanism.name, source, Truth.CONSENSUS_ONLY, mechanism, sweep, ())
     )
-
-
-def triple(x: Sequence[float] | Array) -> tuple[float, float, float]:
-    """Return three numbers as a tuple for descriptions."""
-    a, b, c = (float(each) for each in x)
-    return a, b, c
 
 
 def direction(rng: Rng) -> Array:

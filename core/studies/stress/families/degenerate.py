@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ....algebra import triple
 from ....case.case import Case
 from ....failures import FailureKind
 from ....joints import (
@@ -25,7 +26,7 @@ from ....joints import (
 from ....mechanism.drivers import JointAngle, PointCoordinate
 from ....mechanism.mechanism import GROUND, Body, Mechanism, Point
 from ..truth.reference_motion import followed
-from .base import MOTION_ENDS, Family, Rng, Specimen, as_case, direction, triple
+from .base import MOTION_ENDS, Family, Rng, Specimen, as_case, direction
 from .dimensions import crank_rocker
 from .planar import any_plane, four_bar, slider_crank
 

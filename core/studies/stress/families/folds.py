@@ -9,7 +9,7 @@ import numpy as np
 from ....mechanism.motions import Motion, Sine
 from ..truth.first_fold import turning
 from .base import Family, Rng, Specimen, as_case, power
-from .loops import Builder
+from .loops import random_mechanism
 
 LARGEST, DRIVERS = 4, 3
 # The search for a fold ends after this multiple of the reach. Over one reach, the rates at design
@@ -36,12 +36,8 @@ class Folds(Family):
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
         """Return a sweep past the first fold, if there is one; the other drivers swing."""
-        while True:
-            count = int(rng.integers(1, LARGEST + 1))
-            found = Builder(rng, count, DRIVERS).built()
-            if found is not None:
-                break
-        mechanism, reach = found
+        mechanism, reach = random_mechanism(rng, lambda: int(rng.integers(1, LARGEST + 1)), DRIVERS)
+        count = len(mechanism.bodies)
         driver, stop = mechanism.drivers[0].name, FARTHER * reach
 
         def swing() -> Motion:

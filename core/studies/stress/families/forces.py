@@ -8,9 +8,10 @@ from functools import partial
 
 import numpy as np
 
+from ....algebra import triple
 from ....case.case import Case, Quantity
-from ....case.markers import with_markers
 from ....case.measures import DriverEffort, ElementForce, ForceMeasure, JointForce, JointMoment
+from ....case.quantity import with_markers
 from ....joints import Joint, Revolute
 from ....mechanism.body import Body, Inertia
 from ....mechanism.drivers import JointAngle
@@ -24,9 +25,9 @@ from ....mechanism.loads import (
 )
 from ....mechanism.mechanism import GROUND, Mechanism
 from ....mechanism.motions import Motion, Sine
-from .base import Family, Rng, Specimen, as_case, bodies, direction, power, triple
+from .base import Family, Rng, Specimen, as_case, bodies, direction, power
 from .dimensions import crank_rocker
-from .loops import Builder
+from .loops import random_mechanism
 from .planar import any_plane, four_bar
 
 LARGEST = 8
@@ -58,7 +59,7 @@ class Forces(Family):
             mechanism, reach, what = four_bar(plane, *crank_rocker(rng)), 1.0, "four_bar"
             along: Sequence[np.ndarray] = (plane.e1, plane.e2, np.array(plane.normal))
         else:
-            mechanism, reach = _loop(rng)
+            mechanism, reach = random_mechanism(rng, lambda: bodies(rng, LARGEST))
             reach *= NEAR
             what, along = f"loop of {len(mechanism.bodies)} bodies", (direction(rng),)
             if rng.random() < 0.5 and (doubled := _doubled(rng, mechanism)) is not None:
@@ -88,12 +89,6 @@ def _case(
         mechanism=with_markers(mechanism, outputs),
         outputs=(*case.outputs, *outputs),
     )
-
-
-def _loop(rng: Rng) -> tuple[Mechanism, float]:
-    while (found := Builder(rng, bodies(rng, LARGEST)).built()) is None:
-        pass
-    return found
 
 
 def _doubled(rng: Rng, mechanism: Mechanism) -> Mechanism | None:

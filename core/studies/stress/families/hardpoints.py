@@ -7,10 +7,11 @@ from functools import partial
 
 import numpy as np
 
+from ....algebra import triple
 from ....joints import Distance, Revolute, Spherical, Translational
 from ....mechanism.drivers import PointCoordinate
 from ....mechanism.mechanism import GROUND, Body, Mechanism, Point
-from .base import Family, Rng, Specimen, as_case, power, triple
+from .base import Family, Rng, Specimen, as_case, power
 
 At = Callable[[float, float, float], tuple[float, float, float]]
 """Function from a hardpoint to the perturbed hardpoint [m]."""

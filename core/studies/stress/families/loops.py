@@ -8,13 +8,14 @@ motions shows this. The reference is followed from the design.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import MISSING, fields
+from collections.abc import Callable, Sequence
+from dataclasses import MISSING, fields, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
+from ....algebra import triple
 from ....errors import MechanismError
 from ....joints import AxialJoint, Coupler, Gear, Joint, Kind, RackPinion
 from ....mechanism.drivers import Driver, JointAngle, JointDisplacement, PointCoordinate
@@ -23,7 +24,7 @@ from ....mechanism.motions import Motion, Sine
 from ....trajectory import Array
 from ..truth.conditions import conditions
 from ..truth.evaluation import Evaluator, Poses
-from .base import Family, Rng, Specimen, as_case, bodies, direction, triple
+from .base import Family, Rng, Specimen, as_case, bodies, direction
 
 LARGEST = 30
 # Joint types for the tree, and for the closures. Types with five freedoms carry no body.
@@ -48,12 +49,8 @@ class Loops(Family):
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
         """Return a loop, driven far enough to meet a dead centre in every second specimen."""
-        while True:
-            count = bodies(rng, LARGEST)
-            found = Builder(rng, count).built()
-            if found is not None:
-                break
-        mechanism, reach = found
+        mechanism, reach = random_mechanism(rng, lambda: bodies(rng, LARGEST))
+        count = len(mechanism.bodies)
         motions: dict[str, Motion] = {d.name: Sine(0.1 * reach, 0.7) for d in mechanism.drivers[1:]}
         values = np.linspace(-reach, reach, samples)
         return Specimen(
@@ -61,6 +58,18 @@ class Loops(Family):
             partial(as_case, mechanism, mechanism.drivers[0].name, values, motions=motions),
             facts=(("bodies", count),),
         )
+
+
+def random_mechanism(rng: Rng, count: Callable[[], int], most: int = 2) -> tuple[Mechanism, float]:
+    """Return a random mechanism that can be closed, and the reach of its drivers.
+
+    Args:
+        count: returns a number of bodies.
+        most: largest number of drivers.
+    """
+    while (found := Builder(rng, count(), most).built()) is None:
+        pass
+    return found
 
 
 class Builder:
@@ -248,9 +257,4 @@ class Builder:
         driven = [d.point for d in found.drivers if isinstance(d, PointCoordinate)]
         shown = {*driven, *(f"p_{body.name}" for body in self.bodies[-3:])}
         points = [point for point in found.points if point.name in shown]
-        return (
-            Mechanism(
-                found.name, found.bodies, found.joints, points, found.drivers, found.couplers
-            ),
-            reach,
-        )
+        return replace(found, points=points), reach

@@ -8,13 +8,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ....algebra import triple
 from ....joints import Cylindrical, Distance, Joint, Revolute, Spherical, Translational, Universal
 from ....mechanism.drivers import JointAngle, JointDisplacement
 from ....mechanism.mechanism import Body, Mechanism, Point
 from ....trajectory import Array
 from ..truth.long_double import Real, extended, unit
 from ..truth.reference_motion import Motion
-from .base import Rng, direction, triple
+from .base import Rng, direction
 
 Plan = tuple[float, float]
 """A point in the plane."""

@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from ....algebra import triple
 from ....case.case import Case
 from ....failures import FailureKind
 from ....mechanism.mechanism import Mechanism
 from ..truth.newton_kantorovich import LANES, System
 from ..truth.reference_motion import Motion, Truth, closed, closed_poses
-from .base import TOL, Family, Rng, Specimen, as_case, direction, power, triple
+from .base import TOL, Family, Rng, Specimen, as_case, direction, power
 from .dimensions import crank_rocker
 from .planar import any_plane, four_bar, four_bar_motion
 

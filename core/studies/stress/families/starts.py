@@ -9,13 +9,14 @@ from functools import partial
 
 import numpy as np
 
+from ....algebra import triple
 from ....case.case import TIME
 from ....joints import RackPinion, Revolute, Translational
 from ....mechanism.drivers import PointCoordinate
 from ....mechanism.mechanism import GROUND, Body, Mechanism, Point
 from ....mechanism.motions import Absolute, Motion, Sine
-from .base import Family, Rng, Specimen, as_case, triple
-from .loops import Builder
+from .base import Family, Rng, Specimen, as_case
+from .loops import random_mechanism
 from .planar import any_plane, flat_plane
 
 LARGEST, DRIVERS = 5, 3
@@ -56,11 +57,7 @@ class Starts(Family):
 
 def _closed(rng: Rng, digits: str) -> tuple[Mechanism, dict[str, Motion]]:
     """Return a random closed mechanism; its drivers swing by a part of its reach."""
-    while True:
-        found = Builder(rng, int(rng.integers(1, LARGEST + 1)), DRIVERS).built()
-        if found is not None:
-            break
-    mechanism, reach = found
+    mechanism, reach = random_mechanism(rng, lambda: int(rng.integers(1, LARGEST + 1)), DRIVERS)
     mechanism = replace(
         mechanism, drivers=[replace(each, relative=False) for each in mechanism.drivers]
     )

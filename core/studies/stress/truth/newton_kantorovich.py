@@ -14,6 +14,7 @@ tested under the same conditions from the nearer knot.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -168,16 +169,7 @@ class System:
         q = q / np.sqrt((q * q).sum(axis=1, keepdims=True))
         found = self.solved(Poses(u, q), self.sampled(samples), times, near)
         changed = changes(knots, left + (s > 0.5), found)[1]
-        return Solved(
-            found.times,
-            found.poses,
-            found.angles,
-            found.jacobian,
-            found.inverse,
-            found.v,
-            found.a,
-            np.where(changed <= LARGEST_CHANGE, found.step, np.inf),
-        )
+        return replace(found, step=np.where(changed <= LARGEST_CHANGE, found.step, np.inf))
 
 
 def _fold(knots: Sequence[Solved], stop: float) -> float | None:

@@ -15,7 +15,7 @@ solutions meet, errors are roots of the rows' errors: no position error may exce
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 
 import numpy as np
@@ -177,16 +177,7 @@ def _replaced(found: Solved, poses: Poses, where: NDArray[np.bool_]) -> Solved:
         np.where(where, old, new)
         for old, new in ((poses.u, found.poses.u), (poses.q, found.poses.q))
     )
-    return Solved(
-        found.times,
-        Poses(u, q),
-        found.angles,
-        found.jacobian,
-        found.inverse,
-        found.v,
-        found.a,
-        found.step,
-    )
+    return replace(found, poses=Poses(u, q))
 
 
 def closed_poses(system: System, motion: Motion, values: Real) -> Poses:
