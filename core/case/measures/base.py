@@ -152,14 +152,10 @@ def key_of(each: Field[Any]) -> str:
     return each.metadata.get("key", each.name)
 
 
-def norm(a: Vec3) -> Jet:
-    """Return the length of a vector of jets."""
-    return sqrt(a @ a)
-
-
 def length(design: Mapping[str, Vec3], start: str, end: str) -> Any:
     """Return the distance between two points at design [m]."""
-    return norm(design[end] - design[start]).x
+    along = design[end] - design[start]
+    return sqrt(along @ along).x
 
 
 def coordinates(place: Vec3) -> Vector:
