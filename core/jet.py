@@ -17,6 +17,11 @@ from .algebra import Vec3
 
 Lanes: TypeAlias = NDArray[np.float64]
 
+VANISHING = 2.0**-20
+"""A length below this part of the numbers it is made of has lost six digits of its direction, and
+so of its rates: they keep the nine to ten that tolerances ask for.
+"""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Jet:
@@ -88,6 +93,27 @@ def arctan2(y: Jet, x: Jet) -> Jet:
     """
     rate = (x * y.dot - y * x.dot) / (x * x + y * y)
     return Jet(np.arctan2(y.x, x.x), rate.x, rate.v)
+
+
+def doubles(a: Jet) -> Lanes:
+    """Return the value as doubles, whatever its numbers are."""
+    return np.asarray(a.x).astype(np.float64)
+
+
+def where(known: NDArray[np.bool_], a: Jet) -> Jet:
+    """Return the jet, NaN where it is not known."""
+    return Jet(*(np.where(known, part, np.nan) for part in (a.x, a.v, a.a)))
+
+
+def norm(a: Vec3, size: Lanes | float) -> Jet:
+    """Return the length of a vector of jets. Its rates are NaN where it almost vanishes.
+
+    Args:
+        size: of the numbers that the vector is a sum of.
+    """
+    length = sqrt(a @ a)
+    rates = where(doubles(length) > VANISHING * size, length)
+    return Jet(length.x, rates.v, rates.a)
 
 
 def each(a: Vec3, do: Callable[[Jet], Jet]) -> Vec3:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..algebra import Vec3, cross, quat
-from ..jet import Jet, arctan2, sqrt
+from ..jet import Jet, arctan2, doubles, sqrt
 from ..kinematics import DOUBTFUL, agreement
 from ..mechanism.motions import Path
 from ..trajectory import Array
@@ -38,7 +38,7 @@ def euler_parameters(x: Vec3, y: Vec3) -> list[Jet]:
         [z.x - x.z, x.y + y.x, 1.0 - x.x + y.y - z.z, y.z + z.y],
         [x.y - y.x, z.x + x.z, y.z + z.y, 1.0 - x.x - y.y + z.z],
     ]
-    largest = np.argmax([_floats(products[k][k]) for k in range(4)], axis=0)
+    largest = np.argmax([doubles(products[k][k]) for k in range(4)], axis=0)
     own = sqrt(_select(largest, [products[k][k] for k in range(4)]))
     return [_select(largest, products[i]) / (2.0 * own) for i in range(4)]
 
@@ -57,7 +57,7 @@ def signed(sign: Array, e: Sequence[Jet]) -> list[Jet]:
 
 def floats(e: Sequence[Jet]) -> Array:
     """Return the values of jets as doubles, shape (4, n, ...)."""
-    return np.array([_floats(each) for each in e])
+    return np.array([doubles(each) for each in e])
 
 
 def angular_velocity(e: Sequence[Jet]) -> Array:
@@ -76,8 +76,8 @@ def rotation_vector(e: Sequence[Jet]) -> list[Jet]:
     e0, *along = e
     square = along[0] * along[0] + along[1] * along[1] + along[2] * along[2]
     # exact numbers, which are objects, have digits enough for the quotient
-    doubles = np.asarray(square.x).dtype != object
-    small = (_floats(square) < _SMALL) & (_floats(e0) > 0.0) & doubles
+    rounded = np.asarray(square.x).dtype != object
+    small = (doubles(square) < _SMALL) & (doubles(e0) > 0.0) & rounded
     root = sqrt(_select(small.astype(int), [square, e0 * e0]))  # any number where it is small
     quotient = 2.0 * arctan2(root, e0) / root
     series, coefficient = 0.0 * square, 2.0
@@ -86,7 +86,7 @@ def rotation_vector(e: Sequence[Jet]) -> list[Jet]:
         series = series + coefficient * power
         power = power * square
         coefficient *= (2 * k + 1) ** 2 / ((2 * k + 2) * (2 * k + 3))
-    whole = (_floats(square) < _WHOLE) & (_floats(e0) < 0.0)
+    whole = (doubles(square) < _WHOLE) & (doubles(e0) < 0.0)
     which = np.where(whole, 2, small.astype(int))
     unknown = np.full((), np.nan)
     factor = _select(which, [quotient, series, Jet(unknown, unknown, unknown)])
@@ -168,11 +168,6 @@ def _known_before(known: NDArray[np.bool_]) -> NDArray[np.int64]:
     indices = np.arange(len(known)).reshape(-1, *(1,) * (known.ndim - 1))
     last = np.maximum.accumulate(np.where(known, indices, 0), axis=0)
     return np.concatenate([last[:1], last[:-1]])
-
-
-def _floats(jet: Jet) -> Array:
-    """Return the value of a jet as doubles, whatever its numbers are."""
-    return np.asarray(jet.x).astype(np.float64)
 
 
 def _select(which: NDArray[Any], jets: Sequence[Jet]) -> Jet:

@@ -163,6 +163,23 @@ def test_the_rotation_vector_of_a_whole_turn_is_unknown():
     assert np.isnan(found.position).tolist() == [False, False, False, True]
 
 
+def test_rates_of_vanishing_lengths_are_unknown():
+    """Directions that become opposite or parallel, points that meet: what is left is round-off."""
+    case = arm([math.pi, 2.0 * math.pi, math.pi + 1e-8, 1.0])
+    meeting = [Point("A", "ground", (1.0, 1.0, 0.0)), *case.mechanism.points[1:]]
+    case = replace(case, mechanism=replace(case.mechanism, points=meeting))
+    normal = ((0.0, 1.0, -1.0), (0.0, 2.0, -2.0))
+    width, apart = series(
+        case,
+        Angle("w", *TOLERANCE, ("ground", "disc"), normal),
+        Distance("l", *TOLERANCE, ("A", "B")),
+    )
+    np.testing.assert_allclose(width.position, [math.pi, 0.0, math.pi - 1e-8, 1.0], atol=1e-12)
+    for rates in (width.velocity, width.acceleration):
+        assert np.isnan(rates).tolist() == [True, True, True, False]
+    assert np.isnan(apart.velocity).tolist() == [False, True, False, False]
+
+
 def test_distances_and_angles():
     angle = np.linspace(0.2, 3.0, 15)
     n = np.array(AXIS) / 3.0

@@ -84,6 +84,38 @@ def hinged(center, hinge, axis, angles, types, rate=1.0, points=(), between=None
 ANGLES = np.linspace(-0.3, 0.4, 8)
 
 
+def test_a_wheel_on_its_side_has_no_toe():
+    """Its axis of rotation is vertical, but for round-off: no direction in the road plane."""
+    rolled = [0.5 * np.pi, 1.5 * np.pi, 0.3]
+    types = ["toe", "steer_angle", "half_track_change", "camber"]
+    found = hinged((0.0, 0.7, 0.3), (0.0, 0.6, 0.3), (1, 0, 0), rolled, types)
+    for each in types[:3]:
+        assert np.isnan(found[each].position).tolist() == [True, True, False]
+    assert np.abs(found["camber"].position[:2]) == pytest.approx(0.5 * np.pi, abs=ROUND_OFF)
+    assert np.isnan(found["camber"].velocity).tolist() == [True, True, False]
+
+
+def test_a_steering_axis_along_a_view_has_no_angle_in_it():
+    ends = Point("low", "carrier", (0.0, 0.6, 0.1)), Point("high", "carrier", (0.0, 0.6, 0.5))
+    types, pair = ["caster", "kingpin_inclination", "scrub_radius"], {"kingpin": ("low", "high")}
+    tipped = [0.5 * np.pi, 0.1]
+    for axis, known in (((1, 0, 0), [False, True]), ((0, 1, 0), [True, False])):
+        found = hinged((0.0, 0.7, 0.3), (0.0, 0.6, 0.3), axis, tipped, types, 1.0, ends, **pair)
+        for each, there in zip(types, known, strict=False):
+            assert np.isfinite(found[each].position).tolist() == [there, True]
+        assert np.isfinite(found["scrub_radius"].position).tolist() == [False, True]
+
+
+def test_half_a_turn_is_positive():
+    """Engines agree to round-off, which must not choose between two ends of the range."""
+    about = np.pi * (1.0 + np.array([-1e-12, 0.0, 1e-12]))
+    found = hinged(
+        (0.0, 0.7, 0.3), (0.0, 0.6, 0.3), (0, 0, 1), [*-about, *about], ["toe", "steer_angle"]
+    )
+    for each in ("toe", "steer_angle"):
+        assert found[each].position == pytest.approx(np.pi, abs=1e-11)
+
+
 def test_swing_axle():
     """A left wheel on an arm about x: it cambers as the arm turns, and its instant centre is the
     hinge.

@@ -143,6 +143,37 @@ def test_change_points(loops, direction):
     assert curve.points["end"][:, :2] == pytest.approx(expected, abs=1e-9)
 
 
+@pytest.mark.parametrize("longer", [1e-8, 1e-4])
+def test_branches_that_miss_each_other(longer):
+    """The coupler of a parallelogram is too long by a little: the crank locks up just before the
+    change point, where a step is a thousand times as long as the bend of the curve.
+    """
+    crank, ground, lean, z = 0.15, 0.4, 0.2, (0.0, 0.0, 1.0)
+    tip = crank * np.array([np.cos(lean), np.sin(lean)])
+    reach, coupler = np.array([ground, 0.0]) - tip, ground + longer
+    span = np.linalg.norm(reach)
+    along = (coupler**2 - crank**2 + span**2) / (2.0 * span)
+    across = np.sqrt(coupler**2 - along**2) * np.array([-reach[1], reach[0]]) / span
+    knee = tip + along * reach / span + across
+    mechanism = Mechanism(
+        "nearly a parallelogram",
+        [Body("crank"), Body("coupler"), Body("rocker")],
+        [
+            Revolute("A", "ground", "crank", (0.0, 0.0, 0.0), z),
+            Revolute("B", "crank", "coupler", (*tip, 0.0), z),
+            Revolute("C", "coupler", "rocker", (*knee, 0.0), z),
+            Revolute("D", "ground", "rocker", (ground, 0.0, 0.0), z),
+        ],
+        [],
+        [JointAngle("turn", "A")],
+    )
+    (event,) = trace(mechanism, "turn", length=0.7, direction=-1).events
+    folded = coupler - crank  # from A's tip to D
+    cosine = (crank**2 + ground**2 - folded**2) / (2.0 * crank * ground)
+    assert event.kind == "limit point"
+    assert event.value == pytest.approx(np.arccos(cosine) - lean, abs=1e-9)
+
+
 def test_a_motion_without_singular_poses():
     """A whole turn of a crank, and back at the design."""
     curve = trace(four_bar(), "turn", length=12.0)

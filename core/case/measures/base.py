@@ -21,7 +21,7 @@ import numpy as np
 
 from ...algebra import Vec3, vec
 from ...errors import MechanismError, unknown
-from ...jet import Jet, sqrt
+from ...jet import sqrt
 from ...mechanism.mechanism import GROUND, Mechanism
 from ..quantity import MARKER, TypedQuantity, own_keys
 
@@ -91,14 +91,10 @@ def key_of(each: Field[Any]) -> str:
     return each.metadata.get("key", each.name)
 
 
-def norm(a: Vec3) -> Jet:
-    """Return the length of a vector of jets."""
-    return sqrt(a @ a)
-
-
 def length(design: Mapping[str, Vec3], start: str, end: str) -> Any:
     """Return the distance between two points at design [m]."""
-    return norm(design[end] - design[start]).x
+    along = design[end] - design[start]
+    return sqrt(along @ along).x
 
 
 def place_on(mechanism: Mechanism, body: str) -> Vec3:

@@ -6,17 +6,22 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from ...algebra import Vec3, cross, triple, vec
 from ...errors import MechanismError
-from ...jet import Jet, arctan2
+from ...jet import Jet, arctan2, doubles, norm
 from ...mechanism.mechanism import Mechanism, Point, Vector
 from ..quantity import MARKER
-from .base import Measure, norm, place_on, reach_of
+from .base import Measure, place_on, reach_of
 
 
 @dataclass(frozen=True)
 class Distance(Measure):
-    """Distance between two points, such as the length of a damper."""
+    """Distance between two points, such as the length of a damper.
+
+    Its rates are unknown while the points coincide.
+    """
 
     type = "distance"
     measure = "m"
@@ -32,16 +37,19 @@ class Distance(Measure):
 
     def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
         """Return the distance [m], minus its value at design if relative."""
-        first, second = self.between
-        length = norm(at[second] - at[first])
-        return length - norm(design[second] - design[first]) if self.relative else length
+        return self._apart(at) - self._apart(design) if self.relative else self._apart(at)
+
+    def _apart(self, at: Mapping[str, Vec3]) -> Jet:
+        first, second = (at[name] for name in self.between)
+        size = np.maximum(*(doubles(norm(each, 0.0)) for each in (first, second)))
+        return norm(second - first, size)
 
 
 @dataclass(frozen=True)
 class Angle(Measure):
     """Angle between a direction of one body and a direction of another, 0 to pi.
 
-    Its rate is unknown while they are parallel.
+    Its rates are unknown while they are parallel, to 1e-6 rad.
 
     Attributes:
         directions: global at design, any length but zero [-].
@@ -91,4 +99,5 @@ class Angle(Measure):
     def _between(self, at: Mapping[str, Vec3]) -> Jet:
         first, a, second, b = (at[name] for name in self.points)
         a, b = a - first, b - second
-        return arctan2(norm(cross(a, b)), a @ b)
+        size = np.sqrt(doubles(a @ a) * doubles(b @ b))
+        return arctan2(norm(cross(a, b), size), a @ b)

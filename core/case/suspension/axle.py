@@ -15,16 +15,12 @@ from typing import Any
 import numpy as np
 
 from ...algebra import Vec3
-from ...jet import Jet, arctan2, sqrt
-from ...trajectory import Array
+from ...jet import Jet, arctan2, sqrt, where
 from ..quantity import HIDDEN
 from .base import SuspensionOutput, held
-from .corner import Corner
+from .corner import PARALLEL, Corner
 from .vehicle import Side, Vehicle
 
-# Lines of less than this angle to each other have no intersection of use [rad]: ten digits are left
-# of it there.
-PARALLEL = 1e-4
 # Wheels steered by less than this have no Ackermann of use [rad]: a quotient of two differences.
 STRAIGHT = 1e-2
 _CARRIER = ("wheel_center", "spin_marker", "top_marker")
@@ -123,7 +119,7 @@ class Ackermann(AxleOutput):
         # tan of the steer angles: -x / y on the left, x / y on the right
         quotient = (a.y / a.x + b.y / b.x) * wheelbase / track
         steered = -np.sign(a.x.x * b.x.x) * np.minimum(np.abs(a.x.x), np.abs(b.x.x))
-        return _where(quotient, steered > STRAIGHT)
+        return where(steered > STRAIGHT, quotient)
 
 
 @dataclass(frozen=True)
@@ -172,7 +168,7 @@ class _AxleRollCenter(AxleOutput):
         y = (first * vb.z - va.z * second) / whole
         z = (va.y * second + first * vb.y) / whole
         known = np.abs(crossing) > PARALLEL
-        return _where(y, known), _where(z, known)
+        return where(known, y), where(known, z)
 
 
 @dataclass(frozen=True)
@@ -201,8 +197,3 @@ class AxleRollCenterOffset(_AxleRollCenter):
         """Return the offset [m]."""
         y, _ = self.place(left, right)
         return self.vehicle.convention.up * y
-
-
-def _where(jet: Jet, known: Array) -> Jet:
-    """Return a jet, NaN where it is not known."""
-    return Jet(*(np.where(known, each, np.nan) for each in (jet.x, jet.v, jet.a)))

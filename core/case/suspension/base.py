@@ -15,9 +15,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ...algebra import Vec3
-from ...jet import Jet
+from ...jet import Jet, where
 from ...mechanism.mechanism import Mechanism, Point
-from ...trajectory import Array
 from ..case import HELD_BUT
 from ..quantity import HIDDEN, TypedQuantity
 from .corner import Corner
@@ -175,9 +174,4 @@ def where_moving(quotient: Jet, corner: Corner, at: Mapping[str, Vec3]) -> Jet:
     # The maximum is over points and samples, not over lanes: lanes may hold variants of a design,
     # which must not be judged by one another.
     fastest = np.max(np.nan_to_num(np.array(speeds)), axis=(0, 1), initial=0.0)
-    still = ~(travel > STILL * fastest)
-
-    def masked(values: Array) -> Array:
-        return np.where(still, np.nan, values)
-
-    return Jet(masked(quotient.x), masked(quotient.v), masked(quotient.a))
+    return where(travel > STILL * fastest, quotient)

@@ -14,11 +14,19 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TypeAlias
 
+import numpy as np
+
 from ...algebra import Scalar, Vec3, cross, vec
-from ...jet import Jet, each, sqrt
+from ...jet import Jet, arctan2, doubles, each, norm, sqrt, where
+from ...trajectory import Array
 from .vehicle import Vehicle
 
 _Column: TypeAlias = Sequence[Jet]
+# Lines of less than this angle to each other, or to a plane, have no intersection of use [rad], and
+# a direction as near to that of a view has no angle there: ten digits are left of them.
+PARALLEL = 1e-4
+# Angles this near to minus half a turn are plus half a turn [rad]: a thousand residuals.
+HALF_TURN = 1e-9
 
 
 class Corner:
@@ -50,10 +58,16 @@ class Corner:
         return _unit(self.point(self.vehicle.spin_marker) - self.center)
 
     @property
-    def heading(self) -> Vec3:
-        """Unit vector along the intersection of wheel plane and road, forward [-]; z is zero."""
+    def _level(self) -> Jet:
+        """Length of the spin's projection on the road [-]; NaN for a wheel on its side."""
         s = self.spin
         level = sqrt(s.x * s.x + s.y * s.y)
+        return where(doubles(level) > PARALLEL, level)
+
+    @property
+    def heading(self) -> Vec3:
+        """Unit vector along the intersection of wheel plane and road, forward [-]; z is zero."""
+        s, level = self.spin, self._level
         return Vec3(s.y / level, -s.x / level, 0.0)
 
     @property
@@ -65,8 +79,7 @@ class Corner:
     @property
     def rise(self) -> Vec3:
         """Unit vector of steepest ascent in the wheel plane [-]."""
-        s = self.spin
-        level = sqrt(s.x * s.x + s.y * s.y)
+        s, level = self.spin, self._level
         return Vec3(-s.x * s.z / level, -s.y * s.z / level, level)
 
     @property
@@ -106,10 +119,29 @@ class Corner:
 
     @property
     def kingpin_offset(self) -> Vec3:
-        """Vector from the contact centre to the steering axis in the road plane [m]; z is zero."""
+        """Vector from the contact centre to the steering axis in the road plane [m]; z is zero. It
+        is NaN for an axis parallel to the road.
+        """
         lower, axis = self.kingpin
         contact = self.contact
-        return lower + ((contact.z - lower.z) / axis.z) * axis - contact
+        size = doubles(norm(axis, 0.0))
+        rise = where(np.abs(doubles(axis.z)) > PARALLEL * size, axis.z)
+        return lower + ((contact.z - lower.z) / rise) * axis - contact
+
+
+def angle_in_view(y: Jet, x: Jet, size: Array | float = 1.0) -> Jet:
+    """Return the angle of a direction in a view [rad], in -pi..pi; NaN where the direction is that
+    of the view itself.
+
+    Half a turn is positive: engines that agree but for round-off must not differ by a whole turn.
+
+    Args:
+        size: length of the direction, its component along the view included.
+    """
+    angle, seen = arctan2(y, x), np.hypot(doubles(x), doubles(y))
+    if np.asarray(angle.x).dtype != object:  # a proved number ends here
+        angle += np.where(angle.x < HALF_TURN - np.pi, 2.0 * np.pi, 0.0)
+    return where(seen > PARALLEL * size, angle)
 
 
 def velocity(a: Vec3) -> Vec3:

@@ -6,9 +6,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ...jet import Jet, arctan2
+from ...jet import Jet, doubles, norm
 from .base import Attitude
-from .corner import Corner
+from .corner import Corner, angle_in_view
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Caster(_Inclination):
     def value(self, corner: Corner) -> Jet:
         """Return the caster angle [rad]."""
         _, axis = corner.kingpin
-        return arctan2(-axis.x, axis.z)
+        return angle_in_view(-axis.x, axis.z, doubles(norm(axis, 0.0)))
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class KingpinInclination(_Inclination):
     def value(self, corner: Corner) -> Jet:
         """Return the kingpin inclination [rad]."""
         _, axis = corner.kingpin
-        return arctan2(-axis.y, axis.z)
+        return angle_in_view(-axis.y, axis.z, doubles(norm(axis, 0.0)))
 
 
 @dataclass(frozen=True)

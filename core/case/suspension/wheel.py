@@ -8,10 +8,10 @@ from enum import StrEnum
 import numpy as np
 
 from ...algebra import Vec3
-from ...jet import Jet, arctan2, sqrt
+from ...jet import Jet, arctan2, norm
 from ...trajectory import Array
 from .base import Attitude, Change
-from .corner import Corner
+from .corner import Corner, angle_in_view
 from .vehicle import Axle, Convention
 
 
@@ -45,7 +45,7 @@ class Toe(Attitude):
     def value(self, corner: Corner) -> Jet:
         """Return the toe-in [rad]."""
         s = corner.spin
-        return arctan2(s.x, s.y)
+        return angle_in_view(s.x, s.y)
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class SteerAngle(Attitude):
     def value(self, corner: Corner) -> Jet:
         """Return the steer angle [rad]."""
         s, side = corner.spin, self.vehicle.side.left * self.vehicle.convention.up
-        return -side * arctan2(s.x, s.y)
+        return side * angle_in_view(-s.x, s.y)
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class Camber(Attitude):
     def value(self, corner: Corner) -> Jet:
         """Return the camber [rad], by its tangent: a sine near one has lost half its digits."""
         s = corner.spin
-        return arctan2(-s.z, sqrt(s.x * s.x + s.y * s.y))
+        return arctan2(-s.z, norm(Vec3(s.x, s.y, 0.0 * s.z), 1.0))
 
 
 def camber_of_front_view(seen: Array, toe: Array) -> Array:

@@ -9,7 +9,8 @@ tangent by Newton's iteration on
 
 B is regular at limit points, J is not. Limit points are zeros of dt along the curve. At
 bifurcations [J -nu] loses rank, and the determinant of B changes its sign if an odd number of
-branches cross.
+branches cross. Without a bifurcation it keeps its sign, so a step with a change of sign where the
+branches miss each other has gone over to the other one: shorter steps follow the bend between them.
 """
 
 from __future__ import annotations
@@ -29,6 +30,10 @@ from ..formulation.acceptance_criteria import LARGEST_DEVIATION
 # The tangent turns by less than this [rad] in a step, so that the correction is a tenth of it:
 # another branch is farther away.
 LARGEST_TURN = 0.2
+COSINE = np.cos(LARGEST_TURN)
+# A curve that turned by more than this since a bifurcation ahead of it was in doubt has bent away
+# from it: three times what a step may turn.
+BENT = np.cos(3.0 * LARGEST_TURN)
 # A step below this is round-off beside the residuals that are corrected.
 SHORTEST = 1e-9
 CORRECTIONS = 10
@@ -162,9 +167,29 @@ class ArclengthWalk:
                 if h < SHORTEST:
                     return
                 continue
+            if after.sign != spot.sign and (bend := self._bend(spot, after)):
+                yield from bend
+                spot, h = bend[-1], bend[-1].arc - (bend[-2] if bend[1:] else spot).arc
+                continue
             h = min(longest, h * float(np.clip(0.5 * LARGEST_TURN / max(turn, 1e-9), 0.5, 2.0)))
             spot = after
             yield spot
+
+    def _bend(self, before: Spot, after: Spot) -> list[Spot]:
+        """Return spots round the bend that a step with a change of sign cut off; empty if there is
+        none, and the branches meet within the tolerance.
+        """
+        spots, spot, h = list[Spot](), before, 0.5 * (after.arc - before.arc)
+        while h >= np.sqrt(self.tol):  # of branches nearer to each other, each solves the equations
+            ahead = self.advance(spot, h)
+            if ahead is None or ahead.sign != spot.sign or ahead.dq @ spot.dq < COSINE:
+                h *= 0.5
+                continue
+            spot, h = ahead, 1.5 * h
+            spots.append(spot)
+            if spot.dq @ before.dq < BENT or spot.arc > 2.0 * after.arc - before.arc:
+                return spots
+        return []
 
     def limit(self, before: Spot, after: Spot) -> Beside:
         """Return the turning point of the driver between two spots: the zero of dt, by false
