@@ -151,7 +151,7 @@ def _samples(model: MuJoCoModel, case: Case) -> Iterator[Sample]:
             yield at
 
 
-def told(found: RodForces, rod: str) -> str:
+def report_lines(found: RodForces, rod: str) -> str:
     """Return the findings as lines of text."""
     largest, n = float(np.abs(found.rigid).max()), len(found.rigid)
 
@@ -182,7 +182,7 @@ def main(arguments: Sequence[str]) -> int:
         if not rods:
             raise CaseError(f"case {case.name!r}: no joint is a distance, and MuJoCo has no tendon")
         for rod in rods:
-            print(told(rod_forces(case, rod), rod))
+            print(report_lines(rod_forces(case, rod), rod))
     except KincheckError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

@@ -29,7 +29,7 @@ CASES = (STRUT, "stewart_platform")
 """Cases of the full benchmark: a suspension, and a mechanism of thirteen bodies with
 six coupled loops.
 """
-# This many rounds settle a median to a tenth of the distance between the quartiles.
+# Rounds that settle a median to a tenth of the distance between the quartiles.
 ROUNDS = 20
 
 _MAIN = "import sys; from kincheck.core.cli.main import main; sys.exit(main(sys.argv[1:]))"
@@ -78,7 +78,7 @@ def add(commands: Any) -> None:
         type=whole(1),
         default=ROUNDS,
         metavar="N",
-        help="of all contestants in turn; default %(default)s",
+        help="rounds of all contestants in turn; default %(default)s",
     )
     engines.add_argument(
         "--parts",
@@ -102,7 +102,7 @@ def add(commands: Any) -> None:
         type=whole(0),
         default=SEED,
         metavar="N",
-        help="of the random states; default %(default)s",
+        help="seed of the random states; default %(default)s",
     )
     for each, names in ((engines, "bench"), (formulation, "bench_formulation")):
         # No defaults: they would overwrite the options before the benchmark's name.
@@ -126,7 +126,7 @@ def add(commands: Any) -> None:
 
 
 def _all(options: argparse.Namespace, house: House) -> int:
-    """Measure the engines on a few cases, and the formulation. Takes some minutes."""
+    """Measure the engines on a few cases, and the formulation. This takes some minutes."""
     options.cases, options.engine, options.rounds, options.parts = CASES, [], ROUNDS, None
     return _measured(options, house, formulation=True)
 
@@ -163,7 +163,7 @@ def _measured(options: argparse.Namespace, house: House, *, formulation: bool) -
         )
     ]
     others = [name for name in options.engine if name not in (*house.engines, *house.simulations)]
-    engines += house.find_engines(others, problems)  # of users, or a message
+    engines += house.find_engines(others, problems)  # errors of the user, with a message
     if problems:
         raise KincheckError("\n".join(problems))
     with (
@@ -177,7 +177,7 @@ def _measured(options: argparse.Namespace, house: House, *, formulation: bool) -
             rounds=options.rounds,
             parts=options.parts or bench_engines.PARTS,
             command=options.command,
-            tell=meter,
+            progress=meter,
         )
         if formulation:
             meter("formulation", 1.0)
@@ -190,7 +190,8 @@ def _measured(options: argparse.Namespace, house: House, *, formulation: bool) -
         if entry.outcome is Outcome.UNAVAILABLE and options.engine
     }
     complain(
-        f"engine {name!r} is named and missing; {how_to_install(name)}" for name in sorted(missing)
+        f"engine {name!r} is requested, but missing; {how_to_install(name)}"
+        for name in sorted(missing)
     )
     return Status.FAILED if missing else Status.WITHIN
 
@@ -199,8 +200,8 @@ def _with_one_thread(command: str, variables: Sequence[str]) -> int:
     """Run the command again in a new process whose linear algebra uses one thread. Libraries read
     the number of threads when they are loaded.
 
-    The native engine has one thread. Threads waiting for each other would make the simulators'
-    times depend on the machine's load.
+    The native engine has one thread. With threads that wait for each other, the simulators' times
+    would depend on the machine's load.
     """
     environment = {**os.environ, **dict.fromkeys(variables, "1")}
     return subprocess.run(
@@ -216,7 +217,7 @@ def _destinations(options: argparse.Namespace, name: str) -> list[str]:
 
 def _formulation(options: argparse.Namespace, house: House) -> int:
     """Measure the paper's claims: operation counts (Table 3), round-off of rows, errors of a whole
-    sweep. Needs mpmath.
+    sweep. This needs mpmath.
     """
     from ..report import sections as bench
     from ..studies.paper import formulation as bench_formulation

@@ -1,4 +1,4 @@
-"""kincheck check-engine: check an engine of a user."""
+"""kincheck check-engine: check a user's engine."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     checking: argparse.ArgumentParser
     checking = commands.add_parser(
-        "check-engine", help="check an engine of your own", description=_check_engine.__doc__
+        "check-engine", help="check your own engine", description=_check_engine.__doc__
     )
     checking.set_defaults(do=_check_engine)
     checking.add_argument(
@@ -40,7 +40,7 @@ def add(commands: Any) -> None:
         metavar="MODULE:CLASS",
         help="the class, in a module of this folder or an installed one; or an engine's name",
     )
-    add_verbosity(checking, quiet="print the failed checks and the count alone")
+    add_verbosity(checking, quiet="print only the failed checks and the count")
 
 
 def _check_engine(options: argparse.Namespace, house: House) -> int:
@@ -53,7 +53,7 @@ def _check_engine(options: argparse.Namespace, house: House) -> int:
 
 
 def examined(engine: str | Engine, house: House) -> Report:
-    """Return the report on an engine, or on the engine of a name or at MODULE:CLASS.
+    """Return the report on an engine, given by itself, by name or as MODULE:CLASS.
 
     Raises:
         KincheckError: there is no such engine, or a member of the engine protocol is missing.

@@ -16,7 +16,7 @@ def add(commands: Any) -> None:
     checking: argparse.ArgumentParser
     checking = commands.add_parser(
         "check-joint",
-        help="check a joint type of your own, or a built-in one",
+        help="check your own joint type, or a built-in one",
         description=_check_joint.__doc__,
     )
     checking.set_defaults(do=_check_joint)
@@ -31,9 +31,9 @@ def add(commands: Any) -> None:
         type=whole(0),
         default=0,
         metavar="N",
-        help="of the random poses; default %(default)s",
+        help="seed of the random poses; default %(default)s",
     )
-    add_verbosity(checking, quiet="print the failed checks and the count alone")
+    add_verbosity(checking, quiet="print only the failed checks and the count")
 
 
 def _check_joint(options: argparse.Namespace, house: House) -> int:

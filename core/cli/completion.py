@@ -10,7 +10,8 @@ from .registry import House, Status
 
 SHELLS = ("bash", "zsh", "tcsh")
 FILES = ("FILE", "FILE.html", "RUN")
-# Options of engines: these names complete them; files complete cases, beside the built-in names.
+# Functions of the shells: engine options complete to engine names, cases to built-in names and
+# files.
 ENGINES = ("engine", "require")
 PREAMBLE = {
     "bash": 'kincheck_cases() {{ compgen -W "{names}" -- "$1"; compgen -f -- "$1"; }}',
@@ -37,7 +38,7 @@ def add(commands: Any) -> None:
 
 def _complete(options: argparse.Namespace, house: House) -> int:
     """Print a shell script for the completion of commands, options, built-in cases, engines and
-    files. Print it anew after an update.
+    files. Repeat this after an update.
     """
     import shtab
 
@@ -69,14 +70,14 @@ def _complete(options: argparse.Namespace, house: House) -> int:
                 action.complete = shtab.DIRECTORY  # pyright: ignore[reportAttributeAccessIssue]
             elif action.choices is None:
                 action.choices = names.get(action.dest)
-    # a dictionary by shell, which the library's types do not say
+    # a dictionary by shell, which the library's types omit
     preamble: Any = {options.shell: PREAMBLE[options.shell].format(names=" ".join(house.cases()))}
     print(shtab.complete(found, options.shell, preamble=preamble))
     return Status.WITHIN
 
 
 def _below(parser: Any) -> Iterable[Any]:
-    """Yield the parsers of the commands of a parser, and of theirs."""
+    """Yield the parsers of all commands below a parser."""
     for each in parser.commands().values():
         yield each
         yield from _below(each)

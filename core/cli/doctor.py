@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from .installation import Examination
 
 SAMPLE = "mcpherson_strut"
-"""Case of the self-check: the paper's strut, with a reference of 17 digits."""
+"""Case of the self-check: the paper's strut, whose reference has 17 digits."""
 
 
 def add(commands: Any) -> None:
@@ -30,7 +30,7 @@ def add(commands: Any) -> None:
     doctor.add_argument(
         "--json", metavar="FILE", help="write the findings as JSON; - for standard output"
     )
-    add_verbosity(doctor, quiet="print the verdict and what is essential and missing alone")
+    add_verbosity(doctor, quiet="print only the verdict and the essential missing parts")
 
 
 def _doctor(options: argparse.Namespace, house: House) -> int:
@@ -89,8 +89,10 @@ def _print(found: Examination, console: Console) -> None:
         if check.us_per_step is None
         else f", {check.us_per_step:.3g} us per sample, loop: {check.loop}"
     )
-    said = f": {check.message}" if check.message else ""
-    console.print(f"self-check {check.case}: {check.outcome}{measured}{time}{said}", soft_wrap=True)
+    message = f": {check.message}" if check.message else ""
+    console.print(
+        f"self-check {check.case}: {check.outcome}{measured}{time}{message}", soft_wrap=True
+    )
     _print_verdict(found, console)
 
 

@@ -22,29 +22,31 @@ def add(commands: Any) -> None:
     )
     explaining.set_defaults(do=_explain)
     explaining.add_argument(
-        "case", metavar="CASE", help="built-in name, or path to a case file or another tool's"
+        "case",
+        metavar="CASE",
+        help="name of a built-in case, or path to a case file or to another tool's file",
     )
     explaining.add_argument(
         "--samples",
         type=whole(1),
         default=41,
         metavar="N",
-        help="of the sweep to look at; default %(default)s",
+        help="number of samples of the sweep to examine; default %(default)s",
     )
     explaining.add_argument(
         "--tol",
         type=positive,
         default=TOL,
         metavar="X",
-        help=f"residual that engines may leave [m or -]; default {TOL:g}",
+        help=f"largest residual that engines may leave [m or -]; default {TOL:g}",
     )
     explaining.add_argument(
         "--json", metavar="FILE", help="write the diagnosis as JSON; - for standard output"
     )
     add_verbosity(
         explaining,
-        quiet="print verdict, findings and notes alone",
-        verbose="print all samples and sensitivities, not a few of each",
+        quiet="print only the verdict, the findings and the notes",
+        verbose="print all samples and sensitivities, instead of a few of each",
     )
     import_options.add_options(explaining)
 

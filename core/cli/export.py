@@ -38,20 +38,22 @@ def add(commands: Any) -> None:
     )
     export.set_defaults(do=_export)
     export.add_argument(
-        "case", metavar="CASE", help="built-in name, or path to a case file or another tool's"
+        "case",
+        metavar="CASE",
+        help="name of a built-in case, or path to a case file or to another tool's file",
     )
     export.add_argument("--to", required=True, metavar="FORMAT", help=formats())
     export.add_argument(
-        "--out", type=Path, metavar="FILE", help="default: the case's name, in this folder"
+        "--out",
+        type=Path,
+        metavar="FILE",
+        help="stem of the written files; default: the case's name, in this folder",
     )
     export.add_argument(
         "--at",
         type=number,
         metavar="VALUE",
-        help=(
-            "start there: a value of the swept driver as the sweep has it, in SI units; default:"
-            " the design position"
-        ),
+        help=("value of the swept driver at the start, in SI units; default: the design position"),
     )
     import_options.add_options(export)
 
@@ -59,8 +61,7 @@ def add(commands: Any) -> None:
 def _export(options: argparse.Namespace, house: House) -> int:
     """Write a case's mechanism in a simulator's format, with a consistent start.
 
-    A second file beside the first holds parts foreign to the format, such as the constraints of a
-    URDF.
+    A second file holds the parts that the format lacks, such as the loop constraints of a URDF.
     """
     from ..case.io.model_writer import written
 
@@ -75,10 +76,10 @@ def _export(options: argparse.Namespace, house: House) -> int:
 def keep_texts(
     texts: Mapping[str, str], name: str, out: Path | None, json: str | None = None
 ) -> None:
-    """Write texts, keyed by file suffix, side by side, and print the files' names.
+    """Write texts to files that differ by suffix, and print their names.
 
     Args:
-        json: destination of the JSON; "-" for standard output, which then has nothing else.
+        json: destination of the JSON; "-" for standard output, which then holds nothing else.
 
     Raises:
         KincheckError: a file cannot be written, would overwrite the JSON, or exists and
@@ -94,7 +95,7 @@ def keep_texts(
     }
     for file in files:
         if out is None and file.exists():
-            raise KincheckError(f"{file} is there already; name a file with --out to write over it")
+            raise KincheckError(f"{file} exists already; give --out to overwrite a file")
     if json and (problems := unwritable([("--json", json), *(("--out", file) for file in files)])):
         raise KincheckError("\n".join(problems))
     for file, text in files.items():

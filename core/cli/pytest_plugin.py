@@ -1,12 +1,12 @@
 """The pytest plugin: `pytest --kincheck` collects case files as tests, one for each engine.
 
     pytest --kincheck                                   # every installed engine
-    pytest --kincheck --kincheck-engine mujoco          # this one only, and it must be there
+    pytest --kincheck --kincheck-engine mujoco          # only this one, which must be installed
 
 Files are TOML or JSON with the schema kincheck-case/1, anywhere pytest looks. A test fails if an
-output is out of tolerance or an engine breaks. A test is skipped if an engine is missing or
-cannot express the case, or nothing was compared (not judged). pytest loads this file every time, so
-slow imports wait for --kincheck.
+output is out of tolerance or an engine fails. A test is skipped if an engine is missing or cannot
+express the case, or if nothing was compared (not judged). pytest loads this file in every session,
+so slow imports wait for --kincheck.
 """
 
 from __future__ import annotations
@@ -26,9 +26,7 @@ if TYPE_CHECKING:
     from .registry import House
 
 SCHEMA = re.compile(rb"""(^\s*|["'])schema["']?\s*[=:]\s*["']kincheck-case/""", re.MULTILINE)
-"""Mark of a TOML or JSON case file of any version: an unknown version gets a message, and
-is not ignored.
-"""
+"""Mark of a TOML or JSON case file of any version: an unknown version causes a message."""
 SUFFIXES = ".toml", ".json"
 
 
@@ -46,8 +44,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         default=[],
         metavar="NAME",
         help=(
-            "an engine to solve them with, which must be installed; may be repeated; default: all,"
-            " skipped where not installed"
+            "engine to solve them with, which must be installed; may be repeated; default: all"
+            " installed engines"
         ),
     )
 
@@ -104,7 +102,7 @@ class EngineTest(pytest.Item):
     """A test of one engine on one case.
 
     Attributes:
-        required: the engine was requested by name, so a missing engine is a failure.
+        required: whether the engine was requested by name, so that a missing engine is a failure.
     """
 
     def __init__(self, *, case: Case, engine: Engine, required: bool, **whole: Any) -> None:
@@ -141,7 +139,7 @@ class CaseFailedError(Exception):
 
 
 def _solved(case: Case, engine: Engine) -> Record:
-    """Return the record of the pair. A simulator runs in its own process, because a crash would
+    """Return the record of the pair. A simulator runs in a separate process, because a crash would
     end the tests.
     """
     from ..harness.engine import may_run_here

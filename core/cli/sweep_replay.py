@@ -1,4 +1,4 @@
-"""Solve single variants of a study again, as a run does."""
+"""Solution of single variants of a study, as in a run."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ if TYPE_CHECKING:
 
 
 def replay_problems(options: argparse.Namespace) -> list[str]:
-    """Return what keeps variants from being solved again: a Latin hypercube takes their number."""
+    """Return the problems of a replay: a Latin hypercube depends on the number of variants."""
     if not options.replay:
         return []
     if options.sampling is Sampling.LATIN:
         if options.samples is None:
             return ["--replay: a Latin hypercube depends on the number of variants; give --samples"]
     elif options.samples is not None:
-        return ["--replay: a variant is known by seed and index; leave out --samples"]
+        return ["--replay: seed and index identify a variant; leave out --samples"]
     return []
 
 
 def replay(options: argparse.Namespace, house: House, study: Study, engine: Engine | None) -> int:
-    """Solve single variants as a run does: its table, its report, its status."""
+    """Solve single variants as a run does, with its table, report and exit status."""
     from ..harness import run as running
     from ..harness.standard import STANDARD
     from . import destinations as delivery
@@ -63,8 +63,8 @@ def replay(options: argparse.Namespace, house: House, study: Study, engine: Engi
 
 
 def checking_solver(options: argparse.Namespace, engine: Engine) -> Solver:
-    """Return the solver of checked variants: this process for an engine without foreign code, else
-    worker processes.
+    """Return the solver of checked variants: this process for an engine without foreign code,
+    worker processes for others.
     """
     from ..harness.engine import may_run_here
     from ..harness.execution import here

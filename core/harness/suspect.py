@@ -1,4 +1,6 @@
-"""Suspicion of a reference: the engines of a case agree with each other and not with it."""
+"""Suspicion of a reference: the engines of a case agree with each other, but not with the
+reference.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,7 @@ from .evidence import Explanation, Suspect
 from .record import Deviation, Deviations, OutputSeries, Record
 from .slips import Held, NamedChange, Slip, Uncertain, slips
 
-# Most outputs explained in a sentence; further ones are counted.
+# Largest number of outputs explained in a sentence; further ones are counted.
 MOST_EXPLAINED = 12
 ADVICE = "suspect the reference, the output's component or a sign"
 UNEXPLAINED = (
@@ -44,10 +46,10 @@ class _Off:
 
 
 def suspect(case: Case, records: Sequence[Record]) -> Suspect | None:
-    """Return the suspicion of a reference; None unless the engines agree within tolerance and it
-    does not fit.
+    """Return the suspicion of a reference; None unless the engines agree within tolerance and the
+    reference does not fit.
 
-    A single engine has no other to agree with; a slip must then explain all deviations.
+    A single engine agrees with no other, so a slip must explain all deviations.
     """
     mine = [record for record in records if record.case == case.name and record.solved]
     whole = [record for record in mine if record.solved == record.samples]
@@ -113,15 +115,15 @@ def _unit(case: Case) -> Unit:
 
 
 def _reasons(explanations: Sequence[Explanation], left: Sequence[str]) -> str:
-    said = [
+    reasons = [
         f"{', '.join(each.outputs)} ({', '.join(each.quantities)}): the reference {each.change}"
         f" fits within {value_text(_number(each.difference), each.unit)}, tolerance"
         f" {value_text(_number(each.tolerance), each.unit)}"
         for each in explanations
     ]
     if left:
-        said.append(f"{shortened(left, MOST_EXPLAINED)}: {UNEXPLAINED}")
-    return "; ".join(said)
+        reasons.append(f"{shortened(left, MOST_EXPLAINED)}: {UNEXPLAINED}")
+    return "; ".join(reasons)
 
 
 def _number(value: float) -> str:
@@ -193,8 +195,8 @@ def _off(case: Case, beat: float, record: Record) -> Iterator[_Off]:
 def _explained(
     case: Case, beat: float, record: Record, off: Sequence[_Off]
 ) -> tuple[list[Explanation], list[str]]:
-    """Return the slips that explain the deviations, equal ones merged, and the unexplained outputs
-    by name.
+    """Return the slips that explain the deviations, merged if equal, and the unexplained outputs by
+    name.
     """
     every = {order: _held(case, beat, record, order) for order in range(len(QUANTITIES))}
     units = {output.name: output.unit for output in case.outputs}
@@ -241,7 +243,7 @@ def _explained(
 
 
 def _definitions(case: Case, off: _Off, others: Mapping[str, Held]) -> list[NamedChange]:
-    """Return the changes from other definitions of an output: of camber, if toe is known too."""
+    """Return the changes from other definitions of an output: for camber, if toe is known."""
     camber = next(output for output in case.outputs if output.name == off.output)
     if not isinstance(camber, Camber) or off.order:
         return []

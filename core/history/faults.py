@@ -19,7 +19,7 @@ from ..harness.execution import bounded
 BUSY = 30.0
 
 # Runs that cannot be read, told one by one: where there are more, the whole file is at fault.
-MOST_TOLD = 5
+MOST_LISTED = 5
 
 
 class HistoryError(KincheckError):
@@ -68,11 +68,11 @@ def explained(path: Path, what: str, run: int | None = None) -> Generator[None]:
         raise HistoryError(f"history {path}: cannot be {what}: {bounded(error)}{advice}") from error
 
 
-def told(path: Path, passed_over: Mapping[int, str]) -> list[str]:
-    """Return a line for each unreadable run, up to MOST_TOLD of them."""
+def damage_lines(path: Path, passed_over: Mapping[int, str]) -> list[str]:
+    """Return a line for each unreadable run, up to MOST_LISTED of them."""
     runs = sorted(passed_over, reverse=True)
-    lines = [f"{passed_over[run]}; the other runs are used" for run in runs[:MOST_TOLD]]
-    if left := runs[MOST_TOLD:]:
+    lines = [f"{passed_over[run]}; the other runs are used" for run in runs[:MOST_LISTED]]
+    if left := runs[MOST_LISTED:]:
         lines.append(
             f"history {path}: {len(left)} more runs cannot be read:"
             f" {shortened([str(run) for run in left], 20)}"

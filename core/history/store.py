@@ -27,7 +27,7 @@ import msgspec
 from ..harness.provenance import missing, versions
 from ..harness.record import Record, Results, settled
 from .connections import readable_connection, writable_connection
-from .faults import DamagedRunError, HistoryError, explained, told
+from .faults import DamagedRunError, HistoryError, damage_lines, explained
 from .process_identity import alive, owner
 
 Status: TypeAlias = Literal["running", "finished", "interrupted", "killed"]
@@ -201,7 +201,7 @@ class Store:
     @property
     def damage(self) -> list[str]:
         """Return a line for each run passed over."""
-        return told(self.path, self.passed_over)
+        return damage_lines(self.path, self.passed_over)
 
     def run(self, run: int) -> RunRow:
         """Return the run of a number.

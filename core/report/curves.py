@@ -75,12 +75,12 @@ def curves(results: Results, case: str | None = None) -> Iterator[Rows]:
     Args:
         case: only this one.
     """
-    told: set[str] = set()
+    written: set[str] = set()
     for record in results.records:
         if case not in (None, record.case) or not record.driver:
             continue
-        if record.case not in told:
-            told.add(record.case)
+        if record.case not in written:
+            written.add(record.case)
             for name, series in results.references.get(record.case, {}).items():
                 yield _rows(results, record, REFERENCE, record.truth, name, series)
         for name, series in record.outputs.items():

@@ -210,10 +210,10 @@ class _Draughtsman:
 
     def _label(self, a: int, b: int, text: str) -> None:
         """Add a label; texts at the same place share one."""
-        for k, (*place, said) in enumerate(self.drawn.labels):
+        for k, (*place, label) in enumerate(self.drawn.labels):
             if place == [a, b]:
-                if text not in said.split(" · "):
-                    self.drawn.labels[k] = (a, b, f"{said} · {text}")
+                if text not in label.split(" · "):
+                    self.drawn.labels[k] = (a, b, f"{label} · {text}")
                 return
         self.drawn.labels.append((a, b, text))
 

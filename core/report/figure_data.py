@@ -124,11 +124,11 @@ def precision_figure(efforts: Sequence[Effort], styles: Mapping[str, Style]) -> 
             [_finite(each.us_per_sample) for each in mine],
             [_finite(each.error) for each in mine],
         )
-        told = {
+        hover = {
             "text": [each.setting for each in mine],
             "hovertemplate": "%{text}: %{x:.3~g} µs, %{customdata:.3~g} m",
         }
-        traces.append(curve | told)
+        traces.append(curve | hover)
     times = [value for trace in traces for value in trace["x"] if value]
     return _floored(
         {"data": traces, "layout": {"xaxis": ticked_axis(TIMES, times), "hovermode": "closest"}}

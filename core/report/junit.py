@@ -49,11 +49,11 @@ def to_junit(results: Results) -> bytes:
                     time="0.000000",
                 )
                 ElementTree.SubElement(test, "error", message=results.unread.get(case, UNMADE))
-        said = [f"note: {note}" for named, note in notes(results.run) if named == case]
-        said += [f"suspect: {why}" for named, why in suspects(results) if named == case]
-        if said:
+        lines = [f"note: {note}" for named, note in notes(results.run) if named == case]
+        lines += [f"suspect: {why}" for named, why in suspects(results) if named == case]
+        if lines:
             ElementTree.SubElement(suite, "system-out").text = FORBIDDEN.sub(
-                "\ufffd", "\n".join(said)
+                "\ufffd", "\n".join(lines)
             )
         count_tests(suite)
     ElementTree.indent(root)

@@ -84,7 +84,7 @@ def to_markdown(results: Results) -> str:
         )
         lines.append(row([code(case), *cells]))
     lines += ["", f"{escaped(_reading(results))}."]
-    lines += [escaped(f"{said}.") for said in [unread(results.run)] if said]
+    lines += [escaped(f"{sentence}.") for sentence in [unread(results.run)] if sentence]
     lines += [escaped(f"Note: {case}: {note}.") for case, note in notes(results.run)]
     lines += [escaped(f"Suspect: {case}: {why}.") for case, why in suspects(results)]
     lines += [

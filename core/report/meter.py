@@ -26,7 +26,7 @@ class Meter:
 
     def __init__(self, name: str, *, quiet: bool = False, every: float = 0.0) -> None:
         self.name, self.quiet, self.every = name, quiet, every
-        self.begun, self.told = perf_counter(), -every
+        self.begun, self.shown_at = perf_counter(), -every
         self.bar = None
         if sys.stderr.isatty() and not quiet:
             self.bar = Progress(
@@ -61,9 +61,9 @@ class Meter:
             self.bar.update(self.task, description=visible(what), completed=done, refresh=True)
             return
         now = perf_counter() - self.begun
-        if self.quiet or now - self.told < self.every:
+        if self.quiet or now - self.shown_at < self.every:
             return
-        self.told = now
+        self.shown_at = now
         left = f", about {_time(now * (1.0 - done) / done)} left" if 0.0 < done < 1.0 else ""
         print(
             f"{self.name}: {visible(what)} ({100 * done:.0f} %{left})", file=sys.stderr, flush=True

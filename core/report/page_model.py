@@ -214,13 +214,15 @@ def _output(
     standard = _standard(positions, records, references)
     band = (standard, positions[0].deviation.tolerance) if standard else None
     figures[key] = output_figure(output, axis, curves, truth, band)
-    said = [
+    sentences = [
         f"{sense[0].upper()}{sense[1:]}." for _, series in curves[:1] if (sense := series.sense)
     ]
-    said += [] if truth else ["No reference."]
-    said += [_band_caption(*band, against(positions[0].deviation.against))] if band else []
+    sentences += [] if truth else ["No reference."]
+    sentences += [_band_caption(*band, against(positions[0].deviation.against))] if band else []
     plot = Plot(
-        key, f"{label} against {axis.name}, all engines", " ".join([*said, axis.besides]).strip()
+        key,
+        f"{label} against {axis.name}, all engines",
+        " ".join([*sentences, axis.besides]).strip(),
     )
     return OutputView(output, label, plot, errors, compared[1:])
 

@@ -26,7 +26,7 @@ def progress(records: list[Record], *, quiet: bool = False) -> Callable[[Record,
     """
     terminal = sys.stderr.isatty()
 
-    def tell(record: Record, done: int, total: int) -> None:
+    def show(record: Record, done: int, total: int) -> None:
         records.append(record)
         if quiet:
             return
@@ -35,7 +35,7 @@ def progress(records: list[Record], *, quiet: bool = False) -> Callable[[Record,
             line = f"\r\x1b[2K{line}" if done < total else "\r\x1b[2K"
         print(line, end="" if terminal else "\n", file=sys.stderr, flush=True)
 
-    return tell
+    return show
 
 
 def lacking(results: Results, required: Sequence[str], named: Sequence[str] = ()) -> list[str]:
@@ -57,7 +57,7 @@ def lacking(results: Results, required: Sequence[str], named: Sequence[str] = ()
         and record.outcome in (Outcome.UNAVAILABLE, Outcome.UNSUPPORTED)
     ]
     lines += [
-        f"engine {record.engine!r} is named and missing: {record.message};"
+        f"engine {record.engine!r} is requested, but missing: {record.message};"
         f" {how_to_install(record.engine)}"
         for record in results.records
         if record.engine in named

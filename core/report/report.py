@@ -156,21 +156,23 @@ def headline(results: Results) -> str:
         if (n := faults[what])
     ]
     if not compared:
-        said = "Nothing was compared"
+        sentence = "Nothing was compared"
     elif failed:
-        said = ", ".join(counts)
+        sentence = ", ".join(counts)
     else:
-        said = (
+        sentence = (
             f"All {len(compared)} comparisons are within tolerance"
             if len(compared) > 1
             else "The one comparison is within tolerance"
         )
-    said += f", {broken} could not be completed" if broken else ""
+    sentence += f", {broken} could not be completed" if broken else ""
     unjudged = _count(records, Outcome.UNJUDGED)
-    said += f", {unjudged} {Outcome.UNJUDGED.shown}" if unjudged else ""
-    said += f"; suspect the reference of {', '.join(results.suspects)}" if results.suspects else ""
-    said += f"; {unread_count(unread)}" if unread else ""
-    return said + (f"; the run ended before {missing} more" if missing else "")
+    sentence += f", {unjudged} {Outcome.UNJUDGED.shown}" if unjudged else ""
+    sentence += (
+        f"; suspect the reference of {', '.join(results.suspects)}" if results.suspects else ""
+    )
+    sentence += f"; {unread_count(unread)}" if unread else ""
+    return sentence + (f"; the run ended before {missing} more" if missing else "")
 
 
 def _fault(record: Record, tol: float) -> str:

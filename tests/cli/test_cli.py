@@ -185,7 +185,7 @@ def test_a_case_without_reference_is_compared_with_the_native_engine_even_if_tha
         ),
         (
             ["--scheduler", "tcp://there:8786"],
-            "--scheduler: how many pairs at a time is the cluster's matter; leave out --jobs",
+            "--scheduler: the cluster decides how many pairs run at a time; leave out --jobs",
         ),
         (["--resume"], "--resume needs a history: give --history FILE, or set KINCHECK_HISTORY"),
     ],

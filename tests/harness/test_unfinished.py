@@ -29,7 +29,7 @@ from ..history.test_regression import kinds, reported
 from ..support.nights import FACTS, changed, keep, nights, records
 
 GONE = {"outcome": Outcome.UNAVAILABLE, "message": "not installed", "seconds": None, "errors": {}}
-UNMADE = "asked for and never made: the run ended before it"
+UNMADE = "not run: the run ended before this pair"
 
 
 @pytest.fixture

@@ -168,7 +168,7 @@ def test_a_case_without_a_reference_is_proved():
 # The whole
 
 
-def measured(tell=print):
+def measured(progress=print):
     """Of fake engines in both modes."""
     both = [
         Measured("native"),
@@ -183,7 +183,7 @@ def measured(tell=print):
         rounds=1,
         parts=("work",),
         command="kincheck bench",
-        tell=tell,
+        progress=progress,
     )
 
 
@@ -284,7 +284,7 @@ def test_an_engine_that_is_named_and_missing_is_no_success(monkeypatch, capsys):
             "kincheck.core.cli.registry.House.find_engines", lambda house, names, *rest: []
         )
         assert main.main(["bench", "engines", "--engine", name, "--cases", "rssr"]) == status
-        assert ("engine 'gone' is named and missing" in capsys.readouterr().err) is (status == 2)
+        assert ("'gone' is requested, but missing" in capsys.readouterr().err) is (status == 2)
 
 
 def test_an_effort_leaves_a_residual_on_purpose():

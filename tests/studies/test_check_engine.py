@@ -83,7 +83,7 @@ def test_what_is_outside_the_protocol_ends_the_check(few):
     ("where", "message"),
     [
         (f"{HERE}:Fauly", "has no class 'Fauly'; did you mean 'Faulty'?"),
-        (f"{HERE}:PointMotion", "PointMotion cannot be made: TypeError"),
+        (f"{HERE}:PointMotion", "PointMotion cannot be created: TypeError"),
         (
             f"{HERE}:np",
             "np is no engine: name, mode, loop, settings, unsupported, build, solve missing",

@@ -154,9 +154,9 @@ def _moved(now: Record, before: Record) -> Iterator[Finding]:
             if off > limit:
                 size = value_text(number(off), motion_unit(old.unit, motion))
                 word = motion_word(motion, old.unit)
-                told = f"{output} {word} differs by up to {size} from what it was"
+                message = f"{output} {word} differs by up to {size} from what it was"
                 yield finding_of(
-                    Kind.MOVED, now, told, now=off, limit=limit, output=output, motion=motion
+                    Kind.MOVED, now, message, now=off, limit=limit, output=output, motion=motion
                 )
                 break
 
@@ -210,21 +210,21 @@ def _errors(now: Record, before: Record) -> Iterator[Finding]:
             base = now.outputs[output].unit if output in now.outputs else ""
             word = motion_word(motion, base)
             if a.tolerance != b.tolerance:
-                told = f"{output} {word}: {number(a.tolerance)} → {number(b.tolerance)}"
+                message = f"{output} {word}: {number(a.tolerance)} → {number(b.tolerance)}"
                 yield finding_of(
-                    Kind.TOLERANCE, now, told, before=a.tolerance, now=b.tolerance, **about
+                    Kind.TOLERANCE, now, message, before=a.tolerance, now=b.tolerance, **about
                 )
             # what is out of tolerance is a failure, and named there
             if b.within and a.against == b.against and drifted(a.max_abs, b.max_abs, b.tolerance):
                 unit = motion_unit(base, motion) if base else ""
                 times = f"×{number(b.max_abs / a.max_abs)}, " if a.max_abs else ""
                 size = f"{number(a.max_abs)} → {value_text(number(b.max_abs), unit)}"
-                told = f"{output} {word} error {size} ({times}tolerance {number(b.tolerance)})"
+                message = f"{output} {word} error {size} ({times}tolerance {number(b.tolerance)})"
                 ratio = b.max_abs / a.max_abs if a.max_abs else None
                 yield finding_of(
                     Kind.DRIFTED,
                     now,
-                    told,
+                    message,
                     before=a.max_abs,
                     now=b.max_abs,
                     ratio=ratio,
@@ -243,12 +243,12 @@ def _references(record: Record, now: References, before: References) -> Iterator
                 _apart(values_of(old, motion), values_of(new, motion)),
             )
             if off > SAME_SAMPLE * max((abs(x) for x in was if x is not None), default=0.0):
-                told = (
+                message = (
                     f"{output} {motion_word(motion, old.unit)} differs by up to {number(off)}"
                     f" {motion_unit(old.unit, motion)} from what it was"
                 )
                 yield finding_of(
-                    Kind.REFERENCE, record, told, now=off, output=output, motion=motion
+                    Kind.REFERENCE, record, message, now=off, output=output, motion=motion
                 )
                 break
 

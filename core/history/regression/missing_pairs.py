@@ -11,7 +11,9 @@ from .findings import Finding, Kind
 from .run_selection import Subject, pairs_of
 
 
-def missing(subject: Subject, store: Store | None, told: Sequence[Finding]) -> Iterator[Finding]:
+def missing(
+    subject: Subject, store: Store | None, findings: Sequence[Finding]
+) -> Iterator[Finding]:
     """Yield the missing pairs in every kind of comparison: the last run may have more pairs than
     the last green one.
 
@@ -24,7 +26,7 @@ def missing(subject: Subject, store: Store | None, told: Sequence[Finding]) -> I
     if last is None:
         return
     known = pairs_of(subject) | {
-        (each.case, each.engine, each.mode) for each in told if each.kind is Kind.ABSENT
+        (each.case, each.engine, each.mode) for each in findings if each.kind is Kind.ABSENT
     }
     for case, engine, mode in last.plan:
         if (case, engine, mode) not in known:

@@ -131,15 +131,15 @@ def _in_file(file: Path, store: Store | None) -> Subject:
         known = f"a number of the history, a results.json, {LAST_GREEN} or BRANCH{BASELINE}"
         raise KincheckError(f"report: there is no run {str(file)!r}; give {known}")
     results = read_results(file)
-    rows, told = store.runs() if store else [], results.run
+    rows, facts = store.runs() if store else [], results.run
     same = [
         row.id
         for row in rows
         if all(
-            row.circumstances.get(key) == told.get(key) for key in ("started", "host", "command")
+            row.circumstances.get(key) == facts.get(key) for key in ("started", "host", "command")
         )
     ]
-    later = [row.id for row in rows if row.started > str(told.get("started", "~"))]
+    later = [row.id for row in rows if row.started > str(facts.get("started", "~"))]
     return Subject(
         str(file), max(same, default=None), results, max(same, default=min(later, default=None))
     )

@@ -21,7 +21,7 @@ from .segmentation import change_points
 from .thresholds import DRIFT, drifted
 
 
-def crept(subject: Subject, around: History, told: Sequence[Finding]) -> Iterator[Finding]:
+def crept(subject: Subject, around: History, findings: Sequence[Finding]) -> Iterator[Finding]:
     """Return the subject's errors a digit above the least since their last step, with the same
     tolerance and standard.
 
@@ -30,7 +30,7 @@ def crept(subject: Subject, around: History, told: Sequence[Finding]) -> Iterato
     """
     known = {
         (each.case, each.engine, each.mode, each.output, each.motion)
-        for each in told
+        for each in findings
         if each.kind is Kind.DRIFTED
     }
     for record in subject.results.records:

@@ -57,7 +57,7 @@ def slower(
     if seconds > limit * should and seconds - should > TIME_FLOOR:
         ratio = seconds / should
         spread = f"×{number(ratio)}; by the spread from run to run, ×{number(limit)} may be chance"
-        told = f"{number(1e3 * should)} → {number(1e3 * seconds)} ms a sweep ({spread})"
+        message = f"{number(1e3 * should)} → {number(1e3 * seconds)} ms a sweep ({spread})"
         yield finding_of(
-            Kind.SLOWER, now, told, before=should, now=seconds, ratio=ratio, limit=limit
+            Kind.SLOWER, now, message, before=should, now=seconds, ratio=ratio, limit=limit
         )

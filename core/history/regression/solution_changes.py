@@ -50,8 +50,8 @@ def _residual(now: Record, before: Record) -> Iterator[Finding]:
         return
     ratio = new / old if old else None
     times = f" (×{number(ratio)})" if ratio else ""
-    told = f"largest residual {number(old)} → {number(new)}{times}"
-    yield finding_of(Kind.RESIDUAL, now, told, before=old, now=new, ratio=ratio, limit=RESIDUAL)
+    message = f"largest residual {number(old)} → {number(new)}{times}"
+    yield finding_of(Kind.RESIDUAL, now, message, before=old, now=new, ratio=ratio, limit=RESIDUAL)
 
 
 def _units(now: Record, before: Record) -> Iterator[Finding]:
@@ -95,11 +95,11 @@ def _gone(now: Record, before: Record) -> Iterator[Finding]:
                     else new.reason or "no reason is given"
                 )
                 word = motion_word(motion, old.unit)
-                told = (
+                message = (
                     f"{output} {word} has no value at {len(gone)} of {len(had)} samples that had"
                     f" one, first at {first}: {why}"
                 )
-                yield finding_of(Kind.GONE, now, told, output=output, motion=motion)
+                yield finding_of(Kind.GONE, now, message, output=output, motion=motion)
 
 
 def _unsolved(record: Record) -> set[int]:

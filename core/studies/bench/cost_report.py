@@ -144,16 +144,16 @@ def sizes(found: Bench, family: str) -> Section:
         )
         for e in sizes
     ]
-    said: list[str] = []
+    sentences: list[str] = []
     for engine in dict.fromkeys(each.engine for each in sizes):
         mine = [each for each in sizes if each.engine == engine]
         if (grown := growth(mine)) is not None:
             n, m, power = grown
-            said.append(
+            sentences.append(
                 f"{engine}: from {n} to {m} {many} the cost grows as their number to the power of"
                 f" {power:.2f}."
             )
-        said += [
+        sentences += [
             f"{engine}, {each.loops} {many}: {each.message}"
             for each in mine
             if each.us_per_sample is None
@@ -171,7 +171,7 @@ def sizes(found: Bench, family: str) -> Section:
     )
     return Section(
         f"Cost against size: {family}",
-        said,
+        sentences,
         (TIMED,),
         headings,
         2,
@@ -195,11 +195,11 @@ def scalings(found: Bench) -> Section:
         )
         for e in found.scalings
     ]
-    said: list[str] = []
+    sentences: list[str] = []
     for mechanism in dict.fromkeys(each.mechanism for each in found.scalings):
         small, *_, large = (each for each in found.scalings if each.mechanism == mechanism)
         power = exponent(small, large)
-        said.append(
+        sentences.append(
             f"{mechanism}: from {small.size} to {large.size} the cost grows as the unknowns to the"
             f" power of {power:.2f}."
         )
@@ -221,7 +221,12 @@ def scalings(found: Bench) -> Section:
         "quartiles",
     )
     return Section(
-        "Cost against size: large mechanisms as one sparse system", said, notes, headings, 1, rows
+        "Cost against size: large mechanisms as one sparse system",
+        sentences,
+        notes,
+        headings,
+        1,
+        rows,
     )
 
 

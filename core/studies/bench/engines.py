@@ -105,7 +105,7 @@ def measure(
     rounds: int,
     parts: Collection[str],
     command: str,
-    tell: Callable[[str, float], object],
+    progress: Callable[[str, float], object],
 ) -> Bench:
     """Measure the requested parts of the motion; batches, studies and processes of the first case.
 
@@ -113,7 +113,7 @@ def measure(
         cases: by name as on the command line; at least one.
         engines: in both modes.
         tol: largest accepted constraint residual, as for `Engine.solve`.
-        tell: called with the name of each measurement and the finished part of all, from 0 to 1.
+        progress: called with the name of each measurement and the finished share, from 0 to 1.
 
     Raises:
         KincheckError: a case has no reference and cannot be given one.
@@ -132,8 +132,8 @@ def measure(
 
     def begin(what: str) -> Callable[[float], object]:
         number = next(numbers)
-        tell(what, number / steps)
-        return lambda done: tell(what, (number + done) / steps)
+        progress(what, number / steps)
+        return lambda done: progress(what, (number + done) / steps)
 
     if "work" in parts:
         for case in true.values():

@@ -79,21 +79,21 @@ def _precision(found: Bench, case: str, mode: str, entries: Sequence[Entry]) -> 
         for entry in entries
     ]
     truths = [entry.against.split(", ") for entry in entries if entry.against]
-    said = [
+    sentences = [
         (
             f"Errors are against: {', '.join(map(against, truths[0]))}."
             if truths
             else "There was nothing to compare with."
         )
     ]
-    said += [
+    sentences += [
         f"{loop}:"
         f" {', '.join(dict.fromkeys(entry.engine for entry in entries if entry.loop == loop))}: the"
         f" loop runs {words}."
         for loop, words in LOOPS_RUN.items()
         if any(entry.loop == loop for entry in entries)
     ]
-    said += [
+    sentences += [
         f"{each.engine}: {each.outcome}: {each.message}" for each in entries if each.solved is None
     ]
     counted = "iterations" if mode == "projection" else "steps"
@@ -112,7 +112,7 @@ def _precision(found: Bench, case: str, mode: str, entries: Sequence[Entry]) -> 
     )
     return Section(
         f"{case}, {mode}: work and precision",
-        said,
+        sentences,
         (TIMED,),
         (*headings, "µs", "quartiles"),
         4,
@@ -134,8 +134,8 @@ def _needed(found: Bench, case: str, mode: str) -> Section:
         ),
     )
     headings = ("engine", "loop", *(f"{required:g} m" for required in REQUIRED))
-    said = _faster(mine) if mode == "projection" else []
-    return Section(f"{case}, {mode}: time at a required error", said, notes, headings, 2, rows)
+    sentences = _faster(mine) if mode == "projection" else []
+    return Section(f"{case}, {mode}: time at a required error", sentences, notes, headings, 2, rows)
 
 
 def _time_needed(each: Needed) -> str:
@@ -146,7 +146,7 @@ def _time_needed(each: Needed) -> str:
 
 def _faster(mine: Sequence[Needed]) -> list[str]:
     """The native engine against the fastest other at each error."""
-    said: list[str] = []
+    sentences: list[str] = []
     for required in REQUIRED:
         times = {
             each.engine: each.us_per_sample
@@ -157,16 +157,16 @@ def _faster(mine: Sequence[Needed]) -> list[str]:
         if ours is None or not times:
             continue
         best = min(times, key=lambda name: times[name])
-        said.append(
+        sentences.append(
             f"At {required:g} m the native engine is {times[best] / ours:.0f} times as fast as the"
             f" fastest other, {best}."
         )
-    return said
+    return sentences
 
 
 def _floors(found: Bench, case: str) -> Section:
     rows: list[tuple[str, ...]] = []
-    said: list[str] = []
+    sentences: list[str] = []
     alone = _level(found, case, native_breakdown.ALONE)
     for floor in (each for each in found.floors if each.case == case):
         times = [
@@ -177,7 +177,7 @@ def _floors(found: Bench, case: str) -> Section:
         beside = times[-1] if times else None
         ratio = None if alone is None else floor.us_per_sample / alone
         rows.append((floor.engine, number(beside), number(floor.us_per_sample), number(ratio)))
-        said.append(f"{floor.counted}.")
+        sentences.append(f"{floor.counted}.")
     notes = (
         (
             "A floor is what the simulator's compiled code alone needs for a sample at its finest"
@@ -189,7 +189,7 @@ def _floors(found: Bench, case: str) -> Section:
     )
     return Section(
         f"{case}: floors",
-        said,
+        sentences,
         notes,
         ("engine", "adapter [µs]", "floor [µs]", "floor / native loops"),
         1,
@@ -238,15 +238,15 @@ def _levels(found: Bench, case: str) -> Section:
         and e.engine != STANDARD
         and e.us_per_sample is not None
     ]
-    said: list[str] = []
+    sentences: list[str] = []
     if others and whole is not None:
         us, best = min(others, key=lambda each: each[0])
-        said.append(
+        sentences.append(
             f"With every body asked for it is {us / whole:.0f} times as fast as the fastest other"
             f" engine that reaches {best.required:g} m, which gives the compared points only:"
             f" {best.engine}, {best.setting}."
         )
-    return Section(f"{case}: the native engine in detail", said, notes, headings, 3, rows)
+    return Section(f"{case}: the native engine in detail", sentences, notes, headings, 3, rows)
 
 
 def _rates(found: Bench) -> Section:

@@ -41,7 +41,7 @@ def measure_loops(
     engines: Sequence[Engine],
     tol: float,
     rounds: int,
-    tell: Callable[[str], object],
+    progress: Callable[[str], object],
 ) -> list[LoopTime]:
     """Return the times of all engines, taking turns on each case; the base is the first engine
     where Pinocchio is none of them.
@@ -55,7 +55,7 @@ def measure_loops(
     base = BASE if BASE in names else names[0]
     found: dict[str, list[tuple[float, float]]] = {name: [] for name in names}
     for case in cases:
-        tell(f"{case.name}: loops of {len(able)} engines")
+        progress(f"{case.name}: loops of {len(able)} engines")
         work = {e.name: _work(case, e, tol) for e in able if e.unsupported(case) is None}
         if base not in work:
             continue

@@ -52,21 +52,21 @@ def spread(values: Sequence[float]) -> Spread:
 def take_turns(
     contestants: Mapping[Key, Work],
     rounds: int,
-    tell: Callable[[float], object] = lambda done: None,
+    progress: Callable[[float], object] = lambda done: None,
 ) -> dict[Key, Spread]:
     """Return the seconds of one call of each contestant, over rounds with a turn of each.
 
     Each is called before all rounds. Quick work is called once more before each of its turns,
     untimed: this fills the caches after the contestant before it, for all alike.
-    Python's garbage is collected between rounds only. `tell` is called before each round, with the
-    finished part of all.
+    Python's garbage is collected between rounds only. `progress` is called before each round with
+    the finished share.
     """
     calls = {key: _calls(work) for key, work in contestants.items()}
     times: dict[Key, list[float]] = {key: [] for key in contestants}
     enabled = gc.isenabled()
     try:
         for number in range(rounds):
-            tell(number / rounds)
+            progress(number / rounds)
             gc.collect()
             gc.disable()
             for key, work in contestants.items():

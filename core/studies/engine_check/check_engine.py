@@ -109,14 +109,16 @@ def _protocol(engine: Engine) -> Iterator[Finding]:
     try:
         pickle.loads(pickle.dumps(engine))
     except Exception as error:  # any error of the engine's own code
-        told = f"{type(error).__name__}: {error}; worker processes need an engine that pickle takes"
-        yield Finding("isolation: pickle", Verdict.FAIL, message=told)
+        message = (
+            f"{type(error).__name__}: {error}; worker processes need an engine that pickle takes"
+        )
+        yield Finding("isolation: pickle", Verdict.FAIL, message=message)
         return
     yield Finding("isolation: pickle", Verdict.PASS)
     (version,) = versions([engine])
-    told = "version() gives none: it is not installed, or cannot be imported"
+    message = "version() gives none: it is not installed, or cannot be imported"
     verdict = Verdict.FAIL if version is None else Verdict.PASS
-    yield Finding("version", verdict, message=told if version is None else version)
+    yield Finding("version", verdict, message=message if version is None else version)
 
 
 def _compared(name: str, record: Record) -> Finding:
@@ -128,10 +130,10 @@ def _compared(name: str, record: Record) -> Finding:
     ]
     worst, where = max(shares, default=(None, ""))
     verdict = VERDICTS.get(record.outcome, Verdict.FAIL)
-    told = "" if record.outcome is Outcome.PASS else f"{record.outcome.shown}: {record.message}"
+    message = "" if record.outcome is Outcome.PASS else f"{record.outcome.shown}: {record.message}"
     limit = None if worst is None else 1.0
     why = "" if worst is None else AGREE_WHY
-    return Finding(name, verdict, worst, limit, why, row=where, message=told)
+    return Finding(name, verdict, worst, limit, why, row=where, message=message)
 
 
 def _folded(record: Record, attempt: Attempt) -> Finding:
@@ -147,14 +149,14 @@ def _folded(record: Record, attempt: Attempt) -> Finding:
         "" if reached else "reaches no sample, though the design is among them",
         "gives no message" if silent else "",
     ]
-    told = "; ".join(filter(None, problems))
+    message = "; ".join(filter(None, problems))
     return Finding(
         BEYOND,
-        Verdict.FAIL if told else Verdict.PASS,
+        Verdict.FAIL if message else Verdict.PASS,
         float(beyond),
         0.0,
         "values at samples that cannot be reached",
-        message=told or f"reaches {reached} of {len(REACH)} samples",
+        message=message or f"reaches {reached} of {len(REACH)} samples",
     )
 
 
@@ -162,9 +164,9 @@ def _unknown(record: Record) -> Finding:
     """Check a joint of an unknown type: refused with a reason, or solved rightly."""
     solved = record.outcome in (Outcome.PASS, Outcome.UNJUDGED)
     good = solved or (record.outcome is Outcome.UNSUPPORTED and record.message)
-    told = record.outcome.shown + (f": {record.message}" if record.message else "")
+    message = record.outcome.shown + (f": {record.message}" if record.message else "")
     remedy = "" if good else "; unsupported() is to return the reason"
-    return Finding(UNKNOWN, Verdict.PASS if good else Verdict.FAIL, message=told + remedy)
+    return Finding(UNKNOWN, Verdict.PASS if good else Verdict.FAIL, message=message + remedy)
 
 
 def _same(
@@ -177,9 +179,9 @@ def _same(
         off = _difference(first[case], attempt)
         if off > worst:
             worst, where = off, case
-    told = "keeps a state from one case to the next, or uses random numbers" if worst else ""
+    message = "keeps a state from one case to the next, or uses random numbers" if worst else ""
     verdict = Verdict.FAIL if worst else Verdict.PASS
-    return Finding(name, verdict, worst, 0.0, SAME_WHY, row=where, message=told)
+    return Finding(name, verdict, worst, 0.0, SAME_WHY, row=where, message=message)
 
 
 def _difference(one: Attempt, other: Attempt) -> float:

@@ -38,8 +38,8 @@ def rates(solved: Sequence[tuple[Case, Record]]) -> Iterator[Finding]:
             yield Finding(f"rates: {after}", Verdict.SKIP, message="the engine gives none")
             continue
         verdict = Verdict.PASS if worst <= 1.0 else Verdict.FAIL
-        told = "" if worst <= 1.0 else f"is not the rate of its {before}"
-        yield Finding(f"rates: {after}", verdict, worst, 1.0, RATES_WHY, row=where, message=told)
+        message = "" if worst <= 1.0 else f"is not the rate of its {before}"
+        yield Finding(f"rates: {after}", verdict, worst, 1.0, RATES_WHY, row=where, message=message)
 
 
 def _step(case: Case) -> float | None:

@@ -73,12 +73,12 @@ def headline(cells: Sequence[Cell]) -> str:
         if count[verdict]
     ]
     wrong, examined = sum(count[each] for each in SILENT), sum(map(_examined, cells))
-    said = (
+    sentence = (
         f"{wrong or 'None'} of {examined} samples silently wrong"
         if examined
         else "No sample was examined"
     )
-    return ", ".join([said, *apart])
+    return ", ".join([sentence, *apart])
 
 
 def _examined(cell: Cell) -> int:

@@ -11,7 +11,7 @@ from ...case.case import Case
 from ...errors import KincheckError
 from ...harness.compare import output_series
 from ...harness.engine import Engine, may_run_here
-from ...harness.execution import Answer, Failure, Pair, bounded, check, said
+from ...harness.execution import Answer, Failure, Pair, bounded, check, error_text
 from ...harness.native_engine import NativeEngine
 from ...harness.provenance import plain
 from ...harness.record import Outcome
@@ -74,7 +74,7 @@ def once(pair: Pair) -> Answer | Failure:
     except KincheckError as error:
         return Failure(Outcome.ERROR, str(error), kind=error.kind)
     except Exception as error:  # a defect
-        return Failure(Outcome.ERROR, said(error))
+        return Failure(Outcome.ERROR, error_text(error))
     return Answer(
         outputs={output.name: output_series(case, output, trajectory) for output in case.outputs},
         solved=int(trajectory.solved.sum()),
