@@ -1,4 +1,4 @@
-"""The limits of a run's evidence, by the facts of its records."""
+"""The limits of a run's evidence, from the facts of its records."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ..harness.record import Outcome, Record, Results
 from .axis import SAMPLES
 
 ANSWERED = (Outcome.PASS, Outcome.FAIL, Outcome.UNJUDGED)
-"""Outcomes of pairs that have an answer."""
+"""Outcomes of pairs with an answer."""
 
 
 def caveats(results: Results) -> list[tuple[str, str]]:
@@ -26,8 +26,8 @@ def caveats(results: Results) -> list[tuple[str, str]]:
 
     add(
         "One description for all",
-        "Every engine was given the same case files. A wrong hardpoint, axis or driver in a file is"
-        " wrong in all of them and shows in no comparison.",
+        "All engines solve the same case files. A wrong hardpoint, axis or driver in a file is"
+        " wrong in all engines, and no comparison shows it.",
     )
     if names := cases(lambda record: record.truth == Truth.IN_HOUSE_ORACLE):
         add(
@@ -46,18 +46,18 @@ def caveats(results: Results) -> list[tuple[str, str]]:
         if pairs and outcome not in ANSWERED:
             add(
                 f"{outcome.shown.capitalize()}: {len(pairs)}",
-                f"Nothing is said about {'; '.join(pairs)}.",
+                f"There are no results for {'; '.join(pairs)}.",
             )
     for case, why in results.unread.items():
-        add(f"Not read: {case}", f"{why}. Nothing is said about it.")
+        add(f"Not read: {case}", f"{why}. There are no results for it.")
     if pairs := [
         f"{product(engine, mode)} on {case}"
         for case, engine, mode in results.missing
         if case not in results.unread
     ]:
         add(
-            f"Never made: {len(pairs)}",
-            f"The run ended before them, and nothing is said about {'; '.join(pairs)}.",
+            f"Not run: {len(pairs)}",
+            f"The run ended before them. There are no results for {'; '.join(pairs)}.",
         )
     for record in records:
         if (
@@ -67,29 +67,29 @@ def caveats(results: Results) -> list[tuple[str, str]]:
         ):
             add(
                 _pair(record),
-                f"{record.solved} of {record.samples} samples were solved; nothing is said about"
-                " the others.",
+                f"{record.solved} of {record.samples} samples were solved; the others have no"
+                " results.",
             )
     for reason, pairs in _uncompared(results).items():
         add(f"Not judged: {', '.join(pairs)}", reason)
     if len({record.mode for record in records if record.outcome in ANSWERED}) > 1:
         add(
             "Modes",
-            "Projection and simulate are different products; their times and errors are no"
-            " ranking.",
+            "Projection and simulate are separate products; their times and errors form no"
+            " common ranking.",
         )
     if len({record.loop for record in records if record.us_per_step is not None}) > 1:
         add(
             "Times",
-            "The loops over the samples run in different places (see loop): a time is that of"
-            " engine and loop together.",
+            "The loops over the samples run in different places (see loop): each time includes"
+            " engine and loop.",
         )
     if names := cases(
         lambda record: any(len(values) > SAMPLES for values in record.driver.values())
     ):
         add(
             f"Thinned figures: {names}",
-            f"About {SAMPLES} samples of each curve are drawn, the worst ones among them; tables"
+            f"About {SAMPLES} samples of each curve are drawn, including the worst; tables"
             " and verdicts used all.",
         )
     return limits

@@ -14,14 +14,14 @@ from ..case.io.escape import visible
 
 
 class Meter:
-    """A bar on a terminal, elsewhere a line now and then.
+    """A bar on a terminal, elsewhere lines at intervals.
 
-    It is drawn only when it is called: a thread that draws would disturb what is timed.
+    Only calls draw it: a drawing thread would disturb measured times.
 
     Args:
-        name: of the command, before each line.
+        name: name of the command, before each line.
         quiet: print nothing.
-        every: seconds between lines without a terminal; 0 for all lines.
+        every: interval between lines without a terminal [s]; 0 for all lines.
     """
 
     def __init__(self, name: str, *, quiet: bool = False, every: float = 0.0) -> None:
@@ -56,7 +56,7 @@ class Meter:
             self.bar.stop()
 
     def __call__(self, what: str, done: float) -> None:
-        """Show what is done now, and the part of all work that is finished, from 0 to 1."""
+        """Show the current work, and the finished share of all work, from 0 to 1."""
         if self.bar is not None:
             self.bar.update(self.task, description=visible(what), completed=done, refresh=True)
             return
@@ -71,7 +71,7 @@ class Meter:
 
 
 def _time(seconds: float) -> str:
-    """Return a time in words, to two units."""
+    """Return a time as text with at most two units."""
     whole = round(seconds)
     if whole < 60:
         return f"{whole} s"

@@ -1,4 +1,4 @@
-"""Progress of the command line, and its messages on missing engines."""
+"""Progress display of the command line, and messages on missing engines."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ if TYPE_CHECKING:
 
 
 def complain(lines: Iterable[str]) -> None:
-    """Print problems on standard error, a line each, with the name of the tool."""
+    """Print each problem on a line of standard error, after the name of the tool."""
     for line in lines:
         print(f"kincheck: {visible(line)}", file=sys.stderr)
 
 
 def progress(records: list[Record], *, quiet: bool = False) -> Callable[[Record, int, int], None]:
-    """Return a function that collects records and shows them on standard error: a changing line on
-    a terminal, plain lines elsewhere; nothing if quiet.
+    """Return a function that collects records and shows them on standard error: as one changing
+    line on a terminal, as plain lines elsewhere, not at all if quiet.
     """
     terminal = sys.stderr.isatty()
 
@@ -39,7 +39,7 @@ def progress(records: list[Record], *, quiet: bool = False) -> Callable[[Record,
 
 
 def lacking(results: Results, required: Sequence[str], named: Sequence[str] = ()) -> list[str]:
-    """Return the failures of required engines and the named engines that are missing."""
+    """Return messages on failures of required engines and on named engines that are missing."""
     from ..harness.record import Outcome
 
     lines = [
@@ -68,7 +68,7 @@ def lacking(results: Results, required: Sequence[str], named: Sequence[str] = ()
 
 
 def uncompared(results: Results) -> list[str]:
-    """Return why a run has compared nothing: then no result deviates, and none is right."""
+    """Return the reason if a run has compared nothing, so that no result is right or wrong."""
     from ..harness.record import Outcome
 
     counts = Counter(record.outcome for record in results.records)
@@ -76,10 +76,10 @@ def uncompared(results: Results) -> list[str]:
         return []
     if not counts[Outcome.UNJUDGED] and any(outcome.bad for outcome in counts):
         return [
-            "nothing was solved: every engine that was there and able ended in an error, a timeout"
-            " or a crash"
+            "nothing was solved: every installed engine that supports a case ended in an error, a"
+            " timeout or a crash"
         ]
-    # it was stopped, or its cases cannot be read, which is said already
+    # the run was stopped, or its cases cannot be read, which another message reports
     if not counts or results.missing:
         return []
     found = ", ".join(

@@ -61,7 +61,7 @@ def test_a_disk_that_fails_in_the_middle_is_a_message_and_the_results_are_delive
     out, err = process.communicate()
     assert process.returncode == 2
     assert (
-        f"kincheck: history {path}: cannot be written: disk I/O error; look at the disk: it may be"
+        f"kincheck: history {path}: cannot be written: disk I/O error; check the disk: it may be"
         " full" in err
     )
     assert len(msgspec.json.decode(out)["records"]) == 4

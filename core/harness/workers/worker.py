@@ -145,8 +145,10 @@ class Worker:
 
 
 class WorkerSlot:
-    """A slot for a worker of one engine. A pair that fails in a used worker is repeated once in a
-    new one, so no outcome depends on earlier pairs.
+    """A slot for a worker of one engine.
+
+    A pair that fails in a used worker is repeated once in a new one, so no outcome depends on
+    earlier pairs.
     """
 
     def __init__(self, limits: Limits) -> None:

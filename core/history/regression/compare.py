@@ -29,8 +29,8 @@ def compare(now: Subject, before: Subject, history: History, slowest: float) -> 
     """Return the differences, in the order of the records.
 
     Args:
-        history: runs on the same machine up to the run compared with, for the usual times.
-        slowest: the largest ratio of times of a pair not called slower.
+        history: runs on the same machine up to the run compared with, which give the usual times.
+        slowest: the largest ratio of times that is not reported as slower.
     """
     earlier = by_pair(before.results.records)
     findings: list[Finding] = []
@@ -65,7 +65,7 @@ def compare(now: Subject, before: Subject, history: History, slowest: float) -> 
 
 
 def unmade(now: Subject) -> list[Finding]:
-    """Return the planned pairs without a record; nothing checks them in any comparison."""
+    """Return the planned pairs without a record, which no comparison checks."""
     pairs, why = now.results.missing, now.results.unread
     return [
         Finding(kind=Kind.LOST, case=case, engine=engine, mode=mode, message=why.get(case, UNMADE))
@@ -103,7 +103,7 @@ def _lost(now: Record, before: Record) -> Iterator[Finding]:
             now,
             f"{now.solved} of {now.samples} samples solved, {before.solved}{asked} before",
         )
-    # the pair as a whole is no longer judged, which is a finding of its own
+    # the whole pair is no longer judged, which is a separate finding
     if now.outcome is Outcome.UNJUDGED:
         return
     for output, old in before.errors.items():
@@ -133,8 +133,8 @@ def _lost(now: Record, before: Record) -> Iterator[Finding]:
 
 
 def _moved(now: Record, before: Record) -> Iterator[Finding]:
-    """Return the outputs with changed values or samples; without a reference nothing else shows
-    them.
+    """Return the outputs with changed values or samples, which only this comparison shows if there
+    is no reference.
     """
     if not (now.driver and before.driver):
         return
@@ -145,7 +145,7 @@ def _moved(now: Record, before: Record) -> Iterator[Finding]:
         for motion in QUANTITIES:
             off = _apart(values_of(old, motion), values_of(now.outputs.get(output), motion))
             judged = getattr(now.errors.get(output), motion, None)
-            # as far as two values can be that are within a tolerance of one standard
+            # largest distance of two values within the tolerance of one standard
             limit = (
                 2.0 * judged.tolerance
                 if judged
@@ -154,7 +154,7 @@ def _moved(now: Record, before: Record) -> Iterator[Finding]:
             if off > limit:
                 size = value_text(number(off), motion_unit(old.unit, motion))
                 word = motion_word(motion, old.unit)
-                message = f"{output} {word} differs by up to {size} from what it was"
+                message = f"{output} {word} differs by up to {size} from its earlier values"
                 yield finding_of(
                     Kind.MOVED, now, message, now=off, limit=limit, output=output, motion=motion
                 )
@@ -162,8 +162,8 @@ def _moved(now: Record, before: Record) -> Iterator[Finding]:
 
 
 def same_samples(now: Record, before: Record) -> bool:
-    """Return whether all drivers have equal values, up to the last digits of sines and splines
-    on another processor.
+    """Return whether all drivers have equal values, up to last digits of sines and splines that
+    differ between processors.
     """
     here, there = now.driver, before.driver
     if {name: len(values) for name, values in here.items()} != {
@@ -177,7 +177,7 @@ def same_samples(now: Record, before: Record) -> bool:
 
 
 def values_of(series: OutputSeries | None, motion: str) -> Sequence[float | None]:
-    """Return the values of a motion over the samples; none without such a series."""
+    """Return the values of a motion over the samples; empty without such a series."""
     return getattr(series, motion, None) or ()
 
 
@@ -190,7 +190,7 @@ def _apart(a: Sequence[float | None], b: Sequence[float | None]) -> float:
 
 
 def _largest(record: Record, motion: str, unit: str) -> float:
-    """Return the largest value of any output of a unit: forces say nothing of displacements."""
+    """Return the largest value of all outputs of a unit: forces set no scale for lengths."""
     outputs = (output for output in record.outputs.values() if output.unit == unit)
     values = (x for output in outputs for x in values_of(output, motion))
     return max((abs(x) for x in values if x is not None), default=0.0)
@@ -214,7 +214,7 @@ def _errors(now: Record, before: Record) -> Iterator[Finding]:
                 yield finding_of(
                     Kind.TOLERANCE, now, message, before=a.tolerance, now=b.tolerance, **about
                 )
-            # what is out of tolerance is a failure, and named there
+            # an error out of tolerance is a failure, which is reported there
             if b.within and a.against == b.against and drifted(a.max_abs, b.max_abs, b.tolerance):
                 unit = motion_unit(base, motion) if base else ""
                 times = f"×{number(b.max_abs / a.max_abs)}, " if a.max_abs else ""
@@ -234,7 +234,7 @@ def _errors(now: Record, before: Record) -> Iterator[Finding]:
 
 
 def _references(record: Record, now: References, before: References) -> Iterator[Finding]:
-    """Return the changed reference values; new and missing ones show in the comparison."""
+    """Return the changed reference values; other findings show new and missing ones."""
     for output, old in before.get(record.case, {}).items():
         new = now.get(record.case, {}).get(output)
         for motion in QUANTITIES:
@@ -245,7 +245,7 @@ def _references(record: Record, now: References, before: References) -> Iterator
             if off > SAME_SAMPLE * max((abs(x) for x in was if x is not None), default=0.0):
                 message = (
                     f"{output} {motion_word(motion, old.unit)} differs by up to {number(off)}"
-                    f" {motion_unit(old.unit, motion)} from what it was"
+                    f" {motion_unit(old.unit, motion)} from its earlier values"
                 )
                 yield finding_of(
                     Kind.REFERENCE, record, message, now=off, output=output, motion=motion

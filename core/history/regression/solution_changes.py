@@ -29,7 +29,7 @@ def differing(now: Subject, before: Subject) -> Iterator[Finding]:
 
 
 def _numbers(now: Record, before: Record) -> Iterator[Finding]:
-    """Yield changes of dof and rank, and numbers now null."""
+    """Yield changes of dof and rank, and numbers that are null now."""
     for name, kind in (("dof", Kind.FREEDOM), ("rank", Kind.RANK)):
         old, new = getattr(before, name), getattr(now, name)
         if None not in (old, new) and new != old:
@@ -55,7 +55,7 @@ def _residual(now: Record, before: Record) -> Iterator[Finding]:
 
 
 def _units(now: Record, before: Record) -> Iterator[Finding]:
-    """Yield outputs with another unit, or with another positive sense."""
+    """Yield outputs with a changed unit or positive sense."""
     for output, old in before.outputs.items():
         new = now.outputs.get(output)
         for what in ("unit", "sense"):
@@ -67,8 +67,8 @@ def _units(now: Record, before: Record) -> Iterator[Finding]:
 
 
 def _gone(now: Record, before: Record) -> Iterator[Finding]:
-    """Yield motions of outputs with null in place of earlier numbers, unless another finding tells
-    it already.
+    """Yield motions of outputs with null in place of earlier numbers, unless another finding
+    reports it.
     """
     if not same_samples(now, before):
         return
@@ -78,7 +78,7 @@ def _gone(now: Record, before: Record) -> Iterator[Finding]:
         for motion in QUANTITIES:
             judged = getattr(before.errors.get(output), motion, None)
             if judged is not None and getattr(now.errors.get(output), motion, None) is None:
-                continue  # no longer compared, which is told with its reason
+                continue  # no longer compared, which another finding reports
             there, here = values_of(old, motion), values_of(new, motion)
             had = [k for k, value in enumerate(there) if value is not None]
             gone = [k for k in had if (k >= len(here) or here[k] is None) and k not in unsolved]
@@ -103,8 +103,8 @@ def _gone(now: Record, before: Record) -> Iterator[Finding]:
 
 
 def _unsolved(record: Record) -> set[int]:
-    """Return the samples at which no output has a position: fewer samples solved are told by
-    themselves.
+    """Return the samples at which no output has a position; another finding reports unsolved
+    samples.
     """
     count = max((len(output.position) for output in record.outputs.values()), default=0)
     series = [output.position for output in record.outputs.values()]
