@@ -1,4 +1,4 @@
-"""Cases and engines by name: the command line's `run` as a function."""
+"""Functions on cases and engines by name, as on the command line."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -22,10 +22,10 @@ _One = TypeVar("_One")
 
 
 def load(name: str | Path, supplied: Supplied = NOTHING) -> Case:
-    """Return a built-in case by its name, or the case in a file.
+    """Return the built-in case of a name, or the case in a file.
 
     Args:
-        name: name, or path of a case file, hardpoint table or model.
+        name: name of the case, or path to a case file, hardpoint table or model.
         supplied: facts missing in a file of another tool.
 
     Raises:
@@ -89,6 +89,6 @@ def check_engine(engine: str | Engine) -> Report:
 
 
 def _several(named: _One | Sequence[_One]) -> Sequence[_One]:
-    """Return a sequence as it is, and anything else as a sequence of one."""
+    """Return a sequence unchanged, and anything else as a sequence of one."""
     several = isinstance(named, Sequence) and not isinstance(named, str)
     return cast("Sequence[_One]", named if several else [named])

@@ -220,7 +220,7 @@ def test_the_page_of_a_killed_run_says_what_was_never_made_and_has_the_reference
     assert main.main(["report", "--history", str(path), "--out", str(tmp_path)]) == 1
     page = (tmp_path / "report.html").read_text("utf-8")
     assert "not run" in page
-    assert "not asked" not in page
+    assert "not requested" not in page
     assert "Lost (3)" in page  # in two rows
 
 

@@ -1,4 +1,4 @@
-"""The benchmark of engines for people: tables, conclusions, diagrams. Modes never share a table."""
+"""The report of the engine benchmark: tables, conclusions, diagrams. Modes never share a table."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ LOOPS_RUN = {
     "simulator": "inside the simulator",
     "compiled": "in machine code",
 }
-"""Where the loop over samples and iterations runs, in words."""
+"""Phrases for the place of the loop over samples and iterations."""
 
 
 def report(found: Bench) -> Report:
-    """The results for people."""
+    """Return the results as a report."""
     run = found.run
     facts = [
         f"kincheck {run['kincheck']}, numpy {run['numpy']}, Python {run['python']}",
@@ -83,7 +83,7 @@ def _precision(found: Bench, case: str, mode: str, entries: Sequence[Entry]) -> 
         (
             f"Errors are against: {', '.join(map(against, truths[0]))}."
             if truths
-            else "There was nothing to compare with."
+            else "No reference was available."
         )
     ]
     sentences += [
@@ -129,8 +129,8 @@ def _needed(found: Bench, case: str, mode: str) -> Section:
         rows.append((engine, here[0].loop, *(_time_needed(each) for each in here)))
     notes = (
         (
-            "µs a sample of the fastest effort whose largest position error is not above, all"
-            " samples reached, and that effort."
+            "Time per sample [µs] of the fastest effort that reaches all samples within this"
+            " position error, and that effort."
         ),
     )
     headings = ("engine", "loop", *(f"{required:g} m" for required in REQUIRED))
@@ -145,7 +145,7 @@ def _time_needed(each: Needed) -> str:
 
 
 def _faster(mine: Sequence[Needed]) -> list[str]:
-    """The native engine against the fastest other at each error."""
+    """Compare the native engine with the fastest other engine at each error, in sentences."""
     sentences: list[str] = []
     for required in REQUIRED:
         times = {
@@ -180,9 +180,9 @@ def _floors(found: Bench, case: str) -> Section:
         sentences.append(f"{floor.counted}.")
     notes = (
         (
-            "A floor is what the simulator's compiled code alone needs for a sample at its finest"
-            " effort: a bound from below for any loop around it, in any language; the adapter's"
-            " time beside it has its loop in Python. The last column: the floor by what the native"
+            "A floor is the time of the simulator's compiled code alone, for a sample at its finest"
+            " effort: a lower bound for any loop around it, in any language. The adapter's time"
+            " includes a loop in Python. The last column is the floor over the time that the native"
             f" loops alone take{'' if alone is None else f', {number(alone)} µs'}, all bodies and"
             " tests included."
         ),
@@ -217,7 +217,7 @@ def _levels(found: Bench, case: str) -> Section:
             (entry.setting, entry.loop, str(entry.outcome), *errors, *cells(us), number(part))
         )
     headings = (
-        "asked for",
+        "requested",
         "loop",
         "outcome",
         *(with_unit(name, motion_unit("m", name)).replace(" [", "\n[") for name in QUANTITIES),
@@ -227,8 +227,8 @@ def _levels(found: Bench, case: str) -> Section:
     )
     notes = (
         (
-            "Whole calls, Python included, but for the loops alone; of the same rounds as the"
-            " engines. Part: of the first line."
+            "Whole calls including Python, except for the loops alone, in the same rounds as the"
+            " engines. Part: fraction of the first line."
         ),
     )
     others = [
@@ -242,7 +242,7 @@ def _levels(found: Bench, case: str) -> Section:
     if others and whole is not None:
         us, best = min(others, key=lambda each: each[0])
         sentences.append(
-            f"With every body asked for it is {us / whole:.0f} times as fast as the fastest other"
+            f"With every body requested it is {us / whole:.0f} times as fast as the fastest other"
             f" engine that reaches {best.required:g} m, which gives the compared points only:"
             f" {best.engine}, {best.setting}."
         )
@@ -263,9 +263,8 @@ def _rates(found: Bench) -> Section:
     ]
     notes = (
         (
-            "Operations of the programs for samples that were accepted, roots, comparisons and"
-            " signs included; a fused multiplication and addition are two. The peak is measured in"
-            " the same rounds."
+            "Operations of the programs for accepted samples, including roots, comparisons and"
+            " signs; a fused multiply-add counts as two. The peak is measured in the same rounds."
         ),
     )
     return Section(

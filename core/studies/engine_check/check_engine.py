@@ -1,8 +1,8 @@
-"""Examination of an engine from outside, against the promises of the engine protocol.
+"""Check of an engine from outside against the engine protocol.
 
 The engine solves a probe of every joint type, mechanisms of several topologies, a motion up to a
-fold and a joint unknown to all engines, always in a worker process. Each check is a row of the
-report: the worst number found, the limit with its reason, the place.
+fold and a joint that no engine knows, always in a worker process. Each check is a row of the
+report: the worst number, the limit with its reason, the place.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from .unknown_joint import UnknownJoint
 MODES = ("projection", "simulate")
 LOOPS = ("python", "simulator", "compiled")
 REACH = np.linspace(-3.0, 3.0, 61)
-"""Angles of the probe of a revolute joint [rad]: rods lock it at -1.8 and 2.4."""
+"""Angles of the probe of a revolute joint [rad]; rods lock it at -1.8 and 2.4."""
 AGREE_WHY = "largest error over the tolerance of its output"
 SAME_WHY = "the same bits from a new model, in another process and order"
 VERDICTS = {
@@ -57,7 +57,7 @@ def check_engine(
         native: the native engine, the standard of cases without a reference.
         topologies: further cases, by a word on their structure.
         tol: largest accepted constraint residual, as for `Engine.solve`.
-        limits: of a pair; those of the command line by default.
+        limits: limits of a pair; by default those of the command line.
         progress: called with each record.
     """
     found = [*_protocol(engine)]
@@ -95,7 +95,7 @@ def _beyond() -> Case:
 
 def _protocol(engine: Engine) -> Iterator[Finding]:
     """Check attributes, version and transport; the rest needs all of them."""
-    given: Any = engine  # not known yet to be one
+    given: Any = engine  # may lack members of the protocol
     facts = (
         ("name", given.name, isinstance(given.name, str) and given.name, "a text"),
         ("mode", given.mode, given.mode in MODES, " or ".join(MODES)),
@@ -116,7 +116,7 @@ def _protocol(engine: Engine) -> Iterator[Finding]:
         return
     yield Finding("isolation: pickle", Verdict.PASS)
     (version,) = versions([engine])
-    message = "version() gives none: it is not installed, or cannot be imported"
+    message = "version() returns None: the engine is not installed, or cannot be imported"
     verdict = Verdict.FAIL if version is None else Verdict.PASS
     yield Finding("version", verdict, message=message if version is None else version)
 
@@ -137,7 +137,7 @@ def _compared(name: str, record: Record) -> Finding:
 
 
 def _folded(record: Record, attempt: Attempt) -> Finding:
-    """Check samples behind a fold: no values, and a message with the reason."""
+    """Check samples beyond a fold: they have no values, and a message gives the reason."""
     if record.outcome is Outcome.UNSUPPORTED:
         return Finding(BEYOND, Verdict.SKIP, message=record.message)
     beyond = sum(each.contradicted or 0 for each in record.errors.values())
@@ -146,7 +146,7 @@ def _folded(record: Record, attempt: Attempt) -> Finding:
     problems = [
         f"ends with {record.outcome.shown}: {record.message}" if record.solved is None else "",
         "has values at samples that cannot be reached; mark them unsolved" if beyond else "",
-        "" if reached else "reaches no sample, though the design is among them",
+        "" if reached else "reaches no sample, although the design is one of them",
         "gives no message" if silent else "",
     ]
     message = "; ".join(filter(None, problems))
@@ -161,7 +161,7 @@ def _folded(record: Record, attempt: Attempt) -> Finding:
 
 
 def _unknown(record: Record) -> Finding:
-    """Check a joint of an unknown type: refused with a reason, or solved rightly."""
+    """Check a joint of an unknown type: it is refused with a reason, or solved correctly."""
     solved = record.outcome in (Outcome.PASS, Outcome.UNJUDGED)
     good = solved or (record.outcome is Outcome.UNSUPPORTED and record.message)
     message = record.outcome.shown + (f": {record.message}" if record.message else "")
@@ -172,7 +172,7 @@ def _unknown(record: Record) -> Finding:
 def _same(
     name: str, pairs: Sequence[Pair], first: Mapping[str, Attempt], solver: Solver
 ) -> Finding:
-    """Check the answers of repeated solves: they are the same."""
+    """Check that repeated solves give the same answers."""
     worst, where = 0.0, ""
     for index, attempt in solver(pairs):
         case = pairs[index].case.name

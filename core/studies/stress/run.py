@@ -25,7 +25,7 @@ from .truth.proofs import distance_from_proof
 from .truth.reference_motion import Reach, Truth
 from .verdicts import BAD, Judgement, Verdict, described_wrong, judged
 
-# Smallest number of specimens of a small share, and smallest number of samples of each.
+# Fewest specimens of a small share, and fewest samples of each.
 FEWEST_SPECIMENS, FEWEST_SAMPLES = 4, 3
 COARSEST = 5
 # Every other mechanism of up to this many bodies is proved: setting up a proof takes long.
@@ -45,7 +45,7 @@ class Example:
 
 @dataclass(frozen=True, eq=False)
 class Made:
-    """A specimen with its case, or the reason of its refusal, and its reference."""
+    """A specimen with its case, or the reason for its refusal, and its reference."""
 
     number: int
     samples: int
@@ -95,7 +95,7 @@ def stress(
                     what, (before + done) / len(families)
                 ),
             )
-        except KincheckError as error:  # the results of the other families are kept
+        except KincheckError as error:  # the other families keep their results
             found.unfinished[family.name] = str(error)
             progress(f"{family.name}: not finished: {error}", (number + 1) / len(families))
     results = Stress(
@@ -140,7 +140,7 @@ def _family(
 
 
 def specimens(family: Family, seed: int, share: int) -> list[Made]:
-    """Return specimens with a share of samples in all."""
+    """Return specimens with a share of samples in total."""
     most = max(FEWEST_SAMPLES, share // FEWEST_SPECIMENS) if family.several else share
     found: list[Made] = []
     while (done := sum(one.samples for one in found)) < share:
@@ -151,9 +151,9 @@ def specimens(family: Family, seed: int, share: int) -> list[Made]:
 
 
 def specimen(family: Family, seed: int, number: int, most: int) -> Made:
-    """Return specimen `number` of a family; the rest of the run does not affect its mechanism."""
+    """Return specimen `number` of a family; its mechanism is independent of the rest of the run."""
     rng = np.random.default_rng([seed, zlib.crc32(family.name.encode()), number])
-    # a coarse sweep is harder to solve, a fine one has more samples to judge
+    # a coarse sweep is harder to solve, a fine sweep has more samples to judge
     fineness = float(rng.random()) ** 0.5
     wanted = int(COARSEST * (family.samples / COARSEST) ** fineness) if family.several else most
     samples = min(wanted, most)
@@ -291,7 +291,7 @@ def _proofs(family: str, made: Sequence[Made], seed: int) -> list[Proofs]:
         except (
             UnprovedError,
             SolveError,
-        ) as error:  # also: too near to a singular design
+        ) as error:  # also raised too near to a singular design
             reasons.append(f"{one.specimen.name}: {error}")
     return (
         [Proofs(family=family, tried=tried, proved=proved, worst=worst, reasons=reasons)]
