@@ -10,7 +10,7 @@ from ..errors import KincheckError, unknown
 from . import import_options
 from .export import formats, keep_texts
 from .option_types import number, whole
-from .registry import House, Status, given
+from .registry import Registry, Status, given
 
 if TYPE_CHECKING:
     from ..studies.assemblies import Survey
@@ -77,7 +77,7 @@ def add(commands: Any) -> None:
     import_options.add_options(listing)
 
 
-def _assemblies(options: argparse.Namespace, house: House) -> int:
+def _assemblies(options: argparse.Namespace, registry: Registry) -> int:
     """List the assemblies found from random starts at a driver value, the intended assembly first.
 
     Exit status: 0 assemblies are found, 1 none is found, 2 the tool could not do its work.
@@ -93,16 +93,16 @@ def _assemblies(options: argparse.Namespace, house: House) -> int:
         )
     if problems := unwritable([("--json", options.json), ("--out", options.out)]):
         raise KincheckError("\n".join(problems))
-    if options.export is not None and options.export not in house.writers:
-        raise KincheckError(unknown("format", options.export, house.writers))
-    case = house.find_case(options.case, import_options.supplied(options))
+    if options.export is not None and options.export not in registry.writers:
+        raise KincheckError(unknown("format", options.export, registry.writers))
+    case = registry.find_case(options.case, import_options.supplied(options))
     import_options.tell_left_out([case])
     found = survey(case, options.at, samples=options.samples, seed=options.seed)
     write_json(found.report(), options.json)
     _print(found, options.json)
     if options.export is not None:
         number: int = options.number or 1
-        texts = written(found, house.writer(options.export), number)
+        texts = written(found, registry.writer(options.export), number)
         keep_texts(texts, f"{case.name}.{number}", options.out, options.json)
     return Status.WITHIN if found.assemblies.found else Status.DEVIATES
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import KincheckError
 from .engine_loading import made
-from .registry import House, Status
+from .registry import Registry, Status
 from .run_options import TOL
 from .verbosity import add_verbosity
 
@@ -43,16 +43,16 @@ def add(commands: Any) -> None:
     add_verbosity(checking, quiet="print only the failed checks and the count")
 
 
-def _check_engine(options: argparse.Namespace, house: House) -> int:
+def _check_engine(options: argparse.Namespace, registry: Registry) -> int:
     """Check an engine: every joint type, several topologies, its rates against differences, its
     refusals, and repeated answers. Each pair is solved in a worker process.
     """
-    report = examined(options.engine, house)
+    report = examined(options.engine, registry)
     report.print(sys.stdout, quiet=options.quiet)
     return Status.WITHIN if report.passed else Status.DEVIATES
 
 
-def examined(engine: str | Engine, house: House) -> Report:
+def examined(engine: str | Engine, registry: Registry) -> Report:
     """Return the report on an engine, given by itself, by name or as MODULE:CLASS.
 
     Raises:
@@ -64,12 +64,12 @@ def examined(engine: str | Engine, house: House) -> Report:
 
     problems = list[str]()
     found = (
-        house.find_engines([engine], problems)
+        registry.find_engines([engine], problems)
         if isinstance(engine, str)
         else [made(repr(engine), engine)]
     )
     if problems:
         raise KincheckError("\n".join(problems))
-    cases = {word: house.case(name) for word, name in TOPOLOGIES.items()}
-    native = house.engine(STANDARD)
+    cases = {word: registry.case(name) for word, name in TOPOLOGIES.items()}
+    native = registry.engine(STANDARD)
     return check_engine(found[0], native, cases, tol=TOL, progress=progress([]))

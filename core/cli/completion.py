@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Iterable
 from typing import Any
 
-from .registry import House, Status
+from .registry import Registry, Status
 
 SHELLS = ("bash", "zsh", "tcsh")
 FILES = ("FILE", "FILE.html", "RUN")
@@ -36,7 +36,7 @@ def add(commands: Any) -> None:
     completion.add_argument("shell", choices=SHELLS, metavar="SHELL", help=", ".join(SHELLS))
 
 
-def _complete(options: argparse.Namespace, house: House) -> int:
+def _complete(options: argparse.Namespace, registry: Registry) -> int:
     """Print a shell script for the completion of commands, options, built-in cases, engines and
     files. Repeat this after an update.
     """
@@ -48,12 +48,12 @@ def _complete(options: argparse.Namespace, house: House) -> int:
     from .main import parser
 
     names = {
-        **{each: [*dict.fromkeys((*house.engines, *house.simulations))] for each in ENGINES},
+        **{each: [*dict.fromkeys((*registry.engines, *registry.simulations))] for each in ENGINES},
         "family": [*Family.registry],
         "template": [*TEMPLATES],
-        "to": [*house.writers],
+        "to": [*registry.writers],
         "joint": sorted(Joint.registry),
-        "export": [*house.writers],
+        "export": [*registry.writers],
     }
     found = parser([])
     for each in (found, *_below(found)):
@@ -71,7 +71,9 @@ def _complete(options: argparse.Namespace, house: House) -> int:
             elif action.choices is None:
                 action.choices = names.get(action.dest)
     # a dictionary by shell, which the library's types omit
-    preamble: Any = {options.shell: PREAMBLE[options.shell].format(names=" ".join(house.cases()))}
+    preamble: Any = {
+        options.shell: PREAMBLE[options.shell].format(names=" ".join(registry.cases()))
+    }
     print(shtab.complete(found, options.shell, preamble=preamble))
     return Status.WITHIN
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from .registry import House, Status
+from .registry import Registry, Status
 from .run_options import TOL
 from .verbosity import add_verbosity
 
@@ -33,7 +33,7 @@ def add(commands: Any) -> None:
     add_verbosity(doctor, quiet="print only the verdict and the essential missing parts")
 
 
-def _doctor(options: argparse.Namespace, house: House) -> int:
+def _doctor(options: argparse.Namespace, registry: Registry) -> int:
     """List installed and missing parts with remedies, and solve a case with the native engine.
 
     Exit status: 0 the tool can do its work, 2 something essential is missing or broken.
@@ -42,7 +42,7 @@ def _doctor(options: argparse.Namespace, house: House) -> int:
     from ..report.terminal import page, write_json
     from .installation import examine
 
-    found = examine(house.case(SAMPLE), house.engine(STANDARD), TOL, house.engines)
+    found = examine(registry.case(SAMPLE), registry.engine(STANDARD), TOL, registry.engines)
     write_json(found, options.json)
     if options.quiet:
         _print_verdict(found, page(options.json))

@@ -7,7 +7,7 @@ from typing import Any
 
 from . import import_options
 from .option_types import positive, whole
-from .registry import House, Status
+from .registry import Registry, Status
 from .run_options import TOL
 from .verbosity import add_verbosity
 
@@ -51,7 +51,7 @@ def add(commands: Any) -> None:
     import_options.add_options(explaining)
 
 
-def _explain(options: argparse.Namespace, house: House) -> int:
+def _explain(options: argparse.Namespace, registry: Registry) -> int:
     """Diagnose a case: degrees of freedom, redundant and contradictory rows by name, conditioning
     along the sweep, resulting tolerances, sensitivity of the outputs to hardpoints, and the
     programs of the native engine.
@@ -63,7 +63,7 @@ def _explain(options: argparse.Namespace, house: House) -> int:
     from ..studies.diagnosis import diagnose
     from ..studies.diagnosis.text import print_diagnosis
 
-    case = house.find_case(options.case, import_options.supplied(options), driven=False)
+    case = registry.find_case(options.case, import_options.supplied(options), driven=False)
     import_options.tell_left_out([case])
     found = diagnose(case, samples=options.samples, tol=options.tol)
     write_json(found, options.json)

@@ -12,7 +12,7 @@ from ..case.io.escape import file_name
 from ..errors import KincheckError, unknown
 from . import import_options
 from .option_types import number
-from .registry import House, Status
+from .registry import Registry, Status
 
 FORMATS = {
     "mjcf": "MuJoCo",
@@ -58,18 +58,18 @@ def add(commands: Any) -> None:
     import_options.add_options(export)
 
 
-def _export(options: argparse.Namespace, house: House) -> int:
+def _export(options: argparse.Namespace, registry: Registry) -> int:
     """Write a case's mechanism in a simulator's format, with a consistent start.
 
     A second file holds the parts that the format lacks, such as the loop constraints of a URDF.
     """
     from ..case.io.model_writer import written
 
-    if options.to not in house.writers:
-        raise KincheckError(unknown("format", options.to, house.writers))
-    case = house.find_case(options.case, import_options.supplied(options))
+    if options.to not in registry.writers:
+        raise KincheckError(unknown("format", options.to, registry.writers))
+    case = registry.find_case(options.case, import_options.supplied(options))
     import_options.tell_left_out([case])
-    keep_texts(written(case, house.writer(options.to), options.at), case.name, options.out)
+    keep_texts(written(case, registry.writer(options.to), options.at), case.name, options.out)
     return Status.WITHIN
 
 

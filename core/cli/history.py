@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import KincheckError, unknown
 from ..report.progress import complain
 from .option_types import whole
-from .registry import House, Status
+from .registry import Registry, Status
 from .run_options import HISTORY
 
 if TYPE_CHECKING:
@@ -91,7 +91,7 @@ def add_history(parser: argparse.ArgumentParser, what: str) -> None:
     )
 
 
-def _history(options: argparse.Namespace, house: House) -> int:
+def _history(options: argparse.Namespace, registry: Registry) -> int:
     """List the runs, the latest first; for a case or an engine, list its errors and times over the
     runs, and their steps.
     """

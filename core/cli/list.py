@@ -10,7 +10,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from ..extras import how_to_install, installed_version, is_extra
-from .registry import House, Status, add_joint_types
+from .registry import Registry, Status, add_joint_types
 from .verbosity import add_verbosity
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def add(commands: Any) -> None:
     add_joint_types(listing)
 
 
-def _list(options: argparse.Namespace, house: House) -> int:
+def _list(options: argparse.Namespace, registry: Registry) -> int:
     """List the built-in cases with the kind and source of their references, and the engines with
     the installed versions (kincheck doctor also imports them); or list the keys and types of files.
     """
@@ -67,18 +67,18 @@ def _list(options: argparse.Namespace, house: House) -> int:
     if options.schema or options.joints or options.outputs:
         _print_references(options, console)
         return Status.WITHIN
-    cases = house.cases()
+    cases = registry.cases()
     if options.quiet:
-        print(*cases, *dict.fromkeys((*house.engines, *house.simulations)), sep="\n")
+        print(*cases, *dict.fromkeys((*registry.engines, *registry.simulations)), sep="\n")
         return Status.WITHIN
     print_line("cases:")
     for name in cases:
-        kind, source = house.summary(name)
+        kind, source = registry.summary(name)
         print_line(f"  {name:{max(map(len, cases))}}  {kind.replace('_', ' '):16}  {source}")
     print_line("engines:")
     engines: list[Engine] = [
-        *map(house.engine, house.engines),
-        *(house.engine(name, "simulate") for name in house.simulations),
+        *map(registry.engine, registry.engines),
+        *(registry.engine(name, "simulate") for name in registry.simulations),
     ]
     width = max(len(engine.name) for engine in engines)
     for engine in engines:

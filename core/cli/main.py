@@ -22,7 +22,7 @@ from . import COMMANDS, command_name
 from .parser import Parser
 
 if TYPE_CHECKING:
-    from .registry import House
+    from .registry import Registry
 
 FULL = errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO
 """Error numbers of a full disk at standard output; other files have their own messages."""
@@ -63,7 +63,7 @@ def _done(argv: list[str]) -> int:
 
             for where in options.joint_type:
                 load_joint(where)
-        return _printed(int(options.do(options, house())))
+        return _printed(int(options.do(options, registry())))
     except KincheckError as error:
         complain(str(error).splitlines())
     except (
@@ -121,11 +121,11 @@ def _print_no_more() -> None:
     print_no_more(sys.stdout)
 
 
-def house() -> House:
+def registry() -> Registry:
     """Return the registry of engines, cases and writers."""
     from ... import adapters, cases
     from . import engine_loading
-    from .registry import House
+    from .registry import Registry
 
     others = engine_loading.offered((*adapters.ENGINES, *adapters.SIMULATIONS))
     writers = adapters.WRITERS, adapters.writer
@@ -135,7 +135,7 @@ def house() -> House:
             return engine_loading.made(name, engine_loading.entry_points()[name].load())
         return adapters.engine(name) if mode == "projection" else adapters.engine(name, mode)
 
-    return House(
+    return Registry(
         (*adapters.ENGINES, *others),
         engine,
         cases.names,

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ..case.case import Case
     from ..harness.engine import Engine
     from ..harness.record import Record
-    from .registry import House
+    from .registry import Registry
 
 SCHEMA = re.compile(rb"""(^\s*|["'])schema["']?\s*[=:]\s*["']kincheck-case/""", re.MULTILINE)
 """Mark of a TOML or JSON case file of any version: an unknown version causes a message."""
@@ -57,7 +57,7 @@ def pytest_configure(config: pytest.Config) -> None:
         raise pytest.UsageError("--kincheck-engine: give --kincheck too")
     problems: list[str] = []
     if names:
-        _house().find_engines(names, problems)
+        _registry().find_engines(names, problems)
     if problems:
         raise pytest.UsageError(f"--kincheck-engine: {'; '.join(problems)}")
 
@@ -86,13 +86,13 @@ class CaseFile(pytest.File):
         """Yield the engines' tests; an invalid file is a collection error with its message."""
         from ..errors import KincheckError
 
-        house = _house()
+        registry = _registry()
         try:
-            case = house.find_case(str(self.path))
+            case = registry.find_case(str(self.path))
         except KincheckError as error:
             raise self.CollectError(str(error)) from None
         required = _required(self.config)
-        for engine in house.find_engines(required or house.engines, []):
+        for engine in registry.find_engines(required or registry.engines, []):
             yield EngineTest.from_parent(  # pyright: ignore[reportUnknownMemberType]
                 self, name=engine.name, case=case, engine=engine, required=bool(required)
             )
@@ -156,14 +156,14 @@ def _solved(case: Case, engine: Engine) -> Record:
         [case],
         [engine],
         tol=TOL,
-        baseline=None if native else _house().engine(STANDARD),
+        baseline=None if native else _registry().engine(STANDARD),
         solver=solver,
     ).records
     return record
 
 
 @cache
-def _house() -> House:
-    from .main import house
+def _registry() -> Registry:
+    from .main import registry
 
-    return house()
+    return registry()

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from ..case.io.escape import file_name, visible
 from ..errors import KincheckError
 from .option_types import whole
-from .registry import House, Status, add_joint_types
+from .registry import Registry, Status, add_joint_types
 from .run_options import TOL
 from .verbosity import add_verbosity
 
@@ -74,7 +74,7 @@ def add(commands: Any) -> None:
     )
 
 
-def _prove(options: argparse.Namespace, house: House) -> int:
+def _prove(options: argparse.Namespace, registry: Registry) -> int:
     """Prove that exactly one solution exists near each sample of the native engine, and enclose its
     outputs.
 
@@ -87,7 +87,7 @@ def _prove(options: argparse.Namespace, house: House) -> int:
     from ..studies.verified_reference import prove_case
 
     unread: dict[str, str] = {}
-    cases = house.find_cases(options.case or [*house.cases()], unread)
+    cases = registry.find_cases(options.case or [*registry.cases()], unread)
     problems = [*unread.values()]
     if options.out is not None:
         try:

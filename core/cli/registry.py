@@ -35,7 +35,7 @@ class Status(IntEnum):
 
 
 @dataclass(frozen=True)
-class House:
+class Registry:
     """The available engines and built-in cases, loaded on use.
 
     Attributes:

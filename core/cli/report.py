@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import KincheckError
 from ..report.progress import complain
 from .history import add_history
-from .registry import House, Status
+from .registry import Registry, Status
 from .verbosity import add_verbosity
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ def add(commands: Any) -> None:
     add_verbosity(report, quiet="print only the headline")
 
 
-def _report(options: argparse.Namespace, house: House) -> int:
+def _report(options: argparse.Namespace, registry: Registry) -> int:
     """Report the changes since another run: new failures, fixes, lost results, lower accuracy,
     longer times, changed versions, the first run of each change, and tolerances to tighten.
 

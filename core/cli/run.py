@@ -18,7 +18,7 @@ from ..harness.interrupts import hold, status_of, words_of
 from ..report.progress import complain, lacking, progress, uncompared
 from . import execution_options, history_options, import_options
 from .engine_loading import WHERE
-from .registry import House, Status
+from .registry import Registry, Status
 from .run_options import HISTORY, add_options, curve_options
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ class _Plan:
     named: Sequence[str]
 
 
-def _run(options: argparse.Namespace, house: House) -> int:
+def _run(options: argparse.Namespace, registry: Registry) -> int:
     """Solve every case with every engine, judge each, print a table and write the requested files.
 
     Exit status: 0 all within tolerance, 1 something deviates or ends in an error, a timeout or a
@@ -70,7 +70,7 @@ def _run(options: argparse.Namespace, house: House) -> int:
     from . import destinations as delivery
 
     to = delivery.Destinations.of(options)
-    plan = _planned(options, house, to)
+    plan = _planned(options, registry, to)
     precision: Any = None
     if options.bench is not None:
         from ..studies.bench.engines import efforts_in
@@ -117,7 +117,7 @@ def _shown(options: argparse.Namespace) -> Callable[[Results, TextIO], None]:
     return print_matrix if options.joints else print_table
 
 
-def _planned(options: argparse.Namespace, house: House, to: Destinations) -> _Plan:
+def _planned(options: argparse.Namespace, registry: Registry, to: Destinations) -> _Plan:
     """Return the plan of the run. Print messages on unreadable cases before any computation.
 
     Raises:
@@ -130,11 +130,11 @@ def _planned(options: argparse.Namespace, house: House, to: Destinations) -> _Pl
         problems.append(f"--resume needs a history: give --history FILE, or set {HISTORY}")
     if options.bench is not None and options.out is None:
         problems.append("--bench adds to the report: give --out DIR")
-    _return_cases(options, house)
+    _return_cases(options, registry)
     import_options.return_cases(options)
-    named: list[str] = options.case or ([] if options.joints else [*house.cases()])
+    named: list[str] = options.case or ([] if options.joints else [*registry.cases()])
     unread: dict[str, str] = {}
-    cases = house.find_cases(
+    cases = registry.find_cases(
         named, unread, list(probes()) if options.joints else [], import_options.supplied(options)
     )
     import_options.tell_left_out(cases)
@@ -148,7 +148,7 @@ def _planned(options: argparse.Namespace, house: House, to: Destinations) -> _Pl
             cases = _judged(cases, options.reference, curve, unused if unread else None)
         except KincheckError as error:
             problems += str(error).splitlines()
-    engines, baseline = _engines(options, house, problems)
+    engines, baseline = _engines(options, registry, problems)
     problems += to.problems(history=options.history)
     problems = problems or execution_options.unreachable(options)
     # With output files or a history, a run without readable cases is recorded too, so that it does
@@ -161,7 +161,7 @@ def _planned(options: argparse.Namespace, house: House, to: Destinations) -> _Pl
         engines,
         baseline,
         {visible(name): visible(message, also="\n") for name, message in unread.items()},
-        [each.name for each in house.find_engines(options.require, [], options.mode)],
+        [each.name for each in registry.find_engines(options.require, [], options.mode)],
         [each.name for each in engines] if options.engine else [],
     )
 
@@ -268,29 +268,29 @@ def _explained(cases: Sequence[Case]) -> Iterator[str]:
         yield from (f"  note: {note}" for note in notes(case))
 
 
-def _return_cases(options: argparse.Namespace, house: House) -> None:
+def _return_cases(options: argparse.Namespace, registry: Registry) -> None:
     """Move cases back from options that take several names: `run --engine native my_case.toml`."""
     for names in (options.engine, options.require):
         swallowed = [
             name
             for name in names
-            if name not in (*house.engines, *house.simulations)
+            if name not in (*registry.engines, *registry.simulations)
             and not WHERE.fullmatch(name)
-            and (name in house.cases() or Path(name).suffix)
+            and (name in registry.cases() or Path(name).suffix)
         ]
         options.case += swallowed
         names[:] = [name for name in names if name not in swallowed]
 
 
 def _engines(
-    options: argparse.Namespace, house: House, problems: list[str]
+    options: argparse.Namespace, registry: Registry, problems: list[str]
 ) -> tuple[list[Engine], Engine | None]:
     """Return the requested engines, and native as the standard if it is not among them."""
     named = [*options.engine, *options.require]
-    every = house.simulations if options.mode == "simulate" else house.engines
-    engines = house.find_engines(
+    every = registry.simulations if options.mode == "simulate" else registry.engines
+    engines = registry.find_engines(
         named if options.engine else [*every, *options.require], problems, options.mode
     )
     if not engines and not problems:
         problems.append(f"no engine has the mode {options.mode!r}; leave out --mode")
-    return engines, house.baseline(engines)
+    return engines, registry.baseline(engines)

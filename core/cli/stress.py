@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import KincheckError, unknown
 from .option_types import positive, whole
-from .registry import House, Status, given
+from .registry import Registry, Status, given
 from .run_options import MODES, TOL
 from .verbosity import add_verbosity
 
@@ -91,7 +91,7 @@ def add(commands: Any) -> None:
     add_verbosity(stress, quiet="print no progress")
 
 
-def _stress(options: argparse.Namespace, house: House) -> int:
+def _stress(options: argparse.Namespace, registry: Registry) -> int:
     """Run engines on random mechanisms that are difficult for solvers, and judge every sample.
 
     Exit status: 0 no sample is silently wrong or refused for a wrong reason, 1 some are, 2 the tool
@@ -115,7 +115,7 @@ def _stress(options: argparse.Namespace, house: House) -> int:
         page(None).print(unheaded(rows))
         return Status.WITHIN
     problems: list[str] = []
-    engines = house.find_engines(options.engine or [STANDARD], problems, options.mode)
+    engines = registry.find_engines(options.engine or [STANDARD], problems, options.mode)
     if options.replay:
         if options.out or options.json:
             problems.append("--replay only prints its findings; leave out --out and --json")
@@ -123,7 +123,7 @@ def _stress(options: argparse.Namespace, house: House) -> int:
             problems.append(f"--replay judges files, which belong to no family; leave out {found}")
         if problems:
             raise KincheckError("\n".join(problems))
-        return _replay(options, house, engines)
+        return _replay(options, registry, engines)
     if options.tol is not None:
         problems.append(
             "--tol is for replayed files, and families have their own tolerances; leave it out,"
@@ -174,14 +174,14 @@ def _run(options: argparse.Namespace, families: list[Family], engines: list[Engi
     return found
 
 
-def _replay(options: argparse.Namespace, house: House, engines: list[Engine]) -> int:
+def _replay(options: argparse.Namespace, registry: Registry, engines: list[Engine]) -> int:
     """Judge case files by following their motion from the design."""
     from ..studies.stress.reproducers import judge
     from ..studies.stress.verdicts import BAD, Verdict
 
     bad, examined = False, set[str]()
     for file in options.replay:
-        case = house.find_case(str(file))
+        case = registry.find_case(str(file))
         for engine in engines:
             found = judge(case, engine, options.tol or TOL)
             counts = ", ".join(

@@ -14,7 +14,7 @@ from ..harness.interrupts import hold, status_of, words_of
 from ..report.progress import complain
 from ..version import VERSION
 from . import execution_options, import_options
-from .registry import House, Status
+from .registry import Registry, Status
 from .sweep_inputs import limited, only
 from .sweep_options import FILES, LIMITS, PART, add_options
 from .sweep_replay import checking_solver, replay, replay_problems
@@ -40,7 +40,7 @@ def add(commands: Any) -> None:
     add_options(sweep)
 
 
-def _sweep(options: argparse.Namespace, house: House) -> int:
+def _sweep(options: argparse.Namespace, registry: Registry) -> int:
     """Solve variants of a case whose hardpoints, directions and lengths vary, and reduce its
     outputs over them.
 
@@ -67,8 +67,8 @@ def _sweep(options: argparse.Namespace, house: House) -> int:
         problems.append(
             "--resume continues from a folder of results: give --out DIR, and leave out --replay"
         )
-    engine, share = _check(options, house, problems)
-    whole = house.find_case(options.case, import_options.supplied(options))
+    engine, share = _check(options, registry, problems)
+    whole = registry.find_case(options.case, import_options.supplied(options))
     case = only(whole, options.output, problems)
     import_options.tell_left_out([case])
     problems = problems or execution_options.unreachable(options)
@@ -83,7 +83,7 @@ def _sweep(options: argparse.Namespace, house: House) -> int:
     variation = variation.sampled(options.sampling, samples)
     study = Study(case, variation, samples, options.seed, options.order, options.tol)
     if options.replay:
-        return replay(options, house, study, engine)
+        return replay(options, registry, study, engine)
     with ExitStack() as stack:
         part = None if options.out is None else stack.enter_context(_part(options))
         stops: list[KeyboardInterrupt | KincheckError] = []
@@ -111,7 +111,7 @@ def _sweep(options: argparse.Namespace, house: House) -> int:
 
 
 def _check(
-    options: argparse.Namespace, house: House, problems: list[str]
+    options: argparse.Namespace, registry: Registry, problems: list[str]
 ) -> tuple[Engine | None, float]:
     """Return the engine of the cross-check, and the share of the variants."""
     if options.check is None:
@@ -126,7 +126,7 @@ def _check(
             f"--check {options.check}: found the share {text!r}, expected a fraction such as"
             " 0.01; correct it"
         )
-    engines = house.find_engines([name], problems)
+    engines = registry.find_engines([name], problems)
     return (engines[0] if engines else None), share
 
 

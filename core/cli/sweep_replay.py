@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from ..errors import KincheckError
 from ..report.progress import complain, lacking, uncompared
 from ..studies.variation.modes import Sampling
-from .registry import House, Status
+from .registry import Registry, Status
 
 if TYPE_CHECKING:
     from ..harness.engine import Engine
@@ -28,7 +28,9 @@ def replay_problems(options: argparse.Namespace) -> list[str]:
     return []
 
 
-def replay(options: argparse.Namespace, house: House, study: Study, engine: Engine | None) -> int:
+def replay(
+    options: argparse.Namespace, registry: Registry, study: Study, engine: Engine | None
+) -> int:
     """Solve single variants as a run does, with its table, report and exit status."""
     from ..harness import run as running
     from ..harness.standard import STANDARD
@@ -40,7 +42,7 @@ def replay(options: argparse.Namespace, house: House, study: Study, engine: Engi
                 f"--replay {index}: there are {study.samples} variants, 0 to {study.samples - 1};"
                 " give one of them"
             )
-    native = house.engine(STANDARD)
+    native = registry.engine(STANDARD)
     engines = [native] if engine is None or engine.name == STANDARD else [native, engine]
     cases = [study.of_variant(index) for index in dict.fromkeys(options.replay)]
     results = running.run(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from .registry import House, Status
+from .registry import Registry, Status
 
 
 def add(commands: Any) -> None:
@@ -22,7 +22,7 @@ def add(commands: Any) -> None:
     )
 
 
-def _templates(options: argparse.Namespace, house: House) -> int:
+def _templates(options: argparse.Namespace, registry: Registry) -> int:
     """Print a table of hardpoints to fill in: `kincheck templates mcpherson > car.csv`, then
     `kincheck run car.csv`.
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import KincheckError, unknown
 from . import import_options
 from .option_types import positive
-from .registry import House, Status
+from .registry import Registry, Status
 
 if TYPE_CHECKING:
     from ..kinematics import Curve, Event
@@ -51,7 +51,7 @@ def add(commands: Any) -> None:
     import_options.add_options(tracing)
 
 
-def _trace(options: argparse.Namespace, house: House) -> int:
+def _trace(options: argparse.Namespace, registry: Registry) -> int:
     """Follow a case's motion from its design position in both directions by arc length, and report
     its singular poses.
 
@@ -64,7 +64,7 @@ def _trace(options: argparse.Namespace, house: House) -> int:
     from ..kinematics import trace
     from ..report.terminal import write_json
 
-    case = house.find_case(options.case, import_options.supplied(options))
+    case = registry.find_case(options.case, import_options.supplied(options))
     import_options.tell_left_out([case])
     drivers = [driver.name for driver in case.mechanism.drivers]
     driver = options.driver or (case.sweep.driver if case.sweep.driver in drivers else drivers[0])

@@ -9,7 +9,7 @@ from kincheck.core.case.case import Case
 from kincheck.core.case.io.reader_options import NOTHING, Supplied
 from kincheck.core.cli.check_engine import examined
 from kincheck.core.cli.engine_loading import made
-from kincheck.core.cli.main import house
+from kincheck.core.cli.main import registry
 from kincheck.core.cli.run_options import TOL
 from kincheck.core.harness import run as running
 from kincheck.core.harness.engine import Engine
@@ -31,7 +31,7 @@ def load(name: str | Path, supplied: Supplied = NOTHING) -> Case:
     Raises:
         KincheckError: there is no such case, or its file is invalid.
     """
-    return house().find_case(str(name), supplied, driven=False)
+    return registry().find_case(str(name), supplied, driven=False)
 
 
 def run(
@@ -58,7 +58,7 @@ def run(
         KincheckError: a case cannot be read, there is no engine of a name, or a member of the
             engine protocol is missing.
     """
-    known, problems = house(), list[str]()
+    known, problems = registry(), list[str]()
     named = known.cases() if cases is None else _several(cases)
     found = [each if isinstance(each, Case) else known.find_case(str(each)) for each in named]
     every = known.simulations if mode == "simulate" else known.engines
@@ -85,7 +85,7 @@ def check_engine(engine: str | Engine) -> Report:
     Raises:
         KincheckError: there is no such engine.
     """
-    return examined(engine, house())
+    return examined(engine, registry())
 
 
 def _several(named: _One | Sequence[_One]) -> Sequence[_One]:

@@ -281,7 +281,7 @@ def test_an_engine_that_is_named_and_missing_is_no_success(monkeypatch, capsys):
         result = found if status else msgspec.structs.replace(found, entries=there)
         monkeypatch.setattr(engines, "measure", lambda *given, found=result, **options: found)
         monkeypatch.setattr(
-            "kincheck.core.cli.registry.House.find_engines", lambda house, names, *rest: []
+            "kincheck.core.cli.registry.Registry.find_engines", lambda registry, names, *rest: []
         )
         assert main.main(["bench", "engines", "--engine", name, "--cases", "rssr"]) == status
         assert ("'gone' is requested, but missing" in capsys.readouterr().err) is (status == 2)
@@ -304,7 +304,7 @@ def test_run_refuses_what_is_no_benchmark(tmp_path, capsys):
         main.main(["run", "rssr", "--engine", "native", "--bench", bad, "--out", str(tmp_path)])
         == 2
     )
-    assert "kincheck bench wrote" in capsys.readouterr().err
+    assert "written by kincheck bench" in capsys.readouterr().err
 
 
 @pytest.mark.usefixtures("one_thread")

@@ -128,7 +128,7 @@ def offered(monkeypatch):
 
 def test_other_packages_offer_engines(offered, capsys):
     offered(sound=f"{HERE}:Sound", broken="tests.nothing:Engine")
-    assert "sound" in main.house().engines
+    assert "sound" in main.registry().engines
     assert main.main(["run", "rssr", "--jobs", "0", "--engine", "sound"]) == 0
     assert main.main(["run", "rssr", "--jobs", "0", "--engine", "broken"]) == 2
     assert "No module named 'tests.nothing'" in capsys.readouterr().out
