@@ -158,7 +158,7 @@ def deviations(
         refused: samples that the standard's solver cannot reach, shape (n,); a value at such a
             sample contradicts the solver.
     """
-    beat, force = pace(case), isinstance(output, ForceMeasure)
+    rate_scale, force = pace(case), isinstance(output, ForceMeasure)
     compared: dict[str, Deviation | None] = {}
     reasons: list[str] = []
     losses = 0
@@ -188,7 +188,7 @@ def deviations(
             name, reference, uncertainty = known[0]
             shown = labels.against(name)
             compared[quantity] = off = deviation(
-                values, reference, output.atol * beat**order, output.rtol, name, uncertainty
+                values, reference, output.atol * rate_scale**order, output.rtol, name, uncertainty
             )
             lost = int((np.isfinite(reference) & ~np.isfinite(values)).sum()) if complete else 0
             many = number_of(lost, "sample")

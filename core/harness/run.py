@@ -122,8 +122,10 @@ def run(
                 case.waiting.append((pair, attempt))
             else:
                 judge(pair, attempt, case.standard)
-    found, asked = [records[key] for key in wanted], planned(cases, engines, unread)
-    return results(cases, found, started=started, tol=tol, command=command, facts=facts, plan=asked)
+    found, requested = [records[key] for key in wanted], planned(cases, engines, unread)
+    return results(
+        cases, found, started=started, tol=tol, command=command, facts=facts, plan=requested
+    )
 
 
 def _distinct(what: str, names: Sequence[str]) -> None:

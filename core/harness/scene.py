@@ -39,11 +39,14 @@ def with_scenes(results: Results, cases: Sequence[Case]) -> Results:
     possibly from a separate process: such a case can neither hang nor end this process.
     """
     answered = {record.case for record in results.records if _answers(record)}
-    asked = any(record.engine == STANDARD for record in results.records)
+    requested = any(record.engine == STANDARD for record in results.records)
     shown = [case for case in cases if len(case.mechanism.moving) <= LARGEST]
     return msgspec.structs.replace(
         results,
-        scenes={case.name: scene(case, poses=case.name in answered, asked=asked) for case in shown},
+        scenes={
+            case.name: scene(case, poses=case.name in answered, requested=requested)
+            for case in shown
+        },
     )
 
 
@@ -51,18 +54,18 @@ def _answers(record: Record) -> bool:
     return record.engine == STANDARD and bool(record.solved)
 
 
-def scene(case: Case, *, poses: bool = True, asked: bool = True) -> Scene:
+def scene(case: Case, *, poses: bool = True, requested: bool = True) -> Scene:
     """Return the scene of a case.
 
     Args:
         poses: solve for the bodies' poses over the sweep; otherwise the scene is the design
             position.
-        asked: if `poses` is false, whether the native engine was run and had no answer.
+        requested: if `poses` is false, whether the native engine was run and had no answer.
     """
     mechanism = case.mechanism
     frames, motions = list[int](), dict[str, BodyMotion]()
     message = (
-        f"the native engine {'has no answer' if asked else 'was not run'} in this run: this is"
+        f"the native engine {'has no answer' if requested else 'was not run'} in this run: this is"
         " the design position"
     )
     if poses:

@@ -59,12 +59,12 @@ def suspect(case: Case, records: Sequence[Record]) -> Suspect | None:
         return None
     if not whole:
         return None
-    beat = pace(case)
-    agreement = _agreement(case, beat, whole[0], mine)
-    off = sorted(_off(case, beat, whole[0]), key=lambda each: (each.order, -each.ratio))
+    rate_scale = pace(case)
+    agreement = _agreement(case, rate_scale, whole[0], mine)
+    off = sorted(_off(case, rate_scale, whole[0]), key=lambda each: (each.order, -each.ratio))
     if agreement is None or not off:
         return None
-    explanations, left = _explained(case, beat, whole[0], off)
+    explanations, left = _explained(case, rate_scale, whole[0], off)
     engines = list(dict.fromkeys(record.engine for record in mine))
     if len(engines) == 1 and (left or not explanations):
         return None
@@ -140,7 +140,7 @@ def _series(output: OutputSeries, order: int) -> Array | None:
     return None if values is None else np.array(values, dtype=np.float64)
 
 
-def _held(case: Case, beat: float, record: Record, order: int) -> dict[str, Held]:
+def _held(case: Case, rate_scale: float, record: Record, order: int) -> dict[str, Held]:
     """Return the values of a record by output, with their tolerances."""
     found: dict[str, Held] = {}
     for output in case.outputs:
@@ -149,13 +149,13 @@ def _held(case: Case, beat: float, record: Record, order: int) -> dict[str, Held
             and (values := _series(record.outputs[output.name], order)) is not None
         ):
             found[output.name] = Held(
-                values, output.atol * beat**order, output.rtol, output.unit + PER_TIME[order]
+                values, output.atol * rate_scale**order, output.rtol, output.unit + PER_TIME[order]
             )
     return found
 
 
 def _agreement(
-    case: Case, beat: float, first: Record, records: Sequence[Record]
+    case: Case, rate_scale: float, first: Record, records: Sequence[Record]
 ) -> dict[tuple[str, int], float] | None:
     """Return the largest difference between the first engine and the others, by output and order.
 
@@ -163,9 +163,9 @@ def _agreement(
     """
     largest: dict[tuple[str, int], float] = {}
     for order in range(len(QUANTITIES)):
-        held = _held(case, beat, first, order)
+        held = _held(case, rate_scale, first, order)
         for record in records:
-            for name, other in _held(case, beat, record, order).items():
+            for name, other in _held(case, rate_scale, record, order).items():
                 if name not in held:
                     continue
                 off = deviation(
@@ -179,10 +179,10 @@ def _agreement(
     return largest
 
 
-def _off(case: Case, beat: float, record: Record) -> Iterator[_Off]:
+def _off(case: Case, rate_scale: float, record: Record) -> Iterator[_Off]:
     """Yield the quantities out of tolerance against the reference."""
     for order, quantity in enumerate(QUANTITIES):
-        for name, held in _held(case, beat, record, order).items():
+        for name, held in _held(case, rate_scale, record, order).items():
             reference: Array | None = getattr(case.reference.get(name), quantity, None)
             if reference is None:
                 continue
@@ -193,12 +193,12 @@ def _off(case: Case, beat: float, record: Record) -> Iterator[_Off]:
 
 
 def _explained(
-    case: Case, beat: float, record: Record, off: Sequence[_Off]
+    case: Case, rate_scale: float, record: Record, off: Sequence[_Off]
 ) -> tuple[list[Explanation], list[str]]:
     """Return the slips that explain the deviations, merged if equal, and the unexplained outputs by
     name.
     """
-    every = {order: _held(case, beat, record, order) for order in range(len(QUANTITIES))}
+    every = {order: _held(case, rate_scale, record, order) for order in range(len(QUANTITIES))}
     units = {output.name: output.unit for output in case.outputs}
     found: dict[tuple[str, tuple[str, ...]], list[tuple[str, str, Slip]]] = {}
     left: list[str] = []

@@ -39,7 +39,7 @@ def compare(now: Subject, before: Subject, history: History, slowest: float) -> 
         if old is None:
             findings.append(
                 finding_of(
-                    Kind.FAILURE if record.outcome.bad else Kind.ADDED, record, _said(record)
+                    Kind.FAILURE if record.outcome.bad else Kind.ADDED, record, _result(record)
                 )
             )
             continue
@@ -55,11 +55,11 @@ def compare(now: Subject, before: Subject, history: History, slowest: float) -> 
             now.facts,
             slowest,
         )
-    asked = set(now.results.missing)
+    unfinished = set(now.results.missing)
     findings += [
         finding_of(Kind.ABSENT, old, f"{old.outcome.shown} there")
         for pair, old in earlier.items()
-        if pair not in asked
+        if pair not in unfinished
     ]
     return findings
 
@@ -80,11 +80,11 @@ def by_pair(records: Sequence[Record]) -> dict[Pair, Record]:
 
 def _outcomes(now: Record, before: Record) -> Iterator[Finding]:
     if now.outcome.bad and not before.outcome.bad:
-        yield finding_of(Kind.FAILURE, now, f"{before.outcome.shown} → {_said(now)}")
+        yield finding_of(Kind.FAILURE, now, f"{before.outcome.shown} → {_result(now)}")
     elif before.outcome.bad and now.outcome is Outcome.PASS:
         yield finding_of(Kind.FIXED, now, f"{before.outcome} → {now.outcome}")
     elif before.outcome.judged and now.outcome is Outcome.UNJUDGED:
-        yield finding_of(Kind.UNJUDGED, now, f"{before.outcome} → {_said(now)}")
+        yield finding_of(Kind.UNJUDGED, now, f"{before.outcome} → {_result(now)}")
     elif before.outcome is Outcome.UNJUDGED and now.outcome is Outcome.PASS:
         yield finding_of(Kind.JUDGED, now, f"{before.outcome.shown} → {now.outcome}")
 
@@ -93,23 +93,23 @@ def _lost(now: Record, before: Record) -> Iterator[Finding]:
     """Return findings on lost phases, samples, motions and standards."""
     phases = [phase for phase in PHASES if _reached(before, phase) and not _reached(now, phase)]
     if phases:
-        why = f": {_said(now)}" if now.outcome is not Outcome.PASS else ""
+        why = f": {_result(now)}" if now.outcome is not Outcome.PASS else ""
         yield finding_of(Kind.LOST, now, f"{', '.join(phases)} no longer reached{why}")
         return
     if (now.solved or 0) < (before.solved or 0):
-        asked = "" if now.samples == before.samples else f" of {before.samples}"
+        total = "" if now.samples == before.samples else f" of {before.samples}"
         yield finding_of(
             Kind.LOST,
             now,
-            f"{now.solved} of {now.samples} samples solved, {before.solved}{asked} before",
+            f"{now.solved} of {now.samples} samples solved, {before.solved}{total} before",
         )
     # the whole pair is no longer judged, which is a separate finding
     if now.outcome is Outcome.UNJUDGED:
         return
     for output, old in before.errors.items():
         new = now.errors.get(output)
-        gone = [motion for motion, _ in old.items() if getattr(new, motion, None) is None]
-        if gone:
+        lost = [motion for motion, _ in old.items() if getattr(new, motion, None) is None]
+        if lost:
             why = (
                 f"the case has no output {output!r} now"
                 if new is None
@@ -118,9 +118,9 @@ def _lost(now: Record, before: Record) -> Iterator[Finding]:
             yield finding_of(
                 Kind.LOST,
                 now,
-                f"{output}: {', '.join(gone)} no longer compared: {why}",
+                f"{output}: {', '.join(lost)} no longer compared: {why}",
                 output=output,
-                motion=gone[0],
+                motion=lost[0],
             )
     if before.validated and not now.validated and now.outcome is Outcome.PASS:
         against, was = (each.truth.replace("_", " ") for each in (now, before))
@@ -253,5 +253,5 @@ def _references(record: Record, now: References, before: References) -> Iterator
                 break
 
 
-def _said(record: Record) -> str:
+def _result(record: Record) -> str:
     return f"{record.outcome.shown}: {record.message}" if record.message else record.outcome.shown

@@ -81,14 +81,14 @@ def _gone(now: Record, before: Record) -> Iterator[Finding]:
                 continue  # no longer compared, which another finding reports
             there, here = values_of(old, motion), values_of(new, motion)
             had = [k for k, value in enumerate(there) if value is not None]
-            gone = [k for k in had if (k >= len(here) or here[k] is None) and k not in unsolved]
-            if gone:
+            lost = [k for k in had if (k >= len(here) or here[k] is None) and k not in unsolved]
+            if lost:
                 at = [
-                    f"{name} = {number(values[gone[0]])}"
+                    f"{name} = {number(values[lost[0]])}"
                     for name, values in now.driver.items()
-                    if gone[0] < len(values)
+                    if lost[0] < len(values)
                 ]
-                first = at[0] if at else f"sample {gone[0]}"
+                first = at[0] if at else f"sample {lost[0]}"
                 why = (
                     "the case has no such output now"
                     if new is None
@@ -96,7 +96,7 @@ def _gone(now: Record, before: Record) -> Iterator[Finding]:
                 )
                 word = motion_word(motion, old.unit)
                 message = (
-                    f"{output} {word} has no value at {len(gone)} of {len(had)} samples that had"
+                    f"{output} {word} has no value at {len(lost)} of {len(had)} samples that had"
                     f" one, first at {first}: {why}"
                 )
                 yield finding_of(Kind.GONE, now, message, output=output, motion=motion)

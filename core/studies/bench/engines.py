@@ -47,8 +47,7 @@ PARTS = ("work", "loop", "batch", "study", "size", "processes")
 study, cost against mechanism size, first use and memory.
 """
 
-# Sizes of chain and ring as one sparse system. A round takes seconds, so that interruptions hardly
-# matter.
+# Sizes of chain and ring as one sparse system. A round takes seconds: interruptions hardly matter.
 LARGE, LARGE_ROUNDS = (100, 1000), 3
 
 
@@ -256,9 +255,7 @@ def _rates(case: Case, native: Mapping[str, Entry], peak: Peak, seconds: Spread)
 
 
 def _load() -> float | None:
-    """Return the number of runnable processes over the last minute; None if the system does not
-    report it.
-    """
+    """Return the number of runnable processes over the last minute; None if it is unknown."""
     return os.getloadavg()[0] if hasattr(os, "getloadavg") else None
 
 

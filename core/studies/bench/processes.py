@@ -110,11 +110,11 @@ def measure_processes(
         ]
         for engine in engines:
             mode = "" if engine.mode == "projection" else f" --mode {engine.mode}"
-            asked = f"--engine {engine.name}{mode}"
-            arguments = ["run", name, *asked.split(), "--jobs", "0"]
+            options = f"--engine {engine.name}{mode}"
+            arguments = ["run", name, *options.split(), "--jobs", "0"]
             kinds.append(
                 _Kind(
-                    f"kincheck run {asked}",
+                    f"kincheck run {options}",
                     _RUN,
                     arguments,
                     rounds=rounds if may_run_here(engine) else 1,

@@ -135,12 +135,16 @@ def measure_sizes(engines: Sequence[Engine], tol: float, rounds: int) -> list[Si
     """Solve chains and rings of all lengths with all engines, in turns, and long chains with the
     native engine by components.
     """
-    asked: list[tuple[str, Engine, Sequence[int]]] = [(CHAIN, engine, LOOPS) for engine in engines]
+    requested: list[tuple[str, Engine, Sequence[int]]] = [
+        (CHAIN, engine, LOOPS) for engine in engines
+    ]
     if any(isinstance(engine, NativeEngine) for engine in engines):
-        asked.insert(1, (CHAIN, BY_COMPONENTS, MANY))
-    asked += [(RING, engine, CRANKS) for engine in engines]
+        requested.insert(1, (CHAIN, BY_COMPONENTS, MANY))
+    requested += [(RING, engine, CRANKS) for engine in engines]
     found = [
-        each for family, engine, ladder in asked for each in _solved(family, engine, ladder, tol)
+        each
+        for family, engine, ladder in requested
+        for each in _solved(family, engine, ladder, tol)
     ]
     work = {
         k: each.work

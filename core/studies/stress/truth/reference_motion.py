@@ -35,8 +35,7 @@ AT_A_FOLD = ROUND_OFF**0.5
 # Above this condition, a residual of 1e-12 (tolerance of a run), times the condition squared,
 # exceeds 1e-9 of the rates (default tolerance of outputs): an engine may refuse, with the reason.
 SINGULAR = (1e-9 / 1e-12) ** 0.5
-# Above this condition a closed form is better than Newton's method, which the rounding of the
-# mechanism (1e-16) limits.
+# Above this condition a closed form is better than Newton's method, limited by rounding (1e-16).
 UNPOLISHED = 1e6
 
 
