@@ -1,5 +1,5 @@
-"""Adapters: one file for each engine or format, each translating the neutral mechanism. An adapter
-is imported at its first use.
+"""Adapters: one package or file per engine and format, which translates the neutral mechanism. An
+adapter is imported at its first use.
 """
 
 import importlib
@@ -32,9 +32,8 @@ SIMULATIONS = {
 """Engines in simulate mode: name on the command line -> module and maker of the engine. A
 simulator's bare name is its recommended solver.
 
-A record belongs to a case, an engine and a mode, so one name in two modes is two products. A
-further variant of a simulator gets a name. A further mode for each variant would need a list of the
-modes to rank together.
+A record belongs to a case, an engine and a mode, so one name in two modes denotes two products. A
+further variant of a simulator gets another name, not another mode, because each mode is a ranking.
 """
 
 
@@ -45,13 +44,10 @@ def engine(name: str, mode: str = "projection") -> Any:
 
 
 WRITERS = ("mjcf", "exudyn", "urdf", "sdf", "osim")
-"""Formats, as on the command line; the function `write` of the module writers.NAME writes format
-NAME.
+"""Formats on the command line; the function `write` of the module writers.NAME writes format NAME.
 """
 
 
 def writer(name: str) -> Any:
-    """Return the function to write a mechanism in a format, by the format's name; no simulator is
-    needed.
-    """
+    """Return the function that writes a mechanism in a named format, without a simulator."""
     return importlib.import_module(f".writers.{name}", __name__).write

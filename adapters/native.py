@@ -10,8 +10,8 @@ from ..core.case.case import Case
 from ..core.harness.native_engine import NativeEngine
 from ..core.kinematics import LAST_ITERATION
 
-# Largest residual at the start of Newton's last step, by effort. This step leaves about the square
-# of that residual.
+# Largest residual at the start of Newton's last step, by effort. The step leaves about the square
+# of this residual.
 EFFORTS: Mapping[str, float] = {
     "1 Newton step": math.inf,
     "last step from below 1e-4": 1e-4,
@@ -25,7 +25,7 @@ class Native(NativeEngine):
     """The native engine; see `Measurable`."""
 
     def efforts(self) -> Mapping[str, Native]:
-        """Return the efforts: how near to the solution Newton's last step starts; all have the same
+        """Return the efforts, by the residual at the start of Newton's last step; all have the same
         predictor.
         """
         return {

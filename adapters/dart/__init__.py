@@ -1,1 +1,1 @@
-"""DART: projection by the kinematics and Jacobians of its Skeleton."""
+"""DART: projection mode with the kinematics and Jacobians of its Skeleton, and simulate mode."""

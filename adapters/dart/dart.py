@@ -1,6 +1,7 @@
-"""DART, projection mode: the tree of a Skeleton, closed by conditions on its body nodes.
+"""DART in projection mode: the tree of a Skeleton, with loops closed by conditions on its body
+nodes.
 
-DART's own constraints live in the velocities of its time steps, and have no residual of a pose.
+DART's own constraints act on the velocities of its time steps, and give no residual of a pose.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from ..shared.tree_engine import TreeEngine
 from ..shared.tree_forces import NO_MASS, Mass, mass_properties
 from ..shared.tree_model import TreeModel
 
-# DART has what turns above what shifts.
+# DART puts rotational components above translational ones.
 ROWS = np.array([3, 4, 5, 0, 1, 2])
 
 
@@ -34,7 +35,7 @@ class Dart(TreeEngine):
 
 
 class DartModel(TreeModel):
-    """The tree in DART: a body node and its joint for each link, a simple frame for each frame."""
+    """The tree in DART: a body node with its joint for each link, a simple frame for each frame."""
 
     computed_by: ClassVar[Mapping[str, str]] = {
         "inverse dynamics": "computeInverseDynamics",
@@ -71,7 +72,7 @@ class DartModel(TreeModel):
 
     def make_frame(self, body: int, offset: Array) -> Any:
         node = self.nodes[body]
-        # a node's own methods of a frame take ten times as long, in its Python binding
+        # in the Python binding, a body node's frame methods take ten times as long
         return self.parts.SimpleFrame(node, "frame", self._at(offset)), node, offset
 
     def _at(self, offset: Array) -> Any:
@@ -80,7 +81,7 @@ class DartModel(TreeModel):
         return placed
 
     def finish(self) -> None:
-        pass  # a skeleton is always ready
+        pass  # a skeleton needs no finalisation
 
     @property
     def unknowns(self) -> int:
@@ -122,7 +123,7 @@ class DartModel(TreeModel):
         )
 
     def set_loads(self, gravity: Vector, masses: Sequence[Mass]) -> None:
-        # DART warns of bodies without mass or inertia
+        # DART warns about bodies without mass or inertia
         for node in self.nodes[1:]:
             node.setInertia(self.parts.Inertia(NO_MASS, np.zeros(3), NO_MASS * np.eye(3)))
         for each in masses:

@@ -1,7 +1,7 @@
-"""DART in simulate mode: the steps of its `World`, its own constraints to close loops.
+"""DART in simulate mode: the steps of its `World`, with its own constraints to close loops.
 
-A driven joint is a velocity actuator, which the constraint solver takes for immovable. Gaps of ball
-and weld constraints are closed at once: DART's own settings close a hundredth of a gap a step.
+A driven joint is a velocity actuator, which the constraint solver treats as immovable. Gaps of ball
+and weld constraints are closed in one step; DART's default closes a hundredth of a gap per step.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from ...core.trajectory import Array
 from ..shared.stepped_tree import SteppedTree, Stepping, Tie
 from .dart import Dart, DartModel
 
-# Part of a gap that a step closes, and the largest velocity to close it with [m/s or rad/s]: none
-# that matters.
+# Fraction of a gap that a step closes, and the largest velocity of the correction [m/s or rad/s],
+# which is no limit in practice.
 REDUCTION, FASTEST = 1.0, 1e9
 
 
@@ -35,7 +35,7 @@ class DartWorld(SteppedTree, DartModel):
         self.q = self.design()
         self.place()
         solver = self.world.getConstraintSolver()
-        # kept here, because a constraint ends with its last holder in Python
+        # kept here, because a constraint is deleted with its last Python reference
         self.constraints = [self.constraint(dart.constraint, tie) for tie in self.ties]
         for constraint in self.constraints:
             solver.addConstraint(constraint)

@@ -1,1 +1,3 @@
-"""Drake: projection by the kinematics and Jacobians of its MultibodyPlant."""
+"""Drake: projection mode with the kinematics and Jacobians of its MultibodyPlant, and simulate
+mode.
+"""

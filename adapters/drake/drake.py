@@ -1,7 +1,8 @@
-"""Drake, projection mode: the tree of a MultibodyPlant, closed by conditions on its frames.
+"""Drake in projection mode: the tree of a MultibodyPlant, with loops closed by conditions on its
+frames.
 
 Drake's own constraints are soft or belong to its inverse kinematics, and have no Jdot v. A ball is
-its quaternion floating joint whose displacement stays zero, because its ball joint has roll, pitch
+Drake's quaternion floating joint with zero displacement, because Drake's ball joint has roll, pitch
 and yaw, which lock at a right angle.
 """
 
@@ -23,7 +24,7 @@ from ..shared.tree_engine import TreeEngine
 from ..shared.tree_forces import Mass, mass_properties
 from ..shared.tree_model import TreeModel
 
-# Drake has what turns above what shifts.
+# Drake puts rotational components above translational ones.
 ROWS = np.array([3, 4, 5, 0, 1, 2])
 
 
@@ -33,7 +34,7 @@ class Drake(TreeEngine):
     name, title, package = "drake", "Drake", "pydrake.multibody.plant"
 
     def version_of(self, simulator: Any) -> str | None:
-        """Return the version of the distribution: the package states none."""
+        """Return the version of the distribution, since the package has none."""
         return importlib.metadata.version("drake")
 
     def model_of(self, case: Case) -> DrakeModel:
@@ -42,13 +43,13 @@ class Drake(TreeEngine):
 
 
 class DrakeModel(TreeModel):
-    """The tree in Drake: a body and its joint for each link, a fixed offset frame for each frame.
+    """The tree in Drake: a body with its joint for each link, a fixed offset frame for each frame.
 
     Attributes:
-        held: whether the displacements of balls are no unknowns.
-        turning: places of the unknown velocities.
-        balls: where in Drake's positions a ball has its quaternion.
-        inertias: of bodies, by their numbers.
+        held: whether the displacements of balls are excluded from the unknowns.
+        turning: indices of the unknown velocities.
+        balls: index of each ball's quaternion in Drake's positions.
+        inertias: inertias of bodies, by body number.
     """
 
     held: ClassVar[bool] = True
@@ -76,7 +77,7 @@ class DrakeModel(TreeModel):
 
     def add_link(self, parent: int, link: Link, offset: Array) -> None:
         tree, n, axis = self.tree, len(self.bodies), np.array(link.axis)
-        # without forces masses play no part, but Drake asks for them
+        # masses do not matter without forces, but Drake requires them
         whole = tree.SpatialInertia(1.0, np.zeros(3), tree.UnitInertia(1.0, 1.0, 1.0))
         inertia = tree.SpatialInertia.Zero() if self.loaded else whole
         body = self.plant.AddRigidBody(f"body {n}", inertia)
@@ -111,7 +112,7 @@ class DrakeModel(TreeModel):
         self.turning: NDArray[np.intp] = np.setdiff1d(
             np.arange(int(self.plant.num_velocities())), idle
         )
-        # of rows and unknowns in a Jacobian, whose columns Drake stores one after another
+        # rows and unknowns of a Jacobian, which Drake stores by columns
         self.chosen = ROWS[:, None] + len(ROWS) * self.turning
         self.places = {int(full): k for k, full in enumerate(self.turning)}
 
@@ -161,7 +162,7 @@ class DrakeModel(TreeModel):
         bias = self.plant.CalcBiasSpatialAcceleration(
             self.context, self.kind, handle, self.zero, self.world, self.world
         ).get_coeffs()[ROWS]
-        # with accelerations of the coordinates for the few output points only
+        # accelerations of the coordinates are needed only for the few output points
         return velocity, bias + self.slope(handle) @ self.a if self.a.any() else bias
 
     def set_loads(self, gravity: Vector, masses: Sequence[Mass]) -> None:
@@ -172,7 +173,7 @@ class DrakeModel(TreeModel):
             mass, c, central = mass_properties(each.body, self.origin[link])
             about_origin = central / mass + (c @ c) * np.eye(3) - np.outer(c, c)
             entries = about_origin[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
-            # bodies are checked already, with an allowance for the digits of tables
+            # bodies are already checked, with an allowance for rounded tables
             whole = tree.SpatialInertia(mass, c, tree.UnitInertia(*entries), True)
             self.inertias.append((link, whole))
 

@@ -1,10 +1,10 @@
-"""Drake in simulate mode: the steps of a discrete MultibodyPlant, whose SAP solver takes its own
+"""Drake in simulate mode: the steps of a discrete MultibodyPlant, whose SAP solver uses Drake's
 constraints to close loops.
 
-Drake has constraints in discrete plants only: a continuous one refuses to be simulated with them.
-They are nearly rigid, a softness that has no setting. A ball is a floating joint with a constraint
-of its point, because Drake's ball joint locks at a right angle. A driven coordinate has an armature
-far above all masses, and is set to its value and its velocity at every step.
+Drake supports constraints only in discrete plants. They are nearly rigid, with a fixed softness. A
+ball is a floating joint with a constraint of its point, because Drake's ball joint locks at a right
+angle. A driven coordinate has an armature far above all masses, and is set to its value and
+velocity at every step.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from ..shared.stepped_tree import SteppedTree, Stepping, Tie
 from ..shared.tree_rows import Terms
 from .drake import Drake, DrakeModel
 
-# Inertia of what is driven [kg or kg m2], the bodies having one: what they ask of it bends its
-# motion by a billionth.
+# Inertia of driven coordinates [kg or kg m2] next to bodies with unit inertia: reactions change
+# their motion by a billionth.
 ARMATURE = 1e9
 
 
@@ -31,7 +31,7 @@ class DrakePlant(SteppedTree, DrakeModel):
     """The tree in a discrete plant, with a constraint for each tie and each relation.
 
     Attributes:
-        couplings: one coordinate is another one times a factor; by the numbers of their bodies.
+        couplings: coordinates that are a factor times another, by the numbers of their bodies.
     """
 
     held = False
@@ -61,7 +61,7 @@ class DrakePlant(SteppedTree, DrakeModel):
 
     def finish(self) -> None:
         plant, tree = self.plant, self.tree
-        # Drake ends the process at a constraint of the world itself
+        # Drake aborts the process at a constraint on the world body alone
         whole = tree.SpatialInertia(1.0, np.zeros(3), tree.UnitInertia(1.0, 1.0, 1.0))
         anchor = plant.AddRigidBody("anchor", whole)
         plant.WeldFrames(self.world, anchor.body_frame())
@@ -72,7 +72,7 @@ class DrakePlant(SteppedTree, DrakeModel):
         for body, _ in self.driven:
             motor = plant.AddJointActuator(f"motor {body}", self.joints[body])
             motor.set_default_rotor_inertia(ARMATURE)
-        # with them Drake evaluates no update outside a simulator
+        # with caching, Drake evaluates no update outside a simulator
         plant.SetUseSampledOutputPorts(False)
         super().finish()
 

@@ -1,1 +1,1 @@
-"""Exudyn: projection by its constraint rows, and its own solvers."""
+"""Exudyn: projection mode with its constraint rows, and simulate mode with its own solvers."""

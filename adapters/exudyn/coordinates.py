@@ -1,8 +1,8 @@
 """Drivers and relations as coordinate constraints for Exudyn's own solvers; private to its adapter.
 
-A generic joint with a moving offset has no rate, so a driven coordinate is a constraint on Exudyn's
-relative coordinate of two bodies, and so are the relations of a screw, a gear, a rack and its
-pinion. Values of the drivers come from Python, by a table that is made before.
+A generic joint with a moving offset has no rate, so driven coordinates are constraints on Exudyn's
+relative coordinates of two bodies, and so are the relations of screws, gears, racks and pinions.
+The drivers' values come from Python, from a table prepared beforehand.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from .rows import Rows
 
 
 class DriverTable:
-    """Values and rates of the drivers at every step of a leg, read by Exudyn at its time."""
+    """Values and rates of the drivers at every step of a leg, which Exudyn reads at its time."""
 
     def __init__(self) -> None:
         self.per_second, self.rows = 1.0, list[list[list[float]]]()
@@ -38,7 +38,8 @@ class Coordinates(Rows):
     """The rows, with drivers and relations for Exudyn's own solvers.
 
     Attributes:
-        angles: the driver's number of each relative angle, or None; their turns are counted.
+        angles: driver number of each relative angle, or None; the turns of these angles are
+            counted.
     """
 
     def __init__(self, mbs: Any, items: Any, case: Case, table: DriverTable) -> None:
@@ -47,7 +48,7 @@ class Coordinates(Rows):
         super().__init__(mbs, items, case.mechanism)
 
     def relative(self, name: str, freedom: str, value: int | None = None) -> int:
-        """Return a new marker of the coordinate of a joint."""
+        """Return a new marker for the coordinate of a joint."""
         joint: Any = self.mechanism.joint(name)
         if freedom == "translation":
             return self.shift(joint.i, joint.j, joint.point, joint.axis)
@@ -63,7 +64,7 @@ class Coordinates(Rows):
         return self.mbs.AddMarker(marker)
 
     def shift(self, i: str, j: str, point: Sequence[float], axis: Sequence[float]) -> int:
-        """Return a new marker of the displacement of a point of body j along an axis of body i."""
+        """Return a new marker for the displacement of a point of body j along an axis of body i."""
         numbers, origins = zip(*(self.bodies[body] for body in (i, j)), strict=True)
         arms = [np.subtract(point, origin) for origin in origins]
         marker = self.items.MarkerBodiesRelativeTranslationCoordinate(

@@ -1,11 +1,11 @@
 """Algebraic equations between the bodies of a mechanism in Exudyn; private to its adapter.
 
-A row may follow a value: that of a driver, or an unknown that is added for two rows to share. Two
+A row may follow a value: the value of a driver, or an additional unknown that two rows share. Two
 coordinates in a fixed ratio (screw, gear, rack and pinion) follow the same unknown, and so do the
 two products whose difference a constant-velocity joint keeps at zero. A displacement is compared
-with its value. An angle is followed by turning the frame on the first body, which leaves the sine
-of what is missing: any number of turns can be followed, in steps that leave less than a quarter
-turn missing.
+with its value. For an angle, the frame on the first body is turned by the value, and the row is the
+sine of the remaining angle: any number of turns can be followed, in steps of less than a quarter
+turn.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ NO_ROTATION = (1.0, 0.0, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class Equation:
-    """An equation: a row of an object of Exudyn equals a constant [m or -]."""
+    """An equation: a row of an Exudyn object equals a constant [m or -]."""
 
     item: int
     index: int
@@ -40,7 +40,7 @@ class Equation:
 
 @dataclass(frozen=True)
 class Following:
-    """A row follows the weight times a value: one of the drivers, or a further unknown."""
+    """A row that follows a weight times a value: a driver's value or a further unknown."""
 
     row: int
     value: int
@@ -51,12 +51,12 @@ class Equations:
     """The bodies of a mechanism and the equations between them, as objects of an Exudyn system.
 
     Attributes:
-        bodies: Exudyn's number and the origin [m] of each body; fixed ones are Exudyn's ground.
+        bodies: Exudyn's number and the origin [m] of each body; fixed bodies are Exudyn's ground.
         nodes: numbers of the nodes, one for each moving body.
         rows: all equations, in order.
-        following: the equations among them with a given value.
-        turning: rows that follow an angle, and their markers on the first and second body; the
-            first turns about its z axis.
+        following: the equations that follow a value.
+        turning: rows that follow an angle, with their markers on the first and second body; the
+            first marker turns about its z axis.
         bent: rows that follow a polynomial of a value: row, value, polynomial.
         values: the number of drivers and further unknowns.
     """
@@ -79,9 +79,9 @@ class Equations:
             if body.fixed:
                 self.bodies[body.name] = self.bodies[GROUND]
                 continue
-            # Points and axes are given in global coordinates, so every node starts parallel to the
-            # global axes. It stands amid the body's joints: case files may leave the origin far
-            # away, and long arms cost digits of the differences.
+            # Points and axes are global, so every node starts parallel to the global axes. It is
+            # amid the body's joints: the origin in a case file may be far away, and long arms cost
+            # digits of the differences.
             origin = middle(self.mechanism, body)
             node = self.mbs.AddNode(
                 self.items.NodeRigidBodyEP(referenceCoordinates=[*origin, *NO_ROTATION])
@@ -91,9 +91,9 @@ class Equations:
             self.nodes.append(node)
 
     def _inertial(self, body: Body, origin: Array) -> dict[str, Any]:
-        """Return mass, centre of mass, and inertia about the node as Exudyn has them."""
+        """Return mass, centre of mass, and inertia about the node in Exudyn's form."""
         if not self.loaded:
-            # Exudyn asks for a mass and inertias; kinematics does not depend on them.
+            # Exudyn requires mass and inertia, which kinematics does not depend on.
             return {"mass": 1.0, "inertia": [1.0, 1.0, 1.0, 0.0, 0.0, 0.0]}
         mass, c, central = mass_properties(body, origin)
         about_node = central + mass * ((c @ c) * np.eye(3) - np.outer(c, c))
@@ -103,8 +103,8 @@ class Equations:
     def marker(
         self, body: str, position: Sequence[float] | Array, rotation: Array | None = None
     ) -> int:
-        """A frame on a body: its origin [m] and rotation matrix (aligned if None), both global at
-        design.
+        """Return a marker with this frame on a body: origin [m] and rotation matrix (aligned if
+        None), both global at design.
         """
         number, origin = self.bodies[body]
         frame = np.eye(4)
@@ -123,7 +123,7 @@ class Equations:
         """Add an object with these rows as equations; return the number of the last row.
 
         Args:
-            keeps: value of the last row [m or -]; the others are zero.
+            keeps: value of the last row [m or -]; the other rows are zero.
         """
         number = self.mbs.AddObject(item)
         self.rows += [
@@ -144,14 +144,14 @@ class Equations:
     def coordinate(self, name: str, freedom: str) -> int:
         """Add a row for the rotation about or translation along a joint's axis; return its number.
 
-        The row is to follow a value.
+        A later call of `follow` gives the row its value.
         """
         joint: Any = self.mechanism.joint(name)
         if freedom == "translation":
             return self.connect_generic(
                 self.markers(joint, joint.point, frame_along(joint.axis, 0)), (X,)
             )
-        # exchanged, so that the row is the sine of the angle and not of its negative
+        # exchanged, so that the row is the sine of the angle, not of its negative
         first, second = self.markers(joint, joint.point, frame_along(joint.axis, 2))
         row = self.connect_generic((second, first), (ABOUT_Z,))
         self.turning[row] = first, second

@@ -1,9 +1,9 @@
 """Exudyn in projection mode: its absolute rigid-body coordinates, its joints, its constraint
 residual and Jacobian.
 
-Every moving body has a node of its own with Euler parameters, so a closed loop is no different from
-a chain. `rows` and `joint_objects` have the objects for joints and drivers; a row may follow a
-driver's value or an unknown besides Exudyn's coordinates.
+Every moving body has one node with Euler parameters, so that closed loops and chains are alike.
+`rows` and `joint_objects` create the objects for joints and drivers; a row may follow a driver's
+value or an unknown besides Exudyn's coordinates.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ from .joint_objects import JOINTS
 from .loads import COMPUTED_BY, Loads
 from .rows import Rows
 
-# Changes of the coordinates per step of the differences of the Jacobian, the speed being one [units
-# of length or -]. Round-off is 1e-16 over the step. Truncation is its sixth power times the seventh
-# derivative of the rows; it matters where the path curves within a hundred steps, as beside a fold.
+# Steps of the finite differences of the Jacobian at unit speed [units of length or -]. Round-off is
+# 1e-16 over the step. Truncation is the sixth power of the step times the seventh derivative of the
+# rows; it matters where the path curves within a hundred steps, as near a fold.
 DIFFERENCES = tuple(1e-3 * 0.5**k for k in range(8))
-# Where the estimates of fourth and of sixth order agree to this part, truncation of the latter is
+# If the estimates of fourth and sixth order agree to this fraction, the truncation of the latter is
 # below round-off: the ratio of the two truncations is about the square of the step times the
 # curvature, 1e-4 here.
 AGREE = 1e-9
@@ -46,7 +46,7 @@ class Exudyn(ProjectionEngine):
 
     @property
     def described(self) -> Mapping[str, Any]:
-        """Exudyn's coordinates and the calls of its solver for the rows."""
+        """Return Exudyn's coordinates and the solver calls that give the rows."""
         return {
             "coordinates": "absolute, NodeRigidBodyEP, 7 per body",
             "residual": "ComputeAlgebraicEquations",
@@ -62,13 +62,13 @@ class Exudyn(ProjectionEngine):
         return ExudynModel(case)
 
     def build(self, case: Case) -> ExudynModel:
-        """Return Exudyn's system of the case in its own frame, at the design position."""
+        """Return Exudyn's system of the case in the scaled frame, at the design position."""
         return self.model_of(self.own(case))
 
     def floor(self, case: Case) -> Floor:
         """Return the floor from the static solver's residual and Jacobian.
 
-        Rates take two more Jacobians, because a difference needs two.
+        Rates need two more Jacobians for a difference.
         """
         model = self.build(case)
         solved = self.solve(model, case, 1e-12)
@@ -93,7 +93,7 @@ class Exudyn(ProjectionEngine):
 
 
 def _least() -> tuple[Any, Any, Any, Any]:
-    """Return container, system, settings and solver of one free coordinate, the smallest model."""
+    """Return container, system, settings and solver of the smallest model, one free coordinate."""
     exu: Any = importlib.import_module("exudyn")
     items: Any = importlib.import_module("exudyn.itemInterface")
     exu.config.printToConsole = False
@@ -117,9 +117,9 @@ class ExudynModel:
     def __init__(self, case: Case) -> None:
         self.case = case
         exu: Any = importlib.import_module("exudyn")
-        # results are reported by the harness; Exudyn's own banners would mix with them
+        # the harness reports results; Exudyn's banners would mix with them
         exu.config.printToConsole = False
-        self.container: Any = exu.SystemContainer()  # owns the system and must live as long
+        self.container: Any = exu.SystemContainer()  # owns the system, and must live as long as it
         self.mbs: Any = self.container.AddSystem()
         items: Any = importlib.import_module("exudyn.itemInterface")
         rows = Rows(self.mbs, items, case.mechanism, loaded=bool(case.forces))
@@ -139,17 +139,17 @@ class ExudynModel:
         self.coordinates = int(self.solver.GetODE2size())
         normalisation = [self.mbs.GetNodeAEIndex(node) for node in rows.nodes]
         constraints = [self.state.GetObjectLTGAE(row.item)[row.index] for row in rows.rows]
-        # in Exudyn's vector and matrix of the whole system the algebraic rows come after those of
-        # the coordinates
+        # in Exudyn's system vector and matrix, the algebraic rows come after the rows of the
+        # coordinates
         self.kept = self.coordinates + np.array(constraints + normalisation)
         self.target = np.array([row.keeps for row in rows.rows] + [0.0] * len(normalisation))
 
-        # rows by values: those of the drivers, then the shared unknowns
+        # rows by values: drivers, then shared unknowns
         self.followed = np.zeros((len(self.kept), rows.values))
         for each in rows.following:
             self.followed[each.row, each.value] = each.weight
         self.driven, self.shared = np.split(self.followed, [len(case.mechanism.drivers)], axis=1)
-        # rows that follow a polynomial: the row, the place of its unknown, the polynomial
+        # rows that follow a polynomial: row, index of its unknown, polynomial
         drivers = len(case.mechanism.drivers)
         self.bent = [(row, value - drivers, curve) for row, value, curve in rows.bent]
         self.unknowns = self.coordinates + rows.values - drivers
@@ -180,12 +180,12 @@ class ExudynModel:
 
     @property
     def q(self) -> Array:
-        """Exudyn's part of the unknowns."""
+        """Exudyn's coordinates among the unknowns."""
         return self.x[: self.coordinates]
 
     def move(self, dx: Array) -> None:
-        # Exudyn's Jacobian is exact along the unit sphere of the Euler parameters only: off it,
-        # Newton is no longer quadratic.
+        # Exudyn's Jacobian is exact only on the unit sphere of the Euler parameters: off the
+        # sphere, Newton's convergence is not quadratic.
         x = self.x + dx
         q = x[: self.coordinates].reshape(-1, 7)
         parameters = q[:, 3:] + NO_ROTATION
@@ -198,15 +198,15 @@ class ExudynModel:
             values[row] = curve(self.x[self.coordinates + place])
         for row, (first, second), frame in self.turning:
             self.mbs.SetMarkerParameter(first, "localHT", frame @ turned(values[row]))
-            # The frame is there: the row is the sine of the angle still missing. From beyond a
-            # quarter turn Newton would go to the other zero of the sine; a residual that is not
-            # finite tells the walk to take a shorter step.
+            # The frame has turned by the value: the row is the sine of the remaining angle. From
+            # beyond a quarter turn, Newton would converge to the other zero of the sine; a
+            # non-finite residual makes the walk take a shorter step.
             values[row] = 0.0 if self._x_axis(first) @ self._x_axis(second) > 0.0 else np.nan
         try:
             self.solver.ComputeAlgebraicEquations(self.mbs)
         except RuntimeError:
-            # Exudyn raises at a pose that it cannot evaluate, such as a rod without length in a
-            # diverged iteration: the walk takes a shorter step. At the design position it is a
+            # Exudyn raises an error at a pose that it cannot evaluate, such as a rod without length
+            # in a diverged iteration: the walk takes a shorter step. At the design position it is a
             # fault of the model.
             if not self.x.any():
                 raise
@@ -223,7 +223,7 @@ class ExudynModel:
 
     def _jacobian(self) -> Array:
         """Return the derivative of the rows by Exudyn's coordinates, shape (rows, coordinates)."""
-        # ComputeJacobianAE would add to what is there; this call clears it first
+        # ComputeJacobianAE adds to the matrix; this call clears it first
         self.solver.ComputeNewtonJacobian(self.mbs, self.settings)
         return self.solver.GetSystemJacobian()[self.kept, : self.coordinates]
 
@@ -231,9 +231,9 @@ class ExudynModel:
         return self.driven
 
     def bias(self, v: Array) -> Array:
-        # The turned frames rest meanwhile: where the rows are met, the terms that their motion
-        # would add are all zero. The step follows the speed, so the accuracy does not depend on the
-        # rate of the sweep.
+        # The turned frames stay at rest here: if the rows are satisfied, their motion would only
+        # add terms that are zero. The step depends on the speed, so the accuracy does not depend on
+        # the rate of the sweep.
         v, rates = v[: self.coordinates], v[self.coordinates :]
         speed = np.abs(v).max() or 1.0
         bias = np.zeros(len(self.kept))
@@ -266,7 +266,7 @@ class ExudynModel:
         return [self._motion(body, arm) for body, arm in self.wanted]
 
     def _motion(self, body: int, arm: Array) -> tuple[Array, Array, Array]:
-        if body == self.ground:  # Exudyn has no acceleration output there
+        if body == self.ground:  # Exudyn has no acceleration output for it
             return arm, np.zeros(3), np.zeros(3)
         position, velocity, acceleration = (
             self.mbs.GetObjectOutputBody(body, kind, arm) for kind in self.output_types

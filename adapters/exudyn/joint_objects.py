@@ -1,7 +1,7 @@
 """Joints and drivers as objects of Exudyn; private to its adapter.
 
-Rows of Exudyn, measured on version 1.13.6 against rotation matrices, markers 0 and 1 being at p0
-and p1, with d = p1 - p0:
+Rows of Exudyn, measured on version 1.13.6 against rotation matrices; markers 0 and 1 are at p0 and
+p1, d = p1 - p0:
 
     object                  constrained axes            rows
     generic joint           some translations           those of x0 . d, y0 . d, z0 . d
@@ -12,7 +12,7 @@ and p1, with d = p1 - p0:
     revolute joint Z                                    d, z0 . x1, z0 . y1
     prismatic joint X                                   y0 . d, z0 . d, z0 . y1, z0 . x1, x0 . y1
 
-A free axis of a generic joint leaves an empty row, which is dropped.
+A free axis of a generic joint gives an empty row, which is dropped.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ from .equations import ABOUT_X, ABOUT_Y, ABOUT_Z, Equations, X, Y, Z
 
 
 def _generic(*axes: int, along: int = 2) -> Callable[[Equations, Any], None]:
-    """A joint that is a generic joint with these axes constrained, its axis being x (0), y or z of
-    the frame.
+    """Return the function for a joint that is a generic joint with these constrained axes; the
+    joint's axis is x (0), y or z of the frame.
     """
 
     def add(rows: Equations, joint: Any) -> None:
@@ -82,8 +82,7 @@ def _cross(
     point: Sequence[float],
     axes: Sequence[int],
 ) -> None:
-    # The last row is x0 . y1, the cosine of the cross: an angle the table has rounded stays as it
-    # is.
+    # The last row is x0 . y1, the cosine of the cross: an angle rounded by a table is kept.
     first, second = joint.axes
     markers = [
         rows.marker(joint.i, point, frame_along(first, 0)),
@@ -96,13 +95,12 @@ def _constant_velocity(rows: Equations, joint: joints.ConstantVelocity) -> None:
     _spherical(rows, joint)
     h, k = (np.array(tuple(unit(axis))) for axis in joint.axes)
     first = frame_along(joint.axes[0], 2)
-    # The shortest turn from h to k is two reflections, in the plane across h and in the plane
-    # between the shafts, across h + k.
+    # The shortest rotation from h to k is two reflections, in the planes normal to h and to h + k.
     between = (h + k) / np.linalg.norm(h + k)
     second = first - 2.0 * np.outer(between, between @ first)
     second[:, 2] = k
     i, j = rows.marker(joint.i, joint.point, first), rows.marker(joint.j, joint.point, second)
-    # x0 . y1 - x1 . y0 stays zero: both products keep to the same unknown, and so do not twist
+    # x0 . y1 - x1 . y0 stays zero: both products follow the same unknown, which prevents twist
     product, common = float(first[:, 0] @ second[:, 1]), rows.unknown()
     for markers in ((i, j), (j, i)):
         rows.follow(rows.connect_generic(markers, (ABOUT_Z,), keeps=product), common)
@@ -152,7 +150,7 @@ def _joint_driver(rows: Equations, driver: JointDriver) -> int:
     return rows.coordinate(driver.joint, driver.freedom)
 
 
-# By exact type: a subclass may mean something else.
+# By exact type: a subclass may have another meaning.
 JOINTS: Mapping[type[joints.Joint], Callable[[Equations, Any], None]] = {
     joints.ConstantVelocity: _constant_velocity,
     joints.Cylindrical: _generic(X, Y, ABOUT_X, ABOUT_Y),

@@ -12,12 +12,12 @@ from ...core.joints.base import unit
 from ...core.kinematics import start_of
 from ..shared.simulation import uneven
 
-# Exudyn's objects keep products at zero only; a smaller value is round-off, below any residual.
+# Exudyn's objects keep products only at zero; a smaller value is round-off, below any residual.
 NOTHING = 1e-12
 
 
 def limitation_of(case: Case) -> str | None:
-    """Return why Exudyn's own solvers cannot simulate the case, or None."""
+    """Return the reason why Exudyn's own solvers cannot simulate the case; None without one."""
     for joint in case.mechanism.joints:
         if isinstance(joint, joints.ConstantVelocity):
             return (
@@ -27,7 +27,7 @@ def limitation_of(case: Case) -> str | None:
         kept = _kept(joint)
         if abs(kept) > NOTHING:
             return (
-                f"{joint} keeps a product at {kept:.3g}, at which Exudyn's own objects keep"
+                f"{joint} keeps a product at {kept:.3g}, and Exudyn's own objects keep products at"
                 " only zero; make its axes exact"
             )
     for coupler in case.mechanism.couplers:
@@ -36,9 +36,7 @@ def limitation_of(case: Case) -> str | None:
     if (reason := uneven(case, "Exudyn")) is not None:
         return reason
     if case.mechanism.couplers and not start_of(case.mechanism, case.sweep.path).stands:
-        return (
-            "turns of coupled joints are counted from the design, where this motion does not begin"
-        )
+        return "turns of coupled joints count from the design, where this motion does not begin"
     return None
 
 

@@ -1,9 +1,9 @@
-"""Masses, gravity and force elements as objects of Exudyn, and forces by them; private to its
+"""Masses, gravity and force elements as objects of Exudyn, and their forces; private to its
 adapter.
 
 Exudyn computes the mass matrix, the right-hand side with its own loads and connectors, and the
-Jacobian of all rows, which are joints. A torsional spring-damper follows any number of turns by an
-unknown of its own, and acts by two torques that the adapter sets.
+Jacobian of all rows, which are joints. A torsional spring-damper has an additional unknown that
+follows any number of turns, and acts by two torques that the adapter sets.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ COMPUTED_BY = {
 
 @dataclass(frozen=True, eq=False)
 class Twister:
-    """A torsional spring-damper at work: its value's place among the unknowns of the rows, a marker
-    on the joint's first body with z along the axis, and its torques on both bodies.
+    """A torsional spring-damper: the index of its angle among the unknowns of the rows, a marker on
+    the joint's first body with z along the axis, and its torques on both bodies.
     """
 
     given: TorsionSpringDamper
@@ -114,8 +114,8 @@ class Loads:
         """Return the forces; see `force_solution.ForceModel`.
 
         Args:
-            model: in Exudyn; see `exudyn.ExudynModel`.
-            J: of all rows.
+            model: the model in Exudyn; see `exudyn.ExudynModel`.
+            J: Jacobian of all rows.
         """
         n, solver = model.coordinates, model.solver
         model.state.SetODE2Coordinates_t(v[:n])
@@ -139,7 +139,7 @@ class Loads:
         return Dynamics(demand, reactions, amounts)
 
     def _twist(self, each: Twister, model: Any, v: Array) -> float:
-        """Set the torques of a torsional spring-damper; return that on the second body."""
+        """Set the torques of a torsional spring-damper; return the torque on the second body."""
         given, place = each.given, model.coordinates + each.value - len(self.mechanism.drivers)
         joint: Any = self.mechanism.joint(given.joint)
         elastic = given.stiffness * (float(model.x[place]) - given.free_angle)
@@ -151,8 +151,8 @@ class Loads:
         return amount
 
     def _on_second(self, joint: Joint, J: Array) -> Array:
-        """Return what the multipliers of a joint's own rows exert on its second body, about the
-        joint's point, shape (6, rows).
+        """Return the wrenches of unit multipliers of a joint's own rows on its second body, about
+        the joint's point, shape (6, rows).
         """
         number, origin = self.rows.bodies[joint.j]
         arm = np.array(self.mechanism.reaction_point(joint)) - origin

@@ -40,11 +40,11 @@ class Rows(Equations):
             self.drive(driver, value)
 
     def drive(self, driver: Driver, value: int) -> None:
-        """Let the driver's coordinate follow its value."""
+        """Make the driver's coordinate follow its value."""
         self.follow(DRIVERS[type(driver)](self, driver), value)
 
     def curve(self, terms: Sequence[tuple[str, str, float]], curve: Sequence[float]) -> None:
-        """Let the first coordinate, of weight one, follow the polynomial of the second."""
+        """Make the first coordinate, of weight one, follow the polynomial of the second."""
         (first, freedom, _), (second, other_freedom, weight) = terms
         value = self.unknown()
         self.follow(self.coordinate(second, other_freedom), value)

@@ -1,6 +1,6 @@
 """Exudyn in simulate mode: its own static and dynamic solvers over a whole leg of the sweep.
 
-Joints are those of projection, drivers and relations those of `coordinates`.
+Joints are as in projection; `coordinates` has drivers and relations.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ class Solver:
     """Exudyn's solver.
 
     Attributes:
-        kind: "static", a load step a sample, positions only; "trapezoidal", of index 2, so
-            constraints hold for rates and drift for positions; "generalized alpha", of index 3, so
-            constraints hold for positions and rates drift.
-        modified: whether Newton keeps its Jacobian from step to step; a dynamic solver always does,
-            which is its default.
-        tolerance: of Newton, relative and absolute.
-        steps: between samples.
+        kind: "static", one load step per sample, only positions; "trapezoidal", index 2: rates
+            satisfy the constraints and positions drift; "generalized alpha", index 3: positions
+            satisfy the constraints and rates drift.
+        modified: whether Newton keeps its Jacobian from step to step, as dynamic solvers always do
+            by default.
+        tolerance: tolerance of Newton, relative and absolute.
+        steps: number of steps between samples.
     """
 
     name: str
@@ -71,7 +71,7 @@ class Solver:
         return Exudyn().version()
 
     def unsupported(self, case: Case) -> str | None:
-        """Return the joint, driver or grid of samples without a counterpart here, or None."""
+        """Return a message on an unsupported joint, driver or sample grid, or None."""
         return Exudyn().unsupported(case) or limitation_of(Exudyn().known(case))
 
     def efforts(self) -> Mapping[str, Solver]:
@@ -84,7 +84,7 @@ class Solver:
         return {f"{n} steps a sample": replace(self, steps=n) for n in (1, 2, 4, 8, 16)}
 
     def floor(self, case: Case) -> None:
-        """Return None: its loop is its own."""
+        """Return None: the simulator runs its own loop."""
 
     def build(self, case: Case) -> _Solved:
         """Return Exudyn's system and its start."""
@@ -96,7 +96,7 @@ class Solver:
 
 
 def trapezoidal() -> Solver:
-    """Return the time stepping of index 2, the only one whose accelerations do not oscillate."""
+    """Return the time stepping of index 2, the only one without oscillating accelerations."""
     return Solver("exudyn", "trapezoidal", steps=4)
 
 
@@ -160,7 +160,7 @@ class _Solved:
         ]
         mbs.Assemble()
         self.settings = self._settings()
-        # rows that follow no unknown beyond Exudyn's coordinates
+        # rows that follow none of the additional unknowns
         self.own = ~self.of.shared.any(axis=1)
         self.details: dict[str, Any] = {
             "rows": len(rows.rows),
@@ -182,7 +182,7 @@ class _Solved:
             each.newton.useModifiedNewton = self.how.modified
         alpha = settings.timeIntegration.generalizedAlpha
         alpha.spectralRadius, alpha.useNewmark, alpha.useIndex2Constraints = 0.6, False, False
-        # it would take the drivers, which it knows by their values, for unaccelerated
+        # it would assume unaccelerated drivers, since it has only their values
         alpha.computeInitialAccelerations = False
         return settings
 
@@ -190,10 +190,10 @@ class _Solved:
         """Yield the poses of a leg."""
         steps = self.how.steps
         n = (len(leg.samples) - 1) * steps
-        # the times of all steps, those of the samples among them as they are
+        # the times of all steps, which contain the exact times of the samples
         times = np.interp(np.arange(n + 1) / steps, np.arange(len(leg.samples)), leg.times)
         driven = leg.drive(times)
-        if not n:  # its sensors store what solvers go through
+        if not n:  # its sensors store every step of the solver
             known = self.start.points.copy()
             if self.how.kind == "static":
                 known[1:] = np.nan
@@ -204,7 +204,7 @@ class _Solved:
         failed = ""
         try:
             self.advance(n, abs(float(times[-1] - times[0])))
-        except RuntimeError as error:  # Exudyn's SolverError; what is stored up to there is good
+        except RuntimeError as error:  # Exudyn's SolverError; the samples stored before are valid
             failed = str(error).strip().split("\n")[0]
         yield from self.poses(driven)
         if failed:
@@ -241,7 +241,9 @@ class _Solved:
             self.mbs.SolveDynamic(self.settings, solverType=solver, showHints=False)
 
     def poses(self, driven: Array) -> Iterator[SimulatedPose]:
-        """Yield the stored samples, all with the residual of the last, the one of largest drift."""
+        """Yield the stored samples, all with the residual of the last one, which has the largest
+        drift.
+        """
         steps = self.how.steps
         stored = [[self.stored(sensor)[::steps] for sensor in sensors] for sensors in self.sensors]
         state = np.hstack([self.stored(sensor) for sensor in self.nodes])[::steps]

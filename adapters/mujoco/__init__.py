@@ -1,1 +1,3 @@
-"""MuJoCo: projection by its kinematics and Jacobians, and its own time stepping."""
+"""MuJoCo: projection mode with its kinematics and Jacobians, and simulate mode with its time
+stepping.
+"""

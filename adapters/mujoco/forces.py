@@ -1,10 +1,10 @@
 """Forces by MuJoCo's recursive Newton-Euler: `mj_rne` and `mj_rnePostConstraint`; private to its
 adapter.
 
-MuJoCo's own constraint forces are those of soft constraints and play no part. Multipliers of one on
-its equalities exert, measured on version 4.0: of a connect, a unit force on the first site and its
-opposite on the second; of a weld, these and half a unit torque along the axes of the second body;
-of a tendon, a unit force that pushes its sites apart.
+MuJoCo's own constraint forces belong to soft constraints and are not used. Unit multipliers of its
+equalities exert, measured on version 4.0: for a connect, a unit force on the first site and its
+opposite on the second; for a weld, these and half a unit torque along the axes of the second body;
+for a tendon, a unit force that pushes its sites apart.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class SiteFrame:
 
     @property
     def rotation(self) -> Array:
-        # the frame of every body is global at design
+        # the frame of every body is parallel to the global axes at design
         return np.array(self.of.d.xmat[self.body]).reshape(3, 3)
 
     @property
@@ -67,7 +67,7 @@ class SiteFrame:
 class LoadedMuJoCo:
     """A model's masses, equalities and sites; see `tree_forces.LoadedTree`.
 
-    Made before the model is compiled; `bind` comes after.
+    It is created before the model is compiled; `bind` is called afterwards.
     """
 
     recursion: ClassVar[bool] = True
@@ -87,7 +87,7 @@ class LoadedMuJoCo:
         }
 
     def bind(self, m: Any, d: Any, closures: Sequence[Equality], rows: Sequence[slice]) -> None:
-        """Take the compiled model, its data, its equalities and the places of their rows."""
+        """Store the compiled model, its data, its equalities and the indices of their rows."""
         self.m, self.d, self.rows = m, d, list(zip(closures, rows, strict=True))
         self.parents = [*map(int, m.body_parentid)]
         self.carrier = {name: int(body.id) for name, body in self.carrier.items()}
@@ -111,7 +111,7 @@ class LoadedMuJoCo:
             axes[:, 2] *= np.sign(np.linalg.det(axes))
             m.body_mass[body], m.body_ipos[body], m.body_inertia[body] = mass, center, principal
             mj.mju_mat2Quat(m.body_iquat[body], axes.ravel())
-            # else MuJoCo takes the frame of the body for that of its inertia
+            # otherwise MuJoCo uses the body frame as the frame of its inertia
             m.body_sameframe[body] = int(mj.mjtSameFrame.mjSAMEFRAME_NONE)
 
     def add_frame(self, body: Any, at: Vector) -> SiteFrame:
@@ -132,12 +132,12 @@ class LoadedMuJoCo:
         mj, m, d = self.mj, self.m, self.d
         found = np.zeros(m.nv)
         d.qvel[:], d.qacc[:] = v, a
-        # masses enter the positions of centres that the velocities refer to
+        # masses affect the positions of the centres to which the velocities refer
         mj.mj_kinematics(m, d)
         mj.mj_comPos(m, d)
         mj.mj_comVel(m, d)
         mj.mj_rne(m, d, 1, found)
-        d.efc_force[:] = 0.0  # those of soft constraints, which `cfrc_int` would count
+        d.efc_force[:] = 0.0  # forces of soft constraints, which `cfrc_int` would include
         mj.mj_rnePostConstraint(m, d)
         return found
 
@@ -170,8 +170,8 @@ class LoadedMuJoCo:
         return found
 
     def _on_first(self, kind: str, i: int, j: int) -> Array:
-        """Return the wrenches on the first site, about either site: they coincide, or the force is
-        along their line.
+        """Return the wrenches on the first site, about either site: the sites coincide, or the
+        force acts along their line.
         """
         d, none = self.d, np.zeros((3, 3))
         if kind == "tendon":

@@ -1,11 +1,11 @@
 """MuJoCo in projection mode: its tree kinematics and its equality constraints, solved by the Newton
 walk of `projection`.
 
-`spec` has the elements for joints and drivers.
+`spec` creates the elements for joints and drivers.
 
-MuJoCo's time stepping treats equalities as soft, so it is not used: position is a root of
-`efc_pos`, velocity and acceleration follow from `efc_J` and its rate. MuJoCo puts that rate into
-`efc_aref` of connects and welds, not of tendons and joints (measured: 4.0).
+MuJoCo's time stepping treats equalities as soft, so this mode does not use it: a position is a root
+of `efc_pos`, and velocity and acceleration follow from `efc_J` and its rate. MuJoCo puts that rate
+into `efc_aref` of connects and welds, not of tendons and joints (measured: 4.0).
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class MuJoCo(ProjectionEngine):
 
     @property
     def described(self) -> Mapping[str, Any]:
-        """The quantities of MuJoCo's equalities in use."""
+        """Return the quantities of MuJoCo's equalities that are used."""
         return {
             "residual": (
                 "efc_pos: units of length; angles: sin(angle/2) of welds, rad of joints; drivers:"
@@ -58,13 +58,15 @@ class MuJoCo(ProjectionEngine):
         }
 
     def build(self, case: Case) -> MuJoCoModel:
-        """Return the compiled model in its own frame, and its rows."""
+        """Return the compiled model in the scaled frame, and its rows."""
         return self.model_of(self.own(case))
 
     def model_of(self, case: Case) -> MuJoCoModel:
         """Return the compiled model of the case, and its rows."""
         model = MuJoCoModel(mujoco(), case)
-        model.m.eq_solref[:] = 0.0  # no spring and no damper: aref is minus Jdot v, to the last bit
+        model.m.eq_solref[:] = (
+            0.0  # without spring and damper, aref equals minus Jdot v to the last bit
+        )
         return model
 
     def floor(self, case: Case) -> Floor:
@@ -126,7 +128,7 @@ class MuJoCoModel:
         self.tendons = [
             (row, *each.ends) for row, each in enumerate(owners) if each.kind == "tendon"
         ]
-        # of joints that follow a polynomial: row, address of the other's coordinate and rate, bend
+        # joints that follow a polynomial: row, addresses of the other's coordinate and rate, curve
         self.bent = [
             (row, int(other.qposadr[0]), int(other.dofadr[0]), Polynomial(each.curve).deriv(2))
             for row, each in enumerate(owners)
@@ -135,9 +137,9 @@ class MuJoCoModel:
         ]
         self.present: slice | NDArray[np.intp] = slice(self.n)
         self.A = np.zeros((self.n + len(mechanism.drivers), self.m.nv))
-        self.columns = np.eye(len(self.A))[:, self.n :]  # the rows of the drivers are the last
+        self.columns = np.eye(len(self.A))[:, self.n :]  # the drivers have the last rows
         self.coordinates: list[tuple[int, int, float]] = []  # row, address in qpos, sign
-        # of joint drivers: address in qpos, in qvel, sign
+        # joint drivers: address in qpos, in qvel, sign
         self.driven: list[tuple[int, int, float]] = []
         # row, site, unit direction, design position
         self.pulled: list[tuple[int, int, Array, Array]] = []
@@ -183,7 +185,7 @@ class MuJoCoModel:
         mj.mj_comPos(m, d)
         mj.mj_tendon(m, d)
         mj.mj_makeConstraint(m, d)
-        # MuJoCo leaves out an equality while its whole Jacobian is zero; the rest keeps its order,
+        # MuJoCo leaves out an equality while its Jacobian is zero; the others keep their order, and
         # efc_J its full length
         self.present = (
             slice(self.n) if d.ne == self.n else np.flatnonzero(np.isin(self.owner, d.efc_id))
@@ -214,8 +216,8 @@ class MuJoCoModel:
         d.qvel[:] = v
         self.mj.mj_comVel(self.m, d)
         self.mj.mj_referenceConstraint(self.m, d)
-        # aref = -(B vel + K I pos) - Jdot v; an absent connect or weld is one that never opens, its
-        # Jdot v is zero
+        # aref = -(B vel + K I pos) - Jdot v; an absent connect or weld never opens, so its Jdot v
+        # is zero
         stiffness, damping, impedance, _ = d.efc_KBIP.reshape(-1, 4).T
         b[self.present] = -(d.efc_aref + damping * d.efc_vel + stiffness * impedance * d.efc_pos)
         for row, i, j in self.tendons:
@@ -244,8 +246,8 @@ class MuJoCoModel:
         return self.loaded.dynamics(self.A, v, a)
 
     def gap(self, closure: Equality) -> Array | float:
-        """Residual of an equality that MuJoCo leaves out: of a weld only between parts of one rigid
-        body, so it is zero.
+        """Return the residual of an equality that MuJoCo leaves out; a weld is left out only
+        between parts of one rigid body, so its residual is zero.
         """
         i, j = closure.ends
         span = self.d.site_xpos[i] - self.d.site_xpos[j]
@@ -260,7 +262,7 @@ class MuJoCoModel:
         return J
 
     def slope_rate(self, site: int) -> Array:
-        """Return the rate of that Jacobian at the velocity last set, shape (3, unknowns)."""
+        """Return the rate of this Jacobian at the velocity last set, shape (3, unknowns)."""
         J = np.zeros((3, self.m.nv))
         self.mj.mj_jacDot(self.m, self.d, J, None, self.d.site_xpos[site], self.m.site_bodyid[site])
         return J

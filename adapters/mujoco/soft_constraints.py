@@ -1,8 +1,8 @@
-"""What MuJoCo reports as the forces of its own constraints, beside those of rigid bodies.
+"""Comparison of the forces that MuJoCo reports for its constraints with the forces of rigid bodies.
 
-MuJoCo's constraints are soft, so these are another product than the engine's forces, which are the
-multipliers of exact rows. At a pose, velocities and applied forces of the exact motion, MuJoCo is
-left to find its own accelerations; its equality of a tendon, which a rod is, has no Jdot v. Run:
+MuJoCo's constraints are soft, so its forces differ from the engine's forces, the multipliers of
+exact rows. At a pose, with velocities and applied forces of the exact motion, MuJoCo finds its own
+accelerations; its tendon equality, which models a rod, has no Jdot v. Run:
 
     python -m kincheck.adapters.mujoco.soft_constraints CASE.toml
 """
@@ -31,18 +31,18 @@ SOFTNESS: Mapping[str, tuple[Sequence[float], Sequence[float]]] = {
     "default": ((0.02, 1.0), (0.9, 0.95, 0.001, 0.5, 2.0)),
     "stiff": ((0.002, 1.0), (0.9999, 0.9999, 0.001, 0.5, 2.0)),
 }
-# Steps of MuJoCo's constraint solver; it stops before, where nothing is left to gain.
+# Largest number of steps of MuJoCo's constraint solver, which stops earlier once it has converged.
 ITERATIONS = 500
 TOL = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
 class RodForces:
-    """The compression of a rod over the samples [N], shape (n,) each.
+    """The compression of a rod over the samples [N], each of shape (n,).
 
     Attributes:
-        rigid: by the exact accelerations.
-        without_bias: of rigid bodies whose row of the rod has no Jdot v.
+        rigid: from the exact accelerations.
+        without_bias: from rigid rows, where the row of the rod lacks Jdot v.
         forward: `efc_force` after `mj_forward`, by softness.
         inverse: `efc_force` after `mj_inverse` at the exact accelerations, by softness.
     """
@@ -57,7 +57,7 @@ def rod_forces(case: Case, rod: str) -> RodForces:
     """Return the forces of a rod, a distance joint that closes a loop, over the sweep of a case.
 
     Raises:
-        CaseError: the case reads no forces, its bodies lack masses, or the rod is no tendon.
+        CaseError: the case has no force output, its bodies lack masses, or the rod is no tendon.
         SolveError: the case cannot be built.
     """
     if not case.forces:
@@ -118,7 +118,7 @@ def rod_forces(case: Case, rod: str) -> RodForces:
 def _rigid(
     model: MuJoCoModel, E: Array, bias: Array, applied: Array, v: Array, case: Case
 ) -> Array:
-    """Return the multipliers of rigid rows E qacc = -bias with these applied forces."""
+    """Return the multipliers of rigid rows E qacc = -bias under these applied forces."""
     n, (rows, _) = len(v), E.shape
     loaded = model.loaded
     assert loaded is not None
@@ -127,7 +127,7 @@ def _rigid(
     mass = np.array(columns).T
     if np.linalg.eigvalsh(0.5 * (mass + mass.T))[0] <= 0.0:
         raise CaseError(
-            f"case {case.name!r}: a body that moves has no mass or no inertia, and MuJoCo finds no"
+            f"case {case.name!r}: a moving body has no mass or no inertia, and MuJoCo finds no"
             " accelerations; give every body mass and inertia"
         )
     system = np.block([[mass, -E.T], [E, np.zeros((rows, rows))]])
@@ -136,7 +136,7 @@ def _rigid(
 
 
 def _samples(model: MuJoCoModel, case: Case) -> Iterator[Sample]:
-    """Yield the samples that the engine's walk reaches."""
+    """Yield the samples that the engine reaches."""
     walk, path = Walk(model, case, TOL, None, own_frame(case)), case.sweep.path
     origin, message = walk.start(path, start_of(case.mechanism, path))
     if origin is None:
@@ -151,7 +151,7 @@ def _samples(model: MuJoCoModel, case: Case) -> Iterator[Sample]:
             yield at
 
 
-def told(found: RodForces, rod: str) -> str:
+def report_lines(found: RodForces, rod: str) -> str:
     """Return the findings as lines of text."""
     largest, n = float(np.abs(found.rigid).max()), len(found.rigid)
 
@@ -182,7 +182,7 @@ def main(arguments: Sequence[str]) -> int:
         if not rods:
             raise CaseError(f"case {case.name!r}: no joint is a distance, and MuJoCo has no tendon")
         for rod in rods:
-            print(told(rod_forces(case, rod), rod))
+            print(report_lines(rod_forces(case, rod), rod))
     except KincheckError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

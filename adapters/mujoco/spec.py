@@ -1,12 +1,12 @@
 """A mechanism as a model specification of MuJoCo; private to its adapter.
 
-Every body frame lies on the global frame at design, so the geometry of a case enters as it stands.
-A joint is a chain of MuJoCo joints (see `joint_chains`). In the spanning tree it carries one of its
-bodies on the other. A cut joint carries an auxiliary body on its first body and closes its loop by
-one equality constraint with its second: a connect if the chain ends in a ball, else a weld; a
-distance is a tendon over two sites. These rows have full rank where the joint's own rows have; two
-connects on the axis of a revolute would not. So a joint has its coordinates wherever it stands, and
-what ties them to one another is a joint equality.
+Every body frame coincides with the global frame at design, so the geometry of a case is used
+unchanged. A joint is a chain of MuJoCo joints (see `joint_chains`). In the spanning tree it
+connects its two bodies. A cut joint carries an auxiliary body on its first body, and one equality
+constraint with its second body closes the loop: a connect if the chain ends in a ball, else a weld;
+a distance is a tendon over two sites. These rows have full rank if the joint's own rows have; two
+connects on the axis of a revolute would not. So every joint has its coordinates, in the tree or
+not, and joint equalities relate them to one another.
 """
 
 from __future__ import annotations
@@ -30,25 +30,23 @@ from ..shared.joint_chains import (
 from ..shared.poses import middle
 
 JOINTS = (*CHAINS, Distance)
-"""The joint types that have a counterpart here, exactly these: a subclass may mean something
-else.
-"""
+"""The supported joint types, exactly these: a subclass may have another meaning."""
 
 
 def coordinate(joint: str, name: str) -> str:
-    """Return the name in the model of a joint's coordinate."""
+    """Return the name of a joint's coordinate in the model."""
     return f"{joint} {name}"
 
 
 @dataclass(frozen=True, slots=True)
 class Equality:
-    """An equality constraint and the two sites it ties (their ids are known once the spec is
-    compiled), the first on the joint's first body; length of a tendon [m].
+    """An equality constraint and the two sites it ties (the compiled model has their ids), the
+    first on the joint's first body; length of a tendon [m].
 
     Attributes:
-        follows, curve: the joint it follows by a polynomial, and this.
-        joint: that it closes; empty for a relation.
-        terms: joint and freedom of the coordinates that a relation ties.
+        follows, curve: the joint that the constraint follows by a polynomial, and the polynomial.
+        joint: the cut joint; empty for a relation.
+        terms: joint and freedom of the coordinates in a relation.
     """
 
     kind: str
@@ -61,8 +59,8 @@ class Equality:
 
 
 class Sketch:
-    """A mechanism written into an MjSpec. The spec is compiled as it is: its XML text would keep
-    six digits.
+    """A mechanism as an MjSpec. The spec is compiled directly, because its XML text has only six
+    digits.
     """
 
     def __init__(self, mj: Any, mechanism: Mechanism) -> None:
@@ -70,17 +68,17 @@ class Sketch:
         self.spec = mj.MjSpec()
         self.spec.option.gravity = [0.0, 0.0, 0.0]
         self.spec.option.jacobian = mj.mjtJacobian.mjJAC_DENSE
-        # autoreset would answer a diverged pose with the design pose
+        # autoreset would replace a diverged pose by the design pose
         self.spec.option.disableflags |= (
             mj.mjtDisableBit.mjDSBL_CONTACT | mj.mjtDisableBit.mjDSBL_AUTORESET
         )
         fixed = [GROUND, *(body.name for body in mechanism.bodies if body.fixed)]
         self.bodies = dict[str, Any].fromkeys(fixed, self.spec.worldbody)
         self.closures: list[Equality] = []
-        self.tree: dict[str, str] = {}  # what carries each body
-        self.means: dict[str, str] = {}  # what closes each cut joint
-        self.relations: list[str] = []  # what ties coordinates to one another
-        # of a joint's coordinate: minus where it moves the joint's first body
+        self.tree: dict[str, str] = {}  # carrier of each body
+        self.means: dict[str, str] = {}  # equality of each cut joint
+        self.relations: list[str] = []  # relations between coordinates
+        # sign of a joint's coordinate: minus if it moves the joint's first body
         self.signs: dict[str, float] = {}
         self.children: dict[str, str] = {}  # joint of the tree -> the body that it carries
         tree = spanning_tree(mechanism)
@@ -88,7 +86,7 @@ class Sketch:
             body = self.bodies[branch.child] = self.body(self.bodies[branch.parent])
             self.tree[branch.child] = "free" if branch.joint is None else str(branch.joint)
             if branch.joint is None:
-                # a body that turns about its middle is predicted best by a tangent
+                # a tangent predicts a body best that turns about its middle
                 x, y, z = middle(mechanism, mechanism.body(branch.child)).tolist()
                 self.attach(body, free((x, y, z)))
                 continue
@@ -111,7 +109,7 @@ class Sketch:
     def body(self, parent: Any) -> Any:
         """Add a body on its parent's frame.
 
-        Mass and inertia do not enter kinematics, but MuJoCo wants them positive definite.
+        Mass and inertia do not affect kinematics, but MuJoCo requires them to be positive definite.
         """
         body = parent.add_body()
         body.mass, body.inertia, body.explicitinertial = 1.0, [1.0, 1.0, 1.0], True
@@ -131,9 +129,9 @@ class Sketch:
         return CHAINS[type(joint)](joint, self.near(joint))
 
     def attach(self, body: Any, links: Sequence[Link], joint: str = "") -> None:
-        """Let a body move relative to its parent by links, the one next to the parent first.
+        """Let a body move relative to its parent by links, in order from the parent.
 
-        The armature, an inertia of each link alone, keeps MuJoCo from warning of hinges in line.
+        The armature, an inertia of each link alone, prevents MuJoCo's warning about hinges in line.
         """
         types = self.mj.mjtJoint
         kinds = {"slide": types.mjJNT_SLIDE, "hinge": types.mjJNT_HINGE, "ball": types.mjJNT_BALL}
@@ -152,7 +150,7 @@ class Sketch:
         body.
         """
         self.attach(body, links, joint.name)
-        # it is that of all the joint's coordinates, so their relations need none
+        # all coordinates of the joint have the same sign, so their relations need none
         self.signs[joint.name] = sign
         for relation in relations(joint):
             self.relate(relation)
@@ -181,8 +179,8 @@ class Sketch:
         for end in ends:
             tendon.wrap_site(end.name)
         equality = self.spec.add_equality(type=self.mj.mjtEq.mjEQ_TENDON, name1=rod.name)
-        # the length is that at design plus a polynomial of another tendon; there is none, which
-        # leaves its constant
+        # the length is its design value plus a polynomial of another tendon; without one, only the
+        # constant counts
         equality.data = [rod.rod_length - rod.design_distance, *[0.0] * (len(equality.data) - 1)]
         self.closures.append(Equality("tendon", ends, rod.rod_length, joint=rod.name))
 
@@ -213,7 +211,7 @@ class Sketch:
         *,
         bent: bool = False,
     ) -> None:
-        """Keep a coordinate at a polynomial of another, the constant first.
+        """Keep a coordinate at a polynomial of another; the constant is the first coefficient.
 
         Args:
             terms: joint, freedom and weight of both.
@@ -232,7 +230,7 @@ class Sketch:
     def join(self, joint: str, kind: str, i: Any, j: Any, position: Sequence[float]) -> None:
         """Tie two bodies of a joint at a position.
 
-        The default data stays: it holds the scale of a weld's rotation rows.
+        The default data are kept: they hold the scale of a weld's rotation rows.
         """
         ends = self.site(i, position), self.site(j, position)
         equality = {"connect": self.mj.mjtEq.mjEQ_CONNECT, "weld": self.mj.mjtEq.mjEQ_WELD}[kind]

@@ -1,8 +1,8 @@
-"""MuJoCo in simulate mode: `mj_step`, its constraints as soft as they are set.
+"""MuJoCo in simulate mode: `mj_step`, with constraints of the set softness.
 
-A driven coordinate has an armature far above all masses, and is set to its value,
-rate and force at every sample; a driver with varying rate, at every step. Velocities and
-accelerations are MuJoCo's own, of `mj_forward` at the sample.
+A driven coordinate has an armature far above all masses, and is set to its value, rate and force at
+every sample, or at every step if the rate varies. Velocities and accelerations come from
+`mj_forward` at the sample.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ from ..shared.joint_equivalents import jointed
 from ..shared.simulation import Leg, SimulatedPose, SimulationEndedError, simulated, start_of
 from .mujoco import MuJoCo, MuJoCoModel, mujoco
 
-# Inertia of what is driven [kg or kg m2], the bodies having one: what they ask of it bends its
-# motion by a billionth.
+# Inertia of driven coordinates [kg or kg m2] next to bodies with unit inertia: reactions change
+# their motion by a billionth.
 ARMATURE = 1e9
-# The impedance range that leaves least softness; MuJoCo clips at it (mjMAXIMP).
+# The impedance range with the least softness; MuJoCo clips at it (mjMAXIMP).
 HARD = (0.9999, 0.9999, 0.001, 0.5, 2.0)
-# Time constant of stiff constraints, in steps: the shortest that MuJoCo takes for stable (refsafe),
+# Time constant of stiff constraints, in steps: the shortest that MuJoCo considers stable (refsafe),
 # with the smallest gaps.
 TIME_CONSTANT = 2.0
-# Of the projecting variant: its correction is of the length of the gap, whatever the step is [s].
+# Step of the projecting variant [s]: its correction equals the gap for any step.
 UNIT_STEP = 1e-3
-# Of its solver, relative: the default, 1e-8, ends the corrections where a gap of a millimetre has
-# come to 1e-10 m.
+# Relative tolerance of its solver: the default, 1e-8, ends the corrections when a gap of a
+# millimetre has shrunk to 1e-10 m.
 TOLERANCE = 1e-15
 
 
@@ -43,12 +43,12 @@ class Stepping:
     """MuJoCo's time stepping: equal steps between the samples.
 
     Attributes:
-        kind: "default" leaves every setting of MuJoCo as it is; "stiff" has the hardest stable
-            constraints and its most accurate integrator; "projecting" sets every velocity to
-            zero before each step, and springs and dampers to close a gap in one step: every step is
-            then a Newton correction in the metric of the masses. It has no velocities.
-        effort: steps between samples; of the default variant, a factor on the number that its own
-            step size asks for.
+        kind: "default" keeps every setting of MuJoCo; "stiff" has the stiffest stable constraints
+            and MuJoCo's most accurate integrator; "projecting" sets every velocity to zero before
+            each step, and springs and dampers to close a gap in one step, so that every step is a
+            Newton correction in the metric of the masses. It has no velocities.
+        effort: steps between samples; for the default variant, a factor on the number given by
+            MuJoCo's default step size.
     """
 
     name: str
@@ -58,7 +58,7 @@ class Stepping:
 
     @property
     def loop(self) -> str:
-        """Steps between samples are one call, unless every velocity has to be cleared."""
+        """Steps between samples are one call, unless every step must clear the velocities."""
         return "python" if self.kind == "projecting" else "simulator"
 
     @property
@@ -93,7 +93,7 @@ class Stepping:
         return MuJoCo().version()
 
     def unsupported(self, case: Case) -> str | None:
-        """Return the joint or driver that has no counterpart here, or None."""
+        """Return a message on the joint or driver that is not supported here, or None."""
         return MuJoCo().unsupported(case)
 
     def efforts(self) -> Mapping[str, Stepping]:
@@ -103,16 +103,14 @@ class Stepping:
         return {f"{n} {what}": replace(self, effort=n) for n in counts}
 
     def floor(self, case: Case) -> None:
-        """Return None: its steps are its own."""
+        """Return None: the simulator runs its own loop."""
 
     def build(self, case: Case) -> _Steps:
         """Return the compiled model with its settings and start."""
         return _Steps(mujoco(), MuJoCo().known(case), self)
 
     def solve(self, model: _Steps, case: Case, tol: float) -> Trajectory:
-        """All samples in reach, however far the constraints drift; see
-        `Engine.solve`.
-        """
+        """Solve all reachable samples, however far the constraints drift; see `Engine.solve`."""
         with model.warnings():
             return simulated(case, model.start, model.run, model.of.details)
 
@@ -146,12 +144,12 @@ class _Steps:
         self.longest = float(m.opt.timestep)
         self.q, self.v, self.sign = (np.array(each) for each in zip(*self.of.driven, strict=True))
         m.dof_armature[self.v] = ARMATURE
-        mj.mj_setConst(m, self.of.d)  # what MuJoCo scales the softness by
+        mj.mj_setConst(m, self.of.d)  # MuJoCo scales the softness by this
         if how.kind == "stiff":
             m.opt.integrator = mj.mjtIntegrator.mjINT_RK4
         if how.kind != "default":
             m.eq_solimp[:] = HARD
-            # else softness follows a mean of the masses, not each row's
+            # otherwise softness depends on a mean of the masses, not on each row
             m.opt.enableflags |= mj.mjtEnableBit.mjENBL_DIAGEXACT
         if how.kind == "projecting":
             m.opt.disableflags |= mj.mjtDisableBit.mjDSBL_REFSAFE
@@ -169,7 +167,7 @@ class _Steps:
 
     @contextmanager
     def warnings(self) -> Generator[None]:
-        """Keep MuJoCo's warnings, which it would write to a file in the working directory."""
+        """Collect MuJoCo's warnings, which it would write to a file in the working directory."""
         before = self.mj.get_mju_user_warning()
         self.mj.set_mju_user_warning(self.warned.append)
         try:
@@ -203,7 +201,7 @@ class _Steps:
         if self.steady:
             self.mj.mj_step(self.m, self.of.d, n)
             return
-        # a force that changes: as it is amid the step
+        # a changing force has its value in the middle of the step
         whole, half = (
             leg.drive(t + (until - t) * (np.arange(n) + part) / n) for part in (0.0, 0.5)
         )
@@ -225,7 +223,7 @@ class _Steps:
         d.qfrc_applied[self.v] = ARMATURE * self.sign * c_tt
 
     def pose(self, driven: Array, steps: int) -> SimulatedPose:
-        """Return the pose at the present state, steps counted from the sample before."""
+        """Return the pose at the current state, with the steps since the previous sample."""
         mj, m, d = self.mj, self.m, self.of.d
         self.set(*driven)
         points = np.full((3, len(self.of.watched), 3), np.nan)

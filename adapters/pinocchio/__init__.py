@@ -1,1 +1,3 @@
-"""Pinocchio: projection by its kinematics and Jacobians, and its constrained dynamics."""
+"""Pinocchio: projection mode with its kinematics and Jacobians, and simulate mode with its
+constrained dynamics.
+"""

@@ -1,10 +1,10 @@
-"""Pinocchio in simulate mode: accelerations of its `constraintDynamics`, integrated by a
+"""Pinocchio in simulate mode: accelerations from its `constraintDynamics`, integrated by a
 Runge-Kutta method of fourth order.
 
-Pinocchio has no time stepping of its own; the loop over the steps is ours. Every joint is a chain
-of slides, hinges and balls (see `joint_chains`), every loop is closed by one rigid
-constraint, of a point or of a whole frame. Driven coordinates have an armature far above all moving
-masses, and are set to their values, rates and forces at every step.
+Pinocchio has no time stepping; the loop over the steps is ours. Every joint is a chain of slides,
+hinges and balls (see `joint_chains`), and one rigid constraint, of a point or of a whole frame,
+closes each loop. Driven coordinates have an armature far above all moving masses, and are set to
+their values, rates and forces at every step.
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ from ..shared.loop_closures import CLOSURES, ends_of
 from ..shared.simulation import Leg, SimulatedPose, SimulationEndedError, simulated, start_of
 from .pinocchio import Pinocchio, PinocchioModel
 
-# Inertia of what is driven [kg or kg m2], the bodies having one: what they ask of it bends its
-# motion by a billionth.
+# Inertia of driven coordinates [kg or kg m2] next to bodies with unit inertia: reactions change
+# their motion by a billionth.
 ARMATURE = 1e9
-# Of the proximal iteration of redundant loops: with none it does not converge, with 1e-4 not
-# always, with this in a few rounds.
+# Damping of the proximal iteration for redundant loops: without it the iteration does not converge,
+# with 1e-4 not always, with this value in a few rounds.
 MU = 1e-8
 ROUNDS = 50
 ACCURACY = 1e-14
-# Time in which a gap closes, in steps. Shorter ones pass the error of every step on to the
-# accelerations (on an RSSR linkage 1e-2 m/s^2 at 4 steps, 6e-7 at 50); with none at all, gaps add
-# up over the samples.
+# Time constant of gap closure, in steps. Shorter times pass the error of every step on to the
+# accelerations (on an RSSR linkage 1e-2 m/s^2 at 4 steps, 6e-7 at 50); without gap closure, gaps
+# accumulate over the samples.
 DECAY = 50.0
 
 
@@ -48,7 +48,7 @@ class Dynamics:
     """Pinocchio's constrained forward dynamics.
 
     Attributes:
-        steps: between samples.
+        steps: number of steps between samples.
     """
 
     steps: int = 2
@@ -74,26 +74,20 @@ class Dynamics:
         return Pinocchio().version()
 
     def unsupported(self, case: Case) -> str | None:
-        """Return which joint or driver has no counterpart here, or None."""
+        """Return a message on the joint or driver that is not supported here, or None."""
         if (self.version() or "").startswith("3."):
-            return "Pinocchio 3 calls its constraintDynamics in another way; install Pinocchio 4"
+            return "constraintDynamics of Pinocchio 3 has another signature; install Pinocchio 4"
         case = Pinocchio().known(case)
         for joint in case.mechanism.joints:
             if relations(joint):
-                return (
-                    f"{joint} ties coordinates to one another, which Pinocchio's constraintDynamics"
-                    " refuses"
-                )
+                return f"{joint} relates coordinates, which Pinocchio's constraintDynamics refuses"
             if isinstance(joint, Distance) and not fits(joint):
                 return (
                     f"{joint} has another length than at design; Pinocchio has no distance"
-                    " constraint, and no body has it there"
+                    " constraint, and a body in its place would not fit"
                 )
         for coupler in case.mechanism.couplers:
-            return (
-                f"{coupler} ties coordinates to one another, which Pinocchio's constraintDynamics"
-                " refuses"
-            )
+            return f"{coupler} relates coordinates, which Pinocchio's constraintDynamics refuses"
         return Pinocchio().unsupported(case)
 
     def efforts(self) -> Mapping[str, Dynamics]:
@@ -101,7 +95,7 @@ class Dynamics:
         return {f"{n} steps a sample": replace(self, steps=n) for n in (1, 2, 4, 8)}
 
     def floor(self, case: Case) -> None:
-        """Return None: its steps are Python's; a bound would be that of projection."""
+        """Return None: the steps are in Python, with the same bound as in projection."""
 
     def build(self, case: Case) -> _Model:
         """Return tree, constraints and start."""
@@ -112,9 +106,7 @@ class Dynamics:
         )
 
     def solve(self, model: _Model, case: Case, tol: float) -> Trajectory:
-        """All samples that can be simulated, however far the constraints drift; see
-        `Engine.solve`.
-        """
+        """Simulate all possible samples, however far the constraints drift; see `Engine.solve`."""
         return simulated(case, model.start, model.run, {"closures": model.closures})
 
 
@@ -167,9 +159,9 @@ class _Model(PinocchioModel):
         )
 
     def branches(self, mechanism: Mechanism, tree: SpanningTree) -> Iterator[Branch]:
-        # Depth first, and what a closure adds right after the body that it hangs on: Pinocchio's
-        # algorithms of inertia take the joints of a subtree to be numbered without a gap. In any
-        # other order constraintDynamics is wrong, without a word.
+        # Depth first, with the joints of a closure right after the body that carries them:
+        # Pinocchio's inertia algorithms require consecutive joint numbers in a subtree. In any
+        # other order the results of constraintDynamics are silently wrong.
         waiting = [Branch("", GROUND, None)]
         while waiting:
             branch = waiting.pop()
@@ -182,8 +174,8 @@ class _Model(PinocchioModel):
             waiting += [each for each in reversed(tree.branches) if each.parent == body]
 
     def _hang(self, joint: Joint, i: int, P: Vector) -> None:
-        """The slides and hinges of a closure, on what joint i carries; a ball at their end is left
-        to the constraint.
+        """Add the slides and hinges of a closure on the body of joint i; the constraint replaces a
+        ball at their end.
         """
         links, point, turns = end_of_loop(CHAINS[type(joint)](joint, P), P)
         tied = Spherical if turns else Fixed
@@ -205,14 +197,12 @@ class _Model(PinocchioModel):
         for t, until in pairwise(leg.times.tolist()):
             h = abs(until - t) / self.steps
             self.stabilise(h)
-            # at the beginning, amid and at the end of every step
+            # at the beginning, the middle and the end of every step
             driven = leg.drive(t + (until - t) * np.arange(2 * self.steps + 1) / (2 * self.steps))
             for k in range(0, 2 * self.steps, 2):
                 q, v = self.step(q, v, h, driven[..., k : k + 3])
                 if not np.isfinite(v).all():
-                    raise SimulationEndedError(
-                        "constraintDynamics diverges to numbers that are not finite"
-                    )
+                    raise SimulationEndedError("constraintDynamics diverges to non-finite numbers")
             yield self.pose(*self.put(q, v, driven[..., -1]), self.steps)
 
     def stabilise(self, h: float) -> None:
@@ -238,8 +228,8 @@ class _Model(PinocchioModel):
         )
 
     def step(self, q: Array, v: Array, h: float, driven: Array) -> tuple[Array, Array]:
-        """One step of Runge and Kutta, the configuration moved along its rates from where the step
-        begins.
+        """Return the state after one Runge-Kutta step, with the configuration moved along its rates
+        from the start of the step.
         """
         q, v, _ = self.put(q, v, driven[..., 0])
         rates, accelerations = list[Array](), list[Array]()
@@ -259,7 +249,7 @@ class _Model(PinocchioModel):
         )
 
     def pose(self, q: Array, v: Array, tau: Array, steps: int) -> SimulatedPose:
-        """Return the pose at this state, steps counted from the sample before."""
+        """Return the pose at this state, with the number of steps since the previous sample."""
         self.q = q
         a = self.acceleration(q, v, tau)
         self.pin.framesForwardKinematics(self.model, self.data, q)

@@ -1,10 +1,10 @@
-"""Pinocchio, projection mode: its joints as a spanning tree, its frames to close the loops; one
-code for Pinocchio 3.9 and 4.
+"""Pinocchio in projection mode: its joints as a spanning tree, its frames to close the loops; the
+same code for Pinocchio 3.9 and 4.
 
-Pinocchio's own constraint models are left alone: their signatures and the moment their data is
-fresh changed between 3 and 4, the axes of their rows depend on the kind, and none is a distance.
-The adapter uses quantities with the same meaning in both: placement, Jacobian, velocity and
-classical acceleration of a frame. `loop_closures` makes the rows of any joint of them.
+Pinocchio's own constraint models are not used: their signatures and the update of their data
+changed between 3 and 4, the axes of their rows depend on the kind, and none is a distance. The
+adapter uses quantities with the same meaning in both versions: placement, Jacobian, velocity and
+classical acceleration of a frame. `loop_closures` makes the rows of any joint from them.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ class PinocchioModel(TreeModel):
 
     def make_frame(self, body: int, offset: Array) -> int:
         pin = self.pin
-        # numbered, because a second frame of one name would silently be the first one
+        # numbered, because a second frame with the same name would silently be the first
         name = f"frame {self.model.nframes}"
         placement = pin.SE3(np.eye(3), offset)
         return self.model.addFrame(pin.Frame(name, body, 0, placement, pin.FrameType.OP_FRAME))
@@ -103,7 +103,7 @@ class PinocchioModel(TreeModel):
         return frame.translation, frame.rotation
 
     def slope(self, handle: int) -> Array:
-        # a matrix of one column is given as a vector
+        # Pinocchio returns a matrix of one column as a vector
         return self.pin.getFrameJacobian(self.model, self.data, handle, self.axes).reshape(6, -1)
 
     def motion(self, handle: int) -> tuple[Array, Array]:

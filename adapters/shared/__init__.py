@@ -1,3 +1,1 @@
-"""Parts shared by engines: chains of joints, loop closures, frame constraints, the
-projection walk.
-"""
+"""Parts shared by adapters: joint chains, loop closures, frame constraints, the projection walk."""

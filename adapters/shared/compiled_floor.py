@@ -1,10 +1,10 @@
-"""A simulator's floor: the time of its compiled code for a sample, without the Python around it.
+"""A simulator's floor: the time of its compiled code for a sample, without the surrounding Python.
 
-Each call of the projection mode into the simulator is timed on the case's model and on the
-smallest model there is; the difference is the compiled work, the rest is Python and its binding. A
-linear system is timed as LAPACK's LU of as many rows as there are unknowns, less the time of one
-row, also if the adapter needs least squares. Nothing else counts: no residual test, no predictor,
-no copying. So a floor is below what any loop around these calls can reach, in whatever language.
+Each call of the projection mode into the simulator is timed on the case's model and on the smallest
+possible model; the difference is the compiled work, and the rest is Python and its binding. A
+linear system is timed as LAPACK's LU with as many rows as unknowns, minus the time of one row, even
+if the adapter needs least squares. Residual tests, predictor and copying do not count. So no loop
+around these calls is faster than the floor, in any language.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ import numpy as np
 from ...core.harness.engine import Floor
 from ...core.trajectory import Trajectory
 
-# Rounds of calls; the fastest one counts, so that interruptions do not. A round is long against the
-# clock's resolution.
+# Rounds of calls; the fastest round counts, so that interruptions do not matter. A round is long
+# against the clock's resolution.
 ROUNDS = 15
 CALLS = 200
 
@@ -38,9 +38,9 @@ def floor_of(
 
     Args:
         engine: name of the engine.
-        pose: calls for the residual and Jacobian of a pose: by name, on the case's model, on the
-            smallest, and how many.
-        rates: further calls once a sample, for velocities and accelerations.
+        pose: calls for the residual and Jacobian of a pose, by name: on the case's model, on the
+            smallest model, and their number.
+        rates: further calls once per sample, for velocities and accelerations.
     """
     large, small = (np.eye(n) + 0.1 * np.ones((n, n)) for n in (unknowns, 1))
     lapack: Any = importlib.import_module("scipy.linalg.lapack")
@@ -51,8 +51,8 @@ def floor_of(
             1,
         )
     }
-    # the adapter's last step only confirms; the pose before it stands for the one that gives the
-    # Jacobian of the rates
+    # the adapter's last step only confirms convergence; the pose before it counts as the pose for
+    # the Jacobian of the rates
     poses = float(solved.iterations[solved.solved].mean())
     counts = {**dict.fromkeys([*pose, *solve], poses), **dict.fromkeys(rates, 1.0)}
     parts = {
@@ -68,6 +68,6 @@ def floor_of(
 
 
 def microseconds(call: Call, least: Call) -> float:
-    """Return the time of a call less the time on the smallest model [us]."""
+    """Return the time of a call minus the time on the smallest model [us]."""
     fastest = [min(timeit.repeat(each, number=CALLS, repeat=ROUNDS)) for each in (call, least)]
     return max(0.0, 1e6 * (fastest[0] - fastest[1]) / CALLS)

@@ -1,6 +1,6 @@
-"""Force elements by the frames of a simulator: the wrench of each on its bodies.
+"""Force elements on the frames of a simulator: the wrench of each element on its bodies.
 
-For simulators without such elements of their own, or whose elements mean something else.
+They serve simulators without such elements, or with elements of another meaning.
 """
 
 from __future__ import annotations
@@ -44,9 +44,9 @@ class Element:
     """A force element on frames of a simulator.
 
     Attributes:
-        frames: one on each of its bodies, at its points.
-        axis: unit vector at design, of the joint of a torsional spring-damper.
-        angle: gives the angle of that joint [rad].
+        frames: one frame on each body of the element, at its point.
+        axis: unit vector of the joint of a torsional spring-damper, at design.
+        angle: returns the angle of this joint [rad].
     """
 
     given: ForceElement
@@ -83,7 +83,7 @@ class Element:
 
 
 def axis_of(each: ForceElement, mechanism: Mechanism) -> Array:
-    """Return the unit axis of a torsional spring-damper's joint; of others, zero."""
+    """Return the unit axis of a torsional spring-damper's joint; for other elements, zero."""
     if not isinstance(each, TorsionSpringDamper):
         return np.zeros(3)
     joint: Any = mechanism.joint(each.joint)

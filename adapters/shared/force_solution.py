@@ -1,7 +1,7 @@
 """Forces of a solved motion by a simulator's own inverse dynamics: J^T lambda = M a + h - Q.
 
-J and its rows are those of the projection, of joints, relations and drivers. What redundant rows
-leave undetermined is said by joint and direction, as the native engine says it.
+J has the rows of the projection, for joints, relations and drivers. Messages name forces that
+redundant rows leave undetermined by joint and direction, as in the native engine.
 """
 
 from __future__ import annotations
@@ -25,9 +25,10 @@ class Dynamics:
     """Forces of a simulator at a sample, in kg, s and the model's unit of length.
 
     Attributes:
-        demand: M a + h - Q by the unknowns, shape (unknowns,).
+        demand: M a + h - Q for the unknowns, shape (unknowns,).
         reactions: by joint, the wrench on its second body about the joint's point, force over
-            moment: without multipliers, shape (6,), and its derivative by them, shape (6, rows).
+            moment: the part without multipliers, shape (6,), and the derivative by the multipliers,
+            shape (6, rows).
         elements: the force of each force element.
     """
 
@@ -41,15 +42,15 @@ class ForceModel(ProjectionModel, Protocol):
     """A simulator's model with forces.
 
     Attributes:
-        computed_by: for the record, the forces of the simulator itself, with its calls.
+        computed_by: for the record, the forces that the simulator computes, with its calls.
     """
 
     @property
     def computed_by(self) -> Mapping[str, str]: ...
 
     def dynamics(self, v: Array, a: Array) -> Dynamics:
-        """Return what the simulator gives at velocities and accelerations, at the current
-        configuration and after its `residual` and `jacobian`.
+        """Return the simulator's forces at velocities and accelerations, at the current
+        configuration, after calls of `residual` and `jacobian`.
         """
         ...
 
@@ -66,11 +67,11 @@ class _Solved:
 def solved_forces(
     model: ForceModel, case: Case, samples: Mapping[int, Sample], unit: float
 ) -> Forces:
-    """Return the forces read by the outputs of the case, at solved samples.
+    """Return the forces that the outputs of the case use, at solved samples.
 
     Args:
-        samples: by their place in the sweep.
-        unit: of length in the model [m].
+        samples: solved samples by their index in the sweep.
+        unit: unit of length in the model [m].
     """
     mechanism, path = case.mechanism, case.sweep.path
     n, wanted = len(path.times), set(case.forces)
@@ -124,7 +125,7 @@ def solved_forces(
 
 
 def _solve(J: Array, demand: Array) -> _Solved:
-    """Return the shortest multipliers for the demand."""
+    """Return the multipliers of least norm for the demand."""
     rows, unknowns = J.shape
     u, sizes, vh = np.linalg.svd(J, full_matrices=True)
     if rows < unknowns or sizes[-1] <= RANK_TOLERANCE * sizes[0]:

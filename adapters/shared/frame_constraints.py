@@ -32,8 +32,8 @@ from ...core.trajectory import Array
 
 
 class Frame(Protocol):
-    """A point of a body and global axes at design, in the simulator's current
-    configuration; global axes.
+    """A frame on a body: a point, with axes that are global at design, in the simulator's current
+    configuration. All vectors are in global axes.
     """
 
     @property
@@ -53,26 +53,26 @@ class Frame(Protocol):
 
     @property
     def velocity(self) -> Array:
-        """The velocity of the point [m/s] and the angular one [rad/s], shape (6,)."""
+        """The velocity of the point [m/s] and the angular velocity [rad/s], shape (6,)."""
         ...
 
     @property
     def acceleration(self) -> Array:
-        """The acceleration of the point [m/s^2] and the angular one [rad/s^2], shape (6,); Jdot v
-        if coordinates have none.
+        """The acceleration of the point [m/s^2] and the angular acceleration [rad/s^2], shape (6,);
+        Jdot v if the coordinates are not accelerated.
         """
         ...
 
 
 class FrameOnBody(Frame, Protocol):
-    """A frame that tells the number of its body."""
+    """A frame with the number of its body."""
 
     @property
     def body(self) -> int: ...
 
 
 class Vector(Protocol):
-    """A vector moving with the mechanism."""
+    """A vector that moves with the mechanism."""
 
     def placed(self) -> tuple[Array, Array]:
         """Return x and J_x, shapes (3,) and (3, unknowns)."""
@@ -84,7 +84,7 @@ class Vector(Protocol):
 
 
 class Condition(Protocol):
-    """n equations; their residuals are zero when they hold."""
+    """n equations, whose residuals are zero if they are satisfied."""
 
     @property
     def n(self) -> int: ...
@@ -100,7 +100,7 @@ class Condition(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Direction:
-    """A unit vector a0 of a body, as it is at design."""
+    """A unit vector of a body, a0 at design."""
 
     frame: Frame
     a0: Array
@@ -167,7 +167,7 @@ class Dot:
 
 @dataclass(frozen=True, eq=False)
 class Length:
-    """|x| = L: the length itself, so that the row is in metres like the others."""
+    """|x| = L, instead of its square, so that the row is in metres like the others."""
 
     x: Vector
     L: float
@@ -201,11 +201,11 @@ class EqualDots:
 
 @dataclass(frozen=True, eq=False)
 class Thread:
-    """h . x = p turn: the displacement along h of frame i is p [m/rad] times the turn about it of
-    j; other rows align the axes.
+    """h . x = p turn: the displacement along h of frame i is p [m/rad] times the rotation of frame
+    j about h; other rows align the axes.
 
-    The angle is known up to whole turns, and the displacement tells which: any number of turns,
-    without a counter. Its row is exact for parallel axes.
+    The displacement gives the number of full turns, so no counter is needed. The row is exact for
+    parallel axes.
     """
 
     i: Frame
@@ -225,7 +225,7 @@ class Thread:
         h, f_i, f_j = self.i.rotation @ self.h, self.i.rotation @ self.f, self.j.rotation @ self.f
         phi = float(phi) - self.p * math.atan2(h @ np.cross(f_i, f_j), f_i @ f_j)
         lead = 2.0 * math.pi * self.p
-        # a thread without lead is a hinge
+        # a screw without lead is a hinge
         return math.remainder(phi, lead) if lead else phi, row - self.p * (
             h @ (self.j.jacobian - self.i.jacobian)[3:]
         )
@@ -236,6 +236,6 @@ class Thread:
 
 
 def skew(a: Array) -> Array:
-    """Return the matrix of the vector product a × , shape (3, 3)."""
+    """Return the matrix of the cross product a ×, shape (3, 3)."""
     x, y, z = a.tolist()
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

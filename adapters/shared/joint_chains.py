@@ -1,15 +1,16 @@
-"""Joints as chains of links, for simulators whose bodies hang on slides, hinges and balls.
+"""Joints as chains of links, for simulators with slides, hinges and balls.
 
-A chain leads from a joint's first body to its second; each link is carried by those before it, and
-points and axes are global at design. The links together leave the same motion as the
-joint, so a chain makes a joint of a tree; with its last body tied to the joint's second body it
-closes a loop. A joint whose point alone is bound ends in a ball.
+A chain leads from a joint's first body to its second; each link moves on the previous one, and
+points and axes are global at design. A chain allows the same motion as the joint, so it replaces
+the joint in a tree; a tie of its last body to the joint's second body closes a loop. The chain of a
+joint that constrains only a point ends in a ball.
 
-Two relations are beyond single links. A screw ties its slide to its hinge. A constant-velocity
+Two joints need relations between links. A screw couples its slide to its hinge. A constant-velocity
 joint is two Hooke's joints in one point with equal bends: hinges n, m, m, n across the bisector b
-of the shafts, the outer angles equal and the inner ones too. Seen half a turn about b the rotation
-R = N(x) M(2y) N(x) is its inverse, so its axis is across b, which is the joint's condition: R
-carries the second shaft, which is the first one seen half a turn about b, without twist.
+of the shafts, the outer angles equal and the inner ones too. A half turn about b transforms the
+rotation R = N(x) M(2y) N(x) into its inverse, so the axis of R is normal to b. This is the joint's
+condition: R moves the second shaft, the image of the first under the half turn about b, without
+twist.
 """
 
 from __future__ import annotations
@@ -43,13 +44,13 @@ from ...core.mechanism.mechanism import Vector
 
 @dataclass(frozen=True)
 class Link:
-    """One freedom, or the three of a ball.
+    """One freedom, or the three freedoms of a ball.
 
     Attributes:
-        axis: unit vector, global at design [-]; without meaning for a ball.
-        point: on the axis, or the ball's centre, global at design [m]; without meaning for a slide.
-        name: of its coordinate; the name of the joint's freedom if drivers and couplers may use
-            it.
+        axis: unit vector, global at design [-]; unused for a ball.
+        point: point on the axis, or the ball's centre, global at design [m]; unused for a slide.
+        name: name of the coordinate; the name of the joint's freedom if drivers and couplers may
+            use it.
     """
 
     move: Literal["slide", "hinge", "ball"]
@@ -107,8 +108,8 @@ CHAINS: dict[type[Joint], Callable[[Any, Vector], list[Link]]] = {
     Inline: lambda joint, P: [_slide(joint.axis, P), _ball(P)],
     OrientationLock: lambda joint, P: _shift(P),
     ParallelAxes: lambda joint, P: [*_shift(P), _hinge(joint.axis, P)],
-    # like a universal joint's, these hinges keep the design angle of the axes where a table has
-    # rounded the right angle
+    # as in a universal joint, these hinges keep the design angle of the axes if a table has rounded
+    # the right angle
     PerpendicularAxes: lambda joint, P: [*_shift(P), *(_hinge(axis, P) for axis in joint.axes)],
     Planar: lambda joint, P: [*_across(joint.axis, P), _hinge(joint.axis, P, "rotation")],
     Revolute: lambda joint, P: [_hinge(joint.axis, P, "rotation")],
@@ -121,15 +122,15 @@ CHAINS: dict[type[Joint], Callable[[Any, Vector], list[Link]]] = {
     Translational: lambda joint, P: [_slide(joint.axis, P, "translation")],
     Universal: lambda joint, P: [_hinge(axis, P) for axis in joint.axes],
 }
-"""By exact joint type: the joint and its point (where it has none, any point near) -> links. A
-distance is no chain.
+"""Function by exact joint type: the joint and its point (a near point if it has none) -> links. A
+distance has no chain.
 """
 
 
 def relations(joint: Joint) -> list[list[tuple[str, str, float]]]:
     """Return the linear relations between a joint's coordinates: joint, freedom, weight of terms.
 
-    The weighted sum of the terms stays zero, as that of `Coupler.terms` does.
+    The weighted sum of the terms stays zero, as for `Coupler.terms`.
     """
     found: Sequence[Mapping[str, float]] = ()
     if isinstance(joint, ConstantVelocity):
@@ -146,10 +147,10 @@ Coordinate = TypeVar("Coordinate")
 
 
 def dependence(terms: Iterable[tuple[Coordinate, float]]) -> tuple[Coordinate, Coordinate, float]:
-    """Solve a relation of two coordinates for one: `one`, `other` and the factor of one = factor *
-    other.
+    """Solve a relation of two coordinates for `one`: return `one`, `other` and the factor in one =
+    factor * other.
 
-    The one is that of the larger weight, so the factor is at most one in size.
+    `one` has the larger weight, so the absolute factor is at most one.
     """
     (other, small), (one, large) = sorted(terms, key=lambda term: abs(term[1]))
     return one, other, -small / large
@@ -158,10 +159,12 @@ def dependence(terms: Iterable[tuple[Coordinate, float]]) -> tuple[Coordinate, C
 def polynomial_in_tree(
     weight: float, curve: Sequence[float], driven: float, driving: float
 ) -> list[float]:
-    """Return the coefficients, the constant first, by which a coordinate of a tree follows another.
+    """Return the polynomial coefficients, the constant first, by which a coordinate of a tree
+    follows another.
 
     Args:
-        weight, curve: of the driving coordinate, see `Coupler.terms` and `Coupler.curve`.
+        weight, curve: weight and curve of the driving coordinate, see `Coupler.terms` and
+            `Coupler.curve`.
         driven, driving: signs of both coordinates in the tree.
     """
     found = [-c for c in curve]
@@ -174,8 +177,9 @@ def end_of_loop(links: Sequence[Link], P: Vector) -> tuple[Sequence[Link], Vecto
     """Return the links of a chain for a loop, and the point of the tie to its last body.
 
     Returns:
-        The links, the point (P, or the centre of a ball), and whether the bodies may turn about it:
-        a ball at the end of a chain is no link, because a tie of points alone leaves the same free.
+        The links, the point (P, or the centre of a ball), and whether the bodies may rotate about
+        it: a ball at the end of a chain is not a link, because a tie of points allows the same
+        rotation.
     """
     if links and links[-1].move == "ball":
         return links[:-1], links[-1].point, True

@@ -1,8 +1,9 @@
-"""The same mechanism for simulators with drivers and closures by joints only.
+"""Equivalent mechanisms for simulators that drive and close only joints.
 
-A driven coordinate of a point becomes that of a slide: three slides in line carry a ball at the
-point, the first one is driven. A rod between two points becomes a body between a universal joint
-and a ball. Each adds as many freedoms as conditions; the motion of every other body stays.
+A driven coordinate of a point becomes the coordinate of a slide: three slides in series carry a
+ball at the point, and the first slide is driven. A rod between two points becomes a body between a
+universal joint and a ball. Each replacement adds as many freedoms as conditions, so no other body
+moves differently.
 """
 
 from __future__ import annotations
@@ -19,21 +20,20 @@ from ...core.joints.base import triad, unit
 from ...core.mechanism.drivers import Driver, JointDisplacement, PointCoordinate
 from ...core.mechanism.mechanism import GROUND, Body, Mechanism, Vector
 
-# A rod whose given length differs from the distance at design by more does not fit at design, and
-# no body has its length there [m].
+# Largest difference of a rod's length from the distance at design for a body in its place [m].
 SAME_LENGTH = 1e-12
-# Sine of the angle between a rod and the axis of its body's hinge below which that axis is no first
-# axis of a cross: 17 degrees.
+# Sine of the smallest angle between a rod and the axis of its body's hinge at which this axis is
+# the first axis of a cross: 17 degrees.
 ALONG = 0.3
 
 
 def jointed(mechanism: Mechanism, *, rods: bool = False) -> Mechanism:
     """Return the mechanism with joint drivers only and without rods.
 
-    Rods whose length differs from the design stay. Added bodies have no mass.
+    Rods whose length differs from the design remain. Added bodies have no mass.
 
     Args:
-        rods: whether all rods stay.
+        rods: whether all rods remain.
     """
     bodies, joints, drivers = list(mechanism.bodies), list[Joint](), list[Driver]()
     for joint in mechanism.joints:
@@ -69,7 +69,7 @@ def fits(rod: Distance) -> bool:
 
 def _rod(mechanism: Mechanism, joint: Distance, rod: str) -> list[Joint]:
     (i, j), (P_i, P_j) = joint.bodies, joint.points
-    if mechanism.is_fixed(j):  # the cross stands on what turns least
+    if mechanism.is_fixed(j):  # the cross is on the body that turns least
         (i, j), (P_i, P_j) = (j, i), (P_j, P_i)
     axes = cross_of(mechanism, i, unit([b - a for a, b in zip(P_i, P_j, strict=True)]))
     return [
@@ -81,8 +81,8 @@ def _rod(mechanism: Mechanism, joint: Distance, rod: str) -> list[Joint]:
 def cross_of(mechanism: Mechanism, body: str, along: Iterable[float]) -> tuple[Vector, Vector]:
     """Return the axes of a cross between a body and a rod along a unit vector, unit vectors.
 
-    The cross locks where the rod comes to lie along the first axis. A crank turns its rod about the
-    crank's own hinge, so the first axis is that of such a hinge where it is across the rod.
+    The cross locks when the rod lies along the first axis. A crank turns its rod about the crank's
+    hinge, so the first axis is the axis of such a hinge, if it is not nearly along the rod.
     """
     d = np.array([*along])
     hinges = [

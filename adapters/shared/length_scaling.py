@@ -1,8 +1,8 @@
-"""Frame of a mechanism in projection: a length unit near its size, an origin beside it.
+"""Scaled frame of a mechanism in projection: a unit of length near its size, and an origin near it.
 
-Simulators know metres and their origin only. A residual of 1e-12 m is a millionth of a mechanism of
-a micrometre, and ten thousand kilometres from the origin no residual is that small: they stopped
-there, or went on in another assembly without a word.
+Simulators have fixed metres and a fixed origin. A residual of 1e-12 m is a millionth of a mechanism
+of one micrometre, and ten thousand kilometres from the origin no residual is so small: without
+scaling, they stop there or silently continue in another assembly.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ class OwnFrame:
     """A unit of length and an origin.
 
     Attributes:
-        unit: a power of two, because nothing is rounded then [m].
-        origin: global [m].
+        unit: a power of two, so that scaling does not round [m].
+        origin: global position [m].
     """
 
     unit: float
@@ -43,7 +43,7 @@ class OwnFrame:
         return length / self.unit
 
     def back(self, position: Array) -> Array:
-        """Return positions in this frame [units], shape (..., 3), as global ones [m]."""
+        """Return positions in this frame [units], shape (..., 3), as global positions [m]."""
         return self.unit * position + np.array(self.origin)
 
 
@@ -59,7 +59,7 @@ def own_frame(case: Case) -> OwnFrame:
     positions = [at for joint in mechanism.joints for at in joint.points_on()] + [
         point.position for point in mechanism.points
     ]
-    # a multiple of the unit: what is on such a grid is moved without being rounded
+    # a multiple of the unit, so that points on such a grid move without rounding
     x, y, z = (
         unit * round(0.5 * (min(axis) + max(axis)) / unit) for axis in zip(*positions, strict=True)
     )
@@ -67,7 +67,7 @@ def own_frame(case: Case) -> OwnFrame:
 
 
 def in_own_frame(case: Case) -> Case:
-    """Return the case with its mechanism in its own frame; drivers and outputs stay in SI.
+    """Return the case with its mechanism in its scaled frame; drivers and outputs stay in SI.
 
     Loads are in kg, s and the unit u of length [m]: inertia in kg u^2, gravity in u/s^2, forces in
     kg u/s^2, torques in kg u^2/s^2, stiffness and damping accordingly.

@@ -1,7 +1,7 @@
-"""Loop closures for simulators with a tree of joints: a cut joint as conditions on two frames,
+"""Loop closures for simulators with a tree of joints: a cut joint becomes conditions on two frames,
 one on each body.
 
-No joint's own rows are redundant, so a loop has dependent rows only by its geometry (planar
+The rows of one joint are never redundant, so a loop has dependent rows only by its geometry (planar
 loops).
 """
 
@@ -68,8 +68,7 @@ def _parallel(joint: Any, i: Frame, j: Frame) -> list[Condition]:
 
 
 def _alike(i: Frame, j: Frame) -> list[Condition]:
-    # cyclic pairs of the axes: the gradients a × b are the three axes themselves, so the rows are
-    # independent
+    # cyclic pairs of the axes: the gradients a × b are the three axes, so the rows are independent
     x, y, z = np.eye(3)
     return [Dot(Direction(i, a), Direction(j, b)) for a, b in ((x, y), (y, z), (z, x))]
 
@@ -84,7 +83,7 @@ def _on_plane(joint: Any, i: Frame, j: Frame) -> list[Condition]:
 
 
 def _crossed(joint: Any, i: Frame, j: Frame) -> list[Condition]:
-    # a table rounds the right angle; the design angle is what two hinges keep
+    # a table may round the right angle; two hinges keep the design angle
     a, b = (_array(unit(axis)) for axis in joint.axes)
     return [Dot(Direction(i, a), Direction(j, b), float(a @ b))]
 
@@ -103,8 +102,8 @@ def twistless(joint: Any, i: Frame, j: Frame) -> list[Condition]:
     With f × g along each shaft, f_i . g_j = g_i . f_j.
     """
     f, g, h = triad(joint.axes[0])
-    # the shortest rotation from h to the other shaft acts on what is normal to h as the reflection
-    # that takes h to its opposite
+    # the shortest rotation from h to the other shaft acts on vectors normal to h like the
+    # reflection that maps h to the opposite of the other shaft
     m = unit(tuple(h + unit(joint.axes[1])))
     f_j, g_j = (_array(a - (2.0 * (m @ a)) * m) for a in (f, g))
     left, right = ((f, g_j), (g, f_j))
@@ -163,12 +162,12 @@ CLOSURES: dict[type[Joint], Closure] = {
         "points at constant distance (1 row), link across the hinge (1)", _link
     ),
 }
-"""By exact joint type."""
+"""Closures by exact joint type."""
 
 
 def ends_of(mechanism: Mechanism, joint: Joint) -> tuple[Vector, Vector]:
     """Return the points of a joint's frames on its first and second body, global at design [m]."""
-    # a fixed joint may come without a point and some types have none: any serves, the origin of a
+    # a fixed joint may lack a point and some types have none: any point works, and the origin of a
     # moving body is near
     P = vars(joint).get("point") or next(
         body.origin for body in mechanism.moving if body.name in joint.bodies

@@ -1,4 +1,4 @@
-"""Frames as OpenSim has them: angles of successive turns about a body's x, y and z axes."""
+"""Frames in OpenSim's form: angles of successive rotations about a body's x, y and z axes."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def orientation(move: str, axis: Vector) -> Vector:
 
 
 def euler_angles(p: Sequence[float]) -> tuple[float, float, float]:
-    """Return the angles [rad] of successive turns about the body's x, y and z axes, exact to
+    """Return the angles [rad] of successive rotations about the body's x, y and z axes, exact to
     round-off at any rotation.
 
     With half angles a, b, c the parameters of such turns give (e1 ± e3, e0 ± e2) =

@@ -18,11 +18,10 @@ from .length_scaling import GLOBAL, OwnFrame
 from .projection_model import ProjectionModel
 
 MAX_ITERATIONS = 20
-# Singular values below this part of the largest count as zero: far above round-off (1e-15), far
-# below a sound mechanism (1e-2).
+# Singular values below this fraction of the largest count as zero: far above round-off (1e-15), far
+# below a regular mechanism (1e-2).
 RANK_TOLERANCE = 1e-9
-# Least squares have arrived where a step is this short: no more is to be gained, and what is left
-# are rows that contradict others.
+# Step at which least squares have converged: the remaining residual comes from contradictory rows.
 ARRIVED = 1e-6
 
 LOST = PoseFailure(FailureKind.NOT_FOUND)
@@ -86,20 +85,22 @@ class PoseSolver:
             raise SolveError(
                 f"case {case.name!r}: {self.unknowns - self.rank} of the {self.unknowns}"
                 " coordinates of the simulator's model are left free by joints and drivers at the"
-                " design position; add a driver, or join what moves freely; if their number is"
+                " design position; add a driver or a joint; if their number is"
                 " right a driver does not move it there (a lock-up): give the design in another"
                 " pose",
                 FailureKind.FREE,
             )
 
     def linear(self, A: Array, b: Array) -> Array:
-        """Solve A x = b; never assumed square: point closures of a planar loop are redundant."""
+        """Solve A x = b, which may not be square: point closures of a planar loop are redundant."""
         if self.square:
             return np.asarray(np.linalg.solve(A, b), dtype=np.float64)
         return np.asarray(np.linalg.lstsq(A, b, rcond=RANK_TOLERANCE)[0], dtype=np.float64)
 
     def newton(self, c: Array) -> tuple[Array, int, float] | None:
-        """Return the sum of all steps, iterations and last residual at driver values c, or None."""
+        """Return the sum of all steps, the iterations and the last residual at driver values c, or
+        None.
+        """
         self.lost = LOST
         met, worst, step, corrected = (
             False,
@@ -114,8 +115,7 @@ class PoseSolver:
                 return None
             if iteration - 1 == self.corrections:
                 return corrected, iteration - 1, worst
-            # one step after meeting the tolerance: quadratic convergence makes it exact to
-            # round-off
+            # one step after the tolerance is met: quadratic convergence makes it exact to round-off
             if met and self.corrections is None:
                 if worst <= self.tol:
                     return corrected, iteration - 1, worst
@@ -136,7 +136,9 @@ class PoseSolver:
         return None
 
     def solve(self, path: Path, t: float) -> Sample | None:
-        """Return the pose with its rates on a path at time t, from the current one, or None."""
+        """Return the pose with its rates on a path at time t, starting from the current pose, or
+        None.
+        """
         c, c_t, c_tt = (path.drive(self.drivers, np.array([t])) / self.units)[..., 0]
         done = self.newton(c)
         if done is None:
@@ -149,7 +151,7 @@ class PoseSolver:
             a = self.linear(jacobian, gamma)
         except np.linalg.LinAlgError:
             return None
-        # least squares would hide rates that no row set can meet (a driver pushed at a dead centre)
+        # least squares would hide rates that do not satisfy the rows (a driver at a dead centre)
         if not (_met(jacobian, v, nu) and _met(jacobian, a, gamma)):
             self.lost = PoseFailure(FailureKind.DEAD_CENTRE)
             return None
@@ -170,5 +172,5 @@ class PoseSolver:
 
 
 def _met(jacobian: Array, v: Array, wanted: Array) -> bool:
-    # a millionth: far above round-off, far below a row that is not met
+    # a millionth: far above round-off, far below the error of an unsatisfied row
     return bool(np.abs(jacobian @ v - wanted).max() <= 1e-6 * (1.0 + np.abs(wanted).max()))

@@ -1,9 +1,9 @@
 """Poses of bodies as displacements from design, and the coordinates of chains of links.
 
-A displacement takes every point of a body from its design position to its present one, x -> q x +
-s, in global axes. So a chain of links (see `joint_chains`) displaces its second body against its
-first by the product of its links' displacements, and backwards its coordinates are those of the
-forward chain with other signs.
+A displacement maps every point of a body from its design position to its current position, x -> q x
++ s, in global axes. So a chain of links (see `joint_chains`) displaces its second body relative to
+its first by the product of its links' displacements; the reversed chain has the same coordinates
+with other signs.
 """
 
 from __future__ import annotations
@@ -30,25 +30,27 @@ def rotated(q: Quat, a: Vec3) -> Vec3:
 class Displacement:
     """Displacement of a body since design: x -> turn x + shift, global [m].
 
-    Scalars are of shape (n,), or the same for all.
+    Components have shape (n,), or are the same for all samples.
     """
 
     turn: Quat = IDENTITY
     shift: Vec3 = ZERO
 
     def of(self, P: Vec3) -> Vec3:
-        """Return the present position of a point of the body from its design position P [m]."""
+        """Return the current position of a point of the body from its design position P [m]."""
         return rotated(self.turn, P) + self.shift
 
     def relative_to(self, other: Displacement) -> Displacement:
-        """Return this displacement relative to another: applied after it, it gives this one."""
+        """Return this displacement relative to another: the other, followed by the result, is this
+        displacement.
+        """
         back = other.turn.conjugate()
         return Displacement(back * self.turn, rotated(back, self.shift - other.shift))
 
     def then_about(self, axis: Vec3, P: Vec3, angle: Scalar) -> Displacement:
-        """Return this displacement followed by a hinge on it.
+        """Return the displacement of a body that a hinge moves on this body.
 
-        The unit axis and the point P on it are those at design.
+        The unit axis and the point P on it are global at design.
         """
         turn = self.turn * about(axis, angle)
         return Displacement(turn, self.of(P) - rotated(turn, P))
@@ -78,8 +80,8 @@ def attitude(body: Body) -> Quat:
 
 
 def displacements(mechanism: Mechanism, way: Mapping[str, BodyMotion]) -> dict[str, Displacement]:
-    """Return the displacement of every body, fixed ones and the ground included, from the motion of
-    the moving ones.
+    """Return the displacement of every body, including fixed bodies and the ground, from the motion
+    of the moving bodies.
     """
     found = {body.name: Displacement() for body in mechanism.bodies} | {GROUND: Displacement()}
     for body in mechanism.moving:
@@ -93,18 +95,18 @@ def displacements(mechanism: Mechanism, way: Mapping[str, BodyMotion]) -> dict[s
 def link_motions(
     joint: Joint, links: Sequence[Link], placed: Mapping[str, Displacement]
 ) -> list[tuple[Array, ...]]:
-    """The coordinates of a joint's links: a number each [m or rad], or of a ball, which is the
-    last, Euler parameters; shape (n,).
+    """Return the coordinates of a joint's links, each of shape (n,): a number [m or rad], or for a
+    ball, which is the last link, Euler parameters.
 
-    Angles are followed from the first sample, which is the design, and so count the turns; between
-    samples they must change by less than half a turn.
+    Angles are followed from the first sample, the design, so full turns count; between samples they
+    must change by less than half a turn.
     """
     if not links:
         return []
     moved = placed[joint.j].relative_to(placed[joint.i])
     point, ball = vec(links[-1].point), links[-1].move == "ball"
     hinges = [(vec(link.axis), vec(link.point)) for link in links if link.move == "hinge"]
-    # of the joints that end in a ball only that on a link has a hinge, which swings the ball
+    # among joints that end in a ball, only the joint on a link has a hinge, which moves the ball
     if ball:
         angles = [_angle(axis, point - P, moved.of(point) - P) for axis, P in hinges]
     else:
@@ -113,7 +115,7 @@ def link_motions(
     swing = Displacement()
     for (axis, P), angle in zip(hinges, angles, strict=True):
         swing = swing.then_about(axis, P, angle)
-    # what slides is carried by slides only, and so moves along its design axes
+    # only slides carry a slide, so it moves along its design axis
     apart = moved.of(point) - swing.of(point)
     turning = iter(angles)
     found: list[tuple[Array, ...]] = []
@@ -158,12 +160,13 @@ def _turns(axes: Sequence[Vec3], q: Quat) -> list[Array]:
             return []
         case [a]:
             return [angle_about(a, q)]
-        # the second turns nothing that is along it, so the first alone takes b where q does
+        # the second hinge does not move vectors along its axis, so the first alone moves b as q
+        # does
         case [a, b]:
             first = _angle(a, b, rotated(q, b))
             rest = about(a, -first) * q
             return [first, angle_about(b, rest)]
-        # bends alike, N(x) M(2y) N(x): its Euler parameters are cos x cos y, along n sin x cos y,
+        # equal bends, N(x) M(2y) N(x): the Euler parameters are cos x cos y, along n sin x cos y,
         # along m sin y
         case [n, m, _, _]:
             x, y = np.arctan2(n @ q.e, q.e0), np.arcsin(np.clip(m @ q.e, -1.0, 1.0))

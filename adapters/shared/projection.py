@@ -1,9 +1,9 @@
-"""Projection mode, shared by the simulators: their residuals and Jacobians in one Newton loop over
-the samples.
+"""Projection mode, shared by the simulators: one Newton loop over the samples with their residuals
+and Jacobians.
 
-The loop walks from the design position outwards, both ways, with a tangent predictor. Convergence
-is judged here, by residual and finiteness, never by a simulator's own word; a step without
-convergence, or to another assembly, is halved.
+The loop walks from the design position in both directions, with a tangent predictor. Residual and
+finiteness decide on convergence, never a simulator's status; a step without convergence, or to
+another assembly, is halved.
 """
 
 from __future__ import annotations
@@ -34,23 +34,23 @@ from .length_scaling import GLOBAL, OwnFrame
 from .pose_solver import PoseSolver, Sample
 from .projection_model import ProjectionModel
 
-# Newton steps of the efforts of a projection, after one tangent predictor; none is Euler's method.
-# None is as many as it takes.
+# Newton steps after one tangent predictor, by effort; 0 is Euler's method, None iterates to
+# convergence.
 EFFORTS: Mapping[str, int | None] = {
     "predictor only": 0,
     "1 Newton step": 1,
     "2 Newton steps": 2,
     "until converged": None,
 }
-# A step shorter than this part of the sample distance that still fails is the end of the motion,
-# not a coarse grid. Change points that are missed by a part d of the size ask for steps of the root
-# of d; with 2^-10 those by 1e-8 were ends, or passed over.
+# A failing step shorter than this fraction of the sample distance is the end of the motion, not a
+# coarse grid. Change points missed by a fraction d of the size need steps of the root of d; with
+# 2^-10, misses of 1e-8 would count as ends, or be passed over.
 SMALLEST_STEP = 2.0**-20
-# Where a singular value of the Jacobian may have been zero on the way, a step is shortened to this
-# part of the sample distance before it is believed. Beside a fold the motion turns round, and
-# another assembly goes straight on. A motion that really passes a singular pose passes it in such a
-# step. It is a few times the smallest step, so that a pose that fails there can still be
-# approached. Closer to a singular pose than the root of round-off, rounding would choose the
+# If a singular value of the Jacobian may have been zero on the way, a step is shortened to this
+# fraction of the sample distance before it is accepted. Near a fold the motion turns back, while
+# another assembly goes straight on. A motion that passes a singular pose passes it in such a step.
+# The fraction is a few times the smallest step, so that the walk can still approach a pose that
+# fails there. Closer to a singular pose than the root of round-off, rounding would choose the
 # assembly.
 FOLD = 8.0 * SMALLEST_STEP
 
@@ -58,9 +58,9 @@ FOLD = 8.0 * SMALLEST_STEP
 def without_counterpart(
     case: Case, simulator: str, joints: Collection[type[Joint]], drivers: Collection[type[Driver]]
 ) -> str | None:
-    """Return a message for the first joint or driver of none of these exact types, or None.
+    """Return a message on the first joint or driver that has none of these exact types, or None.
 
-    A subclass may mean something else.
+    A subclass may have another meaning.
     """
     for what, known in (
         *((joint, joints) for joint in case.mechanism.joints),
@@ -86,9 +86,9 @@ def solve_by_projection(
     """Solve all samples of the case with the model; see `Engine.solve`.
 
     Args:
-        corrections: exactly so many Newton steps after the predictor, whatever residual they leave;
-            None: until it meets tol.
-        frame: in which the model has the mechanism.
+        corrections: exact number of Newton steps after the predictor, whatever the residual; None
+            iterates until the residual meets tol.
+        frame: the frame of the mechanism in the model.
     """
     walk, mechanism, path = (
         Walk(model, case, tol, corrections, frame),
@@ -105,10 +105,11 @@ class Walk(PoseSolver):
     """The walk of a model along the motion of a case, sample by sample."""
 
     def advance(self, path: Path, start: Sample, t: float, step: float) -> tuple[Sample, bool]:
-        """Walk a path from start to time t, halving failed steps; return the end, whether at t.
+        """Walk a path from start to time t with halved steps after failures; return the end, and
+        whether it is at t.
 
         Args:
-            step: between samples; zero if all are one.
+            step: time between samples; zero if all samples are at one time.
         """
         at, h = start, t - start.t
         while at.t != t:
@@ -129,7 +130,7 @@ class Walk(PoseSolver):
     def connected(self, at: Sample, new: Sample) -> bool:
         """Return whether output points and coordinates moved between two poses by their rates.
 
-        At rest they do not show whole turns of a driver, so turns have a limit of their own.
+        At rest they do not show full turns of a driver, so turns have a separate limit.
         """
         if np.abs(new.c - at.c)[self.turns].max(initial=0.0) > LONGEST_TURN:
             return False
@@ -186,7 +187,7 @@ class Walk(PoseSolver):
 
     @property
     def kind_at_start(self) -> FailureKind:
-        """The kind of a failure of the start."""
+        """Return the kind of a failure at the start."""
         return FailureKind.NOT_CLOSED if self.lost.kind is FailureKind.NOT_FOUND else self.lost.kind
 
     def trajectory(self, details: Mapping[str, Any], begin: Start) -> Trajectory:

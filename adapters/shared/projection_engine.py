@@ -1,4 +1,4 @@
-"""Base of the engines in projection mode; each adds its name, its joints and its model."""
+"""Base class of the engines in projection mode; each adds its name, its joints and its model."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ DRIVERS = (JointAngle, JointDisplacement, PointCoordinate)
 
 @dataclass(frozen=True)
 class ProjectionEngine(ABC):
-    """An engine (see `Engine`) with a `ProjectionModel`, solved by the Newton walk.
+    """An engine (see `Engine`) whose `ProjectionModel` the Newton walk solves.
 
     Attributes:
-        corrections: Newton steps after the predictor, whatever residual they leave; None: as many
-            as it takes.
-        name: as on the command line, and of the simulator's Python package by default.
-        package: of the simulator, if it has another name.
-        title: as in a sentence.
-        joints: types with a counterpart.
+        corrections: number of Newton steps after the predictor, whatever the residual; None
+            iterates to convergence.
+        name: name on the command line, and by default of the simulator's Python package.
+        package: name of the simulator's package, if it differs.
+        title: name of the simulator in sentences.
+        joints: supported joint types.
     """
 
     corrections: int | None = None
@@ -46,7 +46,7 @@ class ProjectionEngine(ABC):
     @property
     @abstractmethod
     def described(self) -> Mapping[str, Any]:
-        """The quantities of the simulator in use."""
+        """Return the quantities of the simulator that are used."""
 
     @property
     def settings(self) -> Mapping[str, Any]:
@@ -62,7 +62,7 @@ class ProjectionEngine(ABC):
         except (
             Exception,
             SystemExit,
-        ):  # a broken binary raises what its loader likes; to the harness it all means "not here"
+        ):  # a broken binary may raise any error, and counts as not installed
             return None
 
     def version_of(self, simulator: Any) -> str | None:
@@ -72,37 +72,39 @@ class ProjectionEngine(ABC):
         return str(simulator.__version__)
 
     def known(self, case: Case) -> Case:
-        """Return the case with the equivalents of joints without a counterpart here."""
+        """Return the case with equivalents of unsupported joints."""
         found = with_equivalents(case.mechanism, self.joints)
         return case if found is case.mechanism else replace(case, mechanism=found)
 
     def own(self, case: Case) -> Case:
-        """Return the case as the simulator has it: known joints, in its own frame."""
+        """Return the case for the simulator: known joints, in the scaled frame."""
         return in_own_frame(self.known(case))
 
     def unsupported(self, case: Case) -> str | None:
-        """Return the joint or driver without a counterpart or an equivalent here, or None."""
+        """Return a message on the joint or driver without a counterpart or an equivalent here, or
+        None.
+        """
         return without_counterpart(self.known(case), self.title, self.joints, DRIVERS)
 
     @abstractmethod
     def model_of(self, case: Case) -> ProjectionModel:
-        """Return the simulator's model of the case as it stands, at the design position."""
+        """Return the simulator's model of the unscaled case, at the design position."""
 
     def build(self, case: Case) -> ProjectionModel:
-        """Return the simulator's model of the case in its own frame, at the design position."""
+        """Return the simulator's model of the case in the scaled frame, at the design position."""
         return self.model_of(self.own(case))
 
     def solve(self, model: ProjectionModel, case: Case, tol: float) -> Trajectory:
         """Solve all samples; see `Engine.solve`.
 
         Raises:
-            SolveError: the model was made of another mechanism, of other points, or of a sweep so
-                much longer or shorter that its unit of length differs.
+            SolveError: the model was built for another mechanism, other points, or a sweep whose
+                length gives another unit of length.
         """
         replaced = replaced_joints(case.mechanism, self.joints)
         case = self.known(case)
         own = in_own_frame(case)
-        # The model has no names: numbers of another mechanism would be taken for those of this one.
+        # The model has no names, so results of another mechanism could be mistaken for this one's.
         built = model.case
         if (own.mechanism, own.points, own.forces) != (built.mechanism, built.points, built.forces):
             raise SolveError(

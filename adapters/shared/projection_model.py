@@ -10,14 +10,14 @@ from ...core.trajectory import Array
 
 
 class ProjectionModel(Protocol):
-    """A simulator's kinematics: unknowns x (its tree or body coordinates), rows for closures and
+    """A simulator's kinematics: unknowns x (tree or body coordinates), and rows for closures and
     drivers.
 
-    Lengths are in the unit of the mechanism it was made of, metres or others. All methods speak of
-    the current configuration. `residual` updates the data of the other methods.
+    Lengths are in the unit of the mechanism, metres or another. All methods refer to the current
+    configuration. `residual` updates the data of the other methods.
 
     Attributes:
-        case: the case that the model was made of, in the frame of the model.
+        case: the case of the model, in the frame of the model.
         details: facts for the record.
     """
 
@@ -44,8 +44,8 @@ class ProjectionModel(Protocol):
         ...
 
     def residual(self, c: Array) -> Array:
-        """All rows with the drivers at c, in the mechanism's order, from their design values, shape
-        (rows,).
+        """Return all rows with the drivers at c, in the mechanism's order, relative to their design
+        values, shape (rows,).
         """
         ...
 
@@ -57,7 +57,9 @@ class ProjectionModel(Protocol):
         ...
 
     def driver_columns(self) -> Array:
-        """Derivative of the rows by c, negated: J v = driver_columns c_t, shape (rows, drivers)."""
+        """Return the negative derivative of the rows by c, J v = driver_columns c_t, shape (rows,
+        drivers).
+        """
         ...
 
     def bias(self, v: Array) -> Array:
@@ -65,5 +67,7 @@ class ProjectionModel(Protocol):
         ...
 
     def points(self, v: Array, a: Array) -> Sequence[tuple[Array, Array, Array]]:
-        """Position, velocity and acceleration of each of case.points, in order, global axes."""
+        """Return position, velocity and acceleration of each point of case.points, in order, global
+        axes.
+        """
         ...

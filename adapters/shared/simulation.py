@@ -1,10 +1,9 @@
 """Simulate mode, shared by the simulators: start, direction and acceptance of samples.
 
-A simulator starts at the sample in reach nearest to the design, in a pose and at rates of its
-projection model, because none of them checks its initial values, and goes from there
-in two legs. Backwards is the same motion seen in reverse: its own time still grows, rates change
-their sign and accelerations do not. A simulator then reports its own motion, soft constraints
-and drift included.
+A simulator starts at the reachable sample nearest to the design, with pose and rates of its
+projection model, because no simulator checks its initial values, and runs from there in two legs.
+The backward leg is the motion in reversed time: rates change their sign, accelerations do not. A
+simulator reports its own motion, including soft constraints and drift.
 """
 
 from __future__ import annotations
@@ -25,18 +24,18 @@ from ...core.trajectory import Array, PointMotion, Trajectory, largest_found
 from .projection import Walk
 from .projection_model import ProjectionModel
 
-# A loop that is open by more than this part of the mechanism's size is torn: the pose is no longer
-# one of the mechanism. The softest simulator, MuJoCo as it comes, stays below on most built-in
-# cases.
+# A loop that is open by more than this fraction of the mechanism's size is torn: the pose does not
+# belong to the mechanism. The softest simulator, MuJoCo with default settings, stays below it on
+# most built-in cases.
 TORN = 1e-2
 # Largest difference in the spacing of equidistant samples, relative to the spacing: round-off.
 EQUIDISTANT = 1e-6
-# Residual of the pose to set off from: what projection reaches.
+# Residual of the start pose, which projection reaches.
 START = 1e-12
 
 
 class SimulationEndedError(KincheckError):
-    """A simulator cannot go on; the message says why."""
+    """A simulator cannot continue; the message gives the reason."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,15 +43,15 @@ class Start:
     """A consistent pose at a sample near the design.
 
     Attributes:
-        sample: its index.
+        sample: index of the sample.
         configuration: the result of the model's `save` there.
-        v, a: rates of the unknowns there, and theirs.
-        points: position, velocity and acceleration of each of case.points there, shape (3, points,
-            3).
-        residual: of the projection model there [m or -].
-        size: of the mechanism [m].
-        independent: whether the rows of the model are.
-        facts: on the way to the start, for the record.
+        v, a: rates and accelerations of the unknowns there.
+        points: position, velocity and acceleration of each point of case.points there, shape (3,
+            points, 3).
+        residual: residual of the projection model there [m or -].
+        size: size of the mechanism [m].
+        independent: whether the rows of the model are independent.
+        facts: facts on the start for the record.
     """
 
     sample: int
@@ -68,11 +67,10 @@ class Start:
 
 @dataclass(frozen=True, eq=False)
 class Leg:
-    """The samples on one side of the start, the start first, in the order in which they are
-    reached.
+    """The samples on one side of the start, in the order of the simulation, the start first.
 
     Attributes:
-        sign: -1 if the motion is seen in reverse.
+        sign: -1 if time is reversed.
     """
 
     case: Case
@@ -81,12 +79,12 @@ class Leg:
 
     @property
     def times(self) -> Array:
-        """The times of the samples, in the time of the case [s]."""
+        """The times of the samples in the case [s]."""
         return self.case.sweep.path.times[self.samples]
 
     def drive(self, times: Array) -> Array:
-        """Values, rates and accelerations of the drivers at times of the case, as the leg sees
-        them, shape (3, drivers, times).
+        """Return values, rates and accelerations of the drivers at times of the case, in the time
+        of the leg, shape (3, drivers, times).
         """
         moved = self.case.sweep.path.drive(
             [driver.name for driver in self.case.mechanism.drivers], times
@@ -100,10 +98,10 @@ class SimulatedPose:
     """The result of a simulator at a sample, in the time of its leg.
 
     Attributes:
-        points: position, velocity and acceleration of each of case.points, shape (3, points, 3);
-            NaN if it has none.
+        points: position, velocity and acceleration of each point of case.points, shape (3, points,
+            3); NaN if missing.
         residual: the largest violation of its constraints [m or -].
-        steps: from the sample before, of whatever kind its solver makes.
+        steps: number of steps of the solver since the previous sample.
     """
 
     points: Array
@@ -112,8 +110,8 @@ class SimulatedPose:
 
 
 Simulator = Callable[[Leg], Iterator[SimulatedPose]]
-"""Gives the poses of a leg, that of the start first; raises SimulationEndedError where it cannot go
-on.
+"""Function that yields the poses of a leg, the start first, and raises SimulationEndedError if it
+cannot continue.
 """
 
 
@@ -121,8 +119,7 @@ def start_of(model: ProjectionModel, case: Case) -> Start:
     """Return the start of a simulation.
 
     Raises:
-        SolveError: the design does not close, or the samples next to it, on either side, cannot be
-            reached.
+        SolveError: the design does not close, or no sample next to it can be reached.
     """
     walk, path = Walk(model, case, START), case.sweep.path
     begin = where_from(case.mechanism, path)
@@ -160,7 +157,7 @@ def start_of(model: ProjectionModel, case: Case) -> Start:
 
 
 def uneven(case: Case, title: str) -> str | None:
-    """Return the reason why steps of one length do not meet the samples, or None."""
+    """Return the reason why steps of equal length miss the samples, or None."""
     gaps = np.abs(np.diff(case.sweep.path.times))
     if len(gaps) and np.ptp(gaps) > EQUIDISTANT * gaps.max():
         return (
@@ -224,8 +221,8 @@ def simulated(
 def legs(case: Case, start: int) -> list[Leg]:
     """Return the legs from a sample to both ends of the sweep.
 
-    Samples at the same time as the start are in the first leg. A start without other samples is a
-    leg of its own.
+    Samples at the same time as the start are in the first leg. A start without other samples is one
+    leg.
     """
     times = case.sweep.path.times
     sides = [

@@ -1,4 +1,4 @@
-"""A mechanism whose design position is another one of its poses, for formats without a state."""
+"""A mechanism with another pose as its design position, for formats without a state."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from .poses import Displacement, displacements, link_coordinates, rotated
 
 
 def at_start(mechanism: Mechanism, way: Mapping[str, BodyMotion]) -> Mechanism:
-    """Return the same mechanism with the end of the way as its design position.
+    """Return the mechanism with the end of the way as its design position.
 
-    A joint's point goes with its second body and its axis with its first, so that a point stays on
-    its line or plane; pairs go with a body each. Distances keep their lengths. Coordinates of
-    polynomials and of torsional springs count from the start. Drivers, forces and torques are left
-    out.
+    A joint's point moves with its second body and its axis with its first, so that a point stays on
+    its line or plane; of a pair, each element moves with its body. Distances keep their lengths.
+    Coordinates of polynomials and of torsional springs count from the start. Drivers, forces and
+    torques are left out.
     """
     placed = displacements(mechanism, way)
 
@@ -107,5 +107,5 @@ def _joint(joint: Joint, placed: Mapping[str, Displacement]) -> Joint:
             changes[name] = moved(kind, value, joint.j if kind is Kind.POSITION else joint.i)
     if isinstance(joint, Distance):
         changes["length"] = joint.rod_length
-    # without checks: axes that a table has rounded are no better for having moved
+    # without checks: axes rounded by a table stay rounded after the motion
     return joint.changed(**changes)

@@ -1,10 +1,11 @@
-"""Simulate mode of simulators that step a tree of links whose loops their own constraints close.
+"""Simulate mode of simulators that step a tree of links and close its loops by their own
+constraints.
 
-A loop has the chain of its joint on its first body (see `joint_chains`), and one tie of a point or
-of a whole frame to its second. Both simulators solve for velocities at the end of a step and move
-the configuration along them: a driven coordinate that is given its mean velocity over the step is
-at its value after it, a gap of the constraints is closed a step later, and velocities are those of
-the middle of the step. Accelerations are the change of velocities over the last step.
+A cut joint has its chain on its first body (see `joint_chains`), and one tie of a point or of a
+whole frame to its second body. Both simulators solve for velocities at the end of a step and move
+the configuration along them. So a driven coordinate with its mean velocity over the step has its
+value after it, a gap of the constraints closes a step later, and velocities belong to the middle of
+the step. Accelerations are the change of velocities over the last step.
 """
 
 from __future__ import annotations
@@ -35,12 +36,12 @@ TIED: Mapping[str, type[Joint]] = {"point": Spherical, "frame": Fixed, "rod": Di
 
 @dataclass(frozen=True)
 class Tie:
-    """A constraint between two bodies, by their numbers: one point or the whole frame stays
-    together, or two points stay apart by a length.
+    """A constraint between two bodies, by their numbers: one point or the whole frame coincides, or
+    two points keep a distance.
 
     Attributes:
-        points: on the first and the second body, global at design [m].
-        length: of a rod [m].
+        points: points on the first and the second body, global at design [m].
+        length: length of a rod [m].
     """
 
     kind: Literal["point", "frame", "rod"]
@@ -51,16 +52,16 @@ class Tie:
 
 @dataclass(frozen=True)
 class Stepping:
-    """Time stepping of a simulator, steps of equal length between the samples.
+    """Time stepping of a simulator, with steps of equal length between samples.
 
     Attributes:
         steps: between samples.
         projection: the engine of the same simulator in projection mode.
-        model: of the simulator.
-        described: solver, constraints and drivers of the simulator.
-        rods: whether it has a constraint of a distance; without, rods are bodies.
-        couples: whether it has a constraint that couples two coordinates.
-        equal: whether the steps of a whole simulation are of one length.
+        model: class of the simulator's model.
+        described: description of solver, constraints and drivers.
+        rods: whether the simulator has a distance constraint; otherwise rods are bodies.
+        couples: whether the simulator has a constraint that couples two coordinates.
+        equal: whether all steps of a simulation have the same length.
     """
 
     steps: int = 4
@@ -89,7 +90,7 @@ class Stepping:
         return self.projection().version()
 
     def unsupported(self, case: Case) -> str | None:
-        """Return the joint, coupler or driver without a constraint here, or None."""
+        """Return a message on the joint, coupler or driver without a constraint here, or None."""
         engine = self.projection()
         case = engine.known(case)
         if (reason := engine.unsupported(case)) is not None:
@@ -115,7 +116,7 @@ class Stepping:
         return {f"{n} steps a sample": replace(self, steps=n) for n in (1, 2, 4, 8, 16)}
 
     def floor(self, case: Case) -> None:
-        """Return None: a bound on its steps would be that of projection."""
+        """Return None: the bound on its steps is that of projection."""
 
     def build(self, case: Case) -> SteppedTree:
         """Return tree, constraints and start."""
@@ -123,19 +124,19 @@ class Stepping:
         return self.model(replace(case, mechanism=mechanism), self.steps)
 
     def solve(self, model: SteppedTree, case: Case, tol: float) -> Trajectory:
-        """All samples in reach, however far the constraints drift; see `Engine.solve`."""
+        """Solve all reachable samples, however far the constraints drift; see `Engine.solve`."""
         return simulated(case, model.start, model.run, model.details)
 
 
 class SteppedTree(TreeModel):
-    """A tree with ties, whose driven coordinates have given velocities.
+    """A tree with ties and given velocities of the driven coordinates.
 
     The constructor of a simulator's class sets `ties`, makes the model and calls `set_off`.
 
     Attributes:
         ties: constraints that close loops.
-        driven_at: places of the driven coordinates in q.
-        signs: of the driven coordinates in the tree.
+        driven_at: indices of the driven coordinates in q.
+        signs: signs of the driven coordinates in the tree.
     """
 
     gives_forces = False
@@ -143,7 +144,9 @@ class SteppedTree(TreeModel):
 
     @abstractmethod
     def __init__(self, case: Case, steps: int) -> None:
-        """Make the model of a case with joint drivers only, and so many steps between samples."""
+        """Create the model of a case that has only joint drivers, with a number of steps between
+        samples.
+        """
 
     def set_off(self, case: Case, steps: int) -> None:
         """Find the start.
@@ -166,11 +169,11 @@ class SteppedTree(TreeModel):
         """Return the configuration and the velocities after a step.
 
         Args:
-            driven: velocities of the driven coordinates over the step [1/s of their units].
+            driven: velocities of the driven coordinates over the step [their units per second].
             h: length of the step [s].
 
         Raises:
-            SimulationEndedError: the simulator cannot go on.
+            SimulationEndedError: the simulator cannot continue.
         """
 
     def close(self, joint: Joint, ends: tuple[Vector, Vector], named: bool) -> None:
@@ -184,8 +187,8 @@ class SteppedTree(TreeModel):
             self.relate(relation)
         if i == j:
             raise SolveError(
-                f"case {self.case.name!r}: {joint} closes a loop of one body with itself, which no"
-                " constraint of the simulator does; use the projection mode"
+                f"case {self.case.name!r}: {joint} closes a loop of one body with itself, and the"
+                " simulator has no such constraint; use the projection mode"
             )
         self.tie(joint.name, Tie("point" if turns else "frame", (i, j), (point, point)), joint)
 
@@ -214,7 +217,7 @@ class SteppedTree(TreeModel):
             yield self.pose(q, v, a, values[:, -1], self.steps)
 
     def pose(self, q: Array, v: Array, a: Array, driven: Array, steps: int) -> SimulatedPose:
-        """Return the pose at this state, steps counted from the sample before."""
+        """Return the pose at this state, with the number of steps since the previous sample."""
         self.q = q
         residual = float(np.abs(self.residual(driven)).max())
         return SimulatedPose(np.array(self.points(v, a)).swapaxes(0, 1), residual, steps)

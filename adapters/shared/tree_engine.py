@@ -1,4 +1,6 @@
-"""Base of the engines in projection mode whose simulator is a tree of links; see `tree_model`."""
+"""Base class of the engines in projection mode whose simulator has a tree of links; see
+`tree_model`.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,7 @@ from .loop_closures import CLOSURES
 from .projection_engine import ProjectionEngine
 from .tree_model import TreeModel
 
-# One slide, whose point is driven: one frame in a condition.
+# The smallest model: one slide with a driven point, so one frame in a condition.
 LEAST = Mechanism(
     "slide",
     [Body("slide")],
@@ -31,13 +33,13 @@ LEAST = Mechanism(
 
 
 class TreeEngine(ProjectionEngine):
-    """An engine that makes a `TreeModel`."""
+    """An engine whose model is a `TreeModel`."""
 
     joints = CLOSURES
 
     @property
     def described(self) -> Mapping[str, Any]:
-        """Coordinates of the tree and the equations of its loops."""
+        """Return the coordinates of the tree and the equations of its loops."""
         return {
             "coordinates": f"spanning tree in {self.title}; a joint is a chain of slides, hinges"
             " and balls",
@@ -46,18 +48,18 @@ class TreeEngine(ProjectionEngine):
 
     @abstractmethod
     def model_of(self, case: Case) -> TreeModel:
-        """Return the simulator's model of the case as it stands, at the design position."""
+        """Return the simulator's model of the unscaled case, at the design position."""
 
     def build(self, case: Case) -> TreeModel:
-        """Return the simulator's model of the case in its own frame, at the design position."""
+        """Return the simulator's model of the case in the scaled frame, at the design position."""
         return self.model_of(self.own(case))
 
     def floor(self, case: Case) -> Floor:
-        """Return the floor from all that a pose and its rates ask of the simulator."""
+        """Return the floor from all simulator calls for a pose and its rates."""
         model, least = self.build(case), self.model_of(replace(case, mechanism=LEAST, outputs=()))
         solved = self.solve(model, case, 1e-12)
         n, wanted = len(model.moving), len(model.wanted)
-        # the same Python, the smallest model
+        # the same Python on the smallest model
         least.moving, least.wanted = least.moving * n, least.moving * wanted
         zeros = np.zeros(model.unknowns), np.zeros(least.unknowns)
         pose: dict[str, tuple[Call, Call, int]] = {

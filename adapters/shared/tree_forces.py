@@ -1,8 +1,8 @@
 """Forces in a tree of links: inverse dynamics of the simulator, rows and force elements on its
 bodies; see `tree_reactions`.
 
-In a model that gives forces every body of the mechanism is a body of the simulator: a fixed joint
-closes a loop of a free body. So the simulator's recursion and rows tell the bodies apart.
+In a model with forces, every body of the mechanism is a body of the simulator: a fixed joint closes
+a loop of a free body. So the simulator's recursion and rows distinguish the bodies.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ from .tree_reactions import (
     of_relations,
 )
 
-# For simulators that refuse bodies without mass: it changes no force, and its inverse is finite.
+# Mass for simulators that refuse massless bodies: it changes no force, and its inverse is finite.
 NO_MASS = 1e-100
 
 
 class LoadedTree(Protocol):
-    """Needs of forces from a model; see `tree_model.TreeModel`.
+    """Members of a model that the forces need; see `tree_model.TreeModel`.
 
     Attributes:
         parents: number of the carrier of each body.
@@ -65,7 +65,7 @@ class LoadedTree(Protocol):
         ...
 
     def exerted(self) -> Sequence[RowWrench]:
-        """Return the wrenches of multipliers of rows between bodies."""
+        """Return the wrenches of unit multipliers of rows between bodies."""
         ...
 
     def rows_of(self, joint: str) -> Sequence[slice]:
@@ -90,7 +90,7 @@ class Mass:
 
 
 class TreeForces:
-    """Frames of joints, masses and force elements of a model, and the forces by them."""
+    """Frames of joints, masses and force elements of a model, and their forces."""
 
     def __init__(self, model: LoadedTree) -> None:
         self.model, mechanism = model, model.case.mechanism
@@ -129,7 +129,7 @@ class TreeForces:
 
     @cached_property
     def sites(self) -> list[Site]:
-        """The wanted joints."""
+        """Return the requested joints."""
         model, found = self.model, list[Site]()
         for name, frame in self.points.items():
             joint = model.case.mechanism.joint(name)
@@ -143,7 +143,7 @@ class TreeForces:
 
     @cached_property
     def shares(self) -> Mapping[str, Sequence[tuple[int, str]]]:
-        """The rows and freedoms of each joint's coordinates."""
+        """Return the rows and freedoms of each joint's coordinates."""
         return of_relations(self.model.case.mechanism, self.model.coordinate_rows())
 
     def dynamics(self, v: Array, a: Array) -> Dynamics:
@@ -172,8 +172,8 @@ class TreeForces:
         return Dynamics(demand, reactions, amounts)
 
     def _passed_on(self, bodies: int) -> Callable[[int, Array], Array]:
-        """Return what gives the wrench that the joint of a body passes on, about a point: the
-        simulator's own recursion, or else Newton and Euler from the simulator's accelerations.
+        """Return the function for the wrench that the joint of a body transmits, about a point: the
+        simulator's recursion, or else Newton and Euler with the simulator's accelerations.
         """
         if self.model.recursion:
             return self.model.passed_on
@@ -190,7 +190,7 @@ class TreeForces:
 
 
 def demand_of(body: Body, frame: Any, gravity: Array) -> Array:
-    """Return m (a - g) over I wdot + w x I w, about the centre of mass, the place of the frame."""
+    """Return m (a - g) over I wdot + w x I w about the centre of mass, where the frame is."""
     force = body.mass * (frame.acceleration[:3] - gravity)
     if body.inertia is None:
         return np.concatenate([force, np.zeros(3)])
@@ -200,8 +200,8 @@ def demand_of(body: Body, frame: Any, gravity: Array) -> Array:
 
 
 def mass_properties(body: Body, origin: Array) -> tuple[float, Array, Array]:
-    """Return mass, centre of mass from an origin, and inertia about that centre, shape (3, 3), at
-    design.
+    """Return mass, centre of mass from an origin, and inertia about the centre of mass, shape (3,
+    3), at design.
     """
     center = np.array(body.center_of_mass or body.origin) - origin
     inertia = np.zeros((3, 3)) if body.inertia is None else inertia_matrix(body.inertia)

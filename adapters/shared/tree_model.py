@@ -1,14 +1,14 @@
-"""A mechanism as one tree of slides, hinges and balls, for simulators of generalized coordinates.
+"""A mechanism as one tree of slides, hinges and balls, for simulators with generalized coordinates.
 
 The base owns the spanning tree, the joints as chains of links (`joint_chains`), the conditions of
-loops (`loop_closures`), relations, couplers and drivers. A simulator adds links and frames
-and reports how they move. It knows a body by the number of its link; the ground is
-body 0. The axes of every body are global at design, and its origin is the point of its link there.
+loops (`loop_closures`), relations, couplers and drivers. A simulator adds links and frames and
+reports their motion. It knows a body by the number of its link; the ground is body 0. The axes of
+every body are global at design, and its origin is the point of its link there.
 
-A constructor prepares the simulator's empty model and then calls that of the base, which calls
-`add_link` for every link, parents first, `make_frame` for every frame, and `finish` at last. After
-that the model is solved: `design` and `moved` give configurations q, `place` and `rate` update the
-simulator's data, which `placement`, `slope` and `motion` read, frame by frame.
+A constructor prepares the simulator's empty model and then calls the base constructor, which calls
+`add_link` for every link, parents first, `make_frame` for every frame, and finally `finish`. Then
+the model is solved: `design` and `moved` return configurations q, `place` and `rate` update the
+simulator's data, which `placement`, `slope` and `motion` read frame by frame.
 """
 
 from __future__ import annotations
@@ -39,21 +39,19 @@ from .tree_simulator import TreeSimulator
 
 
 class TreeModel(TreeSimulator):
-    """The mechanism in a simulator; a `ProjectionModel`. Rows: those of joints, then of couplers,
-    then one a driver.
+    """The mechanism in a simulator; a `ProjectionModel`. Order of rows: joints, couplers, drivers.
 
     Attributes:
-        origin: of each body, global at design [m].
+        origin: origin of each body, global at design [m].
         carrier: name of a body of the mechanism -> number of its body here.
         coordinates: joint and freedom -> body moved by this coordinate, and its sign.
-        conditions: all rows, the drivers' last.
-        closures: name of a cut joint -> its rows, in words.
+        conditions: all rows, the rows of drivers last.
+        closures: name of a cut joint -> description of its rows.
         parents: number of the carrier of each body; the ground carries itself.
-        branch_of: joint of the tree -> number of the body that it carries, and minus where that is
-            the joint's first.
-        tied: conditions between frames, their joint and the frames.
-        related: rows of coordinates, and joint, freedom and weight of the terms.
-        forces: None unless outputs of the case read forces.
+        branch_of: joint of the tree -> carried body, and its sign: -1 if it is the joint's first.
+        tied: conditions between frames, with their joint and frames.
+        related: rows of coordinates, with joint, freedom and weight of the terms.
+        forces: None unless outputs of the case use forces.
     """
 
     gives_forces: ClassVar[bool] = True
@@ -109,18 +107,18 @@ class TreeModel(TreeSimulator):
         self.columns = np.eye(ends[-1])[:, ends[-1] - len(mechanism.drivers) :]
         self.reset()
 
-    # what a simulator may do in another way
+    # methods that a simulator may override
 
     def branches(self, mechanism: Mechanism, tree: SpanningTree) -> Iterable[Branch]:
-        """Return the branches in an order of parents before children."""
+        """Return the branches in an order with parents before children."""
         return tree.branches
 
     def close(self, joint: Joint, ends: tuple[Vector, Vector], named: bool) -> None:
         """Add the conditions of a cut joint, by its points on both bodies.
 
         Args:
-            named: whether a driver or coupler names it. Its coordinates, which count the turns,
-                then move a copy of the second body.
+            named: whether a driver or coupler names the joint. Its coordinates, which count the
+                turns, then move a copy of the second body.
         """
         (i, j), closure, copied = self.bodies_of(joint), CLOSURES[type(joint)], ""
         if named:
@@ -132,10 +130,10 @@ class TreeModel(TreeSimulator):
         self.conditions += conditions
         self.tied += [(joint.name, each, (i_frame, j_frame)) for each in conditions]
 
-    # the base's own
+    # methods of the base
 
     def _named(self, mechanism: Mechanism) -> set[str]:
-        """Return the joints whose coordinates count: driven, coupled, and of torsional springs."""
+        """Return the joints whose coordinates are used: driven, coupled, with torsional springs."""
         found = {name for coupler in mechanism.couplers for name in coupler.joints}
         found |= {each.joint for each in mechanism.drivers if isinstance(each, JointDriver)}
         springs = mechanism.forces if self.loaded else ()
@@ -149,7 +147,7 @@ class TreeModel(TreeSimulator):
         """Add the links of a branch."""
         at, joint = self.carrier[branch.parent], branch.joint
         if joint is None:
-            # a body that turns about its middle is predicted best by a tangent
+            # a tangent predicts a body best that turns about its middle
             x, y, z = middle(mechanism, mechanism.body(branch.child)).tolist()
             self.carrier[branch.child] = self.add_links(at, free((x, y, z)))
         else:
@@ -161,7 +159,7 @@ class TreeModel(TreeSimulator):
     def add_joint(self, at: int, joint: Joint, P: Vector, sign: int) -> int:
         """Add the links and the relations of a joint on a body; return the number of the last body.
 
-        The chain begins at the joint's first body, or with sign -1 at its second.
+        The chain begins at the joint's first body, or for sign -1 at its second.
         """
         at = self.add_links(at, CHAINS[type(joint)](joint, P), joint.name, sign)
         for relation in relations(joint):
@@ -214,14 +212,14 @@ class TreeModel(TreeSimulator):
         self.q = self.moved(dx)
 
     def observe(self) -> None:
-        """Ask the simulator for the poses and Jacobians of all frames in conditions, at q."""
+        """Read the poses and Jacobians of all frames in conditions from the simulator, at q."""
         self.place()
         for frame in self.moving:
             frame.position, frame.rotation = self.placement(frame.handle)
             frame.jacobian = self.slope(frame.handle)
 
     def observe_rates(self, v: Array) -> None:
-        """Ask the simulator for their velocities at v and their Jdot v, at the q last placed."""
+        """Read the frames' velocities at v and Jdot v from the simulator, at the q last placed."""
         self.v = v
         self.rate(v, np.zeros_like(v))
         for frame in self.moving:
@@ -275,7 +273,7 @@ class TreeModel(TreeSimulator):
         return self.slices[self.conditions.index(condition)]
 
     def exerted(self) -> list[RowWrench]:
-        """Return the wrenches of multipliers of conditions between frames."""
+        """Return the wrenches of unit multipliers of conditions between frames."""
         found = [
             RowWrench(self._rows(condition), frame.body, frame.position, wrenches)
             for _, condition, frames in self.tied

@@ -1,9 +1,9 @@
 """Reactions of the joints of a tree whose loops are closed by rows.
 
-A simulator's recursion gives the wrench that a joint of the tree passes on to all that it carries.
-Rows, drivers, couplers and force elements act on what is carried too: their wrenches are taken from
-it. A cut joint exerts the wrenches of its own rows. What drivers and couplers do along a joint's
-coordinate is no part of its reaction.
+A simulator's recursion gives the wrench that a joint of the tree transmits to all carried bodies.
+Rows, drivers, couplers and force elements also act on the carried bodies, so their wrenches are
+subtracted. A cut joint exerts the wrenches of its own rows. Forces of drivers and couplers along a
+joint's coordinate do not belong to its reaction.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from .frame_constraints import Frame, skew
 
 @dataclass(frozen=True, eq=False)
 class RowWrench:
-    """Wrenches on a body by multipliers of one.
+    """Wrenches of unit multipliers on a body.
 
     Attributes:
-        rows: their places.
+        rows: indices of the rows.
         body: number of the body.
-        point: of it, global.
-        wrenches: of each row, force over moment about the point, shape (rows, 6).
+        point: point of the body, global.
+        wrenches: wrench of each row, force over moment about the point, shape (rows, 6).
     """
 
     rows: slice
@@ -43,8 +43,8 @@ class Carried:
     """A joint of the tree.
 
     Attributes:
-        bodies: numbers of all carried bodies, its own first.
-        sign: minus where that body is the joint's first.
+        bodies: numbers of all carried bodies, the joint's body first.
+        sign: minus if this body is the joint's first.
     """
 
     bodies: list[int]
@@ -56,8 +56,8 @@ class Cut:
     """A joint at the closure of a loop.
 
     Attributes:
-        second: number of its second body.
-        rows: its own.
+        second: number of the joint's second body.
+        rows: rows of the joint.
     """
 
     second: int
@@ -66,7 +66,7 @@ class Cut:
 
 @dataclass(frozen=True, eq=False)
 class Site:
-    """A joint whose reaction is wanted, and a frame at its point on its second body."""
+    """A joint whose reaction is requested, and a frame at its point on its second body."""
 
     joint: Joint
     frame: Frame
@@ -76,13 +76,14 @@ class Site:
         self, passed_on: Callable[[int, Array], Array], exerted: Array, loads: Array
     ) -> tuple[Array, Array]:
         """Return the wrench on the second body without multipliers, shape (6,), and its derivative
-        by them, shape (6, rows); the coordinate's share is still in it.
+        by the multipliers, shape (6, rows); both still include the coordinate's share.
 
         Args:
-            passed_on: gives what the joint of a body passes on to it and all that it carries, about
-                a point.
-            exerted: on each body by multipliers of one, about the origin, shape (bodies, 6, rows).
-            loads: of force elements on each body, about the origin, shape (bodies, 6).
+            passed_on: returns the wrench that the joint of a body transmits to it and all carried
+                bodies, about a point.
+            exerted: wrenches of unit multipliers on each body, about the origin, shape (bodies, 6,
+                rows).
+            loads: wrenches of force elements on each body, about the origin, shape (bodies, 6).
         """
         kind, to_point = self.kind, from_origin(self.frame.position)
         if isinstance(kind, Cut):
@@ -108,7 +109,7 @@ def about_origin(point: Array, wrenches: Array) -> Array:
 
 
 def from_origin(point: Array) -> Array:
-    """Return the matrix from wrenches about the origin to those about a point."""
+    """Return the matrix from wrenches about the origin to wrenches about a point."""
     found = np.eye(6)
     found[3:, :3] = -skew(point)
     return found
@@ -126,11 +127,12 @@ def carried_by(body: int, parents: Sequence[int]) -> list[int]:
 def of_relations(
     mechanism: Mechanism, rows: Mapping[int, Sequence[tuple[str, str]]]
 ) -> dict[str, list[tuple[int, str]]]:
-    """Return, by joint, the rows and freedoms of its coordinates that are no part of its reaction.
+    """Return, by joint, the rows and freedoms of its coordinates that do not belong to its
+    reaction.
 
     Args:
-        rows: joint and freedom of the coordinates in each row. A row of one joint alone, with two
-            of them, is the joint's own (a screw).
+        rows: joint and freedom of the coordinates in each row. A row with two coordinates of one
+            joint is the joint's own (a screw).
     """
     found: dict[str, list[tuple[int, str]]] = {joint.name: [] for joint in mechanism.joints}
     for row, terms in rows.items():

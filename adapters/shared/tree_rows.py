@@ -36,7 +36,7 @@ class BodyFrame:
 
     Attributes:
         body: number of the body.
-        handle: of the simulator; None for a frame of the ground, which never moves.
+        handle: the simulator's handle; None for a frame of the ground, which never moves.
     """
 
     body: int
@@ -50,8 +50,8 @@ class BodyFrame:
 
 @dataclass(frozen=True, eq=False)
 class Linear:
-    """A weighted sum of coordinates [m or rad]: a driver's, or zero by a coupler or a joint's own
-    relation.
+    """A weighted sum of coordinates [m or rad]: a driver's value, or zero for a coupler or a
+    joint's own relation.
     """
 
     of: Coordinates
@@ -82,7 +82,7 @@ class Curved:
     """A linear row plus a polynomial in its last coordinate.
 
     Attributes:
-        sign: of the coordinate in the tree.
+        sign: sign of the coordinate in the tree.
     """
 
     linear: Linear
@@ -119,7 +119,7 @@ class DrivenPoint:
 
     @property
     def pull(self) -> Array:
-        """Wrench of a multiplier of one at the point, shape (1, 6)."""
+        """Return the wrench of a unit multiplier at the point, shape (1, 6)."""
         return np.concatenate([self.k, np.zeros(3)])[None]
 
     def rows(self) -> tuple[Any, Array]:
@@ -131,7 +131,7 @@ class DrivenPoint:
 
 def by_frame(condition: Condition, frames: Sequence[BodyFrame]) -> list[Array]:
     """Return the derivative of a condition's rows by the twist of each of its frames at the frame's
-    point, each of shape (rows, 6): what multipliers of one exert there.
+    point, each of shape (rows, 6): the wrenches of unit multipliers.
     """
     kept, found = [frame.jacobian for frame in frames], list[Array]()
     for moved in frames:

@@ -1,4 +1,4 @@
-"""The part of a simulator in a tree of links; see `tree_model`."""
+"""Interface of a simulator of trees of links; see `tree_model`."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ class TreeSimulator(ABC):
 
     Attributes:
         q: the configuration, never changed in place.
-        recursion: whether it gives the wrenches of its joints.
-        computed_by: forces of its own, with its calls.
+        recursion: whether the simulator gives the wrenches of its joints.
+        computed_by: the forces that the simulator computes, with its calls.
     """
 
     q: Array
@@ -28,7 +28,9 @@ class TreeSimulator(ABC):
 
     @abstractmethod
     def add_link(self, parent: int, link: Link, offset: Array) -> None:
-        """Add a body that moves by a link against its parent, at an offset from its origin [m]."""
+        """Add a body that moves by a link relative to its parent, at an offset from the parent's
+        origin [m].
+        """
 
     @abstractmethod
     def make_frame(self, body: int, offset: Array) -> Any:
@@ -38,7 +40,7 @@ class TreeSimulator(ABC):
 
     @abstractmethod
     def finish(self) -> None:
-        """Make the model ready to be solved: no link and no frame follows."""
+        """Finish the model for solving; no link and no frame follows."""
 
     @property
     @abstractmethod
@@ -47,11 +49,11 @@ class TreeSimulator(ABC):
 
     @abstractmethod
     def coordinate(self, body: int) -> tuple[int, int]:
-        """Return the places of a slide's or hinge's coordinate in q and in v."""
+        """Return the indices of a slide's or hinge's coordinate in q and in v."""
 
     @abstractmethod
     def design(self) -> Array:
-        """Return the configuration at design: of slides and hinges, zero."""
+        """Return the configuration at design, zero for slides and hinges."""
 
     @abstractmethod
     def moved(self, dx: Array) -> Array:
@@ -79,28 +81,28 @@ class TreeSimulator(ABC):
 
     @abstractmethod
     def motion(self, handle: Any) -> tuple[Array, Array]:
-        """Return velocity and acceleration of a frame's point, over the angular ones, global axes,
-        each of shape (6,).
+        """Return velocity and acceleration of a frame's point, over the angular velocity and
+        acceleration, global axes, each of shape (6,).
 
-        With no accelerations of the coordinates, the acceleration is Jdot v.
+        Without accelerations of the coordinates, the acceleration is Jdot v.
         """
 
     @abstractmethod
     def set_loads(self, gravity: Vector, masses: Sequence[Mass]) -> None:
-        """Give the bodies their masses, and the others none, and the model its gravity."""
+        """Set the masses of these bodies, zero mass for others, and the gravity of the model."""
 
     @abstractmethod
     def inverse_dynamics(self, v: Array, a: Array) -> Array:
         """Return M a + h at v and a, at the q last placed, shape (unknowns,).
 
-        It leaves velocities and accelerations updated, as `rate` does.
+        It also updates velocities and accelerations, as `rate` does.
         """
 
     def passed_on(self, body: int, point: Array) -> Array:
-        """Return the wrench that a body's joint passes on to it and all that it carries, after
+        """Return the wrench that a body's joint transmits to it and all carried bodies, after
         `inverse_dynamics`: force over moment about a global point, shape (6,).
 
-        Asked for only of a simulator with such a recursion.
+        Only simulators with a recursion implement it.
         """
         raise NotImplementedError
 

@@ -1,1 +1,3 @@
-"""Simbody, by OpenSim's Python package: projection by its kinematics and its own constraints."""
+"""Simbody, through OpenSim's Python package: projection mode with its kinematics and constraints,
+and simulate mode with its assembler.
+"""

@@ -1,8 +1,8 @@
-"""Simbody in simulate mode: the assembler of Simbody, by OpenSim's `AssemblySolver`.
+"""Simbody in simulate mode: Simbody's assembler, through OpenSim's `AssemblySolver`.
 
-At every sample the assembler starts from the pose of the sample before. It minimizes the weighted
-squares of what violates the constraints and of the driven coordinates' distances from their values;
-with as many drivers as degrees of freedom both come to zero. It has no velocities.
+At every sample the assembler starts from the pose of the previous sample. It minimizes the weighted
+squares of the constraint violations and of the driven coordinates' distances from their values;
+with as many drivers as degrees of freedom both become zero. It has no velocities.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from ..shared.joint_equivalents import jointed
 from ..shared.simulation import Leg, SimulatedPose, SimulationEndedError, simulated, start_of
 from .simbody import Simbody, SimbodyModel, opensim
 
-# Of constraints, beside 1 of a driven coordinate. With an infinite weight, which is OpenSim's own,
-# the optimizer refuses mechanisms whose rows are redundant.
+# Weight of constraints; a driven coordinate has weight 1. With OpenSim's default, an infinite
+# weight, the optimizer refuses mechanisms with redundant rows.
 WEIGHT = 1e3
 
 
@@ -31,7 +31,7 @@ class Assembly:
     """Simbody's assembler, pose after pose.
 
     Attributes:
-        accuracy: of the assembler.
+        accuracy: accuracy of the assembler.
     """
 
     accuracy: float = 1e-12
@@ -54,10 +54,10 @@ class Assembly:
         return Simbody().version()
 
     def unsupported(self, case: Case) -> str | None:
-        """Return the joint or driver without a counterpart here, or None."""
+        """Return a message on the joint or driver that is not supported here, or None."""
         for coupler in case.mechanism.couplers:
             if coupler.curve:
-                return f"{coupler}: OpenSim's assembler gets no polynomial from this adapter"
+                return f"{coupler}: this adapter gives OpenSim's assembler no polynomial relations"
         return Simbody().unsupported(case)
 
     def efforts(self) -> Mapping[str, Assembly]:
@@ -65,7 +65,7 @@ class Assembly:
         return {f"accuracy {x:g}": replace(self, accuracy=x) for x in (1e-3, 1e-6, 1e-9, 1e-12)}
 
     def floor(self, case: Case) -> None:
-        """Return None: its iterations are its own."""
+        """Return None: the simulator runs its own iterations."""
 
     def build(self, case: Case) -> _Assembled:
         """Return OpenSim's model and its start."""
@@ -73,12 +73,12 @@ class Assembly:
         return _Assembled(opensim(), case, self.accuracy)
 
     def solve(self, model: _Assembled, case: Case, tol: float) -> Trajectory:
-        """All samples that can be assembled; see `Engine.solve`."""
+        """Solve all samples that can be assembled; see `Engine.solve`."""
         return simulated(case, model.start, model.run, model.details)
 
 
 class _Assembled(SimbodyModel):
-    """The constrained tree, driven by its coordinates."""
+    """The constrained tree with driven coordinates."""
 
     def __init__(self, o: Any, case: Case, accuracy: float) -> None:
         super().__init__(o, case)
@@ -86,8 +86,8 @@ class _Assembled(SimbodyModel):
         joints = [each for each in case.mechanism.drivers if isinstance(each, JointDriver)]
         if len(self.conditions) > len(joints) + (self.state.getNQErr() > 0):
             raise SolveError(
-                f"case {case.name!r}: a joint closes a loop of one body with itself, of which"
-                " Simbody's assembler knows nothing; use the projection mode"
+                f"case {case.name!r}: a joint closes a loop of one body with itself, which"
+                " Simbody's assembler does not support; use the projection mode"
             )
         driven = [self.coordinates[each.joint, each.freedom] for each in joints]
         self.driven = [(self.moves[body - 1].get_coordinates(0), sign) for body, sign in driven]

@@ -1,9 +1,9 @@
 """A mechanism as a tree of bodies in an OpenSim model, with Simbody's constraints to close loops;
 private to its adapter.
 
-The axes of every body are global at design. Names are numbers, because OpenSim ends the process at
-a name with a blank. Its limits of coordinates play no part: they act on its forces and on
-`setValue`, and neither is used.
+The axes of every body are global at design. Names are numbers, because OpenSim aborts the process
+at a name with a space. Limits of coordinates have no effect: they act on forces and on `setValue`,
+and neither is used.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ NO_TURN = (0.0, 0.0, 0.0)
 
 
 class ConstrainedTree(TreeModel):
-    """The OpenSim model of a case: a body and its joint for each link, a constraint for each cut
+    """The OpenSim model of a case: a body with its joint for each link, a constraint for each cut
     joint and each relation.
 
     Attributes:
         o: OpenSim's package.
-        model: OpenSim's model, which owns all the rest.
-        bodies: of OpenSim, by their numbers; the first is the ground.
-        moves: joint of OpenSim under each body after the ground.
+        model: OpenSim's model, which owns all other objects.
+        bodies: OpenSim's bodies by their numbers; the first is the ground.
+        moves: OpenSim's joint of each body after the ground.
         constraints: purpose of each of OpenSim's constraints: the name of a cut joint, or joint and
             freedom of the coordinates of a relation.
     """
@@ -51,7 +51,7 @@ class ConstrainedTree(TreeModel):
         o, number = self.o, len(self.bodies)
         joint = {"slide": o.SliderJoint, "hinge": o.PinJoint, "ball": o.BallJoint}[link.move]
         axes = self.vector(orientation(link.move, link.axis))
-        # kinematics does not depend on masses, but OpenSim asks for them
+        # kinematics does not depend on masses, but OpenSim requires them
         mass = NO_MASS if self.loaded else 1.0
         body = o.Body(f"body_{number}", mass, o.Vec3(0.0), o.Inertia(mass, mass, mass))
         move = joint(
@@ -80,7 +80,7 @@ class ConstrainedTree(TreeModel):
         for relation in relations(joint):
             self.relate(relation)
         if i == j:
-            # OpenSim ends the process at a constraint of a body with itself
+            # OpenSim aborts the process at a constraint of a body with itself
             super().close(joint, ends, named=False)
             return
         o = self.o
@@ -104,7 +104,7 @@ class ConstrainedTree(TreeModel):
         self.closures[joint.name] = constraint.getConcreteClassName() + (moved if links else "")
 
     def relate(self, terms: Terms, curve: Sequence[float] = ()) -> None:
-        if len(terms) == 1 or curve:  # a driver's, or a polynomial
+        if len(terms) == 1 or curve:  # a driver or a polynomial
             super().relate(terms, curve)
             return
         o, coupler = self.o, self.o.CoordinateCouplerConstraint()
@@ -118,13 +118,13 @@ class ConstrainedTree(TreeModel):
         self.constrain(coupler, 1, [(joint, freedom) for joint, freedom, _ in terms])
 
     def constrain(self, constraint: Any, rows: int, keeps: str | list[tuple[str, str]]) -> None:
-        """Add a constraint of so many rows under a name of its own."""
+        """Add a constraint with a number of rows under a unique name."""
         self.constraints.append((rows, keeps))
         constraint.setName(f"constraint_{self.model.getNumConstraints()}")
         self.model.addConstraint(constraint)
 
     def vector(self, a: Iterable[float]) -> Any:
-        """Return a vector as OpenSim takes it."""
+        """Return a vector as OpenSim's type."""
         return self.o.Vec3(*map(float, a))
 
 

@@ -59,7 +59,7 @@ class LoadedSimbody(ConstrainedTree):
 
     @property
     def constraint_rows(self) -> list[tuple[slice, str | list[tuple[str, str]]]]:
-        """The rows and the purpose of each constraint."""
+        """Return the rows and the purpose of each constraint."""
         ends = accumulate((rows for rows, _ in self.constraints), initial=0)
         kept = [keeps for _, keeps in self.constraints]
         return [(slice(*pair), what) for pair, what in zip(pairwise(ends), kept, strict=True)]
@@ -89,8 +89,8 @@ class LoadedSimbody(ConstrainedTree):
         return body.findStationLocationInGround(self.state, self.o.Vec3(0.0)).to_numpy()
 
     def _on_bodies(self, row: int, count: int) -> Array:
-        """Return the wrench of a multiplier of one on each body, shape (bodies, 6): force over
-        moment about its origin.
+        """Return the wrench of a unit multiplier on each body, shape (bodies, 6): force over moment
+        about its origin.
         """
         o, unit = self.o, np.zeros(count)
         unit[row] = 1.0

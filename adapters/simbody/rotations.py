@@ -1,9 +1,9 @@
 """Rotations of ball joints: Euler parameters here, Euler angles in OpenSim.
 
-OpenSim turns Simbody's quaternions off, and its package has no call to turn them on. At a second
-angle of 90 degrees the rates of the other two are infinite (gimbal lock), but the velocities of a
-ball joint in Simbody are its angular velocity and know no lock. So a step turns Euler parameters
-by that velocity, and Simbody gets the angles of the result: no rate of an angle is ever used.
+OpenSim disables Simbody's quaternions, and its package cannot enable them. At a second angle of 90
+degrees the rates of the other two are infinite (gimbal lock), but the velocities of a ball joint in
+Simbody are its angular velocity, which has no lock. So a step rotates Euler parameters by this
+velocity, and Simbody gets the angles of the result: no rate of an angle is used.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ UNTURNED: Parameters = (1.0, 0.0, 0.0, 0.0)
 
 
 def turned(p: Sequence[float], turn: Sequence[float]) -> Parameters:
-    """Return Euler parameters p turned further by a rotation vector in the axes of the parent
-    [rad].
+    """Return Euler parameters p after a further rotation by a rotation vector in the axes of the
+    parent [rad].
     """
     e0, e1, e2, e3 = p
     x, y, z = turn

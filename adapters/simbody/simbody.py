@@ -1,9 +1,9 @@
 """Simbody in projection mode: its joints as a spanning tree, its own constraints to close loops.
 
-The simulator comes with OpenSim's Python package. A cut joint hangs its slides and hinges on its
+The simulator comes with OpenSim's Python package. A cut joint has its slides and hinges on its
 first body (see `joint_chains`); one constraint of Simbody, of a point or of a whole frame, ties
-their end to the second body. A rod is a constant distance, and a coordinate coupler ties two
-coordinates. Residual, Jacobian and bias of these rows are Simbody's; the base adds the drivers.
+their end to the second body. A rod is a constant distance, and a coordinate coupler relates two
+coordinates. Simbody gives residual, Jacobian and bias of these rows; the base adds the drivers.
 """
 
 from __future__ import annotations
@@ -36,7 +36,9 @@ class Simbody(TreeEngine):
 
     @property
     def described(self) -> Mapping[str, Any]:
-        """Coordinates of Simbody's tree and the calls that give the rows of its constraints."""
+        """Return the coordinates of Simbody's tree and the calls that give the rows of its
+        constraints.
+        """
         return {
             "coordinates": (
                 "spanning tree of OpenSim's slider, pin and ball joints; balls keep Euler"
@@ -128,12 +130,12 @@ class Constraints:
 class SimbodyModel(LoadedSimbody):
     """The constrained tree in Simbody's state.
 
-    The configuration q has the coordinates of slides and hinges at the places that Simbody has for
-    them, and Euler parameters at the four places of a ball.
+    The configuration q has the coordinates of slides and hinges at Simbody's indices, and Euler
+    parameters at the four indices of a ball.
 
     Attributes:
-        slots: the number of Simbody's coordinates.
-        balls: places of a ball's coordinates in q and v.
+        slots: number of Simbody's coordinates.
+        balls: indices of each ball's coordinates in q and v.
     """
 
     def finish(self) -> None:
@@ -142,7 +144,7 @@ class SimbodyModel(LoadedSimbody):
         self.state = self.model.initSystem()
         self.matter = self.model.getMatterSubsystem()
         self.slots, n = self.state.getNQ(), self.state.getNU()
-        # every coordinate is given its place as value, and tells it
+        # each value is its index, so that every coordinate reports its index
         self.state.setQ(o.Vector.createFromMat(np.arange(float(self.slots))))
         self.state.setU(o.Vector.createFromMat(np.arange(float(n))))
         first = [move.get_coordinates(0) for move in self.moves]
@@ -192,7 +194,7 @@ class SimbodyModel(LoadedSimbody):
         self.model.realizeVelocity(self.state)
 
     def add_frame(self, body: int, at: Vector) -> Any:
-        # not among the frames of the base, which reads all of each at every pose
+        # separate from the frames of the base, which reads all their data at every pose
         return self.make_frame(body, np.array(at) - self.origin[body])
 
     def make_frame(self, body: int, offset: Array) -> Station:

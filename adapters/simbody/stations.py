@@ -1,7 +1,7 @@
 """Points of Simbody's bodies, read on demand; private to its adapter.
 
-Most of a frame is never asked for: Simbody's constraints need none, a driven point and an output
-need no rotation. Each call into the package costs as much as its work.
+Most data of a frame are never needed: Simbody's constraints use no frame, and a driven point or an
+output uses no rotation. Each call into the package costs as much as its work.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from ...core.trajectory import Array
 
 
 class Solved(Protocol):
-    """A model in Simbody's state; a: accelerations of the coordinates; matrix: for any result."""
+    """A model in Simbody's state; a: accelerations of the coordinates; matrix: for results."""
 
     state: Any
     matter: Any
@@ -30,8 +30,8 @@ class Station:
 
     Attributes:
         body: number of the body.
-        carrier: the body of OpenSim.
-        point: in the axes of the body [m].
+        carrier: OpenSim's body.
+        point: position of the point in the axes of the body [m].
     """
 
     of: Solved

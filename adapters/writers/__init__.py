@@ -1,1 +1,1 @@
-"""Writers: a mechanism in the format of a simulator, one format a file."""
+"""Writers of mechanisms in the formats of simulators, one module per format."""

@@ -1,14 +1,13 @@
-"""A mechanism as a Python script that builds it in Exudyn, of Exudyn's own objects only. Exudyn is
-not needed to write it.
+"""A mechanism as a Python script that builds it in Exudyn, only from Exudyn's own objects. Writing
+needs no Exudyn.
 
-A moving body is a rigid-body node with Euler parameters, at its origin in the case and
-parallel to the global axes at design, because Exudyn measures the angle of a joint from the pose of
-parallel bodies. Joints are Exudyn's, mostly generic ones. Other joints are spelled out
-with further bodies: a constant-velocity joint is four hinges of which two by two turn alike,
-and a cross whose axes a table has rounded off the right angle is a body on two hinges, because a
-generic joint would set them upright. Coordinates tied to one another are measured by relative
-markers. (Rows that follow further unknowns of a Newton loop, as in the adapter of Exudyn, are no
-objects of Exudyn.)
+A moving body is a rigid-body node with Euler parameters, at its origin in the case and parallel to
+the global axes at design, because Exudyn measures the angle of a joint from the pose of parallel
+bodies. Joints are Exudyn's, mostly generic joints. Other joints are expanded with further bodies: a
+constant-velocity joint is four hinges that turn alike in pairs, and a cross whose right angle a
+table has rounded is a body on two hinges, because a generic joint would restore the right angle.
+Relative markers measure coordinates that are related to one another. (The adapter's rows with
+further unknowns are not objects of Exudyn.)
 """
 
 from __future__ import annotations
@@ -32,7 +31,7 @@ from ..shared.poses import Displacement, displacements, frame_along, link_coordi
 from . import exudyn_loads
 from .exudyn_preamble import END, beginning
 
-# Round-off of a right angle between unit vectors; a generic joint leaves as much as a residual.
+# Round-off of a right angle between unit vectors, which a generic joint leaves as a residual.
 RIGHT_ANGLE = 1e-15
 
 GENERIC: Mapping[type[j.Joint], tuple[int, Sequence[int]]] = {
@@ -43,15 +42,15 @@ GENERIC: Mapping[type[j.Joint], tuple[int, Sequence[int]]] = {
     j.ParallelAxes: (2, (0, 0, 0, 1, 1, 0)),
     j.Planar: (2, (0, 0, 1, 1, 1, 0)),
 }
-"""Joints about one axis as generic joints: which axis of the frame is the joint's, and what is
-constrained: x, y, z, about them.
+"""Joints about one axis as generic joints: the axis of the frame that is the joint's axis, and the
+constrained directions: x, y, z, then rotations about them.
 """
 
 
 def write(
     mechanism: Mechanism, way: Mapping[str, BodyMotion], start: Mapping[str, float]
 ) -> Mapping[str, str]:
-    """A .py file; see `Writer`. Initial coordinates are the end of the way.
+    """Return a .py file; see `Writer`. Initial coordinates are the end of the way.
 
     Raises:
         KincheckError: a joint or coupler has no counterpart in Exudyn.
@@ -77,7 +76,7 @@ class _Script:
         self.measured = set[str]()
 
     def text(self, start: Mapping[str, float]) -> str:
-        """The script."""
+        """Return the script."""
         self.lines.append(f"drivers = {dict(start)!r}")
         fixed = [GROUND, *(body.name for body in self.mechanism.bodies if body.fixed)]
         if self.loaded:
@@ -106,7 +105,7 @@ class _Script:
         return beginning(self.loaded) + "\n".join(self.lines) + "\n" + END
 
     def call(self, function: str, *values: Any, **options: Any) -> None:
-        """Add a call as a line."""
+        """Add a line with a call."""
         texts = [
             *map(_text, values),
             *(f"{name}={_text(value)}" for name, value in options.items()),
@@ -114,8 +113,8 @@ class _Script:
         self.lines.append(f"{function}({', '.join(texts)})")
 
     def arm(self, body: str, P: Sequence[float]) -> _Code:
-        """A point of a body, global at design, as Exudyn wants it; fixed bodies are Exudyn's
-        ground.
+        """Return the text of a point, global at design, in Exudyn's coordinates of a body; fixed
+        bodies are Exudyn's ground.
         """
         origin = (
             (0.0, 0.0, 0.0) if self.mechanism.is_fixed(body) else self.mechanism.body(body).origin
@@ -123,8 +122,8 @@ class _Script:
         return _Code(_text([*(vec(P) - vec(origin))]))
 
     def marker(self, body: str, P: Sequence[float], axes: Array | None = None) -> _Code:
-        """A frame on a body, global at design; the columns are its axes, the global ones if none
-        are given.
+        """Return the text of a frame on a body, global at design; the columns are its axes, by
+        default the global axes.
         """
         frame = [] if axes is None else [_text(axes)]
         return _Code(f"({', '.join([repr(body), self.arm(body, P), *frame])})")
@@ -139,8 +138,8 @@ class _Script:
         second: Array | None = None,
         **options: Any,
     ) -> None:
-        """An object of Exudyn between the two bodies of a joint, its frames alike unless another is
-        given for the second.
+        """Add an object of Exudyn between the two bodies of a joint, with equal frames unless the
+        second has another.
         """
         P_i, P_j = ends or ends_of(self.mechanism, joint)
         markers = (
@@ -152,11 +151,11 @@ class _Script:
     def generic(
         self, joint: j.Joint, constrained: Sequence[int], axes: Array | None = None, **options: Any
     ) -> None:
-        """Add a generic joint with these of x, y, z and the turns about them constrained."""
+        """Add a generic joint with constrained directions: x, y, z, then rotations about them."""
         self.add(joint, "ObjectJointGeneric", axes, constrainedAxes=[*constrained], **options)
 
     def joint(self, joint: j.Joint) -> None:
-        """A joint as objects of Exudyn."""
+        """Add a joint as objects of Exudyn."""
         match joint:
             case j.Spherical():
                 self.add(joint, "ObjectJointSpherical")
@@ -175,8 +174,8 @@ class _Script:
             case j.Distance():
                 self.add(joint, "ObjectConnectorDistance", distance=joint.rod_length)
             case j.RevoluteSpherical(points=(hinge, ball), axis=axis):
-                # the link keeps its place along the hinge: where its foot is there, the generic
-                # joint has nothing to keep apart
+                # the link keeps its position along the hinge; if its foot is on the hinge, the
+                # generic joint needs no offset
                 link = vec(ball) - vec(hinge)
                 self.add(joint, "ObjectConnectorDistance", distance=float(np.hypot.reduce([*link])))
                 foot = [*(vec(hinge) + (unit(axis) @ link) * unit(axis))]
@@ -187,7 +186,7 @@ class _Script:
                 self.generic(joint, constrained, frame_along(axis, column))
 
     def load(self, force: ForceElement) -> None:
-        """A force element as an object or load of Exudyn."""
+        """Add a force element as an object or load of Exudyn."""
         options = exudyn_loads.options(force)
         if isinstance(force, SpringDamper):
             ends = map(self.marker, force.bodies, force.points)
@@ -215,7 +214,7 @@ class _Script:
         return {link.name: value for link, value in zip(links, values, strict=True)}
 
     def coordinate(self, name: str, freedom: str) -> str:
-        """The name of a joint's coordinate, which is measured from now on."""
+        """Return the name of a joint's coordinate, and add its measurement."""
         joint: Any = self.mechanism.joint(name)
         known = f"{name}.{freedom}"
         if known not in self.measured:
@@ -227,7 +226,7 @@ class _Script:
 
 
 class _Code(str):
-    """Text of code."""
+    """Text that is code."""
 
 
 def _text(value: Any) -> str:
@@ -242,7 +241,9 @@ def _text(value: Any) -> str:
 def _spelled_out(
     mechanism: Mechanism, way: Mapping[str, BodyMotion]
 ) -> tuple[Mechanism, Mapping[str, BodyMotion]]:
-    """The mechanism and its way with joints unknown to Exudyn as hinges between further bodies."""
+    """Return the mechanism and its way, with joints unknown to Exudyn as hinges between further
+    bodies.
+    """
     placed, way = displacements(mechanism, way), dict(way)
     bodies, joints, couplers = [*mechanism.bodies], list[j.Joint](), [*mechanism.couplers]
     for joint in mechanism.joints:

@@ -19,8 +19,8 @@ from . import loads
 
 
 def inertial(body: Body) -> tuple[float, list[float], list[float]]:
-    """Return mass, centre of mass and inertia of a body, from its origin and parallel to the global
-    axes at design; Exudyn has the product yz first.
+    """Return mass, centre of mass and inertia of a body, relative to its origin and parallel to the
+    global axes at design; Exudyn puts the product yz first.
     """
     xx, yy, zz, xy, xz, yz = loads.six(loads.inertia_at_origin(body))
     center = np.subtract(loads.center_of(body), body.origin)

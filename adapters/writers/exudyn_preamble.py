@@ -1,10 +1,10 @@
-"""Text of the scripts for Exudyn before and after the lines of a mechanism."""
+"""Text of Exudyn scripts before the lines of a mechanism."""
 
 from . import loads
 
 
 def beginning(loaded: bool) -> str:
-    """Return the functions called by the lines; with masses and force elements if loaded."""
+    """Return the functions that the lines call; with masses and force elements if loaded."""
     masses, body = (loads.LOADED, LOADED_BODY) if loaded else (loads.PLAIN, PLAIN_BODY)
     return BEGINNING.replace("MASSES", masses).replace("BODY", body)
 

@@ -1,10 +1,10 @@
-"""A mechanism as formats of single links have it: a tree of links, ties that close its loops, and
+"""A mechanism for formats with single links: a tree of links, ties that close its loops, and
 relations of coordinates.
 
-Every joint is a chain of slides, hinges and balls (see `joint_chains`), on auxiliary links where it
-has more than one. A joint that closes a loop hangs its chain on its first body, and a tie of one
-point or of a whole frame binds the end to its second body. Coordinates have the sense of the
-joint's: a chain from the second body to the first has its axes reversed.
+Every joint is a chain of slides, hinges and balls (see `joint_chains`), with auxiliary links
+between several. A joint that closes a loop has its chain on its first body, and a tie of one point
+or of a whole frame connects the end to its second body. Coordinates have the sense of the joint's
+coordinates: a chain from the second body to the first has reversed axes.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ class Hung:
     """A joint of the tree: how a link moves on its parent.
 
     Attributes:
-        axis: global at design [-]; without meaning but for a slide and a hinge.
-        point: of the joint, global at design [m].
+        axis: unit vector, global at design [-]; only used by a slide and a hinge.
+        point: point of the joint, global at design [m].
     """
 
     name: str
@@ -42,11 +42,11 @@ class Hung:
 
 @dataclass(frozen=True)
 class Tie:
-    """What closes a loop: one point of two links, or with `whole` their frames, stay together; with
-    a length, two points stay apart by it [m].
+    """A loop closure: one point of two links, or with `whole` their frames, coincide; with a
+    length, two points keep this distance [m].
 
     Attributes:
-        points: on the first and the second link, global at design [m].
+        points: points on the first and the second link, global at design [m].
     """
 
     name: str
@@ -58,11 +58,11 @@ class Tie:
 
 @dataclass(frozen=True)
 class Tree:
-    """All that a format writes of a mechanism but its masses and points.
+    """The parts of a mechanism for a format, except masses and points.
 
     Attributes:
-        frames: of all links at design, parents before children; an auxiliary one is parallel to
-            the global axes.
+        frames: frames of all links at design, parents before children; an auxiliary frame is
+            parallel to the global axes.
         relations: name, and weights by coordinate: the weighted sum stays zero.
         curves: name, driven and driving coordinate, and the polynomial's coefficients, the constant
             first.
@@ -136,7 +136,7 @@ def _hang(
     *,
     forward: bool = True,
 ) -> str:
-    """Hang a chain on a parent, with a body at its end or auxiliary links alone; return the name of
+    """Add a chain to a parent, with a body at its end or only auxiliary links; return the name of
     the last link.
     """
     chain = [*zip(link_names(joint.name, links), links, strict=True)]

@@ -1,4 +1,4 @@
-"""Masses and loads as model files have them; small numbers stand in for missing masses."""
+"""Masses and loads for model files; small numbers replace missing masses."""
 
 from __future__ import annotations
 
@@ -11,14 +11,16 @@ from ...core.mechanism.mechanism import Mechanism, Vector
 from ...core.trajectory import Array
 from ..shared.poses import direction
 
-# Simulators want a mass and an inertia of every body that moves [kg, kg m^2].
+# Simulators require mass and inertia of every moving body [kg, kg m^2].
 STAND_IN = 1e-6
-PLAIN = "Masses and inertias stand in for missing ones."
-LOADED = f"Masses are in kg; {STAND_IN:g} kg and {STAND_IN:g} kg m^2 stand in for missing ones."
+PLAIN = "Masses and inertias are placeholders."
+LOADED = (
+    f"Masses are in kg; {STAND_IN:g} kg and {STAND_IN:g} kg m^2 are placeholders for missing ones."
+)
 
 
 def mass_of(body: Body) -> float:
-    """Return the mass of a body, or the number in its place [kg]."""
+    """Return the mass of a body, or its placeholder [kg]."""
     return body.mass or STAND_IN
 
 
@@ -56,11 +58,11 @@ def inertia_at_origin(body: Body) -> Array:
 
 
 def left_out(mechanism: Mechanism, names: Collection[str], gravity: bool) -> str:
-    """Return a sentence on the loads without a place in a format.
+    """Return a sentence on the loads that a format cannot hold.
 
     Args:
         names: force elements in the file.
-        gravity: whether the file has it.
+        gravity: whether the file has gravity.
     """
     missing = [str(each) for each in mechanism.forces if each.name not in names]
     if any(mechanism.gravity) and not gravity:

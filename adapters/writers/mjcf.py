@@ -1,5 +1,5 @@
-"""A mechanism as MJCF, the XML of MuJoCo. MuJoCo is not needed to write it, and its own writer
-would keep six digits.
+"""A mechanism as MJCF, the XML of MuJoCo. Writing needs no MuJoCo, whose own writer keeps only six
+digits.
 
 A body is a <body> with its frame in the case. A joint is a chain of MuJoCo joints (see
 `joint_chains`), in the tree or, if it closes a loop, on an auxiliary body tied to the second
@@ -46,14 +46,14 @@ NOTE = (
     " Written by kincheck. Lengths are in m, angles in rad. {} Drivers are not part of the model:"
     " the keyframe is consistent with the driver values under custom.{} "
 )
-PLAIN = "Masses, inertias and armatures stand in for missing ones."
+PLAIN = "Masses, inertias and armatures are placeholders."
 LOADED = f"{loads.LOADED} Coordinates have an armature of {loads.STAND_IN:g}."
 
 
 def write(
     mechanism: Mechanism, way: Mapping[str, BodyMotion], start: Mapping[str, float]
 ) -> Mapping[str, str]:
-    """An .xml file; see `Writer`. The keyframe "start" is the end of the way.
+    """Return an .xml file; see `Writer`. The keyframe "start" is the end of the way.
 
     Raises:
         KincheckError: a joint has no counterpart in MJCF, or a name cannot be used there.
@@ -79,22 +79,24 @@ class _Model:
         ET.SubElement(self.root, "compiler", angle="radian")
         gravity = numbers(mechanism.gravity) if self.loaded else "0 0 0"
         ET.SubElement(self.root, "option", gravity=gravity)
-        # an inertia of each coordinate alone: hinges in line would leave the mass matrix near to
+        # an inertia of each coordinate alone: otherwise hinges in line make the mass matrix nearly
         # singular
         armature = numbers([loads.STAND_IN]) if self.loaded else "1"
         ET.SubElement(ET.SubElement(self.root, "default"), "joint", armature=armature)
         self.custom = ET.SubElement(self.root, "custom")
-        if not self.loaded:  # for the reader: the masses below are none
+        if not self.loaded:  # for the reader: the masses below are placeholders
             ET.SubElement(self.custom, "text", name=STAND_INS, data="masses")
         self.elements = {GROUND: ET.SubElement(self.root, "worldbody")}
         self.tendons, self.equalities = (
             ET.SubElement(self.root, "tendon"),
             ET.SubElement(self.root, "equality"),
         )
-        self.frames = {GROUND: Body(GROUND)}  # at design, of all that has an element
+        self.frames = {GROUND: Body(GROUND)}  # design frames of everything with an element
         self.qpos: dict[str, Sequence[float]] = {}
-        self.coordinates: dict[tuple[str, str], str] = {}  # their names, by joint and freedom
-        # of a joint's coordinates: minus where they move the joint's first body
+        self.coordinates: dict[
+            tuple[str, str], str
+        ] = {}  # names of coordinates, by joint and freedom
+        # sign of a joint's coordinates: minus if they move the joint's first body
         self.signs: dict[str, float] = {}
         for body in mechanism.bodies:
             if body.fixed:
@@ -126,11 +128,10 @@ class _Model:
         )
 
     def text(self, start: Mapping[str, float]) -> str:
-        """The document, with a consistent start."""
+        """Return the document, with a consistent start."""
         for driver, value in start.items():
             ET.SubElement(self.custom, "numeric", name=driver, data=numbers([value]))
-        # MuJoCo numbers its coordinates in the order of the document; the joint among the defaults
-        # has no name
+        # MuJoCo numbers coordinates in document order; the joint among the defaults has no name
         names = [
             each.get("name", "") for each in self.root.iter() if each.tag in ("joint", "freejoint")
         ]
@@ -163,7 +164,7 @@ class _Model:
     def add_site(
         self, name: str, body: str, position: Sequence[float], aligned: bool = False
     ) -> str:
-        """A site of a body, parallel to it, or to the global axes at design."""
+        """Add a site to a body, parallel to the body, or to the global axes at design."""
         frame = self.frames[body]
         turned = {"quat": numbers(attitude(frame).conjugate())} if aligned else {}
         ET.SubElement(
@@ -200,7 +201,7 @@ class _Model:
             if link.move == "ball":  # in the axes of the body that it carries
                 self.qpos[name] = value[0], *rotated(attitude(frame).conjugate(), vec(value[1:]))
             self.coordinates[joint.name, link.name] = name
-        # it is that of all the joint's coordinates, so their relations need none
+        # all coordinates of the joint have the same sign, so their relations need none
         self.signs[joint.name] = sign
         for relation in relations(joint):
             self.relate(relation)
@@ -209,7 +210,7 @@ class _Model:
         """Express a joint of a closed loop by an equality."""
         if isinstance(joint, Distance):
             self.add_tendon(joint.name, joint.bodies, joint.points)
-            # its length may change by the constant of the polynomial, since design
+            # the constant of the polynomial is the change of length since design
             change = numbers([joint.rod_length - joint.design_distance, 0, 0, 0, 0])
             ET.SubElement(self.equalities, "tendon", tendon1=joint.name, polycoef=change)
             return
@@ -257,7 +258,7 @@ class _Model:
     def add_ends(
         self, name: str, bodies: Sequence[str], points: Sequence[Sequence[float]]
     ) -> list[str]:
-        """Add a site at either end of a loop closure or spring; return their names."""
+        """Add a site at both ends of a loop closure or spring; return their names."""
         ends = zip(("first", "second"), bodies, points, strict=True)
         return [
             self.add_site(f"{name}.{which}", body, point, aligned=True)
@@ -279,6 +280,6 @@ class _Model:
         self.follow(one, other, polynomial_in_tree(weight, coupler.curve, *signs))
 
     def follow(self, one: str, other: str, coefficients: Sequence[float]) -> None:
-        """Keep a coordinate at a polynomial of another, the constant first."""
+        """Keep a coordinate at a polynomial of another; the constant is the first coefficient."""
         polynomial = numbers([*coefficients, 0, 0, 0, 0][:5])
         ET.SubElement(self.equalities, "joint", joint1=one, joint2=other, polycoef=polynomial)

@@ -1,11 +1,10 @@
 """A mechanism as .osim, the XML of OpenSim, whose simulator is Simbody.
 
-The file has no state of velocities and its ball joints lock at a right angle, so the model is
-written in the pose of its start: there all coordinates are zero. A body has the frame that the case
-gives it. Loops are closed by Simbody's constraints of a point, a distance or a whole frame;
-coordinate couplers tie coordinates to one another, by a factor or a polynomial. Spring-dampers are
-forces of OpenSim. Names of OpenSim are parts of paths: what has
-another meaning there becomes an underscore.
+The format has no velocities, and its ball joints lock at a right angle, so the model is written in
+its start pose, where all coordinates are zero. A body has its frame of the case. Loops are closed
+by Simbody's constraints of a point, a distance or a whole frame; coordinate couplers relate
+coordinates to one another by a factor or a polynomial. Spring-dampers are forces of OpenSim. Names
+in OpenSim are parts of paths: an underscore replaces characters with a meaning in paths.
 """
 
 from __future__ import annotations
@@ -41,7 +40,7 @@ KINDS = {
     "free": "FreeJoint",
 }
 NONE = (0.0, 0.0, 0.0)
-# A joint's coordinates in the order of OpenSim.
+# Coordinates of a joint in OpenSim's order.
 COORDINATES = {
     "slide": [""],
     "hinge": [""],
@@ -54,7 +53,7 @@ COORDINATES = {
 def write(
     mechanism: Mechanism, way: Mapping[str, BodyMotion], start: Mapping[str, float]
 ) -> Mapping[str, str]:
-    """An .osim file in the pose at the end of the way; see `Writer`.
+    """Return an .osim file in the pose at the end of the way; see `Writer`.
 
     Raises:
         KincheckError: a joint has no counterpart here, or a name cannot be used.
@@ -129,13 +128,15 @@ class _Model:
         element = ET.SubElement(bodies, "Body", name=_name(body.name))
         _text(element, "mass", numbers([loads.mass_of(body)]))
         _text(element, "mass_center", numbers(local(body, loads.center_of(body))))
-        # what stands in is the same in all axes, and remains so without rounding
+        # a placeholder is the same in all axes, so the frame does not matter
         matrix = loads.inertia_of(body) if body.inertia is None else loads.own_inertia(body)
         xx, yy, zz, xy, yz, xz = loads.six(matrix)
         _text(element, "inertia", numbers([xx, yy, zz, xy, xz, yz]))
 
     def add_joint(self, joints: ET.Element, joint: Hung) -> None:
-        """Add a joint between a frame of the parent and one of the child, in one place at zero."""
+        """Add a joint between a frame of the parent and a frame of the child, which coincide at
+        zero.
+        """
         element = ET.SubElement(joints, KINDS[joint.move], name=_name(joint.name))
         _text(element, "socket_parent_frame", "parent")
         _text(element, "socket_child_frame", "child")
@@ -190,7 +191,7 @@ class _Model:
             stiffness, length, damping = (
                 numbers([each]) for each in (force.stiffness, force.free_length, force.damping)
             )
-            # what pulls the points together is positive
+            # a force that pulls the points together is positive
             _text(element, "expression", f"{stiffness}*(d-{length})+{damping}*ddot")
             return True
         if isinstance(force, TorsionSpringDamper):
@@ -220,7 +221,7 @@ class _Model:
 
 
 def _turns(angles: Vector) -> Quat:
-    """Return the rotation of successive turns about x, y and z."""
+    """Return the rotation of successive rotations about x, y and z."""
     x, y, z = (
         about(vec(axis), angle) for axis, angle in zip(np.eye(3).tolist(), angles, strict=True)
     )

@@ -1,10 +1,10 @@
-"""A mechanism as SDF, with what Drake reads of it: its tree, ball constraints that close the loops,
-and joints that mimic others.
+"""A mechanism as SDF for Drake: a tree, ball constraints that close the loops, and joints that
+mimic others.
 
-SDF has no state, so the model is written in the pose of its start: there all joints are at zero. A
-link has the frame that the case gives its body; spring-dampers are Drake's. Drake's ball constraint
-is the only tie that its parser knows: a frame is tied by three points, a rod is a link between a
-cross and a ball. Drake has constraints in discrete plants only.
+SDF has no state, so the model is written in its start pose, where all joints are at zero. A link
+has the frame of its body in the case; spring-dampers are Drake's. Drake's parser reads only ball
+constraints: three of them tie a frame, and a rod is a link between a cross and a ball. Drake
+supports constraints only in discrete plants.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ DRAKE = "http://drake.mit.edu"
 def write(
     mechanism: Mechanism, way: Mapping[str, BodyMotion], start: Mapping[str, float]
 ) -> Mapping[str, str]:
-    """An .sdf file in the pose at the end of the way; see `Writer`.
+    """Return an .sdf file in the pose at the end of the way; see `Writer`.
 
     Raises:
         KincheckError: a joint has no counterpart here, or a name cannot be used.
@@ -77,7 +77,7 @@ class _Model:
         for tie in self.tree.ties:
             if tie.length is not None:
                 self.add_rod(tie)
-        # Drake has no ball constraint with the world itself
+        # Drake has no ball constraint with the world body
         self.tree.frames[GROUND] = Body(GROUND)
         self.tree.joints.append(Hung(f"{GROUND}.fixed", "fixed", WORLD, GROUND, (0.0, 0.0, 0.0)))
         for frame in self.tree.frames.values():
@@ -97,15 +97,13 @@ class _Model:
         self.sprung = {each.name for each in mechanism.forces if self.add_spring(each)}
 
     def size(self) -> float:
-        """Return the largest distance of joints along an axis, or 1 m where all are in one
-        place.
-        """
+        """Return the largest distance of joints along an axis, or 1 m if all are in one place."""
         points = np.array([P for tie in self.tree.ties for P in tie.points] or [(0.0, 0.0, 0.0)])
         places = np.array([each.point for each in self.tree.joints])
         return float(np.ptp(np.concatenate([points, places]), axis=0).max()) or 1.0
 
     def add_rod(self, tie: Tie) -> None:
-        """Hang a link on a cross at the first point of a rod, its end tied to the second."""
+        """Add a link on a cross at the first point of a rod; tie its end to the second point."""
         (i, j), (P, Q), length = tie.links, tie.points, tie.length
         assert length is not None
         along = np.array([*unit([b - a for a, b in zip(P, Q, strict=True)])])
@@ -127,7 +125,7 @@ class _Model:
         _text(inertial, "mass", numbers([loads.mass_of(body)]))
         inertia = ET.SubElement(inertial, "inertia")
         entries = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
-        # what stands in is the same in all axes, and remains so without rounding
+        # a placeholder is the same in all axes, so the frame does not matter
         matrix = loads.inertia_of(body) if body.inertia is None else loads.own_inertia(body)
         for entry, value in zip(entries, loads.six(matrix), strict=True):
             _text(inertia, entry, numbers([value]))
@@ -155,11 +153,11 @@ class _Model:
             _text(limit, "upper", "inf")
 
     def joint_name(self, name: str) -> str:
-        """Return the name of a joint, which in SDF must not be that of a link."""
+        """Return the name of a joint, which in SDF must differ from the names of links."""
         return f"{name}.joint" if name in self.tree.frames else name
 
     def add_tie(self, tie: Tie, arm: float) -> None:
-        """Add ball constraints: at the point, and for a whole frame at two further ones."""
+        """Add ball constraints: at the point, and for a whole frame at two further points."""
         arms = np.concatenate([np.zeros((1, 3)), arm * np.eye(3)[:2]]) if tie.whole else [(0,) * 3]
         for k, offset in enumerate(np.array(arms)):
             element = ET.SubElement(
@@ -175,7 +173,9 @@ class _Model:
     def add_spring(self, force: ForceElement) -> bool:
         """Add a spring-damper; return whether Drake has it."""
         if isinstance(force, SpringDamper):
-            assert force.free_length is not None  # a spring without one has that of design
+            assert (
+                force.free_length is not None
+            )  # a spring without a free length has its design length
             if force.free_length <= 0.0:  # Drake refuses it
                 return False
             element = ET.SubElement(self.model, SPRING, name=force.name)

@@ -1,12 +1,11 @@
-"""A mechanism as URDF, which knows trees only, and beside it a JSON file of the conditions of
-its loops.
+"""A mechanism as URDF, which only has trees, with a JSON file of the conditions of its loops.
 
-Every link is parallel to the global axes at design, so axes and arms are the case's numbers, and
-has its origin in its joint's point. A joint is a chain of URDF's revolute and prismatic joints (see
-`joint_chains`). URDF has no ball joint; three hinges would lock at a quarter turn, so a body
-without a chain free of balls floats, and its joints are conditions (see `loop_closures`). Hinges
-are "revolute", not "continuous", with limits beyond all reach: their coordinate is then the angle
-itself, which counts turns.
+Every link is parallel to the global axes at design, so axes and arms are the numbers of the case;
+its origin is the point of its joint. A joint is a chain of URDF's revolute and prismatic joints
+(see `joint_chains`). URDF has no ball joint, and three hinges would lock at a quarter turn, so a
+body that every chain connects by a ball floats, and its joints are conditions (see
+`loop_closures`). Hinges are "revolute" with very large limits, not "continuous": their coordinate
+is then the angle including full turns.
 """
 
 from __future__ import annotations
@@ -59,11 +58,11 @@ FAR = {"lower": "-1e9", "upper": "1e9", "effort": "1e9", "velocity": "1e9"}
 def write(
     mechanism: Mechanism, way: Mapping[str, BodyMotion], start: Mapping[str, float]
 ) -> Mapping[str, str]:
-    """A .urdf file and a .constraints.json beside it, with a consistent start at the end of the
+    """Return a .urdf file and a .constraints.json file, with a consistent start at the end of the
     way; see `Writer`.
 
-    Points of links are in the link's axes, as in URDF. Coordinates of the start go by the name of
-    the joint, neutral at design.
+    Points of links are in the link's axes, as in URDF. Coordinates of the start are listed by joint
+    name, and are neutral at design.
 
     Raises:
         KincheckError: a joint has no counterpart here, or a name cannot be used.
@@ -89,7 +88,7 @@ def write(
 
 
 def _json(table: Mapping[str, Any]) -> str:
-    """Return JSON text with an entry a line."""
+    """Return JSON text with one entry per line."""
 
     def lines(value: Any) -> str:
         if isinstance(value, dict):
@@ -117,16 +116,14 @@ def _json(table: Mapping[str, Any]) -> str:
 
 @dataclass(frozen=True)
 class _End:
-    """A point of a link, in the link's axes [m]; stands in for a frame, of which a condition keeps
-    what it needs.
-    """
+    """A point of a link, in the link's axes [m]; it replaces the frame of a condition."""
 
     link: str
     point: list[float]
 
 
 class _Model:
-    """The document and the file beside it during their construction."""
+    """The document and the constraints file during their construction."""
 
     def __init__(self, mechanism: Mechanism, way: Mapping[str, BodyMotion]) -> None:
         self.mechanism, self.way, self.placed = mechanism, way, displacements(mechanism, way)
@@ -135,9 +132,9 @@ class _Model:
         if mechanism.has_loads:
             note = ("masses are in kg", loads.left_out(mechanism, (), False))
         self.root.append(ET.Comment(NOTE.format(*note)))
-        self.origin: dict[str, Vector] = {}  # of links, global at design
+        self.origin: dict[str, Vector] = {}  # origins of links, global at design
         self.q: dict[str, list[float]] = {}
-        # name and sign, by joint and freedom
+        # name and sign of coordinates, by joint and freedom
         self.coordinates: dict[tuple[str, str], tuple[str, float]] = {}
         self.constraints: list[dict[str, Any]] = []
         self.add_link(GROUND, (0.0, 0.0, 0.0))
@@ -167,22 +164,22 @@ class _Model:
                 self.weigh(body)
 
     def links(self, joint: Joint) -> list[Link] | None:
-        """A joint's chain, from its first body to its second; None if it has a ball or is
-        none.
+        """Return a joint's chain, from its first body to its second; None if there is none or it
+        has a ball.
         """
         chain = CHAINS.get(type(joint))
         links = chain and chain(joint, ends_of(self.mechanism, joint)[0])
         return None if links is None or any(link.move == "ball" for link in links) else links
 
     def add_link(self, name: str, origin: Vector) -> ET.Element:
-        """A link with its origin there, global at design."""
+        """Add a link with its origin at a position, global at design."""
         self.origin[name] = origin
         return ET.SubElement(self.root, "link", name=name)
 
     def attach(
         self, link: str, parent: str, origin: Vector, joint: str, kind: str = "fixed"
     ) -> ET.Element:
-        """A new link on another one, by one of URDF's joints."""
+        """Add a link on another link, with one of URDF's joints."""
         self.add_link(link, origin)
         element = ET.SubElement(self.root, "joint", name=joint, type=kind)
         ET.SubElement(element, "parent", link=parent)
@@ -191,7 +188,7 @@ class _Model:
         return element
 
     def weigh(self, body: Body) -> None:
-        """Give a body's link its mass; a point mass has no inertia."""
+        """Set the mass of a body's link; a point mass has no inertia."""
         link = next(each for each in self.root.iter("link") if each.get("name") == body.name)
         inertial = ET.Element("inertial")
         link.insert(0, inertial)
@@ -202,7 +199,7 @@ class _Model:
         ET.SubElement(inertial, "inertia", dict(zip(ENTRIES, values, strict=True)))
 
     def arm(self, link: str, P: Sequence[float]) -> list[float]:
-        """A point of a link, from its place at design."""
+        """Return a point of a link from its design position."""
         return [*(vec(P) - vec(self.origin[link]))]
 
     def add_free(self, body: Body) -> None:
@@ -213,7 +210,7 @@ class _Model:
         self.q[name] = [*(self.way[body.name].r[-1] - body.origin).tolist(), *e, e0]
 
     def carry(self, end: str, joint: Joint, links: Sequence[Link], sign: int = 1) -> None:
-        """A chain to a new link, from the joint's first body on or (sign -1) from its second."""
+        """Add a chain to a new link, from the joint's first body or (sign -1) from its second."""
         at = joint.bodies[sign < 0]
         values = link_coordinates(joint, links, self.placed)
         chain = [*zip(link_names(joint.name, links), links, values, strict=True)][::sign]
@@ -231,13 +228,13 @@ class _Model:
             self.relate(joint.name, relation)
 
     def close(self, joint: Joint, on_copy: bool) -> None:
-        """Add the conditions of a joint outside the tree; if its coordinates must count turns, it
-        moves a copy.
+        """Add the conditions of a joint outside the tree; if its coordinates must count turns, they
+        move a copy of the body.
         """
         (i, j), ends, closing = joint.bodies, ends_of(self.mechanism, joint), CLOSURES[type(joint)]
         if on_copy:
             links = self.links(joint)
-            assert links is not None  # joints that have relations or can be coupled have no ball
+            assert links is not None  # joints with relations or couplers have no ball
             i, closing = f"{joint.name}.copy", CLOSURES[Fixed]
             self.carry(i, joint, links)
         frames = [
@@ -277,7 +274,7 @@ class _Model:
         )
 
     def pose(self, body: Body) -> dict[str, Any]:
-        """A body's frame in its link."""
+        """Return a body's frame in its link."""
         return {
             "link": body.name,
             "origin": self.arm(body.name, body.origin),

@@ -1,4 +1,4 @@
-"""XML as writers write it: numbers without loss, names used once."""
+"""XML text for writers: lossless numbers, unique names."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from ..shared.joint_chains import Link
 
 def numbers(values: Iterable[Any]) -> str:
     """Return the shortest text of the same doubles, with up to 17 digits."""
-    # minus zero reads like a mistake
+    # minus zero looks like a mistake
     return " ".join(repr(float(value) + 0.0).removesuffix(".0") for value in values)
 
 
 def link_names(joint: str, links: Sequence[Link]) -> list[str]:
-    """The names of a joint's coordinates: its own if it has one only, else JOINT.rotation,
-    JOINT.slide2, ...
+    """Return the names of a joint's coordinates: the joint's name if it has only one, else
+    JOINT.rotation, JOINT.slide2, ...
     """
     if len(links) == 1:
         return [joint]
@@ -29,13 +29,11 @@ def document(root: ET.Element, kinds: Sequence[Sequence[str]], reserved: Sequenc
     """Return the text of a document.
 
     Args:
-        kinds: tags of elements whose names are known by them, those that share their names
-            together.
-        reserved: names kept by the format itself.
+        kinds: groups of element tags; names must be unique in each group.
+        reserved: names reserved by the format.
 
     Raises:
-        KincheckError: a name is used twice, or reserved, so that a reader would refuse or confuse
-            it.
+        KincheckError: a name is used twice or reserved, which a reader would refuse or confuse.
     """
     for tags in kinds:
         names = [

@@ -1,5 +1,5 @@
-"""The command line: one module a command, with `add` (its options) and a function from the options
-to an exit status.
+"""The command line: one module per command, with `add` (its options) and a function from the
+options to an exit status.
 
 A new command is a module and its name in `COMMANDS`. Slow imports wait until the command runs.
 """

@@ -10,12 +10,13 @@ from ..errors import KincheckError, unknown
 from . import import_options
 from .export import formats, keep_texts
 from .option_types import number, whole
-from .registry import House, Status, given
+from .registry import Registry, Status, given
 
 if TYPE_CHECKING:
     from ..studies.assemblies import Survey
 
-# Assemblies meet where the smallest singular value is below this; sound linkages stay above 1e-2.
+# Two assemblies meet where the smallest singular value is below this; regular linkages stay above
+# 1e-2.
 MEETING = 1e-6
 
 
@@ -27,27 +28,29 @@ def add(commands: Any) -> None:
     )
     listing.set_defaults(do=_assemblies)
     listing.add_argument(
-        "case", metavar="CASE", help="built-in name, or path to a case file or another tool's"
+        "case",
+        metavar="CASE",
+        help="name of a built-in case, or path to a case file or to another tool's file",
     )
     listing.add_argument(
         "--at",
         type=number,
         metavar="VALUE",
-        help="of the swept driver as the sweep has it, in SI units; default: the design position",
+        help="value of the swept driver, in SI units; default: the design position",
     )
     listing.add_argument(
         "--samples",
         type=whole(1),
         default=200,
         metavar="N",
-        help="random starts; default %(default)s",
+        help="number of random starts; default %(default)s",
     )
     listing.add_argument(
         "--seed",
         type=whole(0),
         default=0,
         metavar="N",
-        help="of the random starts; default %(default)s",
+        help="seed of the random starts; default %(default)s",
     )
     listing.add_argument(
         "--json",
@@ -63,18 +66,21 @@ def add(commands: Any) -> None:
         "--number",
         type=whole(1),
         metavar="K",
-        help="which one to export; default 1, the first of the list",
+        help="number of the assembly to export; default 1, the first of the list",
     )
     listing.add_argument(
-        "--out", type=Path, metavar="FILE", help="of the export; default: CASE.K in this folder"
+        "--out",
+        type=Path,
+        metavar="FILE",
+        help="stem of the exported files; default: CASE.K in this folder",
     )
     import_options.add_options(listing)
 
 
-def _assemblies(options: argparse.Namespace, house: House) -> int:
-    """List the assemblies found from random starts at a driver value, the intended one first.
+def _assemblies(options: argparse.Namespace, registry: Registry) -> int:
+    """List the assemblies found from random starts at a driver value, the intended assembly first.
 
-    Exit status: 0 some are found, 1 none is, 2 the tool could not do its work.
+    Exit status: 0 assemblies are found, 1 none is found, 2 the tool could not do its work.
     """
     from ..case.io.atomic_files import unwritable
     from ..report.terminal import write_json
@@ -82,21 +88,21 @@ def _assemblies(options: argparse.Namespace, house: House) -> int:
 
     if options.export is None and (found := given(options, ("number", "out"))):
         raise KincheckError(
-            f"{found}: found without --export, expected with it, to say what it writes; add"
+            f"{found}: found without --export, which it belongs to; add"
             " --export FORMAT, or leave out"
         )
     if problems := unwritable([("--json", options.json), ("--out", options.out)]):
         raise KincheckError("\n".join(problems))
-    if options.export is not None and options.export not in house.writers:
-        raise KincheckError(unknown("format", options.export, house.writers))
-    case = house.find_case(options.case, import_options.supplied(options))
+    if options.export is not None and options.export not in registry.writers:
+        raise KincheckError(unknown("format", options.export, registry.writers))
+    case = registry.find_case(options.case, import_options.supplied(options))
     import_options.tell_left_out([case])
     found = survey(case, options.at, samples=options.samples, seed=options.seed)
     write_json(found.report(), options.json)
     _print(found, options.json)
     if options.export is not None:
         number: int = options.number or 1
-        texts = written(found, house.writer(options.export), number)
+        texts = written(found, registry.writer(options.export), number)
         keep_texts(texts, f"{case.name}.{number}", options.out, options.json)
     return Status.WITHIN if found.assemblies.found else Status.DEVIATES
 
@@ -138,7 +144,7 @@ def _print(found: Survey, json: str | None) -> None:
         table.add_row(f"{index}", which, *numbers, *signs)
     console.print(table)
     if found.reason:
-        console.print(f"no assembly is the intended one: {found.reason}", soft_wrap=True)
+        console.print(f"none is the intended assembly: {found.reason}", soft_wrap=True)
     console.print(
         f"distance: from {found.ranked_by}, rms over the bodies of turn [rad] and shift [mechanism"
         " sizes]; det, joints: signs of the determinant and of triple products, + as at design;"

@@ -16,7 +16,7 @@ from ..errors import KincheckError
 from ..extras import how_to_install
 from ..report.progress import complain
 from .option_types import whole
-from .registry import House, Status, add_joint_types
+from .registry import Registry, Status, add_joint_types
 from .run_options import TOL
 from .verbosity import add_verbosity
 
@@ -29,7 +29,7 @@ CASES = (STRUT, "stewart_platform")
 """Cases of the full benchmark: a suspension, and a mechanism of thirteen bodies with
 six coupled loops.
 """
-# This many rounds settle a median to a tenth of the distance between the quartiles.
+# Rounds that settle a median to a tenth of the distance between the quartiles.
 ROUNDS = 20
 
 _MAIN = "import sys; from kincheck.core.cli.main import main; sys.exit(main(sys.argv[1:]))"
@@ -78,7 +78,7 @@ def add(commands: Any) -> None:
         type=whole(1),
         default=ROUNDS,
         metavar="N",
-        help="of all contestants in turn; default %(default)s",
+        help="rounds of all contestants in turn; default %(default)s",
     )
     engines.add_argument(
         "--parts",
@@ -102,7 +102,7 @@ def add(commands: Any) -> None:
         type=whole(0),
         default=SEED,
         metavar="N",
-        help="of the random states; default %(default)s",
+        help="seed of the random states; default %(default)s",
     )
     for each, names in ((engines, "bench"), (formulation, "bench_formulation")):
         # No defaults: they would overwrite the options before the benchmark's name.
@@ -125,20 +125,20 @@ def add(commands: Any) -> None:
     )
 
 
-def _all(options: argparse.Namespace, house: House) -> int:
-    """Measure the engines on a few cases, and the formulation. Takes some minutes."""
+def _all(options: argparse.Namespace, registry: Registry) -> int:
+    """Measure the engines on a few cases, and the formulation. This takes some minutes."""
     options.cases, options.engine, options.rounds, options.parts = CASES, [], ROUNDS, None
-    return _measured(options, house, formulation=True)
+    return _measured(options, registry, formulation=True)
 
 
-def _engines(options: argparse.Namespace, house: House) -> int:
+def _engines(options: argparse.Namespace, registry: Registry) -> int:
     """Measure run time against error for every engine and mode, at several efforts. The contestants
     take turns in one process.
     """
-    return _measured(options, house, formulation=False)
+    return _measured(options, registry, formulation=False)
 
 
-def _measured(options: argparse.Namespace, house: House, *, formulation: bool) -> int:
+def _measured(options: argparse.Namespace, registry: Registry, *, formulation: bool) -> int:
     from ..harness.provenance import THREADS
     from ..harness.record import Outcome
     from ..report.meter import Meter
@@ -152,18 +152,20 @@ def _measured(options: argparse.Namespace, house: House, *, formulation: bool) -
         return _with_one_thread(options.command, THREADS)
     problems = _destinations(options, bench_engines.NAME)
     unread: dict[str, str] = {}
-    names = house.cases() if [*options.cases] == ["all"] else options.cases
-    cases = {name: found for name in names for found in house.find_cases([name], unread)}
+    names = registry.cases() if [*options.cases] == ["all"] else options.cases
+    cases = {name: found for name in names for found in registry.find_cases([name], unread)}
     problems += unread.values()
     engines = [
         engine
-        for mode, known in (("projection", house.engines), ("simulate", house.simulations))
-        for engine in house.find_engines(
+        for mode, known in (("projection", registry.engines), ("simulate", registry.simulations))
+        for engine in registry.find_engines(
             [name for name in known if name in options.engine or not options.engine], problems, mode
         )
     ]
-    others = [name for name in options.engine if name not in (*house.engines, *house.simulations)]
-    engines += house.find_engines(others, problems)  # of users, or a message
+    others = [
+        name for name in options.engine if name not in (*registry.engines, *registry.simulations)
+    ]
+    engines += registry.find_engines(others, problems)  # errors of the user, with a message
     if problems:
         raise KincheckError("\n".join(problems))
     with (
@@ -177,11 +179,11 @@ def _measured(options: argparse.Namespace, house: House, *, formulation: bool) -
             rounds=options.rounds,
             parts=options.parts or bench_engines.PARTS,
             command=options.command,
-            tell=meter,
+            progress=meter,
         )
         if formulation:
             meter("formulation", 1.0)
-            rows = bench_formulation.measure(house.case(STRUT), SEED, bench_formulation.STATES)
+            rows = bench_formulation.measure(registry.case(STRUT), SEED, bench_formulation.STATES)
             found = bench_engines.with_formulation(found, rows)
     deliver(report(found), found, out=options.out, json=options.json)
     missing = {
@@ -190,7 +192,8 @@ def _measured(options: argparse.Namespace, house: House, *, formulation: bool) -
         if entry.outcome is Outcome.UNAVAILABLE and options.engine
     }
     complain(
-        f"engine {name!r} is named and missing; {how_to_install(name)}" for name in sorted(missing)
+        f"engine {name!r} is requested, but missing; {how_to_install(name)}"
+        for name in sorted(missing)
     )
     return Status.FAILED if missing else Status.WITHIN
 
@@ -199,8 +202,8 @@ def _with_one_thread(command: str, variables: Sequence[str]) -> int:
     """Run the command again in a new process whose linear algebra uses one thread. Libraries read
     the number of threads when they are loaded.
 
-    The native engine has one thread. Threads waiting for each other would make the simulators'
-    times depend on the machine's load.
+    The native engine has one thread. With threads that wait for each other, the simulators' times
+    would depend on the machine's load.
     """
     environment = {**os.environ, **dict.fromkeys(variables, "1")}
     return subprocess.run(
@@ -214,15 +217,15 @@ def _destinations(options: argparse.Namespace, name: str) -> list[str]:
     return Destinations.of(options).problems([f"{name}.{kind}" for kind in ("json", "html")])
 
 
-def _formulation(options: argparse.Namespace, house: House) -> int:
+def _formulation(options: argparse.Namespace, registry: Registry) -> int:
     """Measure the paper's claims: operation counts (Table 3), round-off of rows, errors of a whole
-    sweep. Needs mpmath.
+    sweep. This needs mpmath.
     """
     from ..report import sections as bench
     from ..studies.paper import formulation as bench_formulation
 
     if problems := _destinations(options, bench_formulation.NAME):
         raise KincheckError("\n".join(problems))
-    found = bench_formulation.measure(house.case(STRUT), options.seed, bench_formulation.STATES)
+    found = bench_formulation.measure(registry.case(STRUT), options.seed, bench_formulation.STATES)
     bench.deliver(bench_formulation.report(found), found, out=options.out, json=options.json)
     return Status.WITHIN

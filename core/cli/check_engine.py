@@ -1,4 +1,4 @@
-"""kincheck check-engine: check an engine of a user."""
+"""kincheck check-engine: check a user's engine."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import KincheckError
 from .engine_loading import made
-from .registry import House, Status
+from .registry import Registry, Status
 from .run_options import TOL
 from .verbosity import add_verbosity
 
@@ -32,7 +32,7 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     checking: argparse.ArgumentParser
     checking = commands.add_parser(
-        "check-engine", help="check an engine of your own", description=_check_engine.__doc__
+        "check-engine", help="check your own engine", description=_check_engine.__doc__
     )
     checking.set_defaults(do=_check_engine)
     checking.add_argument(
@@ -40,20 +40,20 @@ def add(commands: Any) -> None:
         metavar="MODULE:CLASS",
         help="the class, in a module of this folder or an installed one; or an engine's name",
     )
-    add_verbosity(checking, quiet="print the failed checks and the count alone")
+    add_verbosity(checking, quiet="print only the failed checks and the count")
 
 
-def _check_engine(options: argparse.Namespace, house: House) -> int:
+def _check_engine(options: argparse.Namespace, registry: Registry) -> int:
     """Check an engine: every joint type, several topologies, its rates against differences, its
     refusals, and repeated answers. Each pair is solved in a worker process.
     """
-    report = examined(options.engine, house)
+    report = examined(options.engine, registry)
     report.print(sys.stdout, quiet=options.quiet)
     return Status.WITHIN if report.passed else Status.DEVIATES
 
 
-def examined(engine: str | Engine, house: House) -> Report:
-    """Return the report on an engine, or on the engine of a name or at MODULE:CLASS.
+def examined(engine: str | Engine, registry: Registry) -> Report:
+    """Return the report on an engine, given by itself, by name or as MODULE:CLASS.
 
     Raises:
         KincheckError: there is no such engine, or a member of the engine protocol is missing.
@@ -64,12 +64,12 @@ def examined(engine: str | Engine, house: House) -> Report:
 
     problems = list[str]()
     found = (
-        house.find_engines([engine], problems)
+        registry.find_engines([engine], problems)
         if isinstance(engine, str)
         else [made(repr(engine), engine)]
     )
     if problems:
         raise KincheckError("\n".join(problems))
-    cases = {word: house.case(name) for word, name in TOPOLOGIES.items()}
-    native = house.engine(STANDARD)
+    cases = {word: registry.case(name) for word, name in TOPOLOGIES.items()}
+    native = registry.engine(STANDARD)
     return check_engine(found[0], native, cases, tol=TOL, progress=progress([]))

@@ -7,7 +7,7 @@ import sys
 from typing import Any
 
 from .option_types import whole
-from .registry import House, Status
+from .registry import Registry, Status
 from .verbosity import add_verbosity
 
 
@@ -16,7 +16,7 @@ def add(commands: Any) -> None:
     checking: argparse.ArgumentParser
     checking = commands.add_parser(
         "check-joint",
-        help="check a joint type of your own, or a built-in one",
+        help="check your own joint type, or a built-in one",
         description=_check_joint.__doc__,
     )
     checking.set_defaults(do=_check_joint)
@@ -31,12 +31,12 @@ def add(commands: Any) -> None:
         type=whole(0),
         default=0,
         metavar="N",
-        help="of the random poses; default %(default)s",
+        help="seed of the random poses; default %(default)s",
     )
-    add_verbosity(checking, quiet="print the failed checks and the count alone")
+    add_verbosity(checking, quiet="print only the failed checks and the count")
 
 
-def _check_joint(options: argparse.Namespace, house: House) -> int:
+def _check_joint(options: argparse.Namespace, registry: Registry) -> int:
     """Check a joint type: its equations against their derivatives, its branches, and a closed loop
     in every engine.
     """
@@ -44,7 +44,9 @@ def _check_joint(options: argparse.Namespace, house: House) -> int:
     from .joint_loading import named_joint
 
     report = check_joint(
-        named_joint(options.joint), seed=options.seed, engines=[*map(house.engine, house.engines)]
+        named_joint(options.joint),
+        seed=options.seed,
+        engines=[*map(registry.engine, registry.engines)],
     )
     report.print(sys.stdout, quiet=options.quiet)
     return Status.WITHIN if report.passed else Status.DEVIATES

@@ -1,4 +1,4 @@
-"""Objects of users, loaded by module and name. The command line alone names them; a case file
+"""Loading of a user's objects by module and name. Only the command line names them; a case file
 imports nothing.
 """
 
@@ -14,14 +14,14 @@ from typing import Any
 
 from ..errors import KincheckError, similar
 
-# Files, also pseudo-files, whose lines do not explain a failed import; and the number of lines
-# shown of other files.
+# Files and pseudo-files whose lines do not explain a failed import, and the number of lines shown
+# from other files.
 _NOT_THEIRS, MOST_PLACES = (str(Path(__file__).parents[1]), importlib.__file__, "<"), 3
 
 
 def _raised(error: Exception) -> str:
-    """Return the text of an error of an import with its places, the last first, without those in
-    the importer and in kincheck.
+    """Return the text of an import error with its places, the last first, except places in the
+    importer and in kincheck.
     """
     frames = [
         each
@@ -32,19 +32,19 @@ def _raised(error: Exception) -> str:
         f"{each.filename}, line {each.lineno}: {each.line}"
         for each in (*frames[:MOST_PLACES], *frames[MOST_PLACES:][-1:])
     ]
-    from ..harness.execution import said  # slow
+    from ..harness.execution import error_text  # slow
 
-    told = said(error)
-    # a syntax error has a place of its own, outside the traceback
+    message = error_text(error)
+    # a syntax error has its place outside the traceback
     if isinstance(error, SyntaxError) and error.text:
-        told = f"{type(error).__name__}: {error.msg}"
+        message = f"{type(error).__name__}: {error.msg}"
         places.append(f"{error.filename}, line {error.lineno}: {error.text.strip()}")
-    return f"{told} ({', called from '.join(reversed(places))})" if places else told
+    return f"{message} ({', called from '.join(reversed(places))})" if places else message
 
 
 def _members(module: ModuleType, offered: Callable[[object], bool]) -> list[str]:
-    """Return the names of the wanted objects of a module or package, without those it imports from
-    elsewhere, and with those it loads on first use.
+    """Return the names of the wanted objects that a module or package defines or loads on first
+    use; objects imported from elsewhere are left out.
     """
     found = {
         name: getattr(module, name, None)
@@ -62,7 +62,7 @@ def load_named(where: str, kind: str, offered: Callable[[object], bool]) -> Any:
 
     Args:
         kind: "joint" or "engine", for messages.
-        offered: whether an object is of the kind, to list those of the module in a message.
+        offered: tells whether an object is of the kind, for the list of candidates in a message.
 
     Raises:
         KincheckError: there is no such module or name, or the module cannot be imported.
@@ -79,7 +79,7 @@ def load_named(where: str, kind: str, offered: Callable[[object], bool]) -> Any:
         module = importlib.import_module(module_name)
         found = getattr(module, name, None)
         members = [] if found is not None else _members(module, offered)
-    except SystemExit as end:  # a script: the end would skip the check and set its status
+    except SystemExit as end:  # a script; its exit would skip the check and set the exit status
         raise KincheckError(
             f"module {module_name!r} ends the process when it is imported (status {end.code});"
             ' guard what it does there by if __name__ == "__main__":'

@@ -6,11 +6,12 @@ import argparse
 from collections.abc import Iterable
 from typing import Any
 
-from .registry import House, Status
+from .registry import Registry, Status
 
 SHELLS = ("bash", "zsh", "tcsh")
 FILES = ("FILE", "FILE.html", "RUN")
-# Options of engines: these names complete them; files complete cases, beside the built-in names.
+# Functions of the shells: engine options complete to engine names, cases to built-in names and
+# files.
 ENGINES = ("engine", "require")
 PREAMBLE = {
     "bash": 'kincheck_cases() {{ compgen -W "{names}" -- "$1"; compgen -f -- "$1"; }}',
@@ -35,9 +36,9 @@ def add(commands: Any) -> None:
     completion.add_argument("shell", choices=SHELLS, metavar="SHELL", help=", ".join(SHELLS))
 
 
-def _complete(options: argparse.Namespace, house: House) -> int:
+def _complete(options: argparse.Namespace, registry: Registry) -> int:
     """Print a shell script for the completion of commands, options, built-in cases, engines and
-    files. Print it anew after an update.
+    files. Repeat this after an update.
     """
     import shtab
 
@@ -47,12 +48,12 @@ def _complete(options: argparse.Namespace, house: House) -> int:
     from .main import parser
 
     names = {
-        **{each: [*dict.fromkeys((*house.engines, *house.simulations))] for each in ENGINES},
+        **{each: [*dict.fromkeys((*registry.engines, *registry.simulations))] for each in ENGINES},
         "family": [*Family.registry],
         "template": [*TEMPLATES],
-        "to": [*house.writers],
+        "to": [*registry.writers],
         "joint": sorted(Joint.registry),
-        "export": [*house.writers],
+        "export": [*registry.writers],
     }
     found = parser([])
     for each in (found, *_below(found)):
@@ -69,14 +70,16 @@ def _complete(options: argparse.Namespace, house: House) -> int:
                 action.complete = shtab.DIRECTORY  # pyright: ignore[reportAttributeAccessIssue]
             elif action.choices is None:
                 action.choices = names.get(action.dest)
-    # a dictionary by shell, which the library's types do not say
-    preamble: Any = {options.shell: PREAMBLE[options.shell].format(names=" ".join(house.cases()))}
+    # a dictionary by shell, which the library's types omit
+    preamble: Any = {
+        options.shell: PREAMBLE[options.shell].format(names=" ".join(registry.cases()))
+    }
     print(shtab.complete(found, options.shell, preamble=preamble))
     return Status.WITHIN
 
 
 def _below(parser: Any) -> Iterable[Any]:
-    """Yield the parsers of the commands of a parser, and of theirs."""
+    """Yield the parsers of all commands below a parser."""
     for each in parser.commands().values():
         yield each
         yield from _below(each)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:  # drawing code is imported only for a report
     from ..report.figure_data import Effort, Past
 
     Trends: TypeAlias = Mapping[str, Sequence[Past]] | None
-    """Earlier results of each case up to this run; None where they are not known."""
+    """Earlier results of each case up to this run; None if unknown."""
 
 REPORT = ("results.json", "report.html")
 """File names in a folder of results."""
@@ -28,11 +28,11 @@ REPORT = ("results.json", "report.html")
 
 @dataclass(frozen=True)
 class Destinations:
-    """Destinations of results; None if not wanted.
+    """Destinations of results; None for an unwanted one.
 
     Attributes:
         out: folder for the results and the report.
-        json: a file, or "-" for standard output, which then has nothing else.
+        json: a file, or "-" for standard output, which then holds nothing else.
         junit: a file.
         markdown: a file, for the matrix of cases and engines.
         store: a file, for values in bulk.
@@ -58,8 +58,8 @@ class Destinations:
         return any(getattr(self, each.name) is not None for each in fields(self))
 
     def problems(self, names: Sequence[str] = REPORT, history: Path | None = None) -> list[str]:
-        """Return messages on unwritable destinations, before the work starts.
-        Creates the folder.
+        """Create the folder, and return messages on unwritable destinations, before the work
+        starts.
 
         Args:
             names: files of the folder.
@@ -90,8 +90,8 @@ class Destinations:
 
 @contextmanager
 def json_only() -> Generator[None]:
-    """Reserve standard output for the JSON. Prints of simulators, from Python or C, go
-    to standard error.
+    """Reserve standard output for the JSON: output of simulators, from Python or C, goes to
+    standard error.
     """
     import ctypes
 
@@ -117,7 +117,7 @@ def deliver(
     precision: Mapping[str, Sequence[Effort]] | None = None,
     history: Callable[[], Trends] | None = None,
 ) -> None:
-    """Print the results and write the requested files, as many of them as possible.
+    """Print the results and write as many of the requested files as possible.
 
     Args:
         show: prints the results; default: `print_table`.
@@ -128,7 +128,7 @@ def deliver(
     from ..report.table import print_table
 
     encoded = to_json(results) if to.out is not None or to.json is not None else b""
-    contents = list[tuple[Path, Content]]()  # several may go to one pipe
+    contents = list[tuple[Path, Content]]()  # several destinations may be one pipe
     if to.junit is not None:
         from ..report.junit import to_junit
 
@@ -160,7 +160,7 @@ def _write_page(
     precision: Mapping[str, Sequence[Effort]] | None,
     history: Callable[[], Trends] | None,
 ) -> None:
-    """Write the report; if the history is damaged, without trends and with a note."""
+    """Write the report; for a damaged history, write a note in place of the trends."""
     from ..report.report import WITHOUT_TRENDS, write_report
 
     past = None if history is None else history()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from .registry import House, Status
+from .registry import Registry, Status
 from .run_options import TOL
 from .verbosity import add_verbosity
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from .installation import Examination
 
 SAMPLE = "mcpherson_strut"
-"""Case of the self-check: the paper's strut, with a reference of 17 digits."""
+"""Case of the self-check: the paper's strut, whose reference has 17 digits."""
 
 
 def add(commands: Any) -> None:
@@ -30,10 +30,10 @@ def add(commands: Any) -> None:
     doctor.add_argument(
         "--json", metavar="FILE", help="write the findings as JSON; - for standard output"
     )
-    add_verbosity(doctor, quiet="print the verdict and what is essential and missing alone")
+    add_verbosity(doctor, quiet="print only the verdict and the essential missing parts")
 
 
-def _doctor(options: argparse.Namespace, house: House) -> int:
+def _doctor(options: argparse.Namespace, registry: Registry) -> int:
     """List installed and missing parts with remedies, and solve a case with the native engine.
 
     Exit status: 0 the tool can do its work, 2 something essential is missing or broken.
@@ -42,7 +42,7 @@ def _doctor(options: argparse.Namespace, house: House) -> int:
     from ..report.terminal import page, write_json
     from .installation import examine
 
-    found = examine(house.case(SAMPLE), house.engine(STANDARD), TOL, house.engines)
+    found = examine(registry.case(SAMPLE), registry.engine(STANDARD), TOL, registry.engines)
     write_json(found, options.json)
     if options.quiet:
         _print_verdict(found, page(options.json))
@@ -89,8 +89,10 @@ def _print(found: Examination, console: Console) -> None:
         if check.us_per_step is None
         else f", {check.us_per_step:.3g} us per sample, loop: {check.loop}"
     )
-    said = f": {check.message}" if check.message else ""
-    console.print(f"self-check {check.case}: {check.outcome}{measured}{time}{said}", soft_wrap=True)
+    message = f": {check.message}" if check.message else ""
+    console.print(
+        f"self-check {check.case}: {check.outcome}{measured}{time}{message}", soft_wrap=True
+    )
     _print_verdict(found, console)
 
 

@@ -1,4 +1,4 @@
-"""Engines of users and of other packages: a class by its module and name, or by an entry point."""
+"""Engines of users and of other packages: a class by module and name, or by entry point."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ GROUP = "kincheck.engines"
 """Entry-point group of engines in other packages: name = "module:Class"."""
 
 WHERE = re.compile(r"[\w.]+:[\w.]+")
-"""MODULE:CLASS, which is no name of an engine, and no path of a case file."""
+"""MODULE:CLASS, which is neither the name of an engine nor the path of a case file."""
 
 MEMBERS = ("name", "mode", "loop", "settings", "version", "unsupported", "build", "solve")
 """Attributes and methods of an engine; see `Engine`."""
@@ -36,7 +36,7 @@ def load_engine(where: str) -> Engine:
 
 
 def made(where: str, found: Any) -> Engine:
-    """Return the engine of a class or function, or the engine itself.
+    """Return the engine that a class or function creates, or the engine itself.
 
     Raises:
         KincheckError: the call fails, or a member of the engine protocol is missing.
@@ -45,7 +45,7 @@ def made(where: str, found: Any) -> Engine:
         engine: Any = found() if callable(found) else found
     except Exception as error:  # any error of the engine's own code
         raise KincheckError(
-            f"{where} cannot be made: {type(error).__name__}: {error}; it is called without"
+            f"{where} cannot be created: {type(error).__name__}: {error}; it is called without"
             " arguments"
         ) from error
     missing = [name for name in MEMBERS if not hasattr(engine, name)]

@@ -1,4 +1,4 @@
-"""Options of isolation: worker processes, their number and their limits."""
+"""Options of worker processes: their number and their limits."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def add_options(parser: argparse.ArgumentParser, positive: Callable[[str], float
         number = positive(text)
         if number > MOST:
             raise argparse.ArgumentTypeError(
-                f"{text!r} is more than can be counted, expected {MOST:g} at most; give less"
+                f"{text!r} is too large, expected {MOST:g} at most; give less"
             )
         return number
 
@@ -67,7 +67,7 @@ def contradictions(options: argparse.Namespace) -> list[str]:
     problems: list[str] = []
     if options.scheduler is not None and options.jobs is not None:
         problems.append(
-            "--scheduler: how many pairs at a time is the cluster's matter; leave out --jobs"
+            "--scheduler: the cluster decides how many pairs run at a time; leave out --jobs"
         )
     if options.jobs == 0 and (options.timeout or options.memory):
         problems.append(
@@ -78,8 +78,8 @@ def contradictions(options: argparse.Namespace) -> list[str]:
 
 
 def unreachable(options: argparse.Namespace) -> list[str]:
-    """Return why the requested cluster cannot be reached. Takes time, so it comes before the work
-    and after all other checks.
+    """Return why the requested cluster cannot be reached. This takes time, so it is the last check
+    before the work.
     """
     if options.scheduler is None:
         return []

@@ -7,7 +7,7 @@ from typing import Any
 
 from . import import_options
 from .option_types import positive, whole
-from .registry import House, Status
+from .registry import Registry, Status
 from .run_options import TOL
 from .verbosity import add_verbosity
 
@@ -22,34 +22,36 @@ def add(commands: Any) -> None:
     )
     explaining.set_defaults(do=_explain)
     explaining.add_argument(
-        "case", metavar="CASE", help="built-in name, or path to a case file or another tool's"
+        "case",
+        metavar="CASE",
+        help="name of a built-in case, or path to a case file or to another tool's file",
     )
     explaining.add_argument(
         "--samples",
         type=whole(1),
         default=41,
         metavar="N",
-        help="of the sweep to look at; default %(default)s",
+        help="number of samples of the sweep to examine; default %(default)s",
     )
     explaining.add_argument(
         "--tol",
         type=positive,
         default=TOL,
         metavar="X",
-        help=f"residual that engines may leave [m or -]; default {TOL:g}",
+        help=f"largest residual that engines may leave [m or -]; default {TOL:g}",
     )
     explaining.add_argument(
         "--json", metavar="FILE", help="write the diagnosis as JSON; - for standard output"
     )
     add_verbosity(
         explaining,
-        quiet="print verdict, findings and notes alone",
-        verbose="print all samples and sensitivities, not a few of each",
+        quiet="print only the verdict, the findings and the notes",
+        verbose="print all samples and sensitivities, instead of a few of each",
     )
     import_options.add_options(explaining)
 
 
-def _explain(options: argparse.Namespace, house: House) -> int:
+def _explain(options: argparse.Namespace, registry: Registry) -> int:
     """Diagnose a case: degrees of freedom, redundant and contradictory rows by name, conditioning
     along the sweep, resulting tolerances, sensitivity of the outputs to hardpoints, and the
     programs of the native engine.
@@ -61,7 +63,7 @@ def _explain(options: argparse.Namespace, house: House) -> int:
     from ..studies.diagnosis import diagnose
     from ..studies.diagnosis.text import print_diagnosis
 
-    case = house.find_case(options.case, import_options.supplied(options), driven=False)
+    case = registry.find_case(options.case, import_options.supplied(options), driven=False)
     import_options.tell_left_out([case])
     found = diagnose(case, samples=options.samples, tol=options.tol)
     write_json(found, options.json)

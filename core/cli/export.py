@@ -12,7 +12,7 @@ from ..case.io.escape import file_name
 from ..errors import KincheckError, unknown
 from . import import_options
 from .option_types import number
-from .registry import House, Status
+from .registry import Registry, Status
 
 FORMATS = {
     "mjcf": "MuJoCo",
@@ -38,47 +38,48 @@ def add(commands: Any) -> None:
     )
     export.set_defaults(do=_export)
     export.add_argument(
-        "case", metavar="CASE", help="built-in name, or path to a case file or another tool's"
+        "case",
+        metavar="CASE",
+        help="name of a built-in case, or path to a case file or to another tool's file",
     )
     export.add_argument("--to", required=True, metavar="FORMAT", help=formats())
     export.add_argument(
-        "--out", type=Path, metavar="FILE", help="default: the case's name, in this folder"
+        "--out",
+        type=Path,
+        metavar="FILE",
+        help="stem of the written files; default: the case's name, in this folder",
     )
     export.add_argument(
         "--at",
         type=number,
         metavar="VALUE",
-        help=(
-            "start there: a value of the swept driver as the sweep has it, in SI units; default:"
-            " the design position"
-        ),
+        help=("value of the swept driver at the start, in SI units; default: the design position"),
     )
     import_options.add_options(export)
 
 
-def _export(options: argparse.Namespace, house: House) -> int:
+def _export(options: argparse.Namespace, registry: Registry) -> int:
     """Write a case's mechanism in a simulator's format, with a consistent start.
 
-    A second file beside the first holds parts foreign to the format, such as the constraints of a
-    URDF.
+    A second file holds the parts that the format lacks, such as the loop constraints of a URDF.
     """
     from ..case.io.model_writer import written
 
-    if options.to not in house.writers:
-        raise KincheckError(unknown("format", options.to, house.writers))
-    case = house.find_case(options.case, import_options.supplied(options))
+    if options.to not in registry.writers:
+        raise KincheckError(unknown("format", options.to, registry.writers))
+    case = registry.find_case(options.case, import_options.supplied(options))
     import_options.tell_left_out([case])
-    keep_texts(written(case, house.writer(options.to), options.at), case.name, options.out)
+    keep_texts(written(case, registry.writer(options.to), options.at), case.name, options.out)
     return Status.WITHIN
 
 
 def keep_texts(
     texts: Mapping[str, str], name: str, out: Path | None, json: str | None = None
 ) -> None:
-    """Write texts, keyed by file suffix, side by side, and print the files' names.
+    """Write texts to files that differ by suffix, and print their names.
 
     Args:
-        json: destination of the JSON; "-" for standard output, which then has nothing else.
+        json: destination of the JSON; "-" for standard output, which then holds nothing else.
 
     Raises:
         KincheckError: a file cannot be written, would overwrite the JSON, or exists and
@@ -94,7 +95,7 @@ def keep_texts(
     }
     for file in files:
         if out is None and file.exists():
-            raise KincheckError(f"{file} is there already; name a file with --out to write over it")
+            raise KincheckError(f"{file} exists already; give --out to overwrite a file")
     if json and (problems := unwritable([("--json", json), *(("--out", file) for file in files)])):
         raise KincheckError("\n".join(problems))
     for file, text in files.items():

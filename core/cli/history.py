@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import KincheckError, unknown
 from ..report.progress import complain
 from .option_types import whole
-from .registry import House, Status
+from .registry import Registry, Status
 from .run_options import HISTORY
 
 if TYPE_CHECKING:
@@ -27,11 +27,11 @@ def add(commands: Any) -> None:
     history: argparse.ArgumentParser
     history = commands.add_parser(
         "history",
-        help="list the kept runs, with their trends and steps",
+        help="list the stored runs, their trends and their steps",
         description=_history.__doc__,
     )
     history.set_defaults(do=_history)
-    add_history(history, "the history")
+    add_history(history, "history file")
     history.add_argument(
         "--case",
         nargs="+",
@@ -53,7 +53,7 @@ def add(commands: Any) -> None:
         type=whole(0),
         default=LAST,
         metavar="N",
-        help="the latest N runs; default %(default)s; 0: all",
+        help="number of latest runs; default %(default)s; 0: all",
     )
     history.add_argument(
         "--remove",
@@ -61,19 +61,19 @@ def add(commands: Any) -> None:
         nargs="+",
         default=[],
         metavar="RUN",
-        help="remove these runs, one that is damaged for instance",
+        help="remove these runs, for example damaged ones",
     )
     history.add_argument(
         "--plot",
         type=Path,
         metavar="FILE.html",
-        help="draw errors and times over the runs, as a page",
+        help="draw errors and times over the runs as an HTML page",
     )
     history.add_argument(
         "--export",
         type=Path,
         metavar="FILE",
-        help="write all runs as one table: FILE.parquet or FILE.csv",
+        help="write all runs as a table: FILE.parquet or FILE.csv",
     )
 
 
@@ -85,22 +85,22 @@ def add_history(parser: argparse.ArgumentParser, what: str) -> None:
         metavar="FILE",
         default=os.environ.get(HISTORY) or None,
         help=(
-            f"{what}, which kincheck run --history wrote; default: the environment variable"
+            f"{what}, written by kincheck run --history; default: the environment variable"
             f" {HISTORY}"
         ),
     )
 
 
-def _history(options: argparse.Namespace, house: House) -> int:
-    """List the runs, the latest first; for a case or an engine, its errors and times in the runs,
-    and the steps in these.
+def _history(options: argparse.Namespace, registry: Registry) -> int:
+    """List the runs, the latest first; for a case or an engine, list its errors and times over the
+    runs, and their steps.
     """
     from ..case.io.atomic_files import unwritable
     from ..history.queries import read
     from ..history.store import Store
 
     if options.history is None:
-        raise KincheckError(f"history: which file? give --history FILE, or set {HISTORY}")
+        raise KincheckError(f"history: no file is given; give --history FILE, or set {HISTORY}")
     if problems := unwritable(
         [("--plot", options.plot), ("--export", options.export)], options.history
     ):
@@ -220,4 +220,4 @@ def _print_trends(history: History) -> None:
             soft_wrap=True,
         )
     if not history.pairs:
-        print("no runs of these yet")
+        print("no runs of these cases and engines")

@@ -1,5 +1,5 @@
-"""Connection of a run to the history: records are stored as they come, and trends are read at the
-end. A failing history costs no result.
+"""Connection of a run to the history: each record is stored at once, and trends are read at the
+end. No result is lost if the history fails.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def keeping(
     unread: Sequence[str],
     settings: dict[str, Any],
 ) -> tuple[Keeping | None, list[str]]:
-    """Return the run in its history, or None, and the reasons why the history cannot store it."""
+    """Return the run in its history, or None, and the reasons if the history cannot store it."""
     if options.history is None:
         return None, []
     from ..history.run_recorder import keep
@@ -39,18 +39,16 @@ def keeping(
         return None, [f"{error}; the run is not in the history"]
     if options.resume:
         print(
-            f"kincheck: run {found.run} goes on, {len(found.made)} records are there"
+            f"kincheck: run {found.run} is resumed after {len(found.made)} records"
             if found.resumed
-            else f"kincheck: no run of the same kind without an end: run {found.run} is new",
+            else f"kincheck: no unfinished run to resume: run {found.run} is new",
             file=sys.stderr,
         )
     return found, []
 
 
 def past(keeping: Keeping, problems: list[str]) -> Trends:
-    """Return the runs up to this one by case, for its report; unreadable parts are added
-    to the problems.
-    """
+    """Return the runs up to this one by case, for the report, and report unreadable parts."""
     from ..history.queries import NIGHTS, read
     from ..history.store import HistoryError, Store
     from ..report.trends import trends

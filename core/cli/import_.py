@@ -8,7 +8,7 @@ from typing import Any
 
 from ..errors import KincheckError
 from . import import_options
-from .registry import House, Status
+from .registry import Registry, Status
 
 
 def add(commands: Any) -> None:
@@ -30,7 +30,7 @@ def add(commands: Any) -> None:
     import_options.add_options(importer)
 
 
-def _import(options: argparse.Namespace, house: House) -> int:
+def _import(options: argparse.Namespace, registry: Registry) -> int:
     """Write a model or hardpoint table as a case file: `kincheck import model.xml
     --drive hinge:0:1 > case.toml`, then `kincheck run case.toml`.
 
@@ -47,7 +47,7 @@ def _import(options: argparse.Namespace, house: House) -> int:
             f"import: found {len(options.case)} files, expected one; name it before --hold"
         )
     (file,) = options.case
-    case = house.find_case(file, import_options.supplied(options))
+    case = registry.find_case(file, import_options.supplied(options))
     import_options.tell_left_out([case])
     text = case_text(case, comments=[f"Written by kincheck import from {Path(file).name}."])
     if options.out:

@@ -1,4 +1,4 @@
-"""Options for files: a user's joint types, and facts missing in files of other tools."""
+"""Options for files: a user's joint types, and facts that files of other tools lack."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ def add_options(command: argparse.ArgumentParser) -> None:
         type=positive,
         metavar="X",
         help=(
-            "gaps up to X [m] are the digits of the file: rows that are redundant within it are"
-            " left out; default: [closure] tolerance of a case file, else none are; of a model what"
-            " its digits allow"
+            "accept gaps up to X [m] that stem from rounded digits of the file: rows that are"
+            " redundant within X are left out; default: [closure] tolerance of a case file, else 0;"
+            " for a model, from its digits"
         ),
     )
     points = command.add_argument_group(
@@ -40,18 +40,18 @@ def add_options(command: argparse.ArgumentParser) -> None:
     points.add_argument(
         "--template",
         metavar="NAME",
-        help="of the suspension, where the file does not say it; kincheck templates prints them",
+        help="type of suspension, if the file does not state it; kincheck templates prints them",
     )
     points.add_argument(
         "--units",
         metavar="UNIT",
-        help="mm, m, ... of the coordinates, where the file does not say it",
+        help="unit of the coordinates, such as mm or m, if the file does not state it",
     )
     points.add_argument(
         "--axes",
         metavar="X,Y,Z",
         help=(
-            "where x, y and z point, where the file does not say it: forward,left,up or"
+            "directions of x, y and z, if the file does not state them: forward,left,up or"
             " rearward,right,up, ..."
         ),
     )
@@ -59,31 +59,33 @@ def add_options(command: argparse.ArgumentParser) -> None:
         "--names",
         type=Path,
         metavar="FILE",
-        help='the file\'s own names of the points: TOML, a line ROLE = "NAME" each',
+        help='names of the points in the file: TOML, with a line ROLE = "NAME" for each',
     )
     points.add_argument(
         "--wheel-radius",
         metavar="M",
         help=(
-            "of the loaded wheel [m], where no point is its contact: for roll centre, scrub radius"
-            " and trail"
+            "radius of the loaded wheel [m], if no point is its contact: for roll centre, scrub"
+            " radius and trail"
         ),
     )
-    points.add_argument("--wheelbase", metavar="M", help="[m], for Ackermann and anti-values")
+    points.add_argument(
+        "--wheelbase", metavar="M", help="wheelbase [m], for Ackermann and anti-values"
+    )
     points.add_argument(
         "--axle",
         metavar="MOTION",
         help=(
-            "both wheels, the right one being the mirror image of the left, and a rack: heave, roll"
-            " or steer, over --travel of the left wheel or of the rack"
+            "motion of both wheels, the right one a mirror image of the left, and a rack: heave,"
+            " roll or steer, over --travel of the left wheel or of the rack"
         ),
     )
     points.add_argument(
         "--travel",
         metavar="M[:SAMPLES]",
         help=(
-            "of the wheel, up and down [m], default 0.05:41; or START:STOP:SAMPLES, positive up:"
-            " --travel=-0.04:0.12:33"
+            "travel of the wheel, up and down [m], default 0.05:41; or START:STOP:SAMPLES, positive"
+            " up: --travel=-0.04:0.12:33"
         ),
     )
     points.add_argument(
@@ -97,22 +99,26 @@ def add_options(command: argparse.ArgumentParser) -> None:
     points.add_argument(
         "--position",
         metavar="AXLE",
-        help="front or rear, for anti-values; with --wheelbase, --cg-height and a share",
-    )
-    points.add_argument("--cg-height", metavar="M", help="of the vehicle above the road [m]")
-    points.add_argument(
-        "--brake-share", metavar="X", help="part of the braking force at this axle, 0 to 1"
+        help="axle, front or rear, for anti-values; with --wheelbase, --cg-height and a share",
     )
     points.add_argument(
-        "--drive-share", metavar="X", help="part of the driving force at this axle, 0 to 1"
+        "--cg-height",
+        metavar="M",
+        help="height of the vehicle's centre of gravity above the road [m]",
+    )
+    points.add_argument(
+        "--brake-share", metavar="X", help="share of the braking force at this axle, 0 to 1"
+    )
+    points.add_argument(
+        "--drive-share", metavar="X", help="share of the driving force at this axle, 0 to 1"
     )
     points.add_argument(
         "--sheet",
         metavar="NAME",
-        help="of a workbook with several tables; or the section of a tree, such as front",
+        help="sheet of a workbook with several tables, or section of a tree, such as front",
     )
     model = command.add_argument_group(
-        "models", "Models (MJCF, URDF, SDF); nothing in them says how they are driven."
+        "models", "Models (MJCF, URDF, SDF). They do not state drivers."
     )
     model.add_argument(
         "--drive",
@@ -127,12 +133,12 @@ def add_options(command: argparse.ArgumentParser) -> None:
         action="extend",
         default=[],
         metavar="NAME",
-        help="joints, or free bodies, that stay where they are",
+        help="joints or free bodies that do not move",
     )
     model.add_argument(
         "--hold-rest",
         action="store_true",
-        help="hold joints as far as needed: free bodies, then joints with an actuator, then others",
+        help="hold as many joints as needed: free bodies, joints with an actuator, others",
     )
     model.add_argument(
         "--start",
@@ -148,8 +154,8 @@ def add_options(command: argparse.ArgumentParser) -> None:
 
 
 def return_cases(options: argparse.Namespace) -> None:
-    """Move files from --hold and --start back to the cases: in `run --hold knee hip model.xml` the
-    option, which takes several names, would take the file too.
+    """Move files from --hold and --start back to the cases: these options take several names, and
+    in `run --hold knee hip model.xml` also the file.
     """
     for given in (options.hold, options.start):
         files = [name for name in given if Path(name).is_file()]
@@ -165,5 +171,5 @@ def supplied(options: argparse.Namespace) -> Supplied:
 
 
 def tell_left_out(cases: Iterable[Case]) -> None:
-    """Print on standard error which parts of other tools' files were read and left out."""
+    """Print on standard error the parts of other tools' files that were left out."""
     complain(f"{case.name}: {case.source}" for case in cases if LEFT_OUT in case.source)

@@ -25,8 +25,8 @@ from ..program import disk_cache
 from ..program.llvm import compiler
 
 SCHEMA = "kincheck-doctor/1"
-# Extras of the package and their purposes; engines' extras are added. Requirements without an extra
-# are essential.
+# Extras of the package and their purposes, except engines. Requirements without an extra are
+# essential.
 PURPOSES = {
     "fast": "machine code",
     "proofs": "proved references",
@@ -38,7 +38,8 @@ PURPOSES = {
     "xarray": "results as datasets",
     "matplotlib": "results as figures",
 }
-# Modules of distributions whose import name differs; of other simulators it is the engine's name.
+# Modules of distributions with another import name; a simulator's module usually has the engine's
+# name.
 MODULES = {
     "python-flint": "flint",
     "llvmlite": "llvmlite.binding",
@@ -58,8 +59,8 @@ class Part(msgspec.Struct, frozen=True):
         version: null if it is not installed.
         purpose: use of the part.
         essential: the tool cannot work without it.
-        problem: why it cannot be used; empty if it can.
-        remedy: how to get it; empty if nothing is to be done.
+        problem: the reason why it cannot be used; empty if it can.
+        remedy: how to get or repair it; empty if it works.
     """
 
     name: str
@@ -71,7 +72,9 @@ class Part(msgspec.Struct, frozen=True):
 
 
 class Machine(msgspec.Struct, frozen=True):
-    """The machine. vector_width: doubles in a vector of machine code; null without machine code."""
+    """The machine. vector_width: number of doubles in a vector of machine code; null without
+    machine code.
+    """
 
     python: str
     platform: str
@@ -85,7 +88,7 @@ class Machine(msgspec.Struct, frozen=True):
 
 
 class Check(msgspec.Struct, frozen=True):
-    """Result of the self-check; error: the largest against the reference [unit of its output],
+    """Result of the self-check. error: largest error against the reference [unit of its output],
     with its tolerance.
     """
 
@@ -109,7 +112,7 @@ class Examination(msgspec.Struct, frozen=True):
 
     @property
     def able(self) -> bool:
-        """Return whether nothing essential is missing and the self-check passes."""
+        """Return whether all essential parts work and the self-check passes."""
         return self.check.outcome == Outcome.PASS and not any(
             part.essential and part.problem for part in self.parts
         )
@@ -218,16 +221,16 @@ def _repair(name: str, problem: str) -> str:
 
 def _ended(importing: subprocess.Popen[str]) -> str:
     try:
-        said = importing.communicate(timeout=PATIENCE)[1].strip().splitlines()
+        output = importing.communicate(timeout=PATIENCE)[1].strip().splitlines()
     except subprocess.TimeoutExpired:
         importing.kill()
         importing.communicate()
-        return f"its import does not end within {PATIENCE:g} s"
+        return f"its import takes more than {PATIENCE:g} s"
     if importing.returncode == 0:
         return ""
     return (
         "cannot be imported:"
-        f" {said[-1] if said else f'the process ended with status {importing.returncode}'}"
+        f" {output[-1] if output else f'the process ended with status {importing.returncode}'}"
     )
 
 
@@ -235,7 +238,7 @@ def _cache_problem() -> str:
     """Return why compiled code cannot be cached; empty if it can."""
     folder, remedy = (
         disk_cache.folder(),
-        "every process compiles anew: make it writable, or set XDG_CACHE_HOME to a folder that is",
+        "every process compiles again: make it writable, or set XDG_CACHE_HOME to another folder",
     )
     if folder is None:
         return f"the user has no home directory; {remedy}"
@@ -256,7 +259,7 @@ def _check(case: Case, native: Engine, tol: float) -> Check:
 
 
 def _largest(record: Record) -> tuple[float | None, float | None]:
-    """Return the position error with the largest share of its tolerance, and the tolerance."""
+    """Return the position error that is largest relative to its tolerance, and the tolerance."""
     found = [each.position for each in record.errors.values() if each.position is not None]
     if not found:
         return None, None

@@ -1,4 +1,4 @@
-"""Joint types of users: a class by its module and name, and the sources behind it."""
+"""Joint types of users: a class given by module and name, and the sources behind it."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from ..joints import Coupler, Joint
 from .class_loading import load_named
 
 INSTALLED = "site-packages"
-"""Folder of installed modules: a module in it below the user's folder does not
-belong to the user.
+"""Name of folders of installed modules: a module there is not the user's, even below the user's
+folder.
 """
 
 
@@ -25,7 +25,7 @@ def named_joint(where: str) -> type[Joint]:
     """Return the joint class at MODULE:CLASS, or the built-in one of this type.
 
     Raises:
-        KincheckError: there is no such type, or as `load_joint` has it.
+        KincheckError: there is no such type; or see `load_joint`.
     """
     if where in Joint.registry:
         return Joint.registry[where]
@@ -38,14 +38,14 @@ def named_joint(where: str) -> type[Joint]:
         )
     raise KincheckError(
         f"{unknown('joint type', where, sorted(Joint.registry))}; write MODULE:CLASS"
-        " for a class of your own, such as my_joint:MyJoint for a class in my_joint.py"
+        " for your own class, such as my_joint:MyJoint for a class in my_joint.py"
     )
 
 
 def load_joint(where: str) -> type[Joint]:
     """Return the joint class at MODULE:CLASS; modules of the current folder are found too.
 
-    Case files can name it from then on.
+    From then on, case files can name it.
 
     Raises:
         KincheckError: there is no such module or class, it is no joint, its type is missing or
@@ -57,12 +57,12 @@ def load_joint(where: str) -> type[Joint]:
     named = getattr(found, "type", None)
     if not (isinstance(named, str) and named):
         raise KincheckError(
-            f'{where} has no type, the name of joints like it in case files; write type = "..." in'
+            f'{where} has no type, the name of such joints in case files; write type = "..." in'
             " the class"
         )
     if named in Coupler.registry:
         raise KincheckError(
-            f"{where}: the type {named!r} is that of joints that couple two others; give it another"
+            f"{where}: the type {named!r} belongs to joints that couple two others; give it another"
         )
     return found
 

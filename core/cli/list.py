@@ -10,7 +10,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from ..extras import how_to_install, installed_version, is_extra
-from .registry import House, Status, add_joint_types
+from .registry import Registry, Status, add_joint_types
 from .verbosity import add_verbosity
 
 if TYPE_CHECKING:
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from ..harness.engine import Engine
 
 SOURCE_WIDTH = 100
-"""Characters of a line of the docstrings that `--schema` prints."""
+"""Longest line of the docstrings that `--schema` prints [characters]."""
 BROKEN = 96
-"""Characters, with the next word, from which such a line may have been broken."""
+"""Shortest length, with the next word, of a line that may have been broken [characters]."""
 CUT = {"no_wrap": True, "overflow": "ellipsis", "crop": True}
 
 
@@ -48,37 +48,37 @@ def add(commands: Any) -> None:
     )
     add_verbosity(
         listing,
-        quiet="print the names alone: cases, then engines",
-        verbose="print sources in full, on narrow terminals too",
+        quiet="print only the names: cases, then engines",
+        verbose="print sources in full on narrow terminals, too",
     )
     add_joint_types(listing)
 
 
-def _list(options: argparse.Namespace, house: House) -> int:
-    """List the built-in cases with reference kind and source, and the engines with the installed
-    versions, which kincheck doctor also imports; or the keys and types of files.
+def _list(options: argparse.Namespace, registry: Registry) -> int:
+    """List the built-in cases with the kind and source of their references, and the engines with
+    the installed versions (kincheck doctor also imports them); or list the keys and types of files.
     """
     from ..report.terminal import page
 
     console = page(None)
     # a line for each case: cut at the edge of a terminal, whole in a pipe
     how: Any = {"soft_wrap": True} if options.verbose or not console.is_terminal else CUT
-    tell = partial(console.print, **how)
+    print_line = partial(console.print, **how)
     if options.schema or options.joints or options.outputs:
         _print_references(options, console)
         return Status.WITHIN
-    cases = house.cases()
+    cases = registry.cases()
     if options.quiet:
-        print(*cases, *dict.fromkeys((*house.engines, *house.simulations)), sep="\n")
+        print(*cases, *dict.fromkeys((*registry.engines, *registry.simulations)), sep="\n")
         return Status.WITHIN
-    tell("cases:")
+    print_line("cases:")
     for name in cases:
-        kind, source = house.summary(name)
-        tell(f"  {name:{max(map(len, cases))}}  {kind.replace('_', ' '):16}  {source}")
-    tell("engines:")
+        kind, source = registry.summary(name)
+        print_line(f"  {name:{max(map(len, cases))}}  {kind.replace('_', ' '):16}  {source}")
+    print_line("engines:")
     engines: list[Engine] = [
-        *map(house.engine, house.engines),
-        *(house.engine(name, "simulate") for name in house.simulations),
+        *map(registry.engine, registry.engines),
+        *(registry.engine(name, "simulate") for name in registry.simulations),
     ]
     width = max(len(engine.name) for engine in engines)
     for engine in engines:
@@ -100,7 +100,7 @@ def _version(engine: Engine) -> str | None:
 
 
 def _print_references(options: argparse.Namespace, console: Console) -> None:
-    """Print keys and types: whole lines for a pipe, and for a terminal what fits it."""
+    """Print keys and types, with whole lines for a pipe and broken lines for a terminal."""
     from ..case.io import catalogue
     from ..report.terminal import LOG_WIDTH, indented, unheaded
 
@@ -141,8 +141,8 @@ def _keys() -> Iterator[str]:
 
 
 def _joined(lines: Sequence[str]) -> list[str]:
-    """Return the lines with those joined that only the width of the source file broke: the next
-    one stands below the text, begins no key, and its first word had hardly any room.
+    """Return the lines, joined where only the width of the source file broke them: the next line
+    stands below the text, begins no key, and its first word did not fit.
     """
     found: list[str] = []
     last = ""
@@ -159,13 +159,13 @@ def _joined(lines: Sequence[str]) -> list[str]:
 
 
 def _start(line: str) -> int:
-    """Return the column of a line's text: behind its indentation, or a key and the gap after it."""
+    """Return the column of a line's text: after its indentation, or after a key and its gap."""
     found = re.match(r" *(?:\S.*?\S {2,}(?=\S))?", line)
     return found.end() if found else 0
 
 
 def _hung(line: str, width: int) -> list[str]:
-    """Return the line in parts that fit the width, the further ones below the text."""
+    """Return the line in parts that fit the width, aligned below its text."""
     parts = textwrap.wrap(
         line,
         width,

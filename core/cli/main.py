@@ -1,5 +1,5 @@
-"""The command line. Only this module knows adapters and cases; they, and all slow imports, are
-loaded on use.
+"""The command line. Only this module knows adapters and cases; it loads them, and all slow imports,
+on use.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from . import COMMANDS, command_name
 from .parser import Parser
 
 if TYPE_CHECKING:
-    from .registry import House
+    from .registry import Registry
 
 FULL = errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO
-"""Error numbers of a full standard output; files named by options have their own messages."""
+"""Error numbers of a full disk at standard output; other files have their own messages."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -63,15 +63,17 @@ def _done(argv: list[str]) -> int:
 
             for where in options.joint_type:
                 load_joint(where)
-        return _printed(int(options.do(options, house())))
+        return _printed(int(options.do(options, registry())))
     except KincheckError as error:
         complain(str(error).splitlines())
-    except SystemExit as end:  # raised by an engine or a user's module: ours come from the parser
+    except (
+        SystemExit
+    ) as end:  # raised by an engine or a user's module, since the parser's own are handled above
         where = traceback.extract_tb(end.__traceback__)[-1]
         complain(
             [
                 f"{where.filename}, line {where.lineno}, ended the program with status"
-                f" {end.code!r}; mend it, or leave it out"
+                f" {end.code!r}; correct it, or leave it out"
             ]
         )
     except BrokenPipeError:  # the reader has closed our output
@@ -80,21 +82,21 @@ def _done(argv: list[str]) -> int:
         if error.errno in FULL and error.filename is None:
             complain(
                 [
-                    f"standard output cannot be written ({error.strerror}); files that were asked"
-                    " for are"
+                    f"standard output cannot be written ({error.strerror}); requested files are"
+                    " written"
                 ]
             )
             _print_no_more()
         else:
             traceback.print_exc()
-    except Exception:  # a defect in kincheck: never status 1, a deviation
+    except Exception:  # a defect in kincheck is not status 1, which means a deviation
         traceback.print_exc()
     return Status.FAILED
 
 
 def _be_able_to_print() -> None:
-    """Print characters missing in the encoding as question marks: no finished run ends at a
-    dash. Replace a closed stream by the null device.
+    """Make standard streams printable: characters missing in the encoding become question marks,
+    and the null device replaces a closed stream.
     """
     for name in ("stdout", "stderr"):
         stream: TextIO | None = getattr(sys, name)
@@ -105,9 +107,7 @@ def _be_able_to_print() -> None:
 
 
 def _printed(status: int) -> int:
-    """Return the status of a finished command after its output is flushed. A closed reader
-    is no failure.
-    """
+    """Flush the output of a finished command; return its status. A closed reader is no failure."""
     try:
         sys.stdout.flush()
     except BrokenPipeError:
@@ -121,11 +121,11 @@ def _print_no_more() -> None:
     print_no_more(sys.stdout)
 
 
-def house() -> House:
+def registry() -> Registry:
     """Return the registry of engines, cases and writers."""
     from ... import adapters, cases
     from . import engine_loading
-    from .registry import House
+    from .registry import Registry
 
     others = engine_loading.offered((*adapters.ENGINES, *adapters.SIMULATIONS))
     writers = adapters.WRITERS, adapters.writer
@@ -135,7 +135,7 @@ def house() -> House:
             return engine_loading.made(name, engine_loading.entry_points()[name].load())
         return adapters.engine(name) if mode == "projection" else adapters.engine(name, mode)
 
-    return House(
+    return Registry(
         (*adapters.ENGINES, *others),
         engine,
         cases.names,

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 
 def whole(least: int, most: int | None = None) -> Callable[[str], int]:
-    """Return the reader of a whole number between two limits: 1000000, 1_000_000 or 1e6."""
+    """Return a reader of whole numbers between two limits: 1000000, 1_000_000 or 1e6."""
     expected = f"of {least} or more" if most is None else f"from {least} to {most}"
 
     def read(text: str) -> int:

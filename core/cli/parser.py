@@ -1,4 +1,4 @@
-"""The parser of the command line: argparse, whose errors name the command and the remedy."""
+"""The parser of the command line: argparse with errors that name the command and the remedy."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Parser(argparse.ArgumentParser):
     def parse_known_args(  # pyright: ignore[reportIncompatibleMethodOverride]
         self, args: Any = None, namespace: Any = None
     ) -> Any:
-        """Parse the arguments; exit with a message at an unknown one."""
+        """Parse the arguments; exit with a message at an unknown argument."""
         known = self._option_string_actions
         for word in self._own_options(args or ()):
             name = word.partition("=")[0] if word.startswith("--") else word[:2]
@@ -43,7 +43,7 @@ class Parser(argparse.ArgumentParser):
         )
 
     def commands(self) -> dict[str, Parser]:
-        """Return the parsers of the commands by name; none for a command without further ones."""
+        """Return the parsers of the commands by name; none for a command without subcommands."""
         found: dict[str, Parser] = {}
         for action in self._actions:
             if isinstance(action, argparse._SubParsersAction):  # pyright: ignore[reportPrivateUsage]
@@ -87,4 +87,4 @@ class Parser(argparse.ArgumentParser):
             for parser in self.commands().values()
             if option in parser._option_string_actions
         ]
-        return f"; it belongs to {', '.join(having)}: name that first" if having else ""
+        return f"; it belongs to {', '.join(having)}: give that first" if having else ""

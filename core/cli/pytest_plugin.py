@@ -1,12 +1,12 @@
 """The pytest plugin: `pytest --kincheck` collects case files as tests, one for each engine.
 
     pytest --kincheck                                   # every installed engine
-    pytest --kincheck --kincheck-engine mujoco          # this one only, and it must be there
+    pytest --kincheck --kincheck-engine mujoco          # only this one, which must be installed
 
 Files are TOML or JSON with the schema kincheck-case/1, anywhere pytest looks. A test fails if an
-output is out of tolerance or an engine breaks. A test is skipped if an engine is missing or
-cannot express the case, or nothing was compared (not judged). pytest loads this file every time, so
-slow imports wait for --kincheck.
+output is out of tolerance or an engine fails. A test is skipped if an engine is missing or cannot
+express the case, or if nothing was compared (not judged). pytest loads this file in every session,
+so slow imports wait for --kincheck.
 """
 
 from __future__ import annotations
@@ -23,12 +23,10 @@ if TYPE_CHECKING:
     from ..case.case import Case
     from ..harness.engine import Engine
     from ..harness.record import Record
-    from .registry import House
+    from .registry import Registry
 
 SCHEMA = re.compile(rb"""(^\s*|["'])schema["']?\s*[=:]\s*["']kincheck-case/""", re.MULTILINE)
-"""Mark of a TOML or JSON case file of any version: an unknown version gets a message, and
-is not ignored.
-"""
+"""Mark of a TOML or JSON case file of any version: an unknown version causes a message."""
 SUFFIXES = ".toml", ".json"
 
 
@@ -46,8 +44,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         default=[],
         metavar="NAME",
         help=(
-            "an engine to solve them with, which must be installed; may be repeated; default: all,"
-            " skipped where not installed"
+            "engine to solve them with, which must be installed; may be repeated; default: all"
+            " installed engines"
         ),
     )
 
@@ -59,7 +57,7 @@ def pytest_configure(config: pytest.Config) -> None:
         raise pytest.UsageError("--kincheck-engine: give --kincheck too")
     problems: list[str] = []
     if names:
-        _house().find_engines(names, problems)
+        _registry().find_engines(names, problems)
     if problems:
         raise pytest.UsageError(f"--kincheck-engine: {'; '.join(problems)}")
 
@@ -88,13 +86,13 @@ class CaseFile(pytest.File):
         """Yield the engines' tests; an invalid file is a collection error with its message."""
         from ..errors import KincheckError
 
-        house = _house()
+        registry = _registry()
         try:
-            case = house.find_case(str(self.path))
+            case = registry.find_case(str(self.path))
         except KincheckError as error:
             raise self.CollectError(str(error)) from None
         required = _required(self.config)
-        for engine in house.find_engines(required or house.engines, []):
+        for engine in registry.find_engines(required or registry.engines, []):
             yield EngineTest.from_parent(  # pyright: ignore[reportUnknownMemberType]
                 self, name=engine.name, case=case, engine=engine, required=bool(required)
             )
@@ -104,7 +102,7 @@ class EngineTest(pytest.Item):
     """A test of one engine on one case.
 
     Attributes:
-        required: the engine was requested by name, so a missing engine is a failure.
+        required: whether the engine was requested by name, so that a missing engine is a failure.
     """
 
     def __init__(self, *, case: Case, engine: Engine, required: bool, **whole: Any) -> None:
@@ -141,7 +139,7 @@ class CaseFailedError(Exception):
 
 
 def _solved(case: Case, engine: Engine) -> Record:
-    """Return the record of the pair. A simulator runs in its own process, because a crash would
+    """Return the record of the pair. A simulator runs in a separate process, because a crash would
     end the tests.
     """
     from ..harness.engine import may_run_here
@@ -158,14 +156,14 @@ def _solved(case: Case, engine: Engine) -> Record:
         [case],
         [engine],
         tol=TOL,
-        baseline=None if native else _house().engine(STANDARD),
+        baseline=None if native else _registry().engine(STANDARD),
         solver=solver,
     ).records
     return record
 
 
 @cache
-def _house() -> House:
-    from .main import house
+def _registry() -> Registry:
+    from .main import registry
 
-    return house()
+    return registry()

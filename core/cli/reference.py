@@ -1,5 +1,5 @@
-"""kincheck reference: prove the samples of cases, write them as references, and measure the native
-engine's errors against them.
+"""kincheck reference: prove the samples of cases, write them as references, and measure the errors
+of the native engine.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from ..case.io.escape import file_name, visible
 from ..errors import KincheckError
 from .option_types import whole
-from .registry import House, Status, add_joint_types
+from .registry import Registry, Status, add_joint_types
 from .run_options import TOL
 from .verbosity import add_verbosity
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 # A double has 17 digits; beyond 1000 digits only the time grows.
 FEWEST, DIGITS, MOST = 17, 30, 1000
-# Unproved samples listed one by one; the file has all of them.
+# Largest number of unproved samples in the output; the file has all of them.
 NAMED = 5
 
 
@@ -57,26 +57,26 @@ def add(commands: Any) -> None:
         type=whole(FEWEST, MOST),
         default=DIGITS,
         metavar="N",
-        help="outputs to 10^-N; default %(default)s",
+        help="accuracy of the outputs, 10^-N; default %(default)s",
     )
     proving.add_argument(
         "--decimal",
         action="store_true",
         help=(
-            "take the numbers of a case as the decimals that print them, not as the doubles that"
-            " engines are given"
+            "take the numbers of a case as their printed decimals, instead of as the doubles that"
+            " engines get"
         ),
     )
     add_verbosity(
         proving,
         quiet="print one line for each case",
-        verbose="print every sample that is not proved",
+        verbose="print every unproved sample",
     )
 
 
-def _prove(options: argparse.Namespace, house: House) -> int:
-    """Prove one solution, and no second one, near each sample of the native engine, and enclose
-    its outputs.
+def _prove(options: argparse.Namespace, registry: Registry) -> int:
+    """Prove that exactly one solution exists near each sample of the native engine, and enclose its
+    outputs.
 
     Exit status: 0 all samples are proved, 1 some are not (singular poses), 2 the tool could not
     do its work.
@@ -87,7 +87,7 @@ def _prove(options: argparse.Namespace, house: House) -> int:
     from ..studies.verified_reference import prove_case
 
     unread: dict[str, str] = {}
-    cases = house.find_cases(options.case or [*house.cases()], unread)
+    cases = registry.find_cases(options.case or [*registry.cases()], unread)
     problems = [*unread.values()]
     if options.out is not None:
         try:
@@ -185,7 +185,7 @@ def _missing(found: Reference, named: int) -> list[str]:
         for k, reason in missing[:named]
     ]
     return lines + (
-        [f"  and {len(missing) - named} more; -v shows all, --out writes them"]
+        [f"  and {len(missing) - named} more; -v prints all, --out writes them"]
         if len(missing) > named
         else []
     )

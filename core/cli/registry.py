@@ -1,6 +1,4 @@
-"""Registry of engines, cases and writers for the commands, and the search for named
-cases and engines.
-"""
+"""Registry of engines, cases and writers for the commands, with search by name."""
 
 from __future__ import annotations
 
@@ -25,10 +23,10 @@ if TYPE_CHECKING:
 
 
 class Status(IntEnum):
-    """Exit status: all within tolerance; something deviates, fails or errs; the tool could not do
-    its work, or part of it.
+    """Exit status: all within tolerance (0); something deviates or fails (1); the tool could not do
+    all of its work (2).
 
-    An interrupted command exits with the shell's status for the signal: see `interrupts`.
+    An interrupted command exits with the shell's status for the signal; see `interrupts`.
     """
 
     WITHIN = 0
@@ -37,17 +35,18 @@ class Status(IntEnum):
 
 
 @dataclass(frozen=True)
-class House:
+class Registry:
     """The available engines and built-in cases, loaded on use.
 
     Attributes:
         engines: names of the engines in projection mode, in the order of the results.
-        engine: returns the engine of a name, and of a mode other than projection.
+        engine: returns the engine of a name, and of a mode if it is not projection.
         cases: returns the names of the built-in cases.
         case: returns the built-in case of a name, with its reference.
         writers: names of the export formats.
         writer: returns the writer of a format.
-        summary: returns kind of reference and source of the built-in case of a name, quickly.
+        summary: returns kind of reference and source of a built-in case by its name, without
+            loading it.
         simulations: names of the engines in simulate mode.
     """
 
@@ -105,8 +104,8 @@ class House:
         return case
 
     def matching(self, name: str) -> list[str]:
-        """Return the built-in cases and files matched by a shell-style pattern; any other name as
-        it is.
+        """Return the built-in cases and files that match a shell-style pattern; return any other
+        name unchanged.
 
         Raises:
             KincheckError: the pattern matches nothing.
@@ -127,10 +126,10 @@ class House:
         found: Sequence[Case] = (),
         supplied: Supplied = NOTHING,
     ) -> list[Case]:
-        """Return the cases already found and the named ones, by names, files and patterns.
+        """Return the cases already found, and the cases of names, files and patterns.
 
         Args:
-            unread: receives the messages of unreadable cases, by their names as given.
+            unread: receives the messages of unreadable cases, by the given names.
         """
         cases = {case.name: case for case in found}
         wanted: dict[str, None] = {}
@@ -147,7 +146,7 @@ class House:
                 continue
             if case.name in cases:
                 unread[name] = (
-                    f"{name}: there are two cases named {case.name!r}; results go by name:"
+                    f"{name}: there are two cases named {case.name!r}; names identify results:"
                     " rename one"
                 )
             else:
@@ -157,7 +156,7 @@ class House:
     def find_engines(
         self, names: Sequence[str], problems: list[str], mode: str | None = None
     ) -> list[Engine]:
-        """Return the named engines, each once: by the name of an engine, or by MODULE:CLASS.
+        """Return the engines, each once, of names and MODULE:CLASS.
 
         Args:
             problems: receives the messages of unknown names and missing modes.
@@ -204,14 +203,14 @@ class House:
             engines.append(found)
 
     def baseline(self, engines: Sequence[Engine]) -> Engine | None:
-        """Return the native engine to compare with; None if it is among the engines."""
+        """Return the native engine as the standard; None if it is among the engines."""
         from ..harness.standard import STANDARD
 
         return None if STANDARD in (each.name for each in engines) else self.engine(STANDARD)
 
     def _loaded(self, name: str, mode: str) -> Engine:
-        """Return the engine, or a stand-in if it fails to load: one broken adapter must not end a
-        run of all engines.
+        """Return the engine, or a substitute if it cannot be loaded: a broken adapter must not end
+        a run of all engines.
         """
         from ..harness.unloadable import Unloadable
 
@@ -229,8 +228,8 @@ def add_joint_types(command: argparse.ArgumentParser) -> None:
         default=[],
         metavar="MODULE:CLASS",
         help=(
-            "a joint type of your own for case files, in a module of this folder or an installed"
-            " one; may be repeated; check-joint checks it"
+            "your own joint type for case files, in a module of this folder or an installed one;"
+            " may be repeated; check-joint checks it"
         ),
     )
 
@@ -238,7 +237,7 @@ def add_joint_types(command: argparse.ArgumentParser) -> None:
 def given(options: argparse.Namespace, names: Iterable[str]) -> str:
     """Return the names of the given options, for a message.
 
-    Their defaults are None, False or [].
+    Options with the default None, False or [] count.
     """
     found = (
         name

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import KincheckError
 from ..report.progress import complain
 from .history import add_history
-from .registry import House, Status
+from .registry import Registry, Status
 from .verbosity import add_verbosity
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ OUT = ("regressions.json", "regressions.md", "junit.xml", "report.html")
 def add(commands: Any) -> None:
     """Add the command to the parser."""
     report: argparse.ArgumentParser = commands.add_parser(
-        "report", help="report what changed since another run", description=_report.__doc__
+        "report", help="report the changes since another run", description=_report.__doc__
     )
     report.set_defaults(do=_report)
     report.add_argument(
@@ -34,8 +34,8 @@ def add(commands: Any) -> None:
         nargs="?",
         metavar="RUN",
         help=(
-            "number of a run in the history, or a results.json; default: the latest that is not"
-            " under way"
+            "number of a run in the history, or a results.json; default: the latest run that has"
+            " ended"
         ),
     )
     report.add_argument(
@@ -52,14 +52,14 @@ def add(commands: Any) -> None:
         "--missing-is-failure",
         action="store_true",
         help=(
-            "status 1 also where a case or an engine is missing that the run compared with had, or"
-            " the last run by the same command; for nightly runs, which should never have fewer"
+            "exit with status 1 also if a case or an engine is missing that is in the run compared"
+            " with, or in the last run of the same command; for nightly runs"
         ),
     )
-    add_history(report, "the history of the runs, their steps and their spread")
+    add_history(report, "history of the runs, their steps and their spread")
     report.add_argument("--out", type=Path, metavar="DIR", help=f"write {', '.join(OUT)} there")
     report.add_argument(
-        "--json", metavar="FILE", help="write what changed as JSON; - for standard output"
+        "--json", metavar="FILE", help="write the changes as JSON; - for standard output"
     )
     report.add_argument(
         "--junit",
@@ -71,16 +71,16 @@ def add(commands: Any) -> None:
         "--markdown",
         type=Path,
         metavar="FILE",
-        help="write the summary as Markdown, for a pull request or a mail",
+        help="write the summary as Markdown, for a pull request or an e-mail",
     )
-    add_verbosity(report, quiet="print the headline alone")
+    add_verbosity(report, quiet="print only the headline")
 
 
-def _report(options: argparse.Namespace, house: House) -> int:
-    """Report changes since another run: new failures, fixes, lost results, lower accuracy, longer
-    times, versions, the run of each change, and tolerances to tighten.
+def _report(options: argparse.Namespace, registry: Registry) -> int:
+    """Report the changes since another run: new failures, fixes, lost results, lower accuracy,
+    longer times, changed versions, the first run of each change, and tolerances to tighten.
 
-    Exit status: 0 nothing regressed, 1 something did, 2 the tool could not do its work.
+    Exit status: 0 no regression, 1 a regression, 2 the tool could not do its work.
     """
     from ..history.regression.run_selection import find, find_against
     from ..history.store import Store
@@ -124,7 +124,7 @@ def _write(
     store: Store | None,
     problems: list[str],
 ) -> None:
-    """Write the requested files, as many of them as possible."""
+    """Write as many of the requested files as possible."""
     from ..case.io.atomic_files import to_standard_output, written
     from ..harness.record import to_json
     from ..history.queries import NIGHTS, read

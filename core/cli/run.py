@@ -18,7 +18,7 @@ from ..harness.interrupts import hold, status_of, words_of
 from ..report.progress import complain, lacking, progress, uncompared
 from . import execution_options, history_options, import_options
 from .engine_loading import WHERE
-from .registry import House, Status
+from .registry import Registry, Status
 from .run_options import HISTORY, add_options, curve_options
 
 if TYPE_CHECKING:
@@ -45,9 +45,9 @@ class _Plan:
     """The cases and engines of a run.
 
     Attributes:
-        baseline: native engine to compare with, if it is not among the engines.
-        required, named: names of engines without which the run is incomplete.
-        unread: messages of unreadable cases, by their names as given; the other cases are run.
+        baseline: the native engine as the standard, if it is not among the engines.
+        required, named: names of the engines that the run must contain.
+        unread: messages of unreadable cases, by the given names; the other cases are run.
     """
 
     cases: Sequence[Case]
@@ -58,7 +58,7 @@ class _Plan:
     named: Sequence[str]
 
 
-def _run(options: argparse.Namespace, house: House) -> int:
+def _run(options: argparse.Namespace, registry: Registry) -> int:
     """Solve every case with every engine, judge each, print a table and write the requested files.
 
     Exit status: 0 all within tolerance, 1 something deviates or ends in an error, a timeout or a
@@ -70,7 +70,7 @@ def _run(options: argparse.Namespace, house: House) -> int:
     from . import destinations as delivery
 
     to = delivery.Destinations.of(options)
-    plan = _planned(options, house, to)
+    plan = _planned(options, registry, to)
     precision: Any = None
     if options.bench is not None:
         from ..studies.bench.engines import efforts_in
@@ -86,7 +86,7 @@ def _run(options: argparse.Namespace, house: House) -> int:
     if keeping:
         keeping.end(results, interrupted=stopped is not None)
         problems += keeping.problems + keeping.store.damage
-    # read last, for the page alone: damage there costs no result
+    # read last, and only for the page: damage costs no result
     if options.history is not None:
         history = partial(history_options.past, keeping, problems) if keeping else lambda: None
     delivery.deliver(
@@ -117,11 +117,11 @@ def _shown(options: argparse.Namespace) -> Callable[[Results, TextIO], None]:
     return print_matrix if options.joints else print_table
 
 
-def _planned(options: argparse.Namespace, house: House, to: Destinations) -> _Plan:
-    """Return the plan of the run; messages of unreadable cases are printed before any computation.
+def _planned(options: argparse.Namespace, registry: Registry, to: Destinations) -> _Plan:
+    """Return the plan of the run. Print messages on unreadable cases before any computation.
 
     Raises:
-        KincheckError: all problems, if no case is left or an option is wrong.
+        KincheckError: all problems, if no case is readable or an option is wrong.
     """
     from ..case.joint_probe import probes
 
@@ -129,30 +129,30 @@ def _planned(options: argparse.Namespace, house: House, to: Destinations) -> _Pl
     if options.resume and options.history is None:
         problems.append(f"--resume needs a history: give --history FILE, or set {HISTORY}")
     if options.bench is not None and options.out is None:
-        problems.append("--bench is for the report: give --out DIR")
-    _return_cases(options, house)
+        problems.append("--bench adds to the report: give --out DIR")
+    _return_cases(options, registry)
     import_options.return_cases(options)
-    named: list[str] = options.case or ([] if options.joints else [*house.cases()])
+    named: list[str] = options.case or ([] if options.joints else [*registry.cases()])
     unread: dict[str, str] = {}
-    cases = house.find_cases(
+    cases = registry.find_cases(
         named, unread, list(probes()) if options.joints else [], import_options.supplied(options)
     )
     import_options.tell_left_out(cases)
     unused: list[str] = []
     curve = curve_options(options)
     if not options.reference and curve != type(curve)():
-        problems.append("the options for measured curves need one: give --reference FILE")
+        problems.append("options for measured curves need a curve: give --reference FILE")
     if options.reference and not problems:
         try:
-            # a reference may name an unreadable case: that does not stop the others
+            # a reference may name an unreadable case, which does not stop the others
             cases = _judged(cases, options.reference, curve, unused if unread else None)
         except KincheckError as error:
             problems += str(error).splitlines()
-    engines, baseline = _engines(options, house, problems)
+    engines, baseline = _engines(options, registry, problems)
     problems += to.problems(history=options.history)
     problems = problems or execution_options.unreachable(options)
-    # With outputs or a history, a run without readable cases is recorded too: it must not look like
-    # the run before.
+    # With output files or a history, a run without readable cases is recorded too, so that it does
+    # not look like the previous run.
     if problems or not (cases or to.wanted or options.history is not None):
         raise KincheckError("\n".join([*unread.values(), *problems]))
     complain(line for message in (*unread.values(), *unused) for line in message.splitlines())
@@ -161,7 +161,7 @@ def _planned(options: argparse.Namespace, house: House, to: Destinations) -> _Pl
         engines,
         baseline,
         {visible(name): visible(message, also="\n") for name, message in unread.items()},
-        [each.name for each in house.find_engines(options.require, [], options.mode)],
+        [each.name for each in registry.find_engines(options.require, [], options.mode)],
         [each.name for each in engines] if options.engine else [],
     )
 
@@ -169,10 +169,10 @@ def _planned(options: argparse.Namespace, house: House, to: Destinations) -> _Pl
 def _judged(
     cases: Sequence[Case], files: Sequence[Path], curve: CurveOptions, unused: list[str] | None
 ) -> list[Case]:
-    """Return the cases with the references in these files; how a curve was read is printed.
+    """Return the cases with the references in these files. Print how a curve was read.
 
     Raises:
-        KincheckError: a file cannot be used, or a curve is not of one case.
+        KincheckError: a file cannot be used, or a curve does not belong to one case.
     """
     from ..case.io.reference import PROVED
     from ..case.io.reference_curve import with_curve
@@ -195,8 +195,8 @@ def _judged(
 def _solved(
     options: argparse.Namespace, plan: _Plan
 ) -> tuple[Results, list[str], Keeping | None, int | None]:
-    """Return the results, the problems, the place in the history, and the status if something
-    stopped the run early.
+    """Return the results, the problems, the run in the history, and the status if a signal stopped
+    the run early.
     """
     from ..harness import run as running
     from ..harness.workers.distributed import ClusterError
@@ -209,14 +209,14 @@ def _solved(
     )
     made = [*keeping.made] if keeping else []
     records: list[Record] = [*made]
-    tell = progress(records, quiet=options.quiet)
+    show = progress(records, quiet=options.quiet)
 
     def keep(record: Record, done: int, total: int) -> None:
         if keeping:
             keeping.add(record)
-        tell(record, done, total)
+        show(record, done, total)
 
-    # results for later comparison
+    # results are kept for later comparison
     if keeping is None and (options.out or options.json):
         from ..harness.provenance import conditions
 
@@ -236,14 +236,14 @@ def _solved(
             **about,
         }
         results = running.run(plan.cases, plan.engines, progress=keep, **how)
-        # a signal between the last record and here also keeps all records below
+        # after a signal between the last record and this line, all records are kept below
         hold()
         return results, problems, keeping, None
     except (KeyboardInterrupt, ClusterError) as reason:
         pairs = running.planned(plan.cases, plan.engines, unread)
         records.sort(key=lambda each: pairs.index((each.case, each.engine, each.mode)))
         why = words_of(reason) if isinstance(reason, KeyboardInterrupt) else str(reason)
-        problems.append(f"{why}: {len(records)} of {len(pairs)} records were made and are kept")
+        problems.append(f"{why}: {len(records)} of {len(pairs)} records were finished and are kept")
         results = running.results(plan.cases, records, started=started, plan=pairs, **about)
         return (
             results,
@@ -254,8 +254,8 @@ def _solved(
 
 
 def _explained(cases: Sequence[Case]) -> Iterator[str]:
-    """Yield the native engine's programs for each case, or why there are none, and notes
-    on its geometry.
+    """Yield for each case the account of the native engine's programs, or the reason why there is
+    none, and notes on its geometry.
     """
     from ..case.notes import notes
     from ..harness.program_account import explain
@@ -263,34 +263,34 @@ def _explained(cases: Sequence[Case]) -> Iterator[str]:
     for case in cases:
         try:
             yield from explain(case)
-        except SolveError as error:  # this case alone: its records have the message too
-            yield f"{case.name}: nothing is computed: {error}"
+        except SolveError as error:  # only this case fails: its records have the message too
+            yield f"{case.name}: cannot be solved: {error}"
         yield from (f"  note: {note}" for note in notes(case))
 
 
-def _return_cases(options: argparse.Namespace, house: House) -> None:
-    """Move cases back from options of several names: `run --engine native my_case.toml`."""
+def _return_cases(options: argparse.Namespace, registry: Registry) -> None:
+    """Move cases back from options that take several names: `run --engine native my_case.toml`."""
     for names in (options.engine, options.require):
         swallowed = [
             name
             for name in names
-            if name not in (*house.engines, *house.simulations)
+            if name not in (*registry.engines, *registry.simulations)
             and not WHERE.fullmatch(name)
-            and (name in house.cases() or Path(name).suffix)
+            and (name in registry.cases() or Path(name).suffix)
         ]
         options.case += swallowed
         names[:] = [name for name in names if name not in swallowed]
 
 
 def _engines(
-    options: argparse.Namespace, house: House, problems: list[str]
+    options: argparse.Namespace, registry: Registry, problems: list[str]
 ) -> tuple[list[Engine], Engine | None]:
-    """Return the requested engines, and the native engine as baseline if it is not among them."""
+    """Return the requested engines, and native as the standard if it is not among them."""
     named = [*options.engine, *options.require]
-    every = house.simulations if options.mode == "simulate" else house.engines
-    engines = house.find_engines(
+    every = registry.simulations if options.mode == "simulate" else registry.engines
+    engines = registry.find_engines(
         named if options.engine else [*every, *options.require], problems, options.mode
     )
     if not engines and not problems:
         problems.append(f"no engine has the mode {options.mode!r}; leave out --mode")
-    return engines, house.baseline(engines)
+    return engines, registry.baseline(engines)

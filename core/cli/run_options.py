@@ -14,9 +14,9 @@ from .verbosity import add_verbosity
 if TYPE_CHECKING:
     from ..case.io.reference_curve import CurveOptions
 
-# Largest accepted constraint residual [m or -]: a thousand times the round-off of metre-sized
-# coordinates, and a thousandth of the outputs' 1e-9 m, so that a residual amplified a hundredfold
-# by the mechanism stays invisible.
+# Largest accepted constraint residual [m or -]: a thousand times the round-off of coordinates of
+# one metre, and a thousandth of the outputs' 1e-9 m. A mechanism may amplify it a hundredfold
+# unnoticed.
 TOL = 1e-12
 
 MODES = ("projection", "simulate")
@@ -39,24 +39,24 @@ def add_options(run: argparse.ArgumentParser) -> None:
     run.add_argument(
         "--joints",
         action="store_true",
-        help="run a small closed loop around every joint type, and the cases named",
+        help="run a small closed loop around every joint type, and the named cases",
     )
     must = (
-        "only these, which must be installed (else status 2), by name or MODULE:CLASS; default: all"
+        "only these, by name or MODULE:CLASS; all must be installed (else status 2); default: all"
         " engines"
     )
     run.add_argument("--engine", nargs="+", action="extend", default=[], metavar="NAME", help=must)
     run.add_argument(
         "--mode",
         choices=MODES,
-        help="the engines' mode; projection, unless an engine named has only the other",
+        help="mode of the engines; default: projection, or simulate if an engine has only this",
     )
     run.add_argument(
         "--tol",
         type=positive,
         default=TOL,
         metavar="X",
-        help=f"largest constraint residual [m or -]; default {TOL:g}",
+        help=f"largest accepted constraint residual [m or -]; default {TOL:g}",
     )
     run.add_argument(
         "--out", type=Path, metavar="DIR", help="write results.json and report.html there"
@@ -92,14 +92,14 @@ def add_options(run: argparse.ArgumentParser) -> None:
         type=Path,
         metavar="FILE",
         help=(
-            "judge cases by these files instead of their own references: proved references of"
+            "judge cases by these files instead of by their own references: proved references of"
             " kincheck reference (.json), or one measured curve (.csv, .xlsx, ...)"
         ),
     )
     run.add_argument(
         "--explain",
         action="store_true",
-        help="print what the native engine computes for each case, and leaves out",
+        help="print what the native engine computes for each case, and what it leaves out",
     )
     run.add_argument(
         "--require",
@@ -107,12 +107,12 @@ def add_options(run: argparse.ArgumentParser) -> None:
         action="extend",
         default=[],
         metavar="NAME",
-        help="engines that must be there and able (else status 2)",
+        help="engines that must be installed and support every case (else status 2)",
     )
     add_verbosity(
         run,
-        quiet="print messages and the counts of outcomes alone: no progress, no table",
-        verbose="print the errors of every output, with their tolerances",
+        quiet="print only messages and the counts of outcomes: no progress, no table",
+        verbose="print the errors of every output and their tolerances",
     )
     import_options.add_options(run)
     _add_curve_options(run)
@@ -123,7 +123,7 @@ def add_options(run: argparse.ArgumentParser) -> None:
         metavar="FILE",
         default=os.environ.get(HISTORY) or None,
         help=(
-            "keep the run in this file, each record as it is made; default: the file in the"
+            "store the run in this file, each record at once; default: the file named by the"
             f" environment variable {HISTORY}, if it is set"
         ),
     )
@@ -140,7 +140,7 @@ def add_options(run: argparse.ArgumentParser) -> None:
 def _add_curve_options(run: argparse.ArgumentParser) -> None:
     """Add the options for a measured curve, see --reference."""
     curve = run.add_argument_group(
-        "measured curves", "What the file of --reference does not state; one case at a time."
+        "measured curves", "Facts that the file of --reference does not state; for one case."
     )
     curve.add_argument(
         "--map",
@@ -148,21 +148,21 @@ def _add_curve_options(run: argparse.ArgumentParser) -> None:
         default=[],
         metavar="COLUMN=OUTPUT",
         help=(
-            'what a column holds, where its name does not say it: "Toe Angle=toe [deg]"; with the'
+            'output of a column, if its name does not state it: "Toe Angle=toe [deg]"; with the'
             " opposite sign: COLUMN=-OUTPUT"
         ),
     )
     curve.add_argument(
         "--signs",
         metavar="CONVENTION",
-        help="iso8855 or sae_j670, where the file has no comment '# signs: CONVENTION'",
+        help="iso8855 or sae_j670, if the file has no comment '# signs: CONVENTION'",
     )
     curve.add_argument(
         "--accuracy",
         action="append",
         default=[],
         metavar="OUTPUT=NUMBER UNIT",
-        help='of the measurement, as tolerance of the output: "toe=0.02 deg"',
+        help='uncertainty of the measurement, the tolerance of the output: "toe=0.02 deg"',
     )
     curve.add_argument(
         "--citation",
@@ -170,7 +170,7 @@ def _add_curve_options(run: argparse.ArgumentParser) -> None:
         help="source of the curve; without it, agreement is not called validated",
     )
     curve.add_argument(
-        "--reference-sheet", metavar="NAME", help="of a workbook with several tables"
+        "--reference-sheet", metavar="NAME", help="sheet of a workbook with several tables"
     )
     curve.add_argument(
         "--at-reference",

@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 
 from ..case.io.atomic_files import to_standard_output
-from .registry import House, Status, add_joint_types
+from .registry import Registry, Status, add_joint_types
 
 
 def _case() -> dict[str, Any]:
@@ -59,7 +59,7 @@ def add(commands: Any) -> None:
     add_joint_types(schema)
 
 
-def _schema(options: argparse.Namespace, house: House) -> int:
+def _schema(options: argparse.Namespace, registry: Registry) -> int:
     """Print the JSON Schema of a file, for editors and validators, made from the types of its
     reader and writer.
     """

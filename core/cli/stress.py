@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import KincheckError, unknown
 from .option_types import positive, whole
-from .registry import House, Status, given
+from .registry import Registry, Status, given
 from .run_options import MODES, TOL
 from .verbosity import add_verbosity
 
@@ -43,10 +43,13 @@ def add(commands: Any) -> None:
     )
     stress.add_argument("--list", action="store_true", help="list the families")
     stress.add_argument(
-        "--samples", type=whole(1), metavar="N", help=f"over all families; default {SAMPLES}"
+        "--samples",
+        type=whole(1),
+        metavar="N",
+        help=f"number of samples over all families; default {SAMPLES}",
     )
     stress.add_argument(
-        "--seed", type=whole(0), metavar="S", help="of the random mechanisms; default 0"
+        "--seed", type=whole(0), metavar="S", help="seed of the random mechanisms; default 0"
     )
     stress.add_argument(
         "--engine", nargs="+", action="extend", default=[], metavar="NAME", help="default: native"
@@ -54,13 +57,13 @@ def add(commands: Any) -> None:
     stress.add_argument(
         "--mode",
         choices=MODES,
-        help="the engines' mode; projection, unless an engine named has only the other",
+        help="mode of the engines; default: projection, or simulate if an engine has only this",
     )
     stress.add_argument(
         "--out",
         type=Path,
         metavar="DIR",
-        help="write the tables there, and the smallest bad cases, reduced, as case files",
+        help="write the tables there, and the smallest bad cases as reduced case files",
     )
     stress.add_argument(
         "--json", metavar="FILE", help="write the results as JSON; - for standard output"
@@ -68,7 +71,7 @@ def add(commands: Any) -> None:
     stress.add_argument(
         "--no-proofs",
         action="store_true",
-        help="do not prove a share of the truth, which needs python-flint",
+        help="skip the proof of a share of the reference motions, which needs python-flint",
     )
     stress.add_argument(
         "--replay",
@@ -83,13 +86,13 @@ def add(commands: Any) -> None:
         "--tol",
         type=positive,
         metavar="X",
-        help=f"of replayed files: largest constraint residual; default {TOL:g}",
+        help=f"largest accepted constraint residual of replayed files; default {TOL:g}",
     )
     add_verbosity(stress, quiet="print no progress")
 
 
-def _stress(options: argparse.Namespace, house: House) -> int:
-    """Drive engines through random mechanisms made to break solvers, and judge every sample.
+def _stress(options: argparse.Namespace, registry: Registry) -> int:
+    """Run engines on random mechanisms that are difficult for solvers, and judge every sample.
 
     Exit status: 0 no sample is silently wrong or refused for a wrong reason, 1 some are, 2 the tool
     could not do its work, or an engine supports none of the samples.
@@ -112,20 +115,18 @@ def _stress(options: argparse.Namespace, house: House) -> int:
         page(None).print(unheaded(rows))
         return Status.WITHIN
     problems: list[str] = []
-    engines = house.find_engines(options.engine or [STANDARD], problems, options.mode)
+    engines = registry.find_engines(options.engine or [STANDARD], problems, options.mode)
     if options.replay:
         if options.out or options.json:
-            problems.append("--replay prints what it finds; leave out --out and --json")
+            problems.append("--replay only prints its findings; leave out --out and --json")
         if found := given(options, OF_FAMILIES):
-            problems.append(
-                f"--replay judges files as they are, which are of no family; leave out {found}"
-            )
+            problems.append(f"--replay judges files, which belong to no family; leave out {found}")
         if problems:
             raise KincheckError("\n".join(problems))
-        return _replay(options, house, engines)
+        return _replay(options, registry, engines)
     if options.tol is not None:
         problems.append(
-            "--tol is for replayed files, and families have tolerances of their own; leave it out,"
+            "--tol is for replayed files, and families have their own tolerances; leave it out,"
             " or give --replay"
         )
     known = Family.registry
@@ -142,7 +143,7 @@ def _stress(options: argparse.Namespace, house: House) -> int:
     if options.out is not None:
         write("--out", options.out / FILES[2], markdown(made).encode())
     if undone := [
-        *(f"family {name} is not finished: {why}" for name, why in found.unfinished.items()),
+        *(f"family {name} was not finished: {why}" for name, why in found.unfinished.items()),
         *idle(found),
     ]:
         raise KincheckError("\n".join(undone))
@@ -166,21 +167,21 @@ def _run(options: argparse.Namespace, families: list[Family], engines: list[Engi
             seed=options.seed or 0,
             command=options.command,
             prove=not options.no_proofs,
-            tell=meter,
+            progress=meter,
         )
     if options.out is not None and examples:
         found = replace(found, findings=[save(example, options.out) for example in examples])
     return found
 
 
-def _replay(options: argparse.Namespace, house: House, engines: list[Engine]) -> int:
+def _replay(options: argparse.Namespace, registry: Registry, engines: list[Engine]) -> int:
     """Judge case files by following their motion from the design."""
     from ..studies.stress.reproducers import judge
     from ..studies.stress.verdicts import BAD, Verdict
 
     bad, examined = False, set[str]()
     for file in options.replay:
-        case = house.find_case(str(file))
+        case = registry.find_case(str(file))
         for engine in engines:
             found = judge(case, engine, options.tol or TOL)
             counts = ", ".join(
@@ -201,7 +202,7 @@ def _replay(options: argparse.Namespace, house: House, engines: list[Engine]) ->
                     off = (
                         ""
                         if worst is None
-                        else f", positions off by {worst:.2g} of what is round-off"
+                        else f", position error {worst:.2g} times the round-off bound"
                     )
                     print(
                         f"  {verdict} first at {case.sweep.driver} ="
@@ -211,6 +212,6 @@ def _replay(options: argparse.Namespace, house: House, engines: list[Engine]) ->
                 print(f"  {found.message}")
     if idle := [engine.name for engine in engines if engine.name not in examined]:
         raise KincheckError(
-            f"no sample was examined of {', '.join(idle)}: give another engine or other files"
+            f"no sample of {', '.join(idle)} was examined: give another engine or other files"
         )
     return Status.DEVIATES if bad else Status.WITHIN

@@ -14,7 +14,7 @@ from ..harness.interrupts import hold, status_of, words_of
 from ..report.progress import complain
 from ..version import VERSION
 from . import execution_options, import_options
-from .registry import House, Status
+from .registry import Registry, Status
 from .sweep_inputs import limited, only
 from .sweep_options import FILES, LIMITS, PART, add_options
 from .sweep_replay import checking_solver, replay, replay_problems
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from ..studies.tolerance.study import Study
     from ..studies.tolerance.sweep import Progress
 
-# Seconds between lines of progress without a terminal.
+# Interval between lines of progress without a terminal [s].
 EVERY = 10.0
 
 
@@ -40,12 +40,13 @@ def add(commands: Any) -> None:
     add_options(sweep)
 
 
-def _sweep(options: argparse.Namespace, house: House) -> int:
+def _sweep(options: argparse.Namespace, registry: Registry) -> int:
     """Solve variants of a case whose hardpoints, directions and lengths vary, and reduce its
     outputs over them.
 
-    Exit status: 0 if every variant has a solution and every cross-check agrees, 1 if not, 2 if the
-    work could not be done. An interrupted sweep writes what it has, and ends with 130.
+    Exit status: 0 every variant has a solution and every cross-check agrees, 1 otherwise, 2 the
+    tool could not do its work. An interrupted sweep writes its partial results and exits with
+    status 130.
     """
     from ..studies.tolerance.study import Study
     from ..studies.tolerance.sweep import how_many
@@ -56,18 +57,18 @@ def _sweep(options: argparse.Namespace, house: House) -> int:
     names = ("results.json", "report.html") if options.replay else FILES
     problems += Destinations.of(options).problems(names)
     if options.scheduler is not None and options.jobs is not None:
-        problems.append("--scheduler: how many threads is the cluster's matter; leave out --jobs")
+        problems.append("--scheduler: the cluster decides the number of threads; leave out --jobs")
     problems += replay_problems(options)
     if options.replay and (options.store or options.scheduler):
         problems.append(
-            "--replay solves here, and stores nothing; leave out --store and --scheduler"
+            "--replay solves in this process and stores nothing; leave out --store and --scheduler"
         )
     if options.resume and (options.out is None or options.replay):
         problems.append(
-            "--resume goes on from a folder of results: give --out DIR, and leave out --replay"
+            "--resume continues from a folder of results: give --out DIR, and leave out --replay"
         )
-    engine, share = _check(options, house, problems)
-    whole = house.find_case(options.case, import_options.supplied(options))
+    engine, share = _check(options, registry, problems)
+    whole = registry.find_case(options.case, import_options.supplied(options))
     case = only(whole, options.output, problems)
     import_options.tell_left_out([case])
     problems = problems or execution_options.unreachable(options)
@@ -82,7 +83,7 @@ def _sweep(options: argparse.Namespace, house: House) -> int:
     variation = variation.sampled(options.sampling, samples)
     study = Study(case, variation, samples, options.seed, options.order, options.tol)
     if options.replay:
-        return replay(options, house, study, engine)
+        return replay(options, registry, study, engine)
     with ExitStack() as stack:
         part = None if options.out is None else stack.enter_context(_part(options))
         stops: list[KeyboardInterrupt | KincheckError] = []
@@ -92,9 +93,9 @@ def _sweep(options: argparse.Namespace, house: House) -> int:
     for reason in stops:
         why = words_of(reason) if isinstance(reason, KeyboardInterrupt) else str(reason)
         goes_on = (
-            "--resume goes on from there"
+            "--resume continues from there"
             if part is not None
-            else "with --out DIR it can be taken up with --resume"
+            else "with --out DIR, --resume can continue it"
         )
         problems.append(
             f"{why}: {results.samples} of {results.asked} variants are solved; {goes_on}"
@@ -110,7 +111,7 @@ def _sweep(options: argparse.Namespace, house: House) -> int:
 
 
 def _check(
-    options: argparse.Namespace, house: House, problems: list[str]
+    options: argparse.Namespace, registry: Registry, problems: list[str]
 ) -> tuple[Engine | None, float]:
     """Return the engine of the cross-check, and the share of the variants."""
     if options.check is None:
@@ -122,16 +123,16 @@ def _check(
         share = math.nan
     if not 0.0 < share <= 1.0:
         problems.append(
-            f"--check {options.check}: found the share {text!r}, expected a part of one such as"
+            f"--check {options.check}: found the share {text!r}, expected a fraction such as"
             " 0.01; correct it"
         )
-    engines = house.find_engines([name], problems)
+    engines = registry.find_engines([name], problems)
     return (engines[0] if engines else None), share
 
 
 def _part(options: argparse.Namespace) -> Part:
-    """Return the file of the finished part, with all facts besides the study behind its
-    numbers.
+    """Return the file of the finished part, with all facts that its numbers depend on besides the
+    study.
     """
     import numpy as np
 
@@ -206,7 +207,7 @@ def _solve(
 
 
 def _deliver(options: argparse.Namespace, results: SweepResults) -> list[str]:
-    """Print the table and write the requested files; return the problems of writing."""
+    """Print the table and write the requested files; return the problems in writing."""
     from ..case.io.atomic_files import to_standard_output, write_all
     from ..harness.record import to_json
     from ..studies.tolerance.csv_tables import envelope_csv, gradient_csv, limits_csv

@@ -1,4 +1,4 @@
-"""What kincheck sweep makes of its options: outputs and limits."""
+"""Outputs and limits of kincheck sweep from its options."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ def only(case: Case, names: list[str], problems: list[str]) -> Case:
 def limited(
     options: argparse.Namespace, variation: Variation, whole: Case, case: Case
 ) -> Variation:
-    """Return the variation with the limits of the options too, which replace those of the file; of
-    the outputs of the case alone.
+    """Return the variation with limits for the outputs of the case; limits of the options replace
+    those of the file.
     """
     from ..studies.variation.limits import limits_of_texts
 
@@ -39,5 +39,7 @@ def limited(
         if name in there or name.rpartition(".")[0] in there
     }
     if left_out := [name for name in limits if name not in kept]:
-        complain([f"limits of {', '.join(left_out)}: left out, as --output leaves out these"])
+        complain(
+            [f"limits of {', '.join(left_out)}: left out, as --output leaves out these outputs"]
+        )
     return replace(variation, limits=tuple(kept.values()))

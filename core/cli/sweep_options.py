@@ -12,10 +12,10 @@ from .run_options import TOL
 from .verbosity import add_verbosity
 
 PART = "sweep.part"
-"""File of a sweep's finished part, in the folder of its results until the sweep ends."""
+"""File of the finished part of a sweep, in its folder of results until the sweep ends."""
 
 LIMITS = "limits.csv"
-"""File of the specification limits, for studies that have some."""
+"""File of the specification limits, for studies with limits."""
 
 FILES = ("sweep.json", "sweep.html", "envelope.csv", "gradients.csv")
 
@@ -23,14 +23,16 @@ FILES = ("sweep.json", "sweep.html", "envelope.csv", "gradients.csv")
 def add_options(sweep: argparse.ArgumentParser) -> None:
     """Add the options to the parser of the command."""
     sweep.add_argument(
-        "case", metavar="CASE", help="built-in name, or path to a case file or another tool's"
+        "case",
+        metavar="CASE",
+        help="name of a built-in case, or path to a case file or to another tool's file",
     )
     sweep.add_argument(
         "--vary",
         type=Path,
         required=True,
         metavar="FILE",
-        help="the file that states what varies, and by how much (kincheck-vary/1)",
+        help="file that states what varies, and by how much (kincheck-vary/1)",
     )
     sweep.add_argument("--samples", type=whole(1), metavar="N", help="number of random variants")
     sweep.add_argument(
@@ -46,7 +48,7 @@ def add_options(sweep: argparse.ArgumentParser) -> None:
         choices=[*Sampling],
         default=Sampling.RANDOM,
         help=(
-            "how the variants are drawn: at random, as a Latin hypercube or as a Sobol sequence;"
+            "sampling of the variants: random, Latin hypercube or Sobol sequence;"
             " default %(default)s"
         ),
     )
@@ -73,17 +75,17 @@ def add_options(sweep: argparse.ArgumentParser) -> None:
         type=int,
         choices=(0, 1, 2),
         default=0,
-        help="also reduce derivatives by time up to this order; default %(default)s",
+        help="also reduce time derivatives up to this order; default %(default)s",
     )
     sweep.add_argument(
         "--tol",
         type=positive,
         default=TOL,
         metavar="X",
-        help=f"largest constraint residual; default {TOL:g}",
+        help=f"largest accepted constraint residual; default {TOL:g}",
     )
     sweep.add_argument(
-        "--jobs", type=whole(1), metavar="N", help="threads; default: half the processors"
+        "--jobs", type=whole(1), metavar="N", help="number of threads; default: half the processors"
     )
     sweep.add_argument(
         "--scheduler",
@@ -94,8 +96,8 @@ def add_options(sweep: argparse.ArgumentParser) -> None:
         "--check",
         metavar="ENGINE[:SHARE]",
         help=(
-            "rebuild a share of the variants as cases of their own, at least one, and solve them"
-            " with this engine; default 0.01"
+            "rebuild a share of the variants, at least one, as separate cases, and solve them"
+            " with this engine; default share 0.01"
         ),
     )
     sweep.add_argument(
@@ -104,8 +106,8 @@ def add_options(sweep: argparse.ArgumentParser) -> None:
         nargs="+",
         metavar="INDEX",
         help=(
-            "solve only these variants of the seed, each as a case of its own, as kincheck run"
-            " does; with --check its engine too"
+            "solve only these variants of the seed, each as a separate case, as kincheck run"
+            " does; also with the engine of --check"
         ),
     )
     sweep.add_argument(
@@ -115,7 +117,7 @@ def add_options(sweep: argparse.ArgumentParser) -> None:
         "--out",
         type=Path,
         metavar="DIR",
-        help=f"write {', '.join(FILES)} there, and {LIMITS} of limits",
+        help=f"write {', '.join(FILES)} there, and {LIMITS} if there are limits",
     )
     sweep.add_argument(
         "--json", metavar="FILE", help="write the results as JSON; - for standard output"

@@ -1,4 +1,4 @@
-"""Solve single variants of a study again, as a run does."""
+"""Solution of single variants of a study, as in a run."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from ..errors import KincheckError
 from ..report.progress import complain, lacking, uncompared
 from ..studies.variation.modes import Sampling
-from .registry import House, Status
+from .registry import Registry, Status
 
 if TYPE_CHECKING:
     from ..harness.engine import Engine
@@ -17,19 +17,21 @@ if TYPE_CHECKING:
 
 
 def replay_problems(options: argparse.Namespace) -> list[str]:
-    """Return what keeps variants from being solved again: a Latin hypercube takes their number."""
+    """Return the problems of a replay: a Latin hypercube depends on the number of variants."""
     if not options.replay:
         return []
     if options.sampling is Sampling.LATIN:
         if options.samples is None:
             return ["--replay: a Latin hypercube depends on the number of variants; give --samples"]
     elif options.samples is not None:
-        return ["--replay: a variant is known by seed and index; leave out --samples"]
+        return ["--replay: seed and index identify a variant; leave out --samples"]
     return []
 
 
-def replay(options: argparse.Namespace, house: House, study: Study, engine: Engine | None) -> int:
-    """Solve single variants as a run does: its table, its report, its status."""
+def replay(
+    options: argparse.Namespace, registry: Registry, study: Study, engine: Engine | None
+) -> int:
+    """Solve single variants as a run does, with its table, report and exit status."""
     from ..harness import run as running
     from ..harness.standard import STANDARD
     from . import destinations as delivery
@@ -40,7 +42,7 @@ def replay(options: argparse.Namespace, house: House, study: Study, engine: Engi
                 f"--replay {index}: there are {study.samples} variants, 0 to {study.samples - 1};"
                 " give one of them"
             )
-    native = house.engine(STANDARD)
+    native = registry.engine(STANDARD)
     engines = [native] if engine is None or engine.name == STANDARD else [native, engine]
     cases = [study.of_variant(index) for index in dict.fromkeys(options.replay)]
     results = running.run(
@@ -63,8 +65,8 @@ def replay(options: argparse.Namespace, house: House, study: Study, engine: Engi
 
 
 def checking_solver(options: argparse.Namespace, engine: Engine) -> Solver:
-    """Return the solver of checked variants: this process for an engine without foreign code, else
-    worker processes.
+    """Return the solver of checked variants: this process for an engine without foreign code,
+    worker processes for others.
     """
     from ..harness.engine import may_run_here
     from ..harness.execution import here

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from .registry import House, Status
+from .registry import Registry, Status
 
 
 def add(commands: Any) -> None:
@@ -18,15 +18,15 @@ def add(commands: Any) -> None:
     )
     templates.set_defaults(do=_templates)
     templates.add_argument(
-        "template", nargs="*", metavar="NAME", help="print these only; default: all"
+        "template", nargs="*", metavar="NAME", help="print only these; default: all"
     )
 
 
-def _templates(options: argparse.Namespace, house: House) -> int:
+def _templates(options: argparse.Namespace, registry: Registry) -> int:
     """Print a table of hardpoints to fill in: `kincheck templates mcpherson > car.csv`, then
     `kincheck run car.csv`.
 
-    Its numbers are made up. Rows marked optional may be left out, and so may the column of
+    Its numbers are examples. Rows marked optional may be left out, and so may the column of
     meanings.
     """
     from ..case.models.hardpoints.sample_table import sample_tables

@@ -1,4 +1,4 @@
-"""kincheck trace: follow a motion by its arc length, beyond lock-ups of a driver."""
+"""kincheck trace: follow a motion by its arc length, past lock-ups of a driver."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 from ..errors import KincheckError, unknown
 from . import import_options
 from .option_types import positive
-from .registry import House, Status
+from .registry import Registry, Status
 
 if TYPE_CHECKING:
     from ..kinematics import Curve, Event
 
 LENGTH = 5.0
-"""Default length in each direction: a few whole turns of the bodies together."""
+"""Default length in each direction: a few full turns of all bodies."""
 WAYS = {1: "growing", -1: "falling"}
 
 
@@ -24,24 +24,26 @@ def add(commands: Any) -> None:
     tracing: argparse.ArgumentParser
     tracing = commands.add_parser(
         "trace",
-        help="follow a motion beyond lock-ups; find limit and branch points",
+        help="follow a motion past lock-ups; find limit and branch points",
         description=_trace.__doc__,
     )
     tracing.set_defaults(do=_trace)
     tracing.add_argument(
-        "case", metavar="CASE", help="built-in name, or path to a case file or another tool's"
+        "case",
+        metavar="CASE",
+        help="name of a built-in case, or path to a case file or to another tool's file",
     )
     tracing.add_argument(
         "--driver",
         metavar="NAME",
-        help="whose value is an outcome; default: the one that the case sweeps",
+        help="driver whose value follows from the motion; default: the swept driver",
     )
     tracing.add_argument(
         "--length",
         type=positive,
         default=LENGTH,
         metavar="L",
-        help="either way, in lengths of the mechanism's size and radians; default %(default)s",
+        help="length in each direction [mechanism sizes and radians]; default %(default)s",
     )
     tracing.add_argument(
         "--json", metavar="FILE", help="write the curve as JSON; - for standard output"
@@ -49,20 +51,20 @@ def add(commands: Any) -> None:
     import_options.add_options(tracing)
 
 
-def _trace(options: argparse.Namespace, house: House) -> int:
-    """Follow a case's motion from its design position in both directions by arc length, and name
-    the singular poses on it.
+def _trace(options: argparse.Namespace, registry: Registry) -> int:
+    """Follow a case's motion from its design position in both directions by arc length, and report
+    its singular poses.
 
-    A limit point is a lock-up: the driver's value turns back there, and the motion goes on with the
-    value changing in the other direction. A branch point is a bifurcation: the joints allow several
-    continuations there, and the curve goes straight on. Exit status: 0 the whole length was traced,
-    or a closed curve; 1 the curve ends before; 2 the tool could not do its work.
+    A limit point is a lock-up: the driver's value reverses there while the motion continues. A
+    branch point is a bifurcation: the joints allow several continuations there, and the curve goes
+    straight on. Exit status: 0 the whole length was traced, or a closed curve; 1 the curve ends
+    before; 2 the tool could not do its work.
     """
     from ..case.io.atomic_files import unwritable
     from ..kinematics import trace
     from ..report.terminal import write_json
 
-    case = house.find_case(options.case, import_options.supplied(options))
+    case = registry.find_case(options.case, import_options.supplied(options))
     import_options.tell_left_out([case])
     drivers = [driver.name for driver in case.mechanism.drivers]
     driver = options.driver or (case.sweep.driver if case.sweep.driver in drivers else drivers[0])
@@ -87,7 +89,7 @@ def _lines(case: str, curve: Curve, direction: int, design: float, unit: str) ->
     end = (
         "back at the design position"
         if curve.closed
-        else curve.message or "to the length asked for"
+        else curve.message or "up to the requested length"
     )
     head = (
         f"{case}: {curve.driver} first {WAYS[direction]}: {len(curve.arc)} poses over the length"
@@ -95,7 +97,7 @@ def _lines(case: str, curve: Curve, direction: int, design: float, unit: str) ->
     )
     return [head] + [
         f"  {event.kind} at {curve.driver} = {event.value + design:.9f} {unit} (length"
-        f" {event.arc:.6g}); at the pose nearest to it {event.singularity.words}"
+        f" {event.arc:.6g}); at the nearest pose {event.singularity.words}"
         for event in curve.events
     ]
 

@@ -6,7 +6,7 @@ import argparse
 
 
 def add_verbosity(command: argparse.ArgumentParser, *, quiet: str = "", verbose: str = "") -> None:
-    """Add -q and -v to a command, each with its help; an empty help leaves the option out."""
+    """Add -q and -v to a command, each with its help; an empty help omits the option."""
     group = command.add_mutually_exclusive_group()
     for name, help_text in (("quiet", quiet), ("verbose", verbose)):
         if help_text:

@@ -1,4 +1,4 @@
-"""Comparison: outputs of a trajectory, and their deviations from a reference or another engine.
+"""Outputs of a trajectory, and their deviations from a reference or from another engine.
 
 Only outputs are compared, since generalized coordinates may differ between correct engines. The
 samples are the same, so nothing is interpolated. A deviation is accepted up to atol + rtol * range,
@@ -43,7 +43,7 @@ from . import labels
 from .record import Deviation, Deviations, OutputSeries
 
 NO_VALUE = "has no value at"
-"""Phrase in the reason of a standard without values at some samples; these are not judged."""
+"""Phrase of a reason: the standard has no value at some samples, so they are not judged."""
 
 
 def output_series(
@@ -52,8 +52,8 @@ def output_series(
     """Return an output over the samples of a trajectory.
 
     Args:
-        held: the same poses with velocities by some drivers alone, all others held; outputs defined
-            as such derivatives have no value without it.
+        held: the same poses, with velocities caused by some drivers while the others are at rest;
+            outputs defined as such derivatives have no value without it.
 
     Values are NaN at unsolved samples. A quantity is None if the engine does not give it.
     """
@@ -64,7 +64,7 @@ def output_series(
             return Series(np.full(len(trajectory.solved), np.nan), possible=False)
         trajectory = held
     at = {name: _moving(trajectory.points[name]) for name in output.points}
-    # unknown values are NaN, and so is everything computed from them
+    # NaN marks unknown values, and spreads to all results that depend on them
     with np.errstate(all="ignore"):
         design = {name: _standing(case.mechanism.point(name).position) for name in output.points}
         jet = counted(case.mechanism, case.sweep.path, output, at, design)
@@ -88,7 +88,7 @@ def output_series(
 def _force_series(output: ForceMeasure, trajectory: Trajectory) -> Series:
     """Return a force over the samples, NaN if it is missing or undetermined."""
     given = trajectory.forces
-    # a simulator may solve a joint by its equivalent; it then gives no reaction of the joint
+    # a simulator may replace a joint by an equivalent, which gives no reaction of the joint
     if given is None or not {*given.joints, *given.drivers, *given.elements}.issuperset(
         output.forces
     ):
@@ -155,10 +155,10 @@ def deviations(
             standard with this quantity.
         complete: whether every sample was solved; a missing value is then out of tolerance if the
             standard has one.
-        refused: samples out of reach of the standard's solver, shape (n,); a value at such a sample
-            contradicts the solver.
+        refused: samples that the standard's solver cannot reach, shape (n,); a value at such a
+            sample contradicts the solver.
     """
-    beat, force = pace(case), isinstance(output, ForceMeasure)
+    rate_scale, force = pace(case), isinstance(output, ForceMeasure)
     compared: dict[str, Deviation | None] = {}
     reasons: list[str] = []
     losses = 0
@@ -174,7 +174,7 @@ def deviations(
         if order and force:
             continue  # forces have no rates
         if order >= output.orders:
-            reasons.append(f"{word}: takes a derivative more than engines give")
+            reasons.append(f"{word}: needs a higher derivative than engines give")
         elif values is None:
             reasons.append(f"{word}: the engine gives none")
         elif not known:
@@ -188,7 +188,7 @@ def deviations(
             name, reference, uncertainty = known[0]
             shown = labels.against(name)
             compared[quantity] = off = deviation(
-                values, reference, output.atol * beat**order, output.rtol, name, uncertainty
+                values, reference, output.atol * rate_scale**order, output.rtol, name, uncertainty
             )
             lost = int((np.isfinite(reference) & ~np.isfinite(values)).sum()) if complete else 0
             many = number_of(lost, "sample")
@@ -197,7 +197,7 @@ def deviations(
                 reasons.append(f"{word}: {many} without a value where {shown} has one")
                 losses += lost
             elif not (order or found.possible):
-                inputs = "forces" if force else "velocities to make it of"
+                inputs = "forces" if force else "velocities, on which it depends"
                 reasons.append(f"{word}: the engine gives no {inputs}")
             elif off is None:
                 none = f"{word}: no sample is known to both the engine and {shown}"
@@ -249,7 +249,7 @@ def deviation(
         return None
     error = np.where(both, np.abs(values - reference), -1.0)
     largest, tolerance = float(error.max()), atol + rtol * float(np.ptp(reference[both]))
-    # scaled by the largest, so that no square can overflow or vanish
+    # scaled by the largest value: no square overflows or underflows
     rms = largest * math.sqrt(float(np.mean((error[both] / largest) ** 2))) if largest else 0.0
     worst = int(np.argmax(error))
     if uncertainty is not None:

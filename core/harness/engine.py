@@ -1,5 +1,5 @@
-"""The engine protocol. Every engine implements it, the native one too; the harness knows nothing
-else about engines.
+"""The engine protocol: all that the harness knows of an engine. The native engine implements it
+too.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ class Engine(Protocol):
     """A solver of cases.
 
     Attributes:
-        name: as on the command line.
+        name: name on the command line.
         mode: "projection" (the simulator's kinematics, residuals and Jacobians in a Newton loop) or
-            "simulate" (its own solver or time stepping). Modes are different products and never
+            "simulate" (its own solver or time stepping). Modes are separate products and never
             share a ranking. Name and mode together identify an engine: the recommended simulate
-            mode has the simulator's name, its variants have names of their own.
+            mode has the simulator's name, and each variant has another name.
         loop: place of the loop over samples and iterations: "python", "simulator" or "compiled".
-        settings: the engine's settings, for the report; with them a reader can repeat the run.
+        settings: the settings in the report that a reader needs to repeat the run.
 
     Two attributes are optional, and False by default. `in_process`: the engine loads no foreign
     code. `bounds_error`: the engine itself bounds the error of each pose.
@@ -42,7 +42,9 @@ class Engine(Protocol):
         ...
 
     def unsupported(self, case: Case) -> str | None:
-        """Return why the engine cannot express the case, with the joint or driver; else None."""
+        """Return the reason if the engine cannot express the case, naming the joint or driver; else
+        None.
+        """
         ...
 
     def build(self, case: Case) -> Any:
@@ -53,20 +55,20 @@ class Engine(Protocol):
         """Solve all samples, from the design position outwards. Timed after a warm-up.
 
         Args:
-            model: the result of `build`; may be used for several solves.
+            model: the result of `build`; several solves may share it.
             tol: largest accepted constraint residual, relative to the mechanism's size. A pair
                 fails if a solved sample has a larger one. In simulate mode the simulator's own
                 settings decide on acceptance, and the residual shows the result.
 
         Returns:
             A trajectory of case.points. Samples out of reach are NaN with an explanation, never
-            numbers. Its iterations are Newton's; in simulate mode, time or load steps.
+            numbers. The iterations are Newton iterations; in simulate mode, time or load steps.
         """
         ...
 
 
 def may_run_here(engine: Engine) -> bool:
-    """Return whether an engine may run in this process, by its attribute `in_process`. All other
+    """Return whether an engine may run in this process, by its attribute `in_process`. Other
     engines run in separate processes.
     """
     return bool(getattr(engine, "in_process", False))
@@ -74,7 +76,7 @@ def may_run_here(engine: Engine) -> bool:
 
 def bounds_error(engine: Engine) -> bool:
     """Return whether an engine itself bounds the error of each pose, by its attribute
-    `bounds_error`. All other engines must keep their residuals within the tolerance.
+    `bounds_error`. Other engines must keep their residuals within the tolerance.
     """
     return bool(getattr(engine, "bounds_error", False))
 
@@ -85,7 +87,7 @@ class Floor:
 
     Attributes:
         us_per_sample: the sum of the parts [us].
-        counted: a description of the counted parts and of the method.
+        counted: description of the counted parts and of the method.
         parts: time of each part [us].
     """
 
@@ -102,11 +104,11 @@ class Measurable(Engine, Protocol):
     """
 
     def efforts(self) -> Mapping[str, Engine]:
-        """Return the engine at several efforts, coarse to fine, by their distinguishing setting."""
+        """Return the engine at several efforts, coarse to fine, by the setting that differs."""
         ...
 
     def floor(self, case: Case) -> Floor | None:
-        """Return the time of the compiled code alone; None for a compiled loop: its time is the
-        floor.
+        """Return the time of the compiled code alone; None for a compiled loop, whose own time is
+        the floor.
         """
         ...

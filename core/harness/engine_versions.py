@@ -14,15 +14,15 @@ from functools import partial
 from .engine import Engine, may_run_here
 
 # This marker precedes the version: a library may also print, and may end its process with status 0.
-TOLD = "its version is "
+MARKER = "its version is "
 COMMAND = f"""
 import pickle, sys
 sys.path[:] = pickle.load(sys.stdin.buffer)
 version = pickle.load(sys.stdin.buffer).version()
-print({TOLD!r}, version or "", sep="")
+print({MARKER!r}, version or "", sep="")
 """
 
-# Longest import [s]; a longer one hangs. The slowest needs some seconds on a cold disk.
+# Longest import [s]; a slower one counts as hanging. The slowest needs some seconds on a cold disk.
 PATIENCE = 60.0
 
 
@@ -53,5 +53,5 @@ def _version(engine: Engine, patience: float) -> str | None:
         TypeError,
     ):  # the engine's pairs cannot be sent either, and their records say so
         return None
-    _, told, version = ended.stdout.decode("utf-8", "replace").rpartition(TOLD)
-    return version.strip() or None if told else None
+    _, marker, version = ended.stdout.decode("utf-8", "replace").rpartition(MARKER)
+    return version.strip() or None if marker else None

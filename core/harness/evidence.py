@@ -1,4 +1,4 @@
-"""Evidence on the reference of a case: its origin, its digest, and a suspicion, if any."""
+"""Evidence on the reference of a case: its origin, its digest, and any suspicion."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from ..trajectory import QUANTITIES, Array
 VALUES = "values"
 """Subject of a digest if no file holds the reference."""
 IDENTICAL = (
-    "the reference is identical to native's own result in every bit, which no data of others is: no"
-    " pass is called validated; give the data of their source"
+    "the reference equals native's own result in every bit, as no independent data do: no pass is"
+    " called validated; give the data of the cited source"
 )
-# Straight series prove nothing: their rounded values are equal in every bit from any source. The
+# Straight series prove nothing: their rounded values agree in every bit whatever the source. The
 # series of a driven coordinate is straight.
 FEWEST, STRAIGHT = 3, 1e-9
 
@@ -28,8 +28,8 @@ class Evidence(msgspec.Struct, frozen=True, kw_only=True):
     Attributes:
         citation: source of the reference; empty if none is given.
         sha256: digest of the content.
-        of: the digested content: the name of a file, for its bytes, or "values", as in `digest`.
-        own: whether the reference claims to be others' data, but equals native's own result in
+        of: the digested content: a file name (the bytes of the file) or "values" (see `digest`).
+        own: whether the reference claims to be third-party data, but equals native's own result in
             every bit.
         units, signs: units of the columns by name, and convention of signs; empty in results of
             older versions.
@@ -121,11 +121,10 @@ def digest(reference: Mapping[str, Series]) -> str:
 
 
 class Explanation(msgspec.Struct, frozen=True, kw_only=True):
-    """A change of the reference, after which these quantities of these outputs are within
-    tolerance.
+    """A change of the reference that brings quantities of outputs within tolerance.
 
     Attributes:
-        change: in words, after "the reference"; alternatives are joined with "or".
+        change: words to follow "the reference"; "or" joins alternatives.
         difference, tolerance: the largest remaining difference in the first of the quantities, and
             its tolerance [unit].
     """
@@ -139,15 +138,15 @@ class Explanation(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Suspect(msgspec.Struct, frozen=True, kw_only=True):
-    """A case with engines in agreement with each other and not with the reference.
+    """A case whose engines agree with each other, but not with the reference.
 
     Attributes:
         agreement: largest difference between engines in `output` and `quantity` [unit].
         output, quantity, sample: place of the reference's largest deviation, in tolerances.
         difference, tolerance: the deviation at this place, and its tolerance [unit].
-        explanations: simple changes to make the reference fit.
-        unexplained: outputs and quantities without such a change.
-        message: all of these in one sentence.
+        explanations: simple changes that make the reference fit.
+        unexplained: outputs and quantities that no such change explains.
+        message: the whole suspicion in one sentence.
     """
 
     engines: list[str]

@@ -23,8 +23,8 @@ from .record import Outcome, Seconds
 from .resource_limits import memory_limit
 from .scheduler_delay import waited
 
-# Enough solves for a median unmoved by one interruption. Slow engines stop after the budget
-# [s], except between two solves whose times differ by UNLIKE: the slow one included a compilation.
+# Number of solves: one interruption does not move their median. Slow engines stop after the budget
+# [s], unless two solves differ in time by the factor UNLIKE: the slow one included a compilation.
 WARM_SOLVES = 5
 WARM_BUDGET = 0.5
 UNLIKE = 2.0
@@ -43,7 +43,7 @@ class Pair:
 
     Attributes:
         tol: the largest accepted constraint residual, as for `Engine.solve`.
-        timed: solve again for the time; otherwise the first answer is kept.
+        timed: whether to solve again to measure the time; otherwise the first answer is kept.
     """
 
     case: Case
@@ -83,7 +83,7 @@ class Answer:
 
 @dataclass(frozen=True)
 class Failure:
-    """The reason for a missing answer, and the end of the engine's printed output.
+    """The reason for a missing answer, with the end of the engine's printed output.
 
     Attributes:
         kind: type of the engine's error, if known.
@@ -96,13 +96,13 @@ class Failure:
 
     @staticmethod
     def of(error: BaseException) -> Failure:
-        """Return the failure of an error of the engine."""
+        """Return the failure that an error of the engine stands for."""
         kind = error.kind if isinstance(error, KincheckError) else None
-        return Failure(Outcome.ERROR, said(error), kind=kind)
+        return Failure(Outcome.ERROR, error_text(error), kind=kind)
 
     @property
     def harmful(self) -> bool:
-        """Return whether something broke; the process may then be in any state."""
+        """Return whether the failure may leave the process in a corrupt state."""
         return self.outcome.bad
 
 
@@ -111,7 +111,7 @@ class Attempt:
     """The result of one pair.
 
     Attributes:
-        facts: facts of the engine; None if it ended before it could report them.
+        facts: facts of the engine; None if the process ended before it reported them.
         seconds: times of the completed phases.
     """
 
@@ -122,7 +122,7 @@ class Attempt:
 
 Attempts: TypeAlias = Generator[tuple[int, Attempt]]
 Solver: TypeAlias = Callable[[Sequence[Pair]], Attempts]
-"""Solves pairs somewhere, and yields the index and the result of each pair once, in any order."""
+"""Solver of pairs: it yields the index and the result of each pair once, in any order."""
 
 
 def here(pairs: Sequence[Pair]) -> Attempts:
@@ -134,11 +134,11 @@ def here(pairs: Sequence[Pair]) -> Attempts:
         yield index, attempt(pair)
 
 
-def attempt(pair: Pair, tell: Callable[[Facts], object] = lambda facts: None) -> Attempt:
-    """Solve a pair. Everything the engine raises becomes a failure, KeyboardInterrupt excepted.
+def attempt(pair: Pair, report: Callable[[Facts], object] = lambda facts: None) -> Attempt:
+    """Solve a pair. Any exception of the engine becomes a failure, except KeyboardInterrupt.
 
     Args:
-        tell: receives the engine's facts before any step able to end the process.
+        report: receives the engine's facts before any step that may end the process.
     """
     case, engine = pair.case, pair.engine
     seconds = dict[str, float]()
@@ -149,7 +149,7 @@ def attempt(pair: Pair, tell: Callable[[Facts], object] = lambda facts: None) ->
 
     try:
         facts = Facts(str(engine.loop), plain(engine.settings))
-        tell(facts)
+        report(facts)
         version = engine.version()
         if version is None:
             return become(
@@ -160,7 +160,7 @@ def attempt(pair: Pair, tell: Callable[[Facts], object] = lambda facts: None) ->
                 )
             )
         facts = replace(facts, version=bounded(version))
-        tell(facts)
+        report(facts)
         reason = engine.unsupported(case)
         if reason is not None:
             return become(Failure(Outcome.UNSUPPORTED, bounded(reason)))
@@ -172,7 +172,7 @@ def attempt(pair: Pair, tell: Callable[[Facts], object] = lambda facts: None) ->
 
 
 def _solve(pair: Pair, seconds: dict[str, float]) -> Answer:
-    """Build once, solve, and solve again for the time. The last answer, the timed one, is kept."""
+    """Build once, solve, and solve again to measure the time. Return the last, timed answer."""
     case, engine = pair.case, pair.engine
     begin = perf_counter()
     model = engine.build(case)
@@ -267,16 +267,16 @@ def _check_shape(what: str, values: Any, expected: tuple[int, ...]) -> None:
         raise BadTrajectoryError(f"{what} has shape {np.shape(values)}, expected {expected}")
 
 
-def said(error: BaseException) -> str:
-    """Return any exception as text."""
+def error_text(error: BaseException) -> str:
+    """Return the text of any exception."""
     try:
         text = str(error)
     except Exception as another:  # __str__ is code of the engine too
         text = f"its text cannot be had ({type(another).__name__})"
-    told = bounded(f"{type(error).__name__}: {text}" if text else type(error).__name__)
+    message = bounded(f"{type(error).__name__}: {text}" if text else type(error).__name__)
     if isinstance(error, MemoryError) and (limit := memory_limit()):
-        told += f"; this process may have {limit:g} GB, --memory gives it more"
-    return told
+        message += f"; this process may have {limit:g} GB, --memory gives it more"
+    return message
 
 
 def bounded(text: Any) -> str:

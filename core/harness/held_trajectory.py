@@ -1,4 +1,6 @@
-"""Velocities by some drivers with all others held, for outputs defined as such derivatives."""
+"""Velocities caused by some drivers while the others are at rest, for outputs defined as such
+derivatives.
+"""
 
 from __future__ import annotations
 
@@ -19,11 +21,11 @@ SAME_POSE = 1e-6
 def held_trajectory(
     case: Case, mode: str, found: Trajectory, solve: Callable[[Case], Trajectory]
 ) -> tuple[Trajectory | None, str]:
-    """Return the poses of a trajectory with velocities by some drivers, all others held, and the
-    reason for missing samples.
+    """Return the poses of a trajectory with velocities caused by some drivers while the others are
+    at rest, and the reason for missing samples.
 
-    The trajectory is None if no output needs it, or if the engine runs through time: its velocities
-    then belong to its own path.
+    The trajectory is None if no output needs it, or if the engine steps through time: its
+    velocities then belong to its own path.
 
     Args:
         mode: mode of the engine.

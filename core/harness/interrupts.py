@@ -39,12 +39,12 @@ class Interrupts:
         self._holding = False
 
     def hold(self) -> None:
-        """Only note the next interrupt, as results are being written."""
+        """Postpone the next interrupt while results are written."""
         self._holding = True
 
     @contextmanager
     def deferred(self) -> Generator[None]:
-        """Complete the work inside, and raise an interrupt only at its end."""
+        """Complete the enclosed work, and raise an interrupt only at its end."""
         holding, self._holding = self._holding, True
         try:
             yield
@@ -68,18 +68,18 @@ _current = Interrupts()
 
 
 def hold() -> None:
-    """Only note the next interrupt, and act on it after the results are written."""
+    """Postpone the next interrupt until the results are written."""
     _current.hold()
 
 
 def deferred() -> AbstractContextManager[None]:
-    """Complete the work inside: an interrupt is raised only at its end."""
+    """Complete the enclosed work, and raise an interrupt only at its end."""
     return _current.deferred()
 
 
 @contextmanager
 def listening() -> Generator[Interrupts]:
-    """Handle the signals of this process for a command. Signals ignored before stay ignored."""
+    """Handle the signals of this process during a command. Signals ignored before stay ignored."""
     global _current
     _current = found = Interrupts()
     before: dict[int, Any] = {}

@@ -18,8 +18,8 @@ TRUTHS = {
     Truth.CONSENSUS_ONLY: "consensus only",
 }
 
-UNMADE = "asked for and never made: the run ended before it"
-"""Message of a pair without a record, unless its case cannot be read."""
+UNMADE = "not run: the run ended before this pair"
+"""Message of a planned pair without a record whose case can be read."""
 
 _LABELS = {"half_track_change": "half-track change", "wheelbase_change": "wheel-base change"}
 
@@ -30,8 +30,8 @@ def engine_name(record: Record) -> str:
 
 
 def product(engine: str, mode: str) -> str:
-    """Return the engine's name, with the mode unless it is projection: each mode is a separate
-    product.
+    """Return the engine's name, with its mode unless the mode is projection: each mode is a
+    separate product.
     """
     return engine if mode == "projection" else f"{engine} · {mode}"
 
@@ -44,9 +44,7 @@ def output_label(name: str) -> str:
 
 
 def signs(run: Mapping[str, Any]) -> list[str]:
-    """Return the sign conventions of outputs, a line each with its cases, from the circumstances of
-    a run.
-    """
+    """Return one line for each sign convention, with its cases, from the circumstances of a run."""
     said: dict[str, list[str]] = {}
     for case, facts in run.get("cases", {}).items():
         if words := facts.get("signs"):

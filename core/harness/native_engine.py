@@ -17,8 +17,8 @@ from .standard import STANDARD
 
 @dataclass(frozen=True)
 class NativeEngine:
-    """Geometric constraints, traced, run over lanes of samples by machine code, or by numpy without
-    llvmlite; see `Engine`.
+    """The geometric constraint formulation, traced to programs that machine code (without llvmlite,
+    numpy) runs over lanes of samples; see `Engine`.
 
     Attributes:
         solver: the solver and its settings; with a `last_iteration` above the default, the residual
@@ -44,7 +44,7 @@ class NativeEngine:
 
     @property
     def settings(self) -> Mapping[str, Any]:
-        """Formulation, executor and end of the loop; and additional solved quantities, if any."""
+        """Formulation, executor, termination of the loop, and any additional solved quantities."""
         solver = self.solver
         executor = (
             "llvm, vectors of lanes"

@@ -1,4 +1,4 @@
-"""Account of the native engine's programs for a case, and of the parts left out as not needed."""
+"""Account of the native engine's programs for a case, and of the unneeded parts left out."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ ORDERS = ("positions only", "and velocities", "and accelerations")
 
 
 def explain(case: Case) -> list[str]:
-    """Return lines of text: unknowns, rows, drivers and points, used and left out, and the
+    """Return lines of text on unknowns, rows, drivers and points, used or left out, and on the
     operations of every program.
 
     Raises:
@@ -37,17 +37,14 @@ def explain(case: Case) -> list[str]:
         ),
         f"  fixed, in no program: {_names(fixed)}",
         *(
-            [
-                "  joints between fixed bodies, which hold at the design: left out:"
-                f" {_names(grounded)}"
-            ]
+            [f"  joints between fixed bodies, satisfied at design, left out: {_names(grounded)}"]
             if grounded
             else []
         ),
-        (f"  rows solved {full.rows}, redundant and only checked: {_names(full.redundant)}"),
-        f"  drivers moving: {_names(moving)}; held, constants: {_names(held)}",
+        (f"  rows solved: {full.rows}; redundant rows, only checked: {_names(full.redundant)}"),
+        f"  moving drivers: {_names(moving)}; drivers at rest, constants: {_names(held)}",
         (
-            f"  points computed: {_names(shown(case.points))}; not read by an output, not computed:"
+            f"  points computed: {_names(shown(case.points))}; read by no output, not computed:"
             f" {_names(unread)}"
         ),
     ]
@@ -56,10 +53,10 @@ def explain(case: Case) -> list[str]:
 
 
 def _flops(size: ProgramSize) -> str:
-    """Return the operations of one sample: of each Newton iteration, and once at the end."""
+    """Return the operation counts of a sample: each Newton iteration, and the outputs."""
     newton, outputs = (size.flops[name] for name in ("newton", "outputs"))
     return (
-        f"{newton} operations an iteration, outputs {outputs} once: {newton + outputs} with one"
+        f"{newton} operations per iteration, {outputs} for the outputs: {newton + outputs} with one"
         " iteration"
     )
 

@@ -42,8 +42,8 @@ def results(
     """Return the results of a run: its records, circumstances and references.
 
     Args:
-        facts: further circumstances, from the process at the start of the run. They replace
-            circumstances found here.
+        facts: further circumstances, recorded at the start of the run. They replace those found
+            here.
         plan: the planned pairs of an incomplete run.
     """
     known = {**circumstances(cases, started=started, tol=tol, command=command), **(facts or {})}
@@ -102,7 +102,7 @@ def circumstances(
 def versions(records: Sequence[Record]) -> dict[str, str | None]:
     """Return the version of each engine, by name; None if unknown.
 
-    A resumed run may have found several versions: all are given.
+    A resumed run may have several versions of an engine: all are given.
     """
     found: dict[str, list[str]] = {record.engine: [] for record in records}
     for record in records:
@@ -133,8 +133,8 @@ def references(cases: Sequence[Case]) -> dict[str, dict[str, OutputSeries]]:
 
 
 def git_state(folder: Path) -> dict[str, Any] | None:
-    """Return the commit, the branch (null if none is checked out), and whether files differ from
-    the commit.
+    """Return the commit, the branch (null if none is checked out), and whether the working tree
+    differs from the commit.
 
     For changed files, add a digest of the difference. Return None without a repository.
     """
@@ -151,7 +151,7 @@ def git_state(folder: Path) -> dict[str, Any] | None:
         except (
             OSError,
             subprocess.TimeoutExpired,
-        ):  # git is missing, or a drive does not answer
+        ):  # git is missing, or the drive does not respond
             return None
         return done.stdout.strip() if done.returncode == 0 else None
 
@@ -173,12 +173,12 @@ def git_state(folder: Path) -> dict[str, Any] | None:
 
 
 def conditions() -> dict[str, Any]:
-    """Return the facts for the comparison of later runs: state of files, speed of the machine."""
+    """Return the facts needed to compare later runs: state of the files, speed of the machine."""
     return {"git": git_state(Path.cwd()), "calibration_seconds": calibration()}
 
 
 def calibration() -> float:
-    """Return the seconds of a fixed piece of work, median of five, to compare different days.
+    """Return the time of a fixed piece of work, median of five [s], to compare different days.
 
     Time spent waiting for a processor does not count. The work takes about 20 ms: interpreter steps
     and small linear solves in turn, like the engines' loops.
@@ -232,9 +232,9 @@ def _motion(motion: Motion) -> dict[str, Any]:
 
 
 def plain(facts: Mapping[str, Any]) -> dict[str, Any]:
-    """Return facts of any origin as plain data for JSON; it reads as the same values.
+    """Return facts of any origin as plain data that JSON preserves.
 
-    A value without a counterpart in JSON becomes its text.
+    A value that JSON cannot represent becomes its text.
     """
 
     def instead(value: Any) -> Any:
@@ -244,7 +244,7 @@ def plain(facts: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def readable(text: str) -> str:
-    """Return text fit for UTF-8: file names and messages may contain undecodable bytes."""
+    """Return text that UTF-8 can encode: file names and messages may contain undecodable bytes."""
     return text.encode("utf-8", "replace").decode("utf-8")
 
 

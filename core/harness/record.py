@@ -19,9 +19,9 @@ from .scene_record import Scene
 
 
 class Outcome(StrEnum):
-    """The outcome of a (case, engine) pair. Every pair has exactly one.
+    """The outcome of a (case, engine) pair; every pair has exactly one.
 
-    UNJUDGED is a solved pair without anything to compare it with: neither a pass nor a fault.
+    UNJUDGED is a solved pair that nothing can be compared with: neither a pass nor a fault.
     """
 
     PASS = "pass"
@@ -35,7 +35,7 @@ class Outcome(StrEnum):
 
     @property
     def bad(self) -> bool:
-        """Return whether the pair ran and went wrong. A missing engine or feature is no fault."""
+        """Return whether the pair ran and failed. A missing engine or feature is no fault."""
         return self not in (
             Outcome.PASS,
             Outcome.UNJUDGED,
@@ -71,11 +71,11 @@ class OutputSeries(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Deviation(msgspec.Struct, frozen=True, kw_only=True):
-    """The deviation of an output from its standard, over the samples known to both.
+    """The deviation of an output from its standard over the samples that both have.
 
     Attributes:
         max_abs, tolerance: the largest deviation, and the tolerance at its sample. If the reference
-            has an uncertainty, both are of the sample with the largest ratio of the two.
+            has an uncertainty, both belong to the sample with the largest ratio of the two.
         worst_step: index of the sample.
         against: kind of the reference, or the name of the engine compared with.
     """
@@ -92,10 +92,10 @@ class Deviations(msgspec.Struct, frozen=True, kw_only=True):
     """Deviations of one output. An uncompared quantity is null, and `reason` explains it.
 
     Attributes:
-        lost: number of values missing at samples with a value in the standard, although all samples
-            are solved; absent if zero. If all values are missing, the deviation is null too.
-        contradicted: number of samples with a value, but out of reach of the standard's solver;
-            absent if zero.
+        lost: number of samples without a value where the standard has one, although all samples are
+            solved; absent if zero. If all values are missing, the deviation is null too.
+        contradicted: number of samples with a value that the standard's solver cannot reach; absent
+            if zero.
     """
 
     position: Deviation | None
@@ -116,7 +116,7 @@ class Deviations(msgspec.Struct, frozen=True, kw_only=True):
         return all(each.within for _, each in self.items())
 
     def items(self) -> list[tuple[str, Deviation]]:
-        """Return the quantity and the deviation of each compared quantity."""
+        """Return each compared quantity with its deviation."""
         every = zip(QUANTITIES, (self.position, self.velocity, self.acceleration), strict=True)
         return [(quantity, deviation) for quantity, deviation in every if deviation is not None]
 
@@ -127,7 +127,7 @@ class Seconds(msgspec.Struct, frozen=True, kw_only=True):
     `warm` is the median of several solves after the first. A phase is null if it was not reached.
 
     Attributes:
-        waited: the part of `warm` during which other processes had the processor.
+        waited: the part of `warm` spent waiting for the processor.
     """
 
     build: float | None = None
@@ -155,8 +155,8 @@ class Record(RecordTable, msgspec.Struct, frozen=True, kw_only=True):
         dof: degrees of freedom without drivers; the same in all engines.
         iterations: Newton iterations, sum over the solved samples.
         solved, samples: number of samples reached, and number of samples.
-        us_per_step: time of the warm solve per sample [us], with the forces of outputs; null unless
-            all samples were reached.
+        us_per_step: time of the warm solve per sample [us], including the forces of outputs; null
+            unless all samples were reached.
         evidence: evidence on the reference used for the verdict; null without a reference, and in
             records of older versions.
         reasons: reasons for null numbers, by key: residual_max, rank, dof, iterations, us_per_step.
@@ -229,8 +229,8 @@ class Results(ResultsTable, msgspec.Struct, frozen=True, kw_only=True):
     suspects: dict[str, Suspect] = {}
 
     def blames_reference(self, record: Record) -> bool:
-        """Return whether the suspected reference of the case explains a failure. The record's own
-        message is then not needed.
+        """Return whether the suspected reference of the case explains a failure, so that the
+        record's own message is redundant.
         """
         whole = record.solved == record.samples and not any(
             each.lost for each in record.errors.values()
@@ -253,7 +253,7 @@ class Results(ResultsTable, msgspec.Struct, frozen=True, kw_only=True):
 def to_json(results: msgspec.Struct | Mapping[str, Any]) -> bytes:
     """Return indented JSON. Floats keep all their digits; a list of numbers stays on one line."""
     text = msgspec.json.format(msgspec.json.encode(results), indent=2)
-    # a string cannot hold a bare line break: only white space between numbers is touched
+    # JSON strings hold no bare line break: only white space between numbers changes
     rows = re.compile(rb"\[[^][{}\"]*\]")
     return (
         rows.sub(lambda row: re.sub(rb"\n *", b"", row[0].replace(b",\n", b", \n")), text) + b"\n"
@@ -261,7 +261,7 @@ def to_json(results: msgspec.Struct | Mapping[str, Any]) -> bytes:
 
 
 def settled(record: Record) -> Record:
-    """Return a record with its present outcome. Older files call an uncompared pair a pass."""
+    """Return a record with today's outcome: older files call an uncompared pair a pass."""
     if record.outcome is Outcome.PASS and not record.compared:
         return msgspec.structs.replace(record, outcome=Outcome.UNJUDGED)
     return record

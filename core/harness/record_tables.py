@@ -29,8 +29,8 @@ class RecordTable(Tabular):
 
     def summary(self) -> str:
         """Return case, engine, outcome and message."""
-        told = f": {self.message}" if self.message else ""
-        return f"{self.case}, {self.engine} ({self.mode}), {self.outcome.shown}{told}"
+        message = f": {self.message}" if self.message else ""
+        return f"{self.case}, {self.engine} ({self.mode}), {self.outcome.shown}{message}"
 
     def dataset(self) -> Dataset:
         """Return the outputs and their rates over the driver [units of the output]."""
@@ -47,7 +47,7 @@ class RecordTable(Tabular):
 
 
 class ResultsTable(Tabular):
-    """The records of a run, one a row."""
+    """The records of a run, one per row."""
 
     if TYPE_CHECKING:  # the field of Results
         records: Any

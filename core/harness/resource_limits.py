@@ -6,20 +6,19 @@ import os
 import sys
 from dataclasses import dataclass
 
-# Longest time of a pair [s]. The slowest pair of the built-in cases takes 3 s. A factor of a
-# hundred leaves room for a large mechanism on a busy machine, and ten hanging pairs still end
-# within the hour.
+# Longest time of a pair [s]: a hundred times that of the slowest built-in pair (3 s). This leaves
+# room for a large mechanism on a busy machine, and ten hanging pairs still end within the hour.
 TIMEOUT = 300.0
 
-# Memory of a process [GB]. After all built-in cases, a simulator holds 0.15 to 0.25 GB, by the data
-# limit's count. Sixteen times as much is a leak or a wrong size, and most machines have it to
-# spare.
+# Memory of a process [GB]. After all built-in cases, a simulator holds 0.15 to 0.25 GB, as the data
+# limit counts. Sixteen times as much shows a leak or a wrong size, and most machines have it.
 MEMORY = 4.0
 
-# Largest value of either: bytes are counted to 9.2e18, and a thread waits for at most 9.2e9 s.
+# Largest value of either limit: bytes are counted up to 9.2e18, and a thread waits at most 9.2e9 s.
 MOST = 1e9
 
-# Longest start of an interpreter with numpy [s], on a busy machine; usually a third of a second.
+# Longest start of an interpreter with numpy [s] on a busy machine; usually it takes a third of a
+# second.
 STARTUP = 120.0
 
 
@@ -39,8 +38,8 @@ class Limits:
 def default_jobs() -> int:
     """Return half the number of processors usable by this process.
 
-    Two processors often share a core, and the parent process judges and writes while a worker
-    solves. So the times are measured on a quiet machine.
+    Two processors often share a core, and the parent process judges and writes while workers solve.
+    Half of them leave the machine quiet enough to measure times.
     """
     usable = (
         len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
@@ -51,8 +50,8 @@ def default_jobs() -> int:
 def restrict(gigabytes: float) -> None:
     """Limit the memory of this process [GB].
 
-    A request beyond the limit fails with MemoryError or std::bad_alloc. The data limit is set, not
-    the address space: the latter also counts libraries and the reserved, unused memory of threads.
+    A request beyond the limit fails with MemoryError or std::bad_alloc. The limit applies to data,
+    not to the address space, which includes libraries and the reserved, unused memory of threads.
     """
     if sys.platform == "linux":
         import resource

@@ -1,5 +1,5 @@
-"""Reader of results files, kincheck-results/1. A file may be cut, edited or invented, so all of it
-is checked here, and no later step can fail.
+"""Reader of results files, kincheck-results/1. A file may be truncated, edited or forged, so the
+reader checks all of it, and no later step can fail.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from .record import Outcome, OutputSeries, Record, Results, from_json
 from .scene_record import Scene
 
 LARGEST_FILE = 512_000_000
-# Reports convert numbers to thousandths and degrees, and subtract them; within this bound nothing
-# overflows.
+# Largest number in a file: reports convert units and subtract, and nothing overflows within this
+# bound.
 LARGEST = 1e300
-_ADVICE = "make it anew with kincheck run --json"
+_ADVICE = "write the file again with kincheck run --json"
 
 
 class _Driver(msgspec.Struct, frozen=True):
@@ -60,7 +60,7 @@ def read_results(file: Path) -> Results:
         CaseError: the file cannot be read, holds no results, or contradicts itself: series of other
             lengths than the driver's, unknown names.
     """
-    text = read_text(file, LARGEST_FILE, "give results that kincheck run wrote")
+    text = read_text(file, LARGEST_FILE, "give a results file written by kincheck run")
     try:
         results = from_json(text.encode())
     except (msgspec.DecodeError, RecursionError) as error:
@@ -110,7 +110,7 @@ def _check_record(file: Path, key: str, record: Record, samples: dict[str, int])
             _check_numbers(file, join(f"{key}.driver", name), values, count)
     count = samples.get(record.case, 0)
     moved = record.driver or not (record.outputs or record.outcome is Outcome.FAIL)
-    _check(file, f"{key}.driver", bool(moved), "found none, expected values beside outputs")
+    _check(file, f"{key}.driver", bool(moved), "found none, expected values of drivers")
     for name, series in record.outputs.items():
         _check_series(file, join(f"{key}.outputs", name), series, count)
     for name, deviations in record.errors.items():
@@ -122,7 +122,7 @@ def _check_record(file: Path, key: str, record: Record, samples: dict[str, int])
                 file,
                 place,
                 known,
-                f"found a deviation of what is not there, expected {quantity} in outputs",
+                f"found a deviation of a missing quantity, expected {quantity} in outputs",
             )
             _check(
                 file,
@@ -148,7 +148,7 @@ def _check_numbers(file: Path, key: str, values: Sequence[float | None], count: 
         file,
         key,
         len(values) == count,
-        f"found {len(values)} numbers, expected {count}, as many as samples of the case",
+        f"found {len(values)} numbers, expected {count}, the number of samples of the case",
     )
     _check(
         file,

@@ -1,4 +1,4 @@
-"""The run: every case with every engine, each pair judged and timed, one record per pair."""
+"""The run: every case in every engine, one record per pair, judged and timed."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from ..errors import CaseError
 from .compare import as_numbers
 from .engine import Engine
 from .evidence import Evidence, evidence
-from .execution import Answer, Attempt, Facts, Failure, Pair, Solver, here, said
+from .execution import Answer, Attempt, Facts, Failure, Pair, Solver, error_text, here
 from .provenance import results, truth_of
 from .record import Deviations, Outcome, Record, Results, Seconds
 from .standard import STANDARD, Standard, has_everything, standard_of
 from .verdict import Verdict, judged, promised
 
-UNTOLD = {
+NULL_REASONS = {
     "residual_max": "no sample was solved",
-    "rank": "the engine does not tell it",
-    "dof": "the engine does not tell it",
+    "rank": "the engine does not report it",
+    "dof": "the engine does not report it",
     "iterations": "no sample was solved",
-    "us_per_step": "known only where all samples are solved, and solved again for the time",
+    "us_per_step": "measured only if all samples are solved, by a second solve",
 }
-"""Reasons for null numbers of a record, by key, if the engine has answered."""
+"""Reasons for null numbers in the record of an answer, by key."""
 
 Progress = Callable[[Record, int, int], None]
 """Called with each new record, the number of records so far, and their final number."""
@@ -65,12 +65,12 @@ def run(
     """Solve every case with every engine and judge each answer.
 
     An output is judged against the case's reference. An output, velocity or acceleration missing
-    in the reference is compared with the native engine's. A pair with nothing to compare is
-    `unjudged`, and so is the native engine itself on a case without a reference. An engine fails if
-    it has values at samples reached by neither the reference nor the native engine.
+    in the reference is compared with the native engine's. A pair that nothing can be compared with
+    is `unjudged`, like the native engine on a case without a reference. An engine fails if it has
+    values at samples that neither the reference nor the native engine reaches.
 
-    The records are in the order of cases and engines, the native engine first; the solver may
-    finish them in another order.
+    The records keep the order of cases and engines, the native engine first, whatever the order in
+    which the solver finishes.
 
     Args:
         tol: largest accepted constraint residual, as for `Engine.solve`.
@@ -78,12 +78,12 @@ def run(
             records.
         command: the command line, kept with the results.
         solver: solves the pairs: in this process, in worker processes, on a cluster.
-        made: records of an earlier run of the same cases and engines; their pairs are not solved
+        made: records of an earlier run of the same cases and engines, whose pairs are not solved
             again.
         facts: further circumstances, kept with the results; they replace the present ones.
         unread: names of unreadable requested cases; their pairs count as missing.
-        residuals: fail an engine in projection mode if a solved sample has a residual above `tol`.
-            False for efforts with an intentional residual.
+        residuals: whether an engine in projection mode fails if a solved sample has a residual
+            above `tol`; False for efforts that leave a residual on purpose.
 
     Raises:
         CaseError: two cases have the same name, or two engines the same name and mode; names
@@ -122,15 +122,17 @@ def run(
                 case.waiting.append((pair, attempt))
             else:
                 judge(pair, attempt, case.standard)
-    found, asked = [records[key] for key in wanted], planned(cases, engines, unread)
-    return results(cases, found, started=started, tol=tol, command=command, facts=facts, plan=asked)
+    found, requested = [records[key] for key in wanted], planned(cases, engines, unread)
+    return results(
+        cases, found, started=started, tol=tol, command=command, facts=facts, plan=requested
+    )
 
 
 def _distinct(what: str, names: Sequence[str]) -> None:
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise CaseError(
-            f"run: there are two {what} named {twice[0]!r}; results go by name: rename one, or"
+            f"run: there are two {what} named {twice[0]!r}; names identify results: rename one, or"
             " leave it out"
         )
 
@@ -162,7 +164,7 @@ def _to_solve(
     made: Mapping[tuple[str, str, str], Record],
     judging: Mapping[str, _Judging],
 ) -> Iterator[tuple[Case, Engine]]:
-    """Yield every pair without a record, and the baseline if it is needed as a standard."""
+    """Yield every pair without a record, and the baseline pair if the standard is needed."""
     for case in cases:
         missing = [
             engine for engine in engines if (case.name, engine.name, engine.mode) not in made
@@ -179,7 +181,7 @@ def _standard_known(
     made: Mapping[tuple[str, str, str], Record],
 ) -> Standard | None:
     """Return the standard of a case if it is known before anything is solved."""
-    # third-party data must first be checked for equality with native's result
+    # third-party data must first be checked: they must not equal native's result
     if has_everything(case) and case.truth is not Truth.THIRD_PARTY_DATA:
         return Standard({})
     native = next((engine for engine in engines if engine.name == STANDARD), None)
@@ -206,7 +208,7 @@ def _record(pair: Pair, attempt: Attempt, native: Standard, *, residuals: bool) 
                 case, engine, facts, result, attempt.seconds or Seconds(), verdict, own
             )
         except Exception as error:  # for example, an unsuitable reference
-            result = Failure(Outcome.ERROR, said(error))
+            result = Failure(Outcome.ERROR, error_text(error))
     nothing = Deviations(
         position=None,
         velocity=None,
@@ -222,7 +224,7 @@ def _record(pair: Pair, attempt: Attempt, native: Standard, *, residuals: bool) 
         errors={output.name: nothing for output in case.outputs},
         evidence=evidence(case, native.outputs),
         seconds=attempt.seconds,
-        reasons=dict.fromkeys(UNTOLD, f"{result.outcome}: see message"),
+        reasons=dict.fromkeys(NULL_REASONS, f"{result.outcome}: see message"),
         details={"printed": result.printed} if result.printed else {},
     )
 
@@ -239,7 +241,7 @@ def _answered(
     """Return the record of an answer."""
     solved, samples = answer.solved, len(case.sweep.values)
     details = dict(answer.details)
-    # a correct answer may have notes too, for example of a singular pose on its way
+    # a correct answer may have notes too, for example on a singular pose it passed
     messages = [*verdict.messages, *details.pop("notes", [])]
     numbers = {
         "residual_max": answer.residual if solved else None,
@@ -262,7 +264,7 @@ def _answered(
         },
         errors=dict(verdict.errors),
         **numbers,
-        reasons={key: UNTOLD[key] for key, number in numbers.items() if number is None},
+        reasons={key: NULL_REASONS[key] for key, number in numbers.items() if number is None},
         solved=solved,
         samples=samples,
         seconds=msgspec.structs.replace(seconds, compare=verdict.seconds),

@@ -25,26 +25,28 @@ from .standard import STANDARD
 
 FRAMES = 61  # a few seconds of animation, and a few kilobytes a body
 POSES = 3000  # frames times bodies, at most: a quarter of a megabyte of results
-LARGEST = 200  # moving bodies; no picture shows more
-DIGITS = 6  # of the mechanism's size: a thousandth of a pixel
+LARGEST = 200  # moving bodies; a picture with more is unreadable
+DIGITS = 6  # relative to the mechanism's size: a thousandth of a pixel
 
-# Looser than for a comparison, since poses are only drawn: a thousandth of the digits kept.
+# Looser than for a comparison, since poses are only drawn: a thousandth of the last digit kept.
 TOL = 1e-9
 
 
 def with_scenes(results: Results, cases: Sequence[Case]) -> Results:
     """Return the results with a scene of every case of at most `LARGEST` moving bodies.
 
-    Poses over the sweep are solved here only if these results hold an answer of the native engine.
-    It may have solved them in a separate process. A case solved there can neither hang nor end this
-    process.
+    Poses over the sweep are solved here only if the results hold an answer of the native engine,
+    possibly from a separate process: such a case can neither hang nor end this process.
     """
     answered = {record.case for record in results.records if _answers(record)}
-    asked = any(record.engine == STANDARD for record in results.records)
+    requested = any(record.engine == STANDARD for record in results.records)
     shown = [case for case in cases if len(case.mechanism.moving) <= LARGEST]
     return msgspec.structs.replace(
         results,
-        scenes={case.name: scene(case, poses=case.name in answered, asked=asked) for case in shown},
+        scenes={
+            case.name: scene(case, poses=case.name in answered, requested=requested)
+            for case in shown
+        },
     )
 
 
@@ -52,18 +54,18 @@ def _answers(record: Record) -> bool:
     return record.engine == STANDARD and bool(record.solved)
 
 
-def scene(case: Case, *, poses: bool = True, asked: bool = True) -> Scene:
+def scene(case: Case, *, poses: bool = True, requested: bool = True) -> Scene:
     """Return the scene of a case.
 
     Args:
         poses: solve for the bodies' poses over the sweep; otherwise the scene is the design
             position.
-        asked: if `poses` is false, whether the native engine was run and had no answer.
+        requested: if `poses` is false, whether the native engine was run and had no answer.
     """
     mechanism = case.mechanism
     frames, motions = list[int](), dict[str, BodyMotion]()
     message = (
-        f"the native engine {'has no answer' if asked else 'was not asked'} in this run: this is"
+        f"the native engine {'has no answer' if requested else 'was not run'} in this run: this is"
         " the design position"
     )
     if poses:
@@ -115,7 +117,7 @@ def scene(case: Case, *, poses: bool = True, asked: bool = True) -> Scene:
 
 
 def _wheels(case: Case) -> list[SceneWheel]:
-    """Return the wheels of suspension outputs with a known radius, as others cannot be drawn."""
+    """Return the wheels of suspension outputs; those without a radius cannot be drawn."""
     outputs = [each for each in case.outputs if isinstance(each, SuspensionOutput)]
     found: dict[str, SceneWheel] = {}
     for vehicle in (vehicle for output in outputs for vehicle in output.vehicles):
@@ -132,7 +134,7 @@ def _wheels(case: Case) -> list[SceneWheel]:
 
 
 def _forces(case: Case) -> list[SceneForce]:
-    """Return the outputs of forces at a point along a fixed direction."""
+    """Return the force outputs at a point along a fixed direction."""
     found: list[SceneForce] = []
     for output in case.outputs:
         if isinstance(output, JointForce):
@@ -157,12 +159,12 @@ def _forces(case: Case) -> list[SceneForce]:
 
 
 def _poses(case: Case) -> tuple[list[int], dict[str, BodyMotion], str]:
-    """Return the samples reached, of `FRAMES` evenly spaced ones, and the moving bodies there."""
+    """Return the samples reached among `FRAMES` evenly spaced ones, and the moving bodies there."""
     path, count = case.sweep.path, len(case.sweep.values)
     bodies = tuple(body.name for body in case.mechanism.moving)
     frames = min(FRAMES, count, POSES // max(1, len(bodies)))
     taken = np.unique(np.linspace(0, count - 1, frames).round().astype(int))
-    # not compiled: for so few samples compilation takes longer than numpy
+    # interpreted by numpy: for so few samples, compilation takes longer
     solver = NativeSolver(order=0, compiled=False)
     found = solver.prepare(case.mechanism, replace(path, times=path.times[taken]), bodies=bodies)(
         TOL

@@ -1,4 +1,4 @@
-"""The mechanism of a case in results, for drawing."""
+"""The mechanism of a case as results hold it for drawing."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class ScenePoint(msgspec.Struct, frozen=True, kw_only=True):
     """A named point of a body, global at the design [m].
 
     Attributes:
-        output: whether an output reads the point.
+        output: whether an output uses the point.
     """
 
     name: str
@@ -75,8 +75,8 @@ class SceneForce(msgspec.Struct, frozen=True, kw_only=True):
     Attributes:
         output: the output with the values of the force [N].
         name: the joint or driver.
-        body: the body under the force.
-        position: the force's point of this body, global at the design [m].
+        body: the body that the force acts on.
+        position: the point of this body at which the force acts, global at the design [m].
         direction: global unit vector [-].
     """
 

@@ -1,4 +1,6 @@
-"""Time spent waiting for a processor, subtracted before times of different days are compared."""
+"""Time spent waiting for a processor, which is subtracted before times of different days are
+compared.
+"""
 
 from __future__ import annotations
 
@@ -10,8 +12,8 @@ _ACCOUNT = Path("/proc/thread-self/schedstat")
 def waited() -> float:
     """Return the seconds this thread was ready and waited for a processor; 0 except on Linux.
 
-    Processor time is no substitute for wall-clock time: it does not count the time of a solve that
-    sleeps, or waits for a disk or a lock.
+    Processor time does not replace wall-clock time: it misses the time in which a solve sleeps, or
+    waits for a disk or a lock.
     """
     try:
         # fields: nanoseconds run, nanoseconds waited, time slices (Linux,

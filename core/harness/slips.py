@@ -1,9 +1,9 @@
-"""Slips: simple mistakes in a reference, tried on the whole series: sign, unit, offset, order of
-samples, exchanged columns, another definition of the output.
+"""Slips: simple mistakes in a whole series of a reference: sign, unit, offset, order of samples,
+exchanged columns, another definition of the output.
 
 A slip is reported only if its correction brings the reference within the tolerance and is
-significant. Insignificant are: a sign of a series of zeros, an offset of a constant series, and any
-change of two samples.
+significant. The sign of a series of zeros, the offset of a constant series and any change of two
+samples are insignificant.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from ..unit_text import value_text
 from .compare import deviation
 from .record import Deviation
 
-# Fewest samples: too many changes fit two samples.
+# Fewest samples: two samples fit too many changes.
 FEWEST = 3
-# Smallest size of a series' values, or of their changes, in tolerances: too many changes fit a
-# smaller one, too.
+# Smallest size of a series' values, or of their changes, in tolerances: a smaller one also fits too
+# many changes.
 MEANINGFUL = 10.0
 OTHER_SIGN = "with the other sign"
 FACTORS: Mapping[str, float] = {
@@ -46,8 +46,8 @@ FACTORS: Mapping[str, float] = {
     "2": 2.0,
     "1/2": 0.5,
 }
-"""Factors between units of length and of angle, percent and parts, half and whole, by their names
-in messages.
+"""Factors between units of length and of angle, percent and fractions, half and whole, by their
+names in messages.
 """
 
 
@@ -69,7 +69,7 @@ class Uncertain:
     half: Array | None = None
 
     def changed(self, change: Callable[[Array], Array]) -> Uncertain:
-        """Return the reference after a change of its values and samples, linear about each half."""
+        """Return the reference after an affine change of its values and samples."""
         if self.half is None:
             return Uncertain(change(self.values))
         half = np.abs(change(self.half) - change(np.zeros_like(self.half)))
@@ -82,7 +82,7 @@ class Uncertain:
 
 @dataclass(frozen=True)
 class Slip:
-    """A change to make the reference fit.
+    """A change that makes the reference fit.
 
     Attributes:
         change: in words, after "the reference".
@@ -112,14 +112,14 @@ def slips(
     offsets: bool = True,
     definitions: Sequence[NamedChange] = (),
 ) -> list[Slip]:
-    """Return all single changes to make the reference fit; if there are none, all pairs of changes.
+    """Return all single changes that make the reference fit; without any, all pairs of changes.
 
     Args:
         held: the agreed values of the engines.
         reference: reference of the same output, out of tolerance, shape (n,).
-        others: values of the other outputs, by name, possibly confused with this one.
+        others: values of the other outputs, by name, which the reference may hold by mistake.
         offsets: whether a constant may be added; False for derivatives.
-        definitions: changes from other definitions of the output to that of the engines.
+        definitions: changes from other definitions of the output to the engines' definition.
     """
     if not isinstance(reference, Uncertain):
         reference = Uncertain(reference)
@@ -213,7 +213,7 @@ def _fitting(
 
 
 def _exchanged(reference: Uncertain, others: Mapping[str, Held], before: str) -> Iterator[Slip]:
-    """Yield the other outputs in agreement with the reference, if it varies."""
+    """Yield the other outputs that agree with the reference, if the reference varies."""
     for name, other in others.items():
         yield from _fitting(
             other, reference, [(f"{before}taken as that of output {name}", lambda x: x)], ""

@@ -1,4 +1,4 @@
-"""Standards: values and refusals of the native engine, used if a reference is incomplete."""
+"""Standards: values and refusals of the native engine, which complete a reference."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from ..case.case import Case, Series
 from .record import OutputSeries, Record
 
 STANDARD = "native"
-"""Name of the standard engine for a case without a reference; no other place names it."""
+"""Name of the standard engine, for cases without a complete reference."""
 
 
 UNCERTAIN = "uncertain_samples"
-"""Key of a record's details: reached samples, refused as uncertain."""
+"""Key of a record's details: samples that were reached, but refused as uncertain."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,9 +25,9 @@ class Standard:
 
     Attributes:
         outputs: outputs by name; empty without an answer.
-        absent: the reason for a missing answer, as the end of a sentence on the missing reference.
-        refused: samples out of the native engine's reach, shape (n,); None without such samples.
-            Samples near a singular pose, reached but refused for an uncertain pose or rate, are not
+        absent: the reason for a missing answer, which ends a sentence on the missing reference.
+        refused: samples that the native engine cannot reach, shape (n,); None without such samples.
+            Samples near a singular pose that it refuses for an uncertain pose or rate are not
             included: they contradict no other engine.
         why: the native engine's own message.
     """
@@ -38,14 +38,14 @@ class Standard:
     why: str = ""
 
     def refuses(self, case: Case) -> NDArray[np.bool_] | None:
-        """Return the samples reached by neither the native engine nor the reference, shape (n,)."""
+        """Return the samples that neither native nor the reference reaches, shape (n,)."""
         if self.refused is None:
             return None
         return self.refused & ~known(case.reference.values(), len(self.refused))
 
 
 def standard_of(native: Record) -> Standard:
-    """Return the standard given by a record of the native engine."""
+    """Return the standard from a record of the native engine."""
     if not native.outputs:
         why = f", and the native engine has no answer ({native.outcome.shown}: {native.message})"
         return Standard({}, why)
@@ -71,7 +71,7 @@ def has_everything(case: Case) -> bool:
 
 
 def known(outputs: Iterable[Series], samples: int) -> NDArray[np.bool_]:
-    """Return the samples at which any output has a value, shape (samples,)."""
+    """Return the samples where any output has a value, shape (samples,)."""
     known = np.zeros(samples, dtype=np.bool_)
     for each in outputs:
         known |= np.isfinite(each.position)

@@ -1,4 +1,6 @@
-"""Suspicion of a reference: the engines of a case agree with each other and not with it."""
+"""Suspicion of a reference: the engines of a case agree with each other, but not with the
+reference.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,7 @@ from .evidence import Explanation, Suspect
 from .record import Deviation, Deviations, OutputSeries, Record
 from .slips import Held, NamedChange, Slip, Uncertain, slips
 
-# Most outputs explained in a sentence; further ones are counted.
+# Largest number of outputs explained in a sentence; further ones are counted.
 MOST_EXPLAINED = 12
 ADVICE = "suspect the reference, the output's component or a sign"
 UNEXPLAINED = (
@@ -44,10 +46,10 @@ class _Off:
 
 
 def suspect(case: Case, records: Sequence[Record]) -> Suspect | None:
-    """Return the suspicion of a reference; None unless the engines agree within tolerance and it
-    does not fit.
+    """Return the suspicion of a reference; None unless the engines agree within tolerance and the
+    reference does not fit.
 
-    A single engine has no other to agree with; a slip must then explain all deviations.
+    A single engine agrees with no other, so a slip must explain all deviations.
     """
     mine = [record for record in records if record.case == case.name and record.solved]
     whole = [record for record in mine if record.solved == record.samples]
@@ -57,12 +59,12 @@ def suspect(case: Case, records: Sequence[Record]) -> Suspect | None:
         return None
     if not whole:
         return None
-    beat = pace(case)
-    agreement = _agreement(case, beat, whole[0], mine)
-    off = sorted(_off(case, beat, whole[0]), key=lambda each: (each.order, -each.ratio))
+    rate_scale = pace(case)
+    agreement = _agreement(case, rate_scale, whole[0], mine)
+    off = sorted(_off(case, rate_scale, whole[0]), key=lambda each: (each.order, -each.ratio))
     if agreement is None or not off:
         return None
-    explanations, left = _explained(case, beat, whole[0], off)
+    explanations, left = _explained(case, rate_scale, whole[0], off)
     engines = list(dict.fromkeys(record.engine for record in mine))
     if len(engines) == 1 and (left or not explanations):
         return None
@@ -113,15 +115,15 @@ def _unit(case: Case) -> Unit:
 
 
 def _reasons(explanations: Sequence[Explanation], left: Sequence[str]) -> str:
-    said = [
+    reasons = [
         f"{', '.join(each.outputs)} ({', '.join(each.quantities)}): the reference {each.change}"
         f" fits within {value_text(_number(each.difference), each.unit)}, tolerance"
         f" {value_text(_number(each.tolerance), each.unit)}"
         for each in explanations
     ]
     if left:
-        said.append(f"{shortened(left, MOST_EXPLAINED)}: {UNEXPLAINED}")
-    return "; ".join(said)
+        reasons.append(f"{shortened(left, MOST_EXPLAINED)}: {UNEXPLAINED}")
+    return "; ".join(reasons)
 
 
 def _number(value: float) -> str:
@@ -138,7 +140,7 @@ def _series(output: OutputSeries, order: int) -> Array | None:
     return None if values is None else np.array(values, dtype=np.float64)
 
 
-def _held(case: Case, beat: float, record: Record, order: int) -> dict[str, Held]:
+def _held(case: Case, rate_scale: float, record: Record, order: int) -> dict[str, Held]:
     """Return the values of a record by output, with their tolerances."""
     found: dict[str, Held] = {}
     for output in case.outputs:
@@ -147,13 +149,13 @@ def _held(case: Case, beat: float, record: Record, order: int) -> dict[str, Held
             and (values := _series(record.outputs[output.name], order)) is not None
         ):
             found[output.name] = Held(
-                values, output.atol * beat**order, output.rtol, output.unit + PER_TIME[order]
+                values, output.atol * rate_scale**order, output.rtol, output.unit + PER_TIME[order]
             )
     return found
 
 
 def _agreement(
-    case: Case, beat: float, first: Record, records: Sequence[Record]
+    case: Case, rate_scale: float, first: Record, records: Sequence[Record]
 ) -> dict[tuple[str, int], float] | None:
     """Return the largest difference between the first engine and the others, by output and order.
 
@@ -161,9 +163,9 @@ def _agreement(
     """
     largest: dict[tuple[str, int], float] = {}
     for order in range(len(QUANTITIES)):
-        held = _held(case, beat, first, order)
+        held = _held(case, rate_scale, first, order)
         for record in records:
-            for name, other in _held(case, beat, record, order).items():
+            for name, other in _held(case, rate_scale, record, order).items():
                 if name not in held:
                     continue
                 off = deviation(
@@ -177,10 +179,10 @@ def _agreement(
     return largest
 
 
-def _off(case: Case, beat: float, record: Record) -> Iterator[_Off]:
+def _off(case: Case, rate_scale: float, record: Record) -> Iterator[_Off]:
     """Yield the quantities out of tolerance against the reference."""
     for order, quantity in enumerate(QUANTITIES):
-        for name, held in _held(case, beat, record, order).items():
+        for name, held in _held(case, rate_scale, record, order).items():
             reference: Array | None = getattr(case.reference.get(name), quantity, None)
             if reference is None:
                 continue
@@ -191,12 +193,12 @@ def _off(case: Case, beat: float, record: Record) -> Iterator[_Off]:
 
 
 def _explained(
-    case: Case, beat: float, record: Record, off: Sequence[_Off]
+    case: Case, rate_scale: float, record: Record, off: Sequence[_Off]
 ) -> tuple[list[Explanation], list[str]]:
-    """Return the slips that explain the deviations, equal ones merged, and the unexplained outputs
-    by name.
+    """Return the slips that explain the deviations, merged if equal, and the unexplained outputs by
+    name.
     """
-    every = {order: _held(case, beat, record, order) for order in range(len(QUANTITIES))}
+    every = {order: _held(case, rate_scale, record, order) for order in range(len(QUANTITIES))}
     units = {output.name: output.unit for output in case.outputs}
     found: dict[tuple[str, tuple[str, ...]], list[tuple[str, str, Slip]]] = {}
     left: list[str] = []
@@ -241,7 +243,7 @@ def _explained(
 
 
 def _definitions(case: Case, off: _Off, others: Mapping[str, Held]) -> list[NamedChange]:
-    """Return the changes from other definitions of an output: of camber, if toe is known too."""
+    """Return the changes from other definitions of an output: for camber, if toe is known."""
     camber = next(output for output in case.outputs if output.name == off.output)
     if not isinstance(camber, Camber) or off.order:
         return []

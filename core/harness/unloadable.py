@@ -12,7 +12,7 @@ from ..trajectory import Trajectory
 
 @dataclass(frozen=True)
 class Unloadable:
-    """Substitute for an engine after a failed import of its module: its pairs are errors."""
+    """Substitute for an engine whose module cannot be imported: its pairs end in an error."""
 
     name: str
     reason: str
@@ -21,7 +21,7 @@ class Unloadable:
     settings: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
     def version(self) -> str | None:
-        """Raise the error of the import. The harness calls this method first.
+        """Raise the import error. The harness calls this method first.
 
         Raises:
             ImportError: always.

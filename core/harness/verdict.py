@@ -22,12 +22,12 @@ from .standard import STANDARD, Standard, known
 
 ROUNDED = 2.0
 """Factor on the residual tolerance: engines measure in a unit near the mechanism's size, a power of
-two, possibly larger than the size.
+two that may exceed the size.
 """
 
 
 NAMED = 3
-"""Number of outputs with values in a message; the record has all."""
+"""Largest number of outputs whose values a message gives; the record has all."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +36,7 @@ class Verdict:
 
     Attributes:
         outcome: pass, fail or unjudged.
-        messages: reasons for a failure, or the parts not judged.
+        messages: reasons for a failure, or the unjudged parts.
         errors: deviations of every output.
         seconds: time of the comparison.
     """
@@ -51,7 +51,8 @@ def judged(case: Case, answer: Answer, native: Standard, tol: float) -> Verdict:
     """Return the verdict on an answer.
 
     Args:
-        native: the native engine's answer, for everything missing in the case's reference.
+        native: the native engine's answer, the standard for everything that the case's reference
+            lacks.
         tol: the largest residual promised for solved samples, relative to the size.
     """
     begin = perf_counter()
@@ -63,12 +64,12 @@ def judged(case: Case, answer: Answer, native: Standard, tol: float) -> Verdict:
     }
     faults: list[str] = []
     if not complete:
-        why = answer.message or "the engine does not say why; ask it to"
+        why = answer.message or "the engine gives no reason; its adapter must report one"
         faults.append(
             f"{solved} of {samples} samples solved: {why}{_reached_elsewhere(case, answer, native)}"
         )
     faults += filter(None, (_contradiction(case, answer, native), _worst(case, errors)))
-    # an output without any value has no deviation, and so no deviation out of tolerance
+    # an output without any value has no deviation, so this loop is its only test
     faults += [
         f"{name}: {each.reason}" for name, each in errors.items() if each.lost and each.within
     ]
@@ -100,7 +101,7 @@ def _deviations(
 
 
 def _worst(case: Case, errors: Mapping[str, Deviations]) -> str:
-    """Return the deviation most out of tolerance, in words; empty if all are within."""
+    """Return a sentence on the deviation farthest out of tolerance; empty if all are within."""
     outside: list[tuple[float, Quantity, str, Deviation]] = [
         (off.max_abs / off.tolerance if off.tolerance else np.inf, output, quantity, off)
         for output in case.outputs
@@ -116,8 +117,8 @@ def _worst(case: Case, errors: Mapping[str, Deviations]) -> str:
 
 
 def _contradiction(case: Case, answer: Answer, native: Standard) -> str:
-    """Return the values at samples refused by the native engine, with both sides; empty if there
-    are none.
+    """Return a sentence on values at samples that the native engine refuses, with its reason; empty
+    if there are none.
     """
     refused = native.refuses(case)
     if refused is None:
@@ -140,7 +141,9 @@ def _contradiction(case: Case, answer: Answer, native: Standard) -> str:
 
 
 def _reached_elsewhere(case: Case, answer: Answer, native: Standard) -> str:
-    """Return the number of unsolved samples with a value in a standard, in words; empty if zero."""
+    """Return a phrase with the number of unsolved samples where a standard has a value; empty if
+    zero.
+    """
     samples = len(case.sweep.values)
     unsolved = ~known(answer.outputs.values(), samples)
     for name, series in (
@@ -155,15 +158,15 @@ def _reached_elsewhere(case: Case, answer: Answer, native: Standard) -> str:
 def promised(engine: Engine, tol: float) -> float:
     """Return the largest residual promised for solved samples, relative to the size.
 
-    Infinite for two kinds of engines, judged by their outputs alone: a simulation accepts by its
-    own settings, and an engine with its own bound of the pose error needs no bound of the residual.
+    The tolerance is infinite for engines judged by their outputs alone: a simulation accepts
+    samples by its own settings, and an engine that bounds the pose error needs no bound of the
+    residual.
     """
     return tol if engine.mode == "projection" and not bounds_error(engine) else math.inf
 
 
 def excess(case: Case, residual: float, tol: float) -> str:
-    """Return the excess of the solved samples' residual over the tolerance, in words; empty without
-    an excess.
+    """Return a sentence on a residual of solved samples above the tolerance; empty without one.
 
     The tolerance is relative to the mechanism's size for lengths, and absolute for residuals
     without a unit.
@@ -179,7 +182,7 @@ def excess(case: Case, residual: float, tol: float) -> str:
 
 
 def _not_judged(case: Case, errors: Mapping[str, Deviations]) -> list[str]:
-    """Return the uncompared outputs, quantities or samples, with the reasons; equal reasons are
+    """Return the uncompared outputs, quantities or samples with their reasons; equal reasons are
     merged.
     """
     reasons: dict[str, list[str]] = {}

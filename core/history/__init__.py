@@ -1,1 +1,1 @@
-"""History: runs and their records in one SQLite file, each record durable the moment it is made."""
+"""History: runs and their records in one SQLite file. Each record is durable at once."""

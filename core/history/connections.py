@@ -11,7 +11,7 @@ from .schema import MIGRATIONS, check, migrate, write_ahead
 
 
 def writable_connection(path: Path) -> sqlite3.Connection:
-    """Return a connection for writing; make the tables, or bring them up to date.
+    """Return a connection for writing; create the tables, or migrate them.
 
     Raises:
         HistoryError: the file is not a history.
@@ -19,9 +19,9 @@ def writable_connection(path: Path) -> sqlite3.Connection:
     """
     connection = sqlite3.connect(path, timeout=faults.BUSY, isolation_level=None)
     try:
-        check(connection)  # before anything is changed in a file of another program
+        check(connection)  # before any change, in case the file belongs to another program
         write_ahead(connection, faults.BUSY)
-        connection.execute("PRAGMA synchronous = FULL")  # a commit survives a power cut too
+        connection.execute("PRAGMA synchronous = FULL")  # a commit survives a power failure, too
         connection.execute("PRAGMA foreign_keys = ON")
         migrate(connection)
     except BaseException:
@@ -31,7 +31,7 @@ def writable_connection(path: Path) -> sqlite3.Connection:
 
 
 def readable_connection(path: Path) -> sqlite3.Connection:
-    """Return a connection for reading; a file of an older version is brought up to date first.
+    """Return a connection for reading; migrate a file of an older version first.
 
     Raises:
         HistoryError: the file is missing, is not a history, or is incomplete without its journal.
@@ -39,9 +39,9 @@ def readable_connection(path: Path) -> sqlite3.Connection:
     """
     if not path.is_file():
         raise HistoryError(
-            f"history {path}: there is no such file; `kincheck run --history FILE` makes one"
+            f"history {path}: there is no such file; `kincheck run --history FILE` creates one"
         )
-    # A folder that cannot be written has no journal beside the file, so nobody else writes it.
+    # In a read-only folder the file has no journal beside it, so no process writes it.
     for how in ("mode=ro", "mode=ro&immutable=1"):
         connection = sqlite3.connect(
             f"{path.absolute().as_uri()}?{how}",
@@ -70,12 +70,12 @@ def readable_connection(path: Path) -> sqlite3.Connection:
 def _require_whole(path: Path) -> None:
     """Raise HistoryError if the latest records are only in the journal beside the file.
 
-    Reading them takes a writable folder.
+    Reading them needs a writable folder.
     """
     beside = path.with_name(f"{path.name}-wal")
     if beside.is_file() and beside.stat().st_size:
         raise HistoryError(
-            f"history {path}: its latest records are in {beside.name} still, and the folder cannot"
-            " be written, which putting them together takes; copy both files to a folder that can"
+            f"history {path}: its latest records are still in {beside.name}, and the folder is"
+            " read-only, so they cannot be merged; copy both files to a writable folder"
             " be"
         )

@@ -1,5 +1,5 @@
-"""A history as one table for other programs: Parquet or CSV, a row a case, engine, mode, output and
-motion of a run.
+"""A history as one table for other programs, Parquet or CSV: one row per case, engine, mode, output
+and motion of a run.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ NUMBERS = (
     ),
     *("us_per_step", "residual_max", "max_abs", "rms", "tolerance"),
 )
-"""Columns of the view `measured` that are no text. What was not computed is null, in CSV empty."""
+"""Columns of the view `measured` that are not text. Missing values are null, in CSV empty."""
 
 KINDS = (
     dict.fromkeys(INTEGERS, Kind.INTEGER)
@@ -37,20 +37,20 @@ KINDS = (
 
 SUFFIXES = (".parquet", ".csv")
 
-ROWS = 10_000  # at a time: a few megabytes, and row groups of a size that readers like
+ROWS = 10_000  # rows at a time: a few megabytes, and row groups of a usual size
 
 
 def export(
     store: Store, path: Path, *, cases: Sequence[str] = (), engines: Sequence[str] = ()
 ) -> int:
-    """Write a file, Parquet or CSV by its end; gives the number of rows.
+    """Write a Parquet or CSV file, by its suffix, and return the number of rows.
 
     Args:
         cases, engines: only these; empty: all.
 
     Raises:
         HistoryError: the history cannot be read.
-        KincheckError: the file cannot be written, its end says neither, or pyarrow is not
+        KincheckError: the file cannot be written, it has another suffix, or pyarrow is not
             installed.
     """
     suffix = path.suffix.lower()
@@ -93,7 +93,7 @@ def _rows(
 
 
 def _leave_out(store: Store) -> None:
-    """Leave unreadable runs out of the view: their texts would end the query."""
+    """Exclude unreadable runs from the view: their texts would end the query."""
     if store.passed_over:
         (view,) = store.connection.execute(
             "SELECT sql FROM sqlite_master WHERE name = 'measured'"

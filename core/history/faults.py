@@ -1,4 +1,4 @@
-"""Faults of history files in words: the fault, the file and the remedy."""
+"""Messages on faults of history files: the fault, the file and the remedy."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ import msgspec
 from ..errors import KincheckError, shortened
 from ..harness.execution import bounded
 
-# For another run to let go of the file [s]: it holds it for a millisecond a record. Longer, and
-# something is wrong with it.
+# Longest wait for a file that another run holds [s]. A run holds it for a millisecond per record; a
+# longer hold is a fault.
 BUSY = 30.0
 
-# Runs that cannot be read, told one by one: where there are more, the whole file is at fault.
-MOST_TOLD = 5
+# Largest number of unreadable runs listed one by one; with more, the whole file is damaged.
+MOST_LISTED = 5
 
 
 class HistoryError(KincheckError):
@@ -27,7 +27,7 @@ class HistoryError(KincheckError):
 
 
 class DamagedRunError(HistoryError):
-    """One run of a history cannot be read; the others may be."""
+    """One run of a history cannot be read; others may be readable."""
 
     def __init__(self, run: int, message: str) -> None:
         super().__init__(message)
@@ -36,12 +36,12 @@ class DamagedRunError(HistoryError):
 
 @contextmanager
 def explained(path: Path, what: str, run: int | None = None) -> Generator[None]:
-    """Raise faults of the database as a HistoryError with the file, and with the run if one run is
-    damaged.
+    """Raise faults of the database as a HistoryError that names the file, and the run if only this
+    run is damaged.
 
     Args:
-        what: the action on the file, as a participle.
-        run: the only run concerned.
+        what: participle of the action on the file.
+        run: the run, if the action concerns only one.
     """
     try:
         yield
@@ -68,11 +68,11 @@ def explained(path: Path, what: str, run: int | None = None) -> Generator[None]:
         raise HistoryError(f"history {path}: cannot be {what}: {bounded(error)}{advice}") from error
 
 
-def told(path: Path, passed_over: Mapping[int, str]) -> list[str]:
-    """Return a line for each unreadable run, up to MOST_TOLD of them."""
+def damage_lines(path: Path, passed_over: Mapping[int, str]) -> list[str]:
+    """Return a line for each unreadable run, up to MOST_LISTED of them."""
     runs = sorted(passed_over, reverse=True)
-    lines = [f"{passed_over[run]}; the other runs are used" for run in runs[:MOST_TOLD]]
-    if left := runs[MOST_TOLD:]:
+    lines = [f"{passed_over[run]}; the other runs are used" for run in runs[:MOST_LISTED]]
+    if left := runs[MOST_LISTED:]:
         lines.append(
             f"history {path}: {len(left)} more runs cannot be read:"
             f" {shortened([str(run) for run in left], 20)}"
@@ -81,7 +81,7 @@ def told(path: Path, passed_over: Mapping[int, str]) -> list[str]:
 
 
 def _damaged(error: Exception) -> bool:
-    """Return whether the stored data are at fault, and not the access to them."""
+    """Return whether the stored data are damaged, as opposed to a failed access."""
     return (
         not isinstance(error, OSError | sqlite3.OperationalError)
         or "decode" in str(error)
@@ -92,10 +92,10 @@ def _damaged(error: Exception) -> bool:
 def _advice(message: str) -> str:
     known = {
         "full": "make room",
-        "disk I/O": "look at the disk: it may be full, or over a limit on the size of files",
+        "disk I/O": "check the disk: it may be full, or limit the size of files",
         "readonly": "give a file that can be written",
         "unable to open": "give a file in a folder that exists and can be written",
-        "locked": f"another process holds it for longer than {BUSY:g} s; end that one",
+        "locked": f"another process holds it for more than {BUSY:g} s; end that process",
         "not a database": "give another file",
     }
     return "; " + next(

@@ -1,4 +1,4 @@
-"""The process writing a run, and whether it is alive."""
+"""The identity of the process that writes a run, and a test whether it is alive."""
 
 from __future__ import annotations
 
@@ -10,22 +10,20 @@ from ..harness.provenance import readable
 
 
 def owner() -> str:
-    """Return host, number and start of this process; systems use the numbers again."""
+    """Return host, process id and start of this process; systems reuse process ids."""
     return f"{readable(platform.node())}|{os.getpid()}|{_begun(os.getpid())}"
 
 
 def alive(owner: str) -> bool:
-    """Return whether a process still runs. A process of another host is invisible here and counts
-    as ended.
-    """
+    """Return whether a process still runs. A process of another host counts as ended."""
     host, number, begun = owner.rsplit("|", 2)
     if host != readable(platform.node()):
         return False
     try:
-        os.kill(int(number), 0)  # asks only
+        os.kill(int(number), 0)  # signal 0 only tests the process
     except ProcessLookupError:
         return False
-    except OSError:  # it is another user's, or the system cannot say
+    except OSError:  # the process is another user's, or the system cannot tell
         pass
     return _begun(int(number)) == begun
 
@@ -36,7 +34,7 @@ def _begun(number: int) -> str:
     Empty without /proc, and for an ended process whose exit status nobody has read.
     """
     try:
-        # the second field is the program's name in brackets, and may hold anything
+        # the second field is the program's name in brackets, which may hold any character
         state, *fields = (
             Path(f"/proc/{number}/stat").read_text("utf-8", "replace").rpartition(")")[2].split()
         )

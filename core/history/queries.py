@@ -1,6 +1,4 @@
-"""Series of each pair of case and engine over the runs of a history, for trends, thresholds and
-steps.
-"""
+"""Series of each (case, engine) pair over the runs of a history, for trends, limits and steps."""
 
 from __future__ import annotations
 
@@ -15,12 +13,10 @@ from .schema import OUTCOME
 from .store import RunRow, Store
 
 NIGHTS = 60
-"""Runs that trends and steps look back on: two months, whose points can still be told apart in a
-figure.
-"""
+"""Number of runs in trends and steps: two months, whose points remain distinct in a figure."""
 
 IDLE = Outcome.UNAVAILABLE, Outcome.UNSUPPORTED
-"""Outcomes of a pair whose engine is missing or not able: they say nothing about its results."""
+"""Outcomes of a pair whose engine is missing or does not support the case: they have no results."""
 
 Pair: TypeAlias = tuple[str, str, str]
 """Case, engine and mode."""
@@ -31,9 +27,10 @@ class Entry:
     """One pair in one run.
 
     Attributes:
-        errors: by output.
-        seconds: of a warm solve, without the time of other processes; None if it was not reached.
-        us_per_step: as the record has it.
+        errors: deviations by output.
+        seconds: time of a warm solve without waiting for the processor [s]; None if it was not
+            reached.
+        us_per_step: see `Record`.
     """
 
     run: int
@@ -68,7 +65,7 @@ def read(
 
     Args:
         before: only runs with smaller numbers.
-        last: the largest number of runs; the latest are taken.
+        last: largest number of runs, the latest ones.
         cases, engines: only these; empty: all.
 
     Raises:
@@ -92,8 +89,8 @@ def read(
 
 
 def readable(store: Store) -> list[RunRow]:
-    """Return the runs whose facts and records' columns can all be read, the latest first; pass over
-    the others.
+    """Return the runs whose facts and columns of records are readable, the latest first; skip the
+    others.
 
     Raises:
         HistoryError: the file cannot be read.
@@ -115,9 +112,9 @@ def _entries(store: Store, run: int) -> list[tuple[Pair, Entry]]:
         " us_per_step, message, truth"
     )
     found: list[tuple[Pair, Entry]] = []
-    # also the texts that are not used here: nothing of a damaged run is
+    # unused texts are checked, too: no part of a damaged run counts
     with store.explained("read", run):
-        # rowid: the order in which they were made
+        # rowid gives the order in which the records were added
         for row in store.connection.execute(
             f"SELECT {columns} FROM records WHERE run_id = ? ORDER BY rowid", (run,)
         ):
@@ -134,11 +131,11 @@ def _entries(store: Store, run: int) -> list[tuple[Pair, Entry]]:
 
 
 def own_seconds(warm: float | None, waited: float | None) -> float | None:
-    """Return the seconds of a warm solve without waiting for other processes; None if there are
-    none.
+    """Return the seconds of a warm solve without waiting for the processor; None if they are
+    unknown.
 
-    Measured by 25 equal runs on two processors with five processes: the ratio of two runs reaches
-    4.1 by the clock, and 1.9 so.
+    In 25 equal runs on two processors with five busy processes, the ratio of two runs reaches 4.1
+    by the clock, and 1.9 without waiting.
     """
     return None if warm is None else warm - (waited or 0.0)
 
@@ -156,7 +153,7 @@ def green(store: Store, *, before: int | None = None) -> list[RunRow]:
     )
     with store.explained("read"):
         good: dict[int, int] = dict(store.connection.execute(query).fetchall())
-    # a finished run lacks the pairs of cases that could not be read: its status was 2
+    # a finished run lacks the pairs of unreadable cases: its status was 2
     whole = [
         row
         for row in readable(store)

@@ -1,4 +1,4 @@
-"""The identity of a run: a digest of cases and settings by their content."""
+"""The identity of a run: a digest of the content of cases and settings."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ import numpy as np
 def digest(*things: Any) -> str:
     """Return the SHA-256 digest of data: dataclasses by class and fields, arrays by their bits.
 
-    A pickle would not do: it depends on which equal parts are one object. Objects of other types
-    enter by their text; a text with a memory address makes each digest a different one.
+    A pickle is unsuitable: it depends on which equal parts are one object. Objects of other types
+    enter by their text; a text with a memory address makes every digest different.
     """
     whole = hashlib.sha256()
     for piece in _pieces(things):

@@ -1,4 +1,4 @@
-"""Recording of a run while it goes on, and continuation of a killed run."""
+"""Recording of a run in progress, and continuation of a killed run."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ class Keeping:
 
     Attributes:
         run: its number.
-        resumed: whether it continues an earlier run.
+        resumed: whether the run continues an earlier one.
         made: the records of the earlier run.
         facts: its circumstances, for `run`.
-        problems: faults of the history; after the first, the run goes on without a history.
+        problems: faults of the history; after the first, the run continues without a history.
     """
 
     store: Store
@@ -45,7 +45,7 @@ class Keeping:
             self.store.add_record(self.run, record)
         except HistoryError as error:
             self.problems.append(
-                f"{error}; the records before {record.case} {record.engine} are kept there as run"
+                f"{error}; the records before {record.case} {record.engine} are stored as run"
                 f" {self.run}"
             )
 
@@ -56,7 +56,7 @@ class Keeping:
                 self.store.finish(self.run, results, "interrupted" if interrupted else "finished")
             except HistoryError as error:
                 self.problems.append(
-                    f"{error}; all records are kept there, but run {self.run} has no end; --resume"
+                    f"{error}; all records are stored, but run {self.run} has no end; --resume"
                     " gives it one"
                 )
         self.store.close()
@@ -74,14 +74,14 @@ def keep(
     unread: Sequence[str] = (),
     joints: Mapping[str, str] | None = None,
 ) -> Keeping:
-    """Begin a run in a history, or continue the last one of the same cases, engines, tolerance,
+    """Begin a run in a history, or continue the last one with the same cases, engines, tolerance,
     limits, versions, machine and files.
 
     Args:
         settings: further circumstances.
-        resume: continue a run without an end; begin a new one if there is none.
+        resume: continue an unfinished run; begin a new one if there is none.
         unread: names of requested cases that cannot be read.
-        joints: digests of the modules of joint types, by name: other code makes another run.
+        joints: digests of the modules of joint types, by name: other code is another run.
 
     Raises:
         HistoryError: the file cannot be read or written.
@@ -91,7 +91,7 @@ def keep(
         {**settings, **conditions()}
     )
     plan = planned(cases, engines, unread)
-    # where and how many at a time changes no record
+    # the place of the work and the number of workers change no record
     limits = [settings.get(name) for name in ("timeout", "memory_gb")]
     git: Mapping[str, Any] = facts["git"] or {}
     state = [facts[name] for name in ("kincheck", "python", "numpy")] + [

@@ -1,4 +1,4 @@
-"""The tables of a history, and the migration of files of earlier versions.
+"""Tables of a history, and the migration of files of earlier versions.
 
 `runs`: a row a run. `records`: a row a (case, engine, mode) of a run; trends and tables read the
 columns, and `record` holds the whole record. `documents`: further texts of a run's case, such as
@@ -13,15 +13,13 @@ from collections.abc import Iterator
 from time import monotonic, sleep
 
 APPLICATION = 0x6B696E63
-"""The application_id of these files ("kinc"): another program's database is refused, not added
-to.
-"""
+"""The application_id of these files ("kinc"): databases of other programs are refused."""
 
 OUTCOME = """CASE WHEN outcome = 'pass' AND NOT errors GLOB '*"max_abs":[0-9]*' THEN 'unjudged' ELSE outcome END"""
 """The outcome of a row of `records`: older versions call a solved pair a pass although nothing was
 compared.
 
-No text in a JSON string looks like a deviation, for its quotation marks are escaped.
+No text in a JSON string looks like a deviation, since its quotation marks are escaped.
 """
 
 MIGRATIONS = (
@@ -103,13 +101,13 @@ MIGRATIONS = (
     ORDER BY run, "case", engine, mode, output;
     """,
 )
-"""One text for each version of the schema, which brings the tables from the one before it. A text
-that was published stays.
+"""One text for each version of the schema, which migrates the tables of the previous version.
+Published texts never change.
 """
 
 
 def migrate(connection: sqlite3.Connection) -> None:
-    """Bring the tables up to date in one transaction. Other processes wait for it.
+    """Migrate the tables in one transaction. Other processes wait for it.
 
     Raises:
         ValueError: the file is another program's, or of a later version.
@@ -118,7 +116,7 @@ def migrate(connection: sqlite3.Connection) -> None:
     try:
         version = check(connection)
         for number, text in enumerate(MIGRATIONS[version:], version + 1):
-            # not executescript, which would commit what is before it
+            # not executescript, which would commit the statements before it
             for statement in _statements(text):
                 connection.execute(statement)
             connection.execute(f"PRAGMA user_version = {number}")
@@ -135,7 +133,7 @@ def check(connection: sqlite3.Connection) -> int:
     Raises:
         ValueError: the file is another program's, or of a later version.
     """
-    # in one statement: another process may be making the tables, and is not to be seen halfway
+    # in one statement: another process may be creating the tables, and no half of them must show
     tables, version, application = connection.execute(
         "SELECT (SELECT count(*) FROM sqlite_master), user_version, application_id FROM"
         " pragma_user_version, pragma_application_id"
@@ -151,10 +149,10 @@ def check(connection: sqlite3.Connection) -> int:
 
 
 def write_ahead(connection: sqlite3.Connection, patience: float) -> None:
-    """Turn on write-ahead logging, with which readers and a writer do not wait for each other.
+    """Turn on write-ahead logging, so that readers and a writer do not wait for each other.
 
-    If several processes ask for it in a new file at once, SQLite fails some of them instead of
-    making them wait. These ask again.
+    If several processes request it in a new file at once, SQLite fails some of them instead of
+    making them wait. This function then tries again.
     """
     end = monotonic() + patience
     while True:
@@ -170,7 +168,7 @@ def write_ahead(connection: sqlite3.Connection, patience: float) -> None:
 
 def _statements(text: str) -> Iterator[str]:
     begun = ""
-    # a semicolon may be in a string or a comment: then the statement goes on
+    # a semicolon in a string or a comment does not end the statement
     for part in text.split(";")[:-1]:
         begun += f"{part};"
         if sqlite3.complete_statement(begun):

@@ -1,13 +1,13 @@
-"""The store: a history file, read and written.
+"""Store: access to a history file.
 
     with Store(path) as store:                      # Store(path, writable=False) to read only
         run = store.begin_run(...)                  # its number
-        store.add_record(run, record)               # on the disk when this returns
+        store.add_record(run, record)               # on disk when this returns
         store.finish(run, results)
         for each in store.runs(): ...               # RunRow, the latest first
         results = store.results(run)                # as `kincheck run --json` writes them
 
-Everything else is SQL on `store.connection`: the tables are described in `schema`.
+Other queries are SQL on `store.connection`; `schema` describes the tables.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ import msgspec
 from ..harness.provenance import missing, versions
 from ..harness.record import Record, Results, settled
 from .connections import readable_connection, writable_connection
-from .faults import DamagedRunError, HistoryError, explained, told
+from .faults import DamagedRunError, HistoryError, damage_lines, explained
 from .process_identity import alive, owner
 
 Status: TypeAlias = Literal["running", "finished", "interrupted", "killed"]
-"""The file says that a run is running until it ends; where its process is gone it was killed."""
+"""The file marks a run as running until it ends; without its process, the run was killed."""
 Plan: TypeAlias = Sequence[tuple[str, str, str]]
 
-# Level of compression: the best makes a record 3 % smaller and takes 6 ms for it, not 1 (of 73 kB
-# as JSON).
+# Level of compression: the best level makes a record of 73 kB 3 % smaller, and takes 6 ms instead
+# of 1.
 QUICK = 1
 
 
@@ -57,7 +57,7 @@ class Store:
 
     def __init__(self, path: Path, *, writable: bool = True) -> None:
         self.path = path
-        self.passed_over: dict[int, str] = {}  # runs that cannot be read, and why
+        self.passed_over: dict[int, str] = {}  # reasons of unreadable runs
         with self.explained("opened"):
             self.connection = writable_connection(path) if writable else readable_connection(path)
 
@@ -69,7 +69,7 @@ class Store:
 
     def close(self) -> None:
         """Close the file."""
-        # what was committed is on the disk; tidying up can fail on a full one
+        # commits are on disk; the clean-up can fail on a full disk
         with suppress(sqlite3.Error):
             self.connection.close()
 
@@ -83,10 +83,11 @@ class Store:
         """Begin a run and return its number.
 
         Args:
-            identity: digest by which a later process resumes it; equal for runs with equal records.
-            plan: case, engine and mode of its pairs, in the order of the results.
-            circumstances: as `Results.run`; with the time of the start and the command.
-            references: as `Results.references`, for readers of a run without an end.
+            identity: digest by which a later process resumes the run; equal for runs with equal
+                records.
+            plan: case, engine and mode of the pairs, in the order of the results.
+            circumstances: as `Results.run`, with the start time and the command.
+            references: as `Results.references`, for readers of an unfinished run.
         """
         started, command = circumstances["started"], circumstances["command"]
         row = (started, "running", command, identity, owner(), _json(plan), _json(circumstances))
@@ -101,9 +102,9 @@ class Store:
         return done.lastrowid
 
     def resume_run(self, identity: str) -> RunRow | None:
-        """Return the last run of an identity if it has no end and no other process writes it.
+        """Return the last run of an identity if it is unfinished and no other process writes it.
 
-        From now on this process owns it.
+        From then on, this process owns it.
         """
         with self._transaction():
             query = (
@@ -121,7 +122,7 @@ class Store:
         return None
 
     def add_record(self, run: int, record: Record) -> None:
-        """Keep a record. A second record of a pair is ignored."""
+        """Store a record. A second record of a pair is ignored."""
         seconds = record.seconds
         row: dict[str, Any] = {
             "run_id": run,
@@ -154,7 +155,7 @@ class Store:
             )
 
     def finish(self, run: int, results: Results | None = None, status: Status = "finished") -> None:
-        """End the run, and keep the parts of the results beside the records, such as references."""
+        """End the run, and store the other parts of the results, such as references."""
         with self._transaction():
             if results is not None:
                 for kind in (
@@ -168,7 +169,7 @@ class Store:
             )
 
     def remove(self, run: int) -> None:
-        """Remove a run with its records, and texts used by no other run."""
+        """Remove a run with its records and with texts that no other run uses."""
         with self._transaction():
             for table, column in (("attachments", "run_id"), ("records", "run_id"), ("runs", "id")):
                 removed = self.connection.execute(
@@ -192,7 +193,7 @@ class Store:
 
     @contextmanager
     def sparing(self) -> Generator[None]:
-        """Pass over an unreadable run."""
+        """Skip an unreadable run."""
         try:
             yield
         except DamagedRunError as error:
@@ -200,8 +201,8 @@ class Store:
 
     @property
     def damage(self) -> list[str]:
-        """Return a line for each run passed over."""
-        return told(self.path, self.passed_over)
+        """Return a line for each skipped run."""
+        return damage_lines(self.path, self.passed_over)
 
     def run(self, run: int) -> RunRow:
         """Return the run of a number.
@@ -244,7 +245,7 @@ class Store:
     def results(self, run: int) -> Results:
         """Return the results of a run as the command wrote them.
 
-        Of a run without an end, `run["missing"]` lists the missing pairs.
+        For an unfinished run, `run["missing"]` lists the missing pairs.
         """
         row, records = self.run(run), self.records(run)
         attached: dict[str, dict[str, Any]] = {}
@@ -278,7 +279,9 @@ class Store:
                 yield
                 self.connection.execute("COMMIT")
             except BaseException:
-                if self.connection.in_transaction:  # SQLite has ended it itself after some failures
+                if (
+                    self.connection.in_transaction
+                ):  # after some failures SQLite has already ended the transaction
                     self.connection.execute("ROLLBACK")
                 raise
 
@@ -292,5 +295,5 @@ def _json(value: Any) -> str:
 
 
 def now() -> str:
-    """Return the present time in the format of the history."""
+    """Return the current time in the format of the history."""
     return datetime.now(UTC).isoformat(timespec="milliseconds")

@@ -5,11 +5,11 @@
     case = kincheck.load("rssr")
     results = kincheck.run(case, engines=["native", "mujoco"])
 
-All names of `kincheck.core` are here too. Each is imported on first use: the command line and
-pytest start without numpy.
+The package also has all names of `kincheck.core`. Each is imported on first use, so that the
+command line and pytest start without numpy.
 
-This folder is the package kincheck itself; its parts lie in folders of their own. They are named
-in full here: in the sources, a relative import would look for them in this folder.
+This folder is the package kincheck; its parts are in other folders. Imports of them are absolute,
+because in the sources a relative import would look in this folder.
 """
 
 from importlib import import_module
@@ -26,7 +26,7 @@ __all__ = ["check_engine", "load", "run"]
 __all__ += core.__all__
 
 
-if not TYPE_CHECKING:  # type checkers would take any name for one of these
+if not TYPE_CHECKING:  # otherwise type checkers would accept any name
 
     def __getattr__(name: str) -> Any:
         """Import a public name on first use."""
@@ -38,5 +38,5 @@ if not TYPE_CHECKING:  # type checkers would take any name for one of these
 
 
 def __dir__() -> list[str]:
-    """Return the public names, loaded or not."""
+    """Return the public names, whether loaded or not."""
     return sorted({*globals(), *__all__})

@@ -1,8 +1,7 @@
 """The command kincheck, also as `python -m kincheck`.
 
-This folder is the package kincheck itself; its parts lie in folders of their own.
-
-It takes signals before it imports the rest: an interrupt during imports is one line too.
+Signals are handled before the other imports, so that an interrupt during imports also prints one
+line.
 """
 
 import os
@@ -12,7 +11,7 @@ from importlib import import_module
 from types import FrameType
 
 SIGNALS = 128
-"""Exit status of a process that a signal has ended, less the signal's number, as shells have it."""
+"""Offset of the exit status after a signal, as in shells: add the signal's number."""
 
 
 def leave(number: int, frame: FrameType | None) -> None:
@@ -28,15 +27,14 @@ def main() -> int:
     for number in (signal.SIGINT, signal.SIGTERM):
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, leave)
-    # by its name: relative to this file, as installed, it would be .core, which no checker finds in
-    # the sources
+    # absolute: the relative name .core exists only as installed, so checkers miss it in the sources
     status: int = import_module("kincheck.core.cli.main").main()
-    # Python would end by the signal itself if the interrupt has come while a text was executed
+    # Python would end by the signal itself if the interrupt came during `exec`
     if status > SIGNALS:
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(status)
-    # all is done; while Python ends, it would end by the signal
+    # an interrupt must not change the status while Python exits
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     return status
 

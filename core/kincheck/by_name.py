@@ -1,4 +1,4 @@
-"""Cases and engines by name: the command line's `run` as a function."""
+"""Functions on cases and engines by name, as on the command line."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -9,7 +9,7 @@ from kincheck.core.case.case import Case
 from kincheck.core.case.io.reader_options import NOTHING, Supplied
 from kincheck.core.cli.check_engine import examined
 from kincheck.core.cli.engine_loading import made
-from kincheck.core.cli.main import house
+from kincheck.core.cli.main import registry
 from kincheck.core.cli.run_options import TOL
 from kincheck.core.harness import run as running
 from kincheck.core.harness.engine import Engine
@@ -22,16 +22,16 @@ _One = TypeVar("_One")
 
 
 def load(name: str | Path, supplied: Supplied = NOTHING) -> Case:
-    """Return a built-in case by its name, or the case in a file.
+    """Return the built-in case of a name, or the case in a file.
 
     Args:
-        name: name, or path of a case file, hardpoint table or model.
+        name: name of the case, or path to a case file, hardpoint table or model.
         supplied: facts missing in a file of another tool.
 
     Raises:
         KincheckError: there is no such case, or its file is invalid.
     """
-    return house().find_case(str(name), supplied, driven=False)
+    return registry().find_case(str(name), supplied, driven=False)
 
 
 def run(
@@ -58,7 +58,7 @@ def run(
         KincheckError: a case cannot be read, there is no engine of a name, or a member of the
             engine protocol is missing.
     """
-    known, problems = house(), list[str]()
+    known, problems = registry(), list[str]()
     named = known.cases() if cases is None else _several(cases)
     found = [each if isinstance(each, Case) else known.find_case(str(each)) for each in named]
     every = known.simulations if mode == "simulate" else known.engines
@@ -85,10 +85,10 @@ def check_engine(engine: str | Engine) -> Report:
     Raises:
         KincheckError: there is no such engine.
     """
-    return examined(engine, house())
+    return examined(engine, registry())
 
 
 def _several(named: _One | Sequence[_One]) -> Sequence[_One]:
-    """Return a sequence as it is, and anything else as a sequence of one."""
+    """Return a sequence unchanged, and anything else as a sequence of one."""
     several = isinstance(named, Sequence) and not isinstance(named, str)
     return cast("Sequence[_One]", named if several else [named])

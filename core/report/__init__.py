@@ -1,1 +1,1 @@
-"""Reporting: results as a table, JSON, JUnit XML, Markdown and one HTML file."""
+"""Reports: results as table, JSON, JUnit XML, Markdown and one HTML file."""

@@ -3,7 +3,7 @@
 
 const SUPERSCRIPTS = { ..."⁰¹²³⁴⁵⁶⁷⁸⁹", "-": "⁻" };
 
-// A number to some digits; a format such as ".9g" says how many.
+// A number as text in a format such as ".9g".
 function shown(value, format) {
   if (typeof value !== "number") return String(value);
   const digits = Number((/\d+/.exec(format || "") || [6])[0]);
@@ -26,9 +26,9 @@ function niceStep(step) {
 }
 
 // The scale of one side of a figure.
-//   side: the axis of the layout; values: all that is drawn, or the categories;
-//   from, to: pixels of its ends; count: ticks that have room;
-//   view: two values that were zoomed to, or null.
+//   side: the axis of the layout; values: all drawn values, or the categories;
+//   from, to: pixels of its ends; count: largest number of ticks;
+//   view: two values of the zoom, or null.
 function scaled(side, values, from, to, count, view) {
   if (isCategory(side, values)) return categories(side, values, from, to, count);
   const log = side.type === "log";
@@ -70,7 +70,7 @@ function ticksOf(side, low, high, count, zoomed) {
   return linearTicks(low, high, count, side.dtick);
 }
 
-// Ticks with room between them, the first one always.
+// Ticks with room between them; the first tick stays.
 function apart(ticks, place) {
   const kept = [];
   for (const tick of ticks) {
@@ -109,7 +109,7 @@ function powerText(factor, power) {
   return factor === 1 ? raised : `${factor}·${raised}`;
 }
 
-// Places side by side; names that have no room get no tick.
+// Places side by side; names without room get no tick.
 function categories(side, values, first, last, count) {
   const [from, to] = side.autorange === "reversed" ? [last, first] : [first, last];
   const names = [...new Set(values)];

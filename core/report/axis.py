@@ -1,4 +1,4 @@
-"""The axis of the sweep: a driver or time, its values at the samples, and its direction on the
+"""The axis of the sweep: a driver or time, with its values at the samples and its direction on the
 page.
 """
 
@@ -12,7 +12,7 @@ from typing import Any
 from ..harness.record import Record
 from ..unit_text import value_text, with_unit
 
-# a figure is that many pixels wide; longer series are thinned, the worst samples always kept
+# a figure's width in pixels; longer series are thinned, but keep their worst samples
 SAMPLES = 500
 
 DISPLAY = {
@@ -21,7 +21,7 @@ DISPLAY = {
     "s": ("s", 1.0),
     "rad/m": ("°/m", 180 / math.pi),
 }
-"""Units of results, and what they are shown in: the unit and the factor."""
+"""Display unit and factor by the unit of results."""
 
 DRIVER_UNITS = {
     "point_coordinate": "m",
@@ -30,13 +30,13 @@ DRIVER_UNITS = {
     "time": "s",
 }
 """SI unit of the values of a driver, by its type."""
-# Directions in files are exact, or the three digits of a table: this allows for those.
+# Directions in files are exact, or have the three digits of a table, which this tolerance allows.
 ALONG = 1 - 1e-5
 
 
 @dataclass(frozen=True)
 class Moved:
-    """A driver, or time, at the samples in SI, with the factor to display units."""
+    """A driver, or time, at the samples [SI], with the factor to display units."""
 
     name: str
     unit: str
@@ -50,7 +50,7 @@ class Moved:
         return cls(name.replace("_", " "), unit, scale, values)
 
     def at(self, step: int) -> str:
-        """The value at a sample, in words."""
+        """Return the value at a sample as text."""
         if step >= len(self.values):
             return ""
         value = f"{self.scale * self.values[step]:+.4g}".replace("-", "\N{MINUS SIGN}")
@@ -62,11 +62,11 @@ class Axis(Moved):
     """The axis of the sweep: its kept samples and their values in display units.
 
     Attributes:
-        title: as written beside the outputs' figures, with the sense of the motion.
-        kept: indices of the samples drawn.
-        up: 1 for an axis drawn upwards against the outputs, as wheel travel is, -1 for downwards, 0
-            for an axis to the right.
-        further: the other moving drivers and their motions, in words.
+        title: title beside the figures of outputs, with the sense of the motion.
+        kept: indices of the drawn samples.
+        up: 1 for an axis drawn upwards, such as wheel travel, -1 for downwards, 0 for an axis to
+            the right.
+        further: the other moving drivers, with phrases on their motions.
     """
 
     title: str
@@ -75,14 +75,14 @@ class Axis(Moved):
     further: list[tuple[Moved, str]]
 
     def at(self, step: int) -> str:
-        """The values of all drivers at a sample, in words."""
+        """Return the values of all drivers at a sample as text."""
         return ", ".join(
             filter(None, (super().at(step), *(moved.at(step) for moved, _ in self.further)))
         )
 
     @property
     def besides(self) -> str:
-        """Return a sentence on the drivers in `further`; empty without any."""
+        """Return a sentence on the drivers in `further`; empty without them."""
         named = [f"{moved.name} ({how})" if how else moved.name for moved, how in self.further]
         return (
             f"{'Driven' if self.unit == 's' else 'Also driven'}: {', '.join(named)}."
@@ -105,10 +105,10 @@ def driver_axis(facts: Mapping[str, Any], records: Sequence[Record], worst: Iter
     """Return the axis of the sweep.
 
     Args:
-        facts: of the case: its "driver" (name, type, point and direction), its "motions" by name;
-            may be empty.
+        facts: facts of the case: its "driver" (name, type, point and direction), its "motions" by
+            name; may be empty.
         records: the records of one case.
-        worst: samples kept by thinning.
+        worst: samples that thinning keeps.
     """
     series = next((record.driver for record in records if record.driver), dict[str, list[float]]())
     driver, motions = facts.get("driver", {}), facts.get("motions", {})
@@ -123,10 +123,10 @@ def driver_axis(facts: Mapping[str, Any], records: Sequence[Record], worst: Iter
         if name != key
     ]
     name, unit, values = swept.name, swept.unit, swept.values
-    # Suspension engineers read curves against wheel travel with the travel upwards, as the wheel
-    # goes, so that left and right of the middle are in and out. So it is drawn wherever a point is
-    # driven along the global z axis; every other driver, angles, rack travel and time, lies to the
-    # right. Driven along -z, the axis runs backwards: up on paper is up on the vehicle.
+    # Suspension engineers draw wheel travel upwards, so that left and right of the middle are
+    # inwards and outwards. The axis of a point driven along the global z axis is therefore
+    # vertical; the axis of any other driver (angle, rack travel, time) points to the right. For a
+    # point driven along -z the axis is reversed: up on the page is up on the vehicle.
     up = _upwards(driver)
     title = with_unit(name, unit)
     if up and "wheel" in driver.get("point", "") and driver.get("relative", True):

@@ -1,7 +1,7 @@
 "use strict";
-// A canvas: the projection onto it, and what its pen draws and writes.
+// A canvas: the projection onto it, and functions to draw lines and text.
 
-// The pen of an empty canvas, as sharp as the screen.
+// The drawing context of an empty canvas at the screen's resolution.
 function cleared(canvas, width, height) {
   const pen = canvas.getContext("2d");
   const ratio = window.devicePixelRatio || 1;
@@ -13,7 +13,7 @@ function cleared(canvas, width, height) {
   return pen;
 }
 
-// The projection of a direction to look from.
+// The projection along a viewing direction.
 // Returns `seen`, the place of a point on the canvas [px] and its depth in sizes of the mechanism,
 // and `flat`, the components of a vector to the right and down.
 function cameraOf(azimuth, elevation, zoom, bounds, width, height) {
@@ -34,7 +34,7 @@ function cameraOf(azimuth, elevation, zoom, bounds, width, height) {
   return { seen, flat };
 }
 
-// What a pen draws of points on the canvas.
+// Functions that draw lines and shapes through points on the canvas.
 function brush(pen) {
   const line = (points, stroke, thick, dash = [], alpha = 1) => {
     pen.beginPath();
@@ -63,7 +63,7 @@ function brush(pen) {
   return { pen, line, area, disc };
 }
 
-// What writes text beside a place, where no other text is; or nothing where there is no room.
+// A function that writes text beside a place without overlap, or omits it without room.
 //   offsets: places to try: to the left (-1), over (0) or to the right (1), and down [px].
 function writer(pen, width, height, family, halo) {
   const written = [];

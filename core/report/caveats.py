@@ -1,4 +1,4 @@
-"""The limits of a run's evidence, by the facts of its records."""
+"""The limits of a run's evidence, from the facts of its records."""
 
 from __future__ import annotations
 
@@ -10,54 +10,54 @@ from ..harness.record import Outcome, Record, Results
 from .axis import SAMPLES
 
 ANSWERED = (Outcome.PASS, Outcome.FAIL, Outcome.UNJUDGED)
-"""Outcomes of pairs that have an answer."""
+"""Outcomes of pairs with an answer."""
 
 
 def caveats(results: Results) -> list[tuple[str, str]]:
     """Return each limit of the run as a title and a sentence."""
     records = results.records
-    said: list[tuple[str, str]] = []
+    limits: list[tuple[str, str]] = []
 
-    def say(title: str, text: str) -> None:
-        said.append((title, text))
+    def add(title: str, text: str) -> None:
+        limits.append((title, text))
 
     def cases(holds: Callable[[Record], bool]) -> str:
         return ", ".join(dict.fromkeys(record.case for record in records if holds(record)))
 
-    say(
+    add(
         "One description for all",
-        "Every engine was given the same case files. A wrong hardpoint, axis or driver in a file is"
-        " wrong in all of them and shows in no comparison.",
+        "All engines solve the same case files. A wrong hardpoint, axis or driver in a file is"
+        " wrong in all engines, and no comparison shows it.",
     )
     if names := cases(lambda record: record.truth == Truth.IN_HOUSE_ORACLE):
-        say(
+        add(
             f"In-house oracle: {names}",
             "This project computed the reference. Agreement with our own oracle is not validation.",
         )
     if names := cases(lambda record: record.truth == Truth.CONSENSUS_ONLY):
-        say(
+        add(
             f"Consensus only: {names}",
             "There is no reference. Engines that agree with the native one may be wrong together.",
         )
     for case, note in notes(results.run):
-        say(f"Note on {case}", f"{note[:1].upper()}{note[1:]}.")
+        add(f"Note on {case}", f"{note[:1].upper()}{note[1:]}.")
     for outcome in Outcome:
         pairs = [_pair(record) for record in records if record.outcome is outcome]
         if pairs and outcome not in ANSWERED:
-            say(
+            add(
                 f"{outcome.shown.capitalize()}: {len(pairs)}",
-                f"Nothing is said about {'; '.join(pairs)}.",
+                f"There are no results for {'; '.join(pairs)}.",
             )
     for case, why in results.unread.items():
-        say(f"Not read: {case}", f"{why}. Nothing is said about it.")
+        add(f"Not read: {case}", f"{why}. There are no results for it.")
     if pairs := [
         f"{product(engine, mode)} on {case}"
         for case, engine, mode in results.missing
         if case not in results.unread
     ]:
-        say(
-            f"Never made: {len(pairs)}",
-            f"The run ended before them, and nothing is said about {'; '.join(pairs)}.",
+        add(
+            f"Not run: {len(pairs)}",
+            f"The run ended before them. There are no results for {'; '.join(pairs)}.",
         )
     for record in records:
         if (
@@ -65,34 +65,34 @@ def caveats(results: Results) -> list[tuple[str, str]]:
             and record.samples is not None
             and record.solved < record.samples
         ):
-            say(
+            add(
                 _pair(record),
-                f"{record.solved} of {record.samples} samples were solved; nothing is said about"
-                " the others.",
+                f"{record.solved} of {record.samples} samples were solved; the others have no"
+                " results.",
             )
     for reason, pairs in _uncompared(results).items():
-        say(f"Not judged: {', '.join(pairs)}", reason)
+        add(f"Not judged: {', '.join(pairs)}", reason)
     if len({record.mode for record in records if record.outcome in ANSWERED}) > 1:
-        say(
+        add(
             "Modes",
-            "Projection and simulate are different products; their times and errors are no"
-            " ranking.",
+            "Projection and simulate are separate products; their times and errors form no"
+            " common ranking.",
         )
     if len({record.loop for record in records if record.us_per_step is not None}) > 1:
-        say(
+        add(
             "Times",
-            "The loops over the samples run in different places (see loop): a time is that of"
-            " engine and loop together.",
+            "The loops over the samples run in different places (see loop): each time includes"
+            " engine and loop.",
         )
     if names := cases(
         lambda record: any(len(values) > SAMPLES for values in record.driver.values())
     ):
-        say(
+        add(
             f"Thinned figures: {names}",
-            f"About {SAMPLES} samples of each curve are drawn, the worst ones among them; tables"
+            f"About {SAMPLES} samples of each curve are drawn, including the worst; tables"
             " and verdicts used all.",
         )
-    return said
+    return limits
 
 
 def _pair(record: Record) -> str:

@@ -1,5 +1,5 @@
-"""Curves of a run as a table for other programs: a row for an output of an engine, or of the
-reference, at a sample.
+"""Curves of a run as a table for other programs: one row per output, engine (or reference) and
+sample.
 """
 
 from __future__ import annotations
@@ -27,13 +27,17 @@ COLUMNS: Mapping[str, Kind] = {
     "velocity": Kind.NUMBER,
     "acceleration": Kind.NUMBER,
 }
-"""SI units; velocities and accelerations are per second. An unknown number is an empty cell."""
+"""Columns, in SI units; velocities and accelerations are per second. A missing number is an empty
+cell.
+"""
 
 MOST = 3_000_000
-"""Characters of curves that a page offers as files; packed they are some 40 % of it."""
+"""Largest size of the curves that a page offers as files [characters]; compressed, some 40 % of the
+page.
+"""
 
 REFERENCE = "reference"
-"""Engine of the rows of the reference, whose mode is its kind."""
+"""Engine in the rows of the reference; their mode is the kind of the reference."""
 
 
 def write_curves_csv(results: Results, path: Path) -> int:
@@ -47,7 +51,7 @@ def write_curves_parquet(results: Results, path: Path) -> int:
 
 
 def downloads(results: Results, cases: Mapping[str, str]) -> dict[str, str]:
-    """Return the curves of cases as CSV, as many cases as a page has room for.
+    """Return the curves of as many cases as a page has room for, as CSV.
 
     Args:
         cases: names by any key.
@@ -73,14 +77,14 @@ def curves(results: Results, case: str | None = None) -> Iterator[Rows]:
     """Yield the rows of `COLUMNS`, a chunk for each output of each engine.
 
     Args:
-        case: only this one.
+        case: name of the only case; None for all.
     """
-    told: set[str] = set()
+    written: set[str] = set()
     for record in results.records:
         if case not in (None, record.case) or not record.driver:
             continue
-        if record.case not in told:
-            told.add(record.case)
+        if record.case not in written:
+            written.add(record.case)
             for name, series in results.references.get(record.case, {}).items():
                 yield _rows(results, record, REFERENCE, record.truth, name, series)
         for name, series in record.outputs.items():

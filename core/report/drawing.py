@@ -26,13 +26,13 @@ MARKS = {
     "universal": "cross",
     "constant_velocity": "cross",
 }
-"""How a joint is marked, by type; others get a mark that stands for any joint."""
+"""Mark of a joint by its type; other types get a general mark."""
 
-# Up to this many hardpoints every one is joined with every other, as arms are drawn; more would be
-# a tangle, and get a hub.
+# Up to this many hardpoints of a body are linked pairwise, as arms are drawn; more are linked to a
+# hub.
 ALL_JOINED = 4
-# Hardpoints of one body closer than this are one [m]: tables are given to a tenth of a millimetre
-# at best.
+# Hardpoints of one body closer than this are one point [m]: tables have at best a tenth of a
+# millimetre.
 SAME = 1e-6
 
 
@@ -41,7 +41,7 @@ Numbers: TypeAlias = list[float]
 
 @dataclass
 class Drawing:
-    """A drawing as the page's script reads it; places are indices of `nodes`, bodies indices of
+    """A drawing as the page's script reads it; a node is an index of `nodes`, a body an index of
     `bodies`.
 
     Attributes:
@@ -50,18 +50,18 @@ class Drawing:
         nodes: body, and x, y, z in its frame [m].
         links: two nodes of one body.
         rods: two nodes of two bodies.
-        marks: node, kind of mark, axis in the body's frame or null, whether the joint is on
-            something fixed.
-        labels: two nodes, with the text between them.
-        wheels: body, centre [m] and axis of rotation in its frame, upward direction, global, and
+        marks: node, kind of mark, axis in the body's frame or null, whether the joint is on a fixed
+            body.
+        labels: two nodes, and the text between them.
+        wheels: body, centre [m] and axis of rotation in its frame, global upward direction, and
             radius [m].
-        arrows: body, place in its frame [m], label, and force [N], global, in each frame of the
-            scene; null where it is unknown.
-        paths: nodes with a path over the frames.
+        arrows: body, place in its frame [m], label, and global force [N] in each frame of the
+            scene; null if unknown.
+        paths: nodes whose path over the frames is drawn.
         steps: the caption of each frame.
-        start: the frame closest to the design position, shown first.
-        joints: name, type and bodies of every joint, in words.
-        caption: the source of the poses, or the reason for none.
+        start: the frame closest to the design position, which is shown first.
+        joints: name, type and bodies of every joint, as text.
+        caption: the source of the poses, or the reason why there are none.
     """
 
     bodies: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
@@ -88,7 +88,7 @@ class Drawing:
 
     @property
     def layers(self) -> list[str]:
-        """Return the names of the layers that the page switches on and off."""
+        """Return the names of the layers that the page can hide."""
         there = {"wheels": self.wheels, "forces": self.arrows}
         return ["names", "frames", "paths", *(name for name, each in there.items() if each)]
 
@@ -96,7 +96,7 @@ class Drawing:
 def drawing(
     scene: Scene, axis: Axis, outputs: Mapping[str, Sequence[float | None]] | None = None
 ) -> Drawing:
-    """Return the drawing of a scene, its frames named by the values of the axis.
+    """Return the drawing of a scene; the values of the axis name its frames.
 
     Args:
         outputs: values over the samples, for the arrows of forces, by output.
@@ -136,8 +136,8 @@ class _Draughtsman:
         )
 
     def add_arrows(self, outputs: Mapping[str, Sequence[float | None]]) -> None:
-        """Add an arrow for the components of each joint or driver along global axes, and one for
-        every other direction.
+        """Add one arrow for all components of a joint or driver along global axes, and one for each
+        other direction.
         """
         groups: dict[str, list[SceneForce]] = {}
         for force in self.scene.forces:
@@ -172,7 +172,7 @@ class _Draughtsman:
         )
 
     def _node(self, body: str, position: Sequence[float]) -> int:
-        """The hardpoint of a body there, a new one if there is none."""
+        """Return the hardpoint of a body at a position, a new one if there is none."""
         number, local = self._local(body, position)
         for k, (other, *place) in enumerate(self.drawn.nodes):
             if other == number and all(
@@ -187,7 +187,7 @@ class _Draughtsman:
         i, j = joint.bodies
         self.drawn.joints.append((joint.name, joint.type.replace("_", " "), f"{i} – {j}"))
         if not joint.points:
-            return  # it has directions only and is nowhere in particular
+            return  # the joint has directions only, and no position
         first, second = self._node(i, joint.points[0]), self._node(j, joint.points[-1])
         if len(joint.points) > 1:
             self._label(first, second, joint.name)
@@ -210,21 +210,21 @@ class _Draughtsman:
 
     def _label(self, a: int, b: int, text: str) -> None:
         """Add a label; texts at the same place share one."""
-        for k, (*place, said) in enumerate(self.drawn.labels):
+        for k, (*place, label) in enumerate(self.drawn.labels):
             if place == [a, b]:
-                if text not in said.split(" · "):
-                    self.drawn.labels[k] = (a, b, f"{said} · {text}")
+                if text not in label.split(" · "):
+                    self.drawn.labels[k] = (a, b, f"{label} · {text}")
                 return
         self.drawn.labels.append((a, b, text))
 
     def _body(self, number: int) -> dict[str, Any]:
-        """Return a body for the page; join the hardpoints of a moving body, a single one with a
-        chosen origin.
+        """Return a body for the page; link the hardpoints of a moving body, a single one to a given
+        origin.
         """
         body = self.bodies[number]
         if not body.fixed:
             mine = [k for k, (other, *_) in enumerate(self.drawn.nodes) if other == number]
-            # the global origin is that of bodies which were given none
+            # the global origin is the default, not a given origin
             if len(mine) == 1 and any(body.origin):
                 mine = sorted({*mine, self._node(body.name, body.origin)})
             self._link(number, mine)

@@ -1,8 +1,8 @@
 "use strict";
 // Elements of the page: those of SVG, with the lines, symbols and colours of Plotly's JSON, and the
-// keys that they obey. The style sheet colours them: dark mode and paper need no second set.
+// keys that act on them. The style sheet colours them: dark mode and print need no second set.
 
-// The engines' colours; the style sheet names them --s0 and on.
+// The engines' colours; in the style sheet --s0, --s1, ...
 const COLOURS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"];
 const DASHES = { solid: "", dot: "2,3", dash: "8,4" };
 const SVG = "http://www.w3.org/2000/svg";
@@ -26,7 +26,7 @@ const stroke = ({ color, width, dash } = {}) => ({
   "stroke-dasharray": dash in DASHES ? DASHES[dash] : dash,
 });
 
-// A place as SVG writes it [px].
+// A place as text for SVG [px].
 const pixels = ([x, y]) => `${x.toFixed(1)} ${y.toFixed(1)}`;
 
 // The outline of a symbol around 0, 0.
@@ -46,7 +46,7 @@ function symbol(name, r) {
   return paths[name.replace("-open", "").replace("-thin", "")] || circle;
 }
 
-// Call what stands at a key's name when that key alone is pressed on an element.
+// Call the function under a key's name if that key alone is pressed on an element.
 function listenToKeys(on, keys) {
   on.addEventListener("keydown", (event) => {
     if (!(event.key in keys) || event.ctrlKey || event.metaKey || event.altKey) return;
@@ -56,7 +56,7 @@ function listenToKeys(on, keys) {
   });
 }
 
-// The figure of a box as an SVG file, with the colours that it has on the screen.
+// The figure of a box as an SVG file, with its colours on the screen.
 function standalone(box) {
   const svg = box.querySelector("svg");
   const copy = svg.cloneNode(true);

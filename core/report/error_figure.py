@@ -20,21 +20,21 @@ def error_figure(
     curves: Sequence[tuple[Style, Values, Deviation]],
     standard: Values,
 ) -> Figure:
-    """Absolute error of each engine per sample on a log axis, with the tolerance and the worst
-    sample.
+    """Return the absolute error of each engine per sample on a log axis, with the tolerance and the
+    worst sample.
 
     An error of zero has no place on the axis: the page draws it on a labelled floor,
     `layout.meta.floor`.
 
     Args:
-        unit: of the errors.
-        curves: the judged engines and their deviations; at least one.
-        standard: the values compared with.
+        unit: unit of the errors.
+        curves: at least one judged engine, each with its deviations.
+        standard: the values of the standard.
     """
     traces: list[Figure] = []
     for style, values, _ in curves:
         errors = taken(absolute_errors(values, standard), axis.kept, 1.0)
-        # three digits are as many as an error deserves, and keep the page small
+        # three digits suffice for an error, and keep the page small
         rounded = [None if e is None else float(f"{e:.2e}") for e in errors]
         curve = style.curve("driver", rounded, width=1.2, size=5)
         curve["marker"]["maxdisplayed"] = 3 * MARKERS
@@ -89,8 +89,8 @@ def error_figure(
 
 
 def log_axis(title: str, low: float, high: float) -> tuple[Figure, float]:
-    """Return a log axis for errors, and its lowest line: the floor, on which the page draws errors
-    of exactly zero.
+    """Return a log axis for errors, and the floor, its lowest line: the page draws zero errors
+    there.
 
     Args:
         low, high: the smallest and the largest value, both above zero.
@@ -110,7 +110,7 @@ def log_axis(title: str, low: float, high: float) -> tuple[Figure, float]:
 
 
 def absolute_errors(values: Values, standard: Values) -> list[float | None]:
-    """Return the distance from the standard at each sample; None if either is unknown."""
+    """Return the distance from the standard at each sample; None if a value is unknown."""
     return [
         None if a is None or b is None else abs(a - b)
         for a, b in zip(values, standard, strict=True)

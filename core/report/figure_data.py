@@ -19,9 +19,8 @@ class Past:
     """The result of one engine for a case in one run.
 
     Attributes:
-        run: label of the run on the axis, such as its date; runs are in the order given, oldest
-            first.
-        engine: as the report names it; an engine outside the report's own run has its own style.
+        run: label of the run on the axis, such as its date; the oldest run comes first.
+        engine: name in the report; an engine outside the report's run has another style.
         max_error: largest position error over all outputs [m]; None if nothing was compared.
         us_per_step: warm time of a sample [us]; None unless all samples were reached.
     """
@@ -37,9 +36,9 @@ class Effort:
     """The result of one engine at one effort setting.
 
     Attributes:
-        engine: as the report names it.
-        mode: of the engine; each has a diagram of its own.
-        setting: in words, "tol 1e-6" for one.
+        engine: name in the report.
+        mode: mode of the engine; each mode has a separate diagram.
+        setting: the setting as text, such as "tol 1e-6".
         error: largest position error over all outputs [m].
         us_per_sample: warm time of a sample [us].
     """
@@ -52,8 +51,8 @@ class Effort:
 
 
 def trend_figures(history: Sequence[Past], styles: Mapping[str, Style]) -> dict[str, Figure]:
-    """Return figures of error and time of each engine over the runs, on log axes, without series
-    that have no value.
+    """Return figures of error and time of each engine over the runs, on log axes; empty series are
+    left out.
 
     An error of zero has no place on the axis: the page draws it on a labelled floor, as in the
     error figures.
@@ -62,8 +61,7 @@ def trend_figures(history: Sequence[Past], styles: Mapping[str, Style]) -> dict[
     drawn = _styles((each.engine for each in history), styles)
 
     def figure(values: Mapping[tuple[str, str], float | None]) -> Figure:
-        # a category each: a date would otherwise become a place on a calendar, and runs of one
-        # night one point
+        # one category per run: on a time axis, the runs of one night would coincide
         curves = [
             style.curve(runs, [values.get((style.name, run)) for run in runs]) for style in drawn
         ]
@@ -88,8 +86,8 @@ def trend_figures(history: Sequence[Past], styles: Mapping[str, Style]) -> dict[
 
 
 def ticked_axis(title: str, values: Sequence[float]) -> Figure:
-    """Return a log axis for values above zero, with ticks at 1, 2 and 5 of every decade; over many
-    decades at 1 alone.
+    """Return a log axis for values above zero, with ticks at 1, 2 and 5 of every decade, or over
+    many decades only at 1.
     """
     span = max(values, default=1.0) / min(values, default=1.0)
     return {
@@ -102,8 +100,8 @@ def ticked_axis(title: str, values: Sequence[float]) -> Figure:
 
 
 def _decade(values: Sequence[float]) -> Figure:
-    """Return the range of a log axis for values closer than a decade: a tenth drawn over the whole
-    page would look like a step.
+    """Return the range of a log axis for values within a decade: ten percent over the whole page
+    would look like a step.
     """
     low, high = (math.log10(end(values, default=1.0)) for end in (min, max))
     middle = 0.5 * (low + high)
@@ -111,8 +109,8 @@ def _decade(values: Sequence[float]) -> Figure:
 
 
 def precision_figure(efforts: Sequence[Effort], styles: Mapping[str, Style]) -> Figure:
-    """Work-precision diagram: error against time of each engine, a point for each setting, joined
-    in the order of time.
+    """Return the work-precision diagram: error against time of each engine, with a point for each
+    setting, joined in the order of time.
     """
     traces: list[Figure] = []
     for style in _styles((each.engine for each in efforts), styles):
@@ -124,11 +122,11 @@ def precision_figure(efforts: Sequence[Effort], styles: Mapping[str, Style]) -> 
             [_finite(each.us_per_sample) for each in mine],
             [_finite(each.error) for each in mine],
         )
-        told = {
+        hover = {
             "text": [each.setting for each in mine],
             "hovertemplate": "%{text}: %{x:.3~g} µs, %{customdata:.3~g} m",
         }
-        traces.append(curve | told)
+        traces.append(curve | hover)
     times = [value for trace in traces for value in trace["x"] if value]
     return _floored(
         {"data": traces, "layout": {"xaxis": ticked_axis(TIMES, times), "hovermode": "closest"}}
@@ -136,7 +134,7 @@ def precision_figure(efforts: Sequence[Effort], styles: Mapping[str, Style]) -> 
 
 
 def _floored(figure: Figure) -> Figure:
-    """The figure with an axis for errors upwards."""
+    """Return the figure with a vertical axis for errors."""
     positive = [value for trace in figure["data"] for value in trace["y"] if value]
     side, floor = log_axis(
         "largest position error [m]", min(positive, default=1.0), max(positive, default=1.0)
@@ -148,8 +146,8 @@ def _floored(figure: Figure) -> Figure:
 
 
 def _styles(engines: Iterable[str], styles: Mapping[str, Style]) -> list[Style]:
-    """Return a style for each engine: the page's, or one after those for an engine missing from the
-    page's run.
+    """Return a style for each engine: the page's style, or a further one for an engine missing from
+    the page's run.
     """
     drawn: list[Style] = []
     for name in dict.fromkeys(engines):

@@ -1,9 +1,9 @@
 """Figures of the report in a part of Plotly's JSON: outputs against the driver, and differences.
 
 `plot.js` draws it: traces of type scatter (lines, markers, closed bands) and bar, axes of type
-linear, log and category, shapes of type line and rect. Engines' colours are those of the style
-sheet, so that dark mode and print need no second set of figures. Samples refer to the driver's
-values by the word "driver"; the page inserts the values.
+linear, log and category, shapes of type line and rect. The style sheet has the engines' colours, so
+that dark mode and print need no second set of figures. The word "driver" in a trace stands for the
+driver's values, which the page inserts.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from .axis import DISPLAY, Axis
 Figure: TypeAlias = dict[str, Any]
 Values: TypeAlias = Sequence[float | None]
 
-MARKERS = 9  # per curve, staggered, so that coincident curves stay tellable
-# one more than the page shows where a curve is pointed at
+MARKERS = 9  # markers per curve, staggered, so that coincident curves stay distinguishable
+# digits: one more than the page shows at the pointer
 DIGITS = 10
-THIN = 1 / 2000  # a band narrower than this part of the curve's range is less than a pixel
+THIN = 1 / 2000  # a band narrower than this fraction of the curve's range is less than a pixel
 
 DASHES = ("solid", "12px,5px", "3px,3px", "12px,4px,3px,4px", "7px,7px")
 SYMBOLS = (
@@ -41,7 +41,7 @@ SYMBOLS = (
 
 @dataclass(frozen=True)
 class Style:
-    """How an engine is drawn, the same in every figure of a page."""
+    """Style of an engine, the same in every figure of a page."""
 
     key: str
     name: str
@@ -51,7 +51,7 @@ class Style:
 
     @classmethod
     def number(cls, index: int, name: str) -> Style:
-        """The style of the index-th engine."""
+        """Return the style of the index-th engine."""
         k = index % len(COLOURS)
         return cls(
             f"s{k}", name, COLOURS[k], DASHES[index % len(DASHES)], SYMBOLS[index % len(SYMBOLS)]
@@ -60,7 +60,7 @@ class Style:
     def curve(
         self, x: Any, y: Sequence[float | None], *, width: float = 1.8, size: int = 8
     ) -> Figure:
-        """Return the trace of a curve with markers, its line and markers of these sizes."""
+        """Return the trace of a curve with markers, with these sizes of line and markers."""
         return {
             "type": "scatter",
             "mode": "lines+markers",
@@ -85,7 +85,7 @@ def output_figure(
 
     Args:
         curves: the engines and their outputs; at least one.
-        truth: the reference.
+        truth: values of the reference.
         band: the values compared with, and the tolerance; drawn if it is wide enough to be seen.
     """
     unit, scale = DISPLAY.get(curves[0][1].unit, (curves[0][1].unit, 1.0))
@@ -159,7 +159,7 @@ def output_figure(
 
 
 def layout_over(axis: Axis, value_axis: Figure) -> Figure:
-    """Return the layout of curves over a driver; its axis is upright where `axis.up` says so."""
+    """Return the layout of curves over a driver, whose axis is vertical if `axis.up` is not 0."""
     moved_axis: Figure = {
         "title": {"text": axis.title},
         "hoverformat": ".6~g",
@@ -178,8 +178,8 @@ def layout_over(axis: Axis, value_axis: Figure) -> Figure:
 def _flat_range(
     curves: Sequence[Values], standard: OutputSeries, tolerance: float, scale: float
 ) -> Figure:
-    """Return the range of an axis whose curves differ by less than the tolerance over the sweep:
-    round-off drawn over the whole figure would look like a motion.
+    """Return the range of an axis for curves that vary by less than the tolerance: round-off drawn
+    over the whole figure would look like a motion.
     """
     known = [v for curve in [*curves, standard.position] for v in curve if v is not None]
     finite = [v for v in known if math.isfinite(v)]
@@ -197,7 +197,7 @@ def band_is_thin(standard: OutputSeries, tolerance: float) -> bool:
 
 def taken(values: Values, kept: Sequence[int], scale: float) -> list[float | None]:
     """Return the kept values for drawing, scaled and rounded."""
-    # JSON has no NaN and no infinity; both mean here that there is nothing to draw.
+    # JSON has neither NaN nor infinity; null stands for a value that cannot be drawn.
     taken = (values[k] if k < len(values) else None for k in kept)
     return [
         float(f"{scale * v:.{DIGITS}g}") if v is not None and math.isfinite(v) else None
@@ -206,7 +206,7 @@ def taken(values: Values, kept: Sequence[int], scale: float) -> list[float | Non
 
 
 def ticks(axis: Axis) -> Figure:
-    """Return the ticks of an axis of angles: quarters of a turn, if it has any."""
+    """Return the ticks of an axis of angles: quarter turns, if the axis has any."""
     if axis.unit == "°" and axis.values and max(axis.values) - min(axis.values) > math.pi:
         return {"dtick": 90}
     return {}

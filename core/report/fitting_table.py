@@ -11,16 +11,16 @@ from rich.text import Text
 
 # Wider than any table [characters].
 UNBOUNDED = 100_000
-# Text is wrapped to lines of this many characters, not of less.
+# Shortest line that text is wrapped to [characters].
 READABLE = 30
 INDENT, GAP = 2, 2
 
 
 class FittingTable(Table):
-    """A table without lines that breaks no word.
+    """A table without rules that breaks no word.
 
-    Where the console is too narrow for all columns, each row is a block: its first cell, and below
-    it the others with their heads. A first cell that is a number has its head too.
+    If the console is too narrow for all columns, each row is a block: its first cell, and below it
+    the others with their heads. A number in the first cell has its head, too.
     """
 
     def __init__(self, *, title: str | None = None) -> None:
@@ -34,11 +34,11 @@ class FittingTable(Table):
         )
 
     def natural_width(self, console: Console, options: ConsoleOptions) -> int:
-        """Return the width of the table if no text is wrapped [characters]."""
+        """Return the width of the table without wrapped text [characters]."""
         return self._width(console, options, UNBOUNDED)
 
     def _width(self, console: Console, options: ConsoleOptions, readable: int) -> int:
-        """Return the width of the table if text is wrapped to a number of characters."""
+        """Return the width of the table with text wrapped to a number of characters."""
         width = self._extra_width
         for column in self.columns:
             found = self._measure_column(console, options.update_width(UNBOUNDED), column)

@@ -5,8 +5,8 @@
 const barAxes = (trace) => (trace.orientation === "h" ? ["y", "x"] : ["x", "y"]);
 
 // Where a figure is drawn in a box.
-//   traces: those that are seen; size: width and height of the box [px];
-//   view: the two values of each axis that were zoomed to, or null; font: family of the texts.
+//   traces: the visible traces; size: width and height of the box [px];
+//   view: the two values of each axis in the zoom, or null; font: family of the texts.
 // Returns the edges of the frame [px], the scales `x` and `y`, the axes `sides`, whether names
 // below it are `slanted`, the layout, and `tops`, where stacked bars end, by trace.
 function frameOf(traces, layout, [width, height], view, font) {
@@ -34,7 +34,7 @@ function frameOf(traces, layout, [width, height], view, font) {
   return { left, right, top, bottom, width, height, x, y, sides, slanted, layout, floor, tops };
 }
 
-// Where bars end that stand on others, by trace.
+// The ends of stacked bars, by trace.
 function stacked(traces) {
   const found = new Map();
   const sums = new Map();
@@ -49,7 +49,7 @@ function stacked(traces) {
   return found;
 }
 
-// All values along an axis that the frame has to hold; zeros on a floor need no room.
+// All values along an axis that the frame must hold; zeros on a floor need no room.
 function drawnValues(axis, traces, tops, floor) {
   const valuesOf = (trace) => {
     const height = barAxes(trace)[1] === axis;

@@ -23,7 +23,7 @@ def write_plot(history: History, path: Path, *, title: str) -> None:
 
 
 def page(history: History, *, title: str) -> str:
-    """The page as HTML text."""
+    """Return the page as HTML text."""
     by_case = trends(history)
     names = dict.fromkeys(past.engine for each in by_case.values() for past in each)
     styles = {name: Style.number(index, name) for index, name in enumerate(names)}

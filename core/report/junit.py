@@ -11,7 +11,7 @@ from ..harness.record import Deviations, Outcome, Record, Results
 
 COUNTS = {"tests": "testcase", "failures": "failure", "errors": "error", "skipped": "skipped"}
 FORBIDDEN = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
-"""What XML 1.0 cannot hold, not even escaped; a simulator's message may."""
+"""Characters that XML 1.0 cannot hold, not even escaped; a simulator's message may contain them."""
 
 SUSPECTED = "suspect the reference rather than the engine: see the suite's output"
 
@@ -19,10 +19,10 @@ SUSPECTED = "suspect the reference rather than the engine: see the suite's outpu
 def to_junit(results: Results) -> bytes:
     """Return the results as JUnit XML.
 
-    A missing engine or feature, and an output without a verdict, is a skip with its reason. A pair
-    without a record is an error.
+    A missing engine or feature, or an output without a verdict, is a skipped test with its reason.
+    A pair without a record is an error.
 
-    Notes on a case's geometry are the output of its suite.
+    The output of a suite holds the notes on its case's geometry.
     """
     root = ElementTree.Element("testsuites", name="kincheck")
     for case in dict.fromkeys(
@@ -45,15 +45,15 @@ def to_junit(results: Results) -> bytes:
                     suite,
                     "testcase",
                     classname=f"{case}.{engine}.{mode}",
-                    name="never made",
+                    name="not run",
                     time="0.000000",
                 )
                 ElementTree.SubElement(test, "error", message=results.unread.get(case, UNMADE))
-        said = [f"note: {note}" for named, note in notes(results.run) if named == case]
-        said += [f"suspect: {why}" for named, why in suspects(results) if named == case]
-        if said:
+        lines = [f"note: {note}" for named, note in notes(results.run) if named == case]
+        lines += [f"suspect: {why}" for named, why in suspects(results) if named == case]
+        if lines:
             ElementTree.SubElement(suite, "system-out").text = FORBIDDEN.sub(
-                "\ufffd", "\n".join(said)
+                "\ufffd", "\n".join(lines)
             )
         count_tests(suite)
     ElementTree.indent(root)
@@ -64,7 +64,7 @@ def to_junit(results: Results) -> bytes:
 
 
 def count_tests(suite: ElementTree.Element) -> None:
-    """Write the numbers of a suite's tests, failures, errors and skipped tests into it."""
+    """Set a suite's numbers of tests, failures, errors and skipped tests."""
     for count, tag in COUNTS.items():
         suite.set(count, str(sum(1 for _ in suite.iter(tag))))
 
@@ -92,7 +92,7 @@ def _test(
 
 
 def _verdict(record: Record, output: str, deviations: Deviations) -> tuple[str, str]:
-    """Return the element of a test case, none if it passed, and its message."""
+    """Return the element of a test case (none if it passed) and its message."""
     if record.outcome in (Outcome.UNJUDGED, Outcome.UNAVAILABLE, Outcome.UNSUPPORTED):
         return "skipped", f"{record.outcome.shown}: {record.message}"
     if record.outcome is Outcome.FAIL:
@@ -107,7 +107,7 @@ def _verdict(record: Record, output: str, deviations: Deviations) -> tuple[str, 
             off = [f"{output}: {deviations.reason}"]
         if deviations.contradicted:
             off.append(record.message)
-        # missing samples are missing from every output, and a residual is of all of them
+        # missing samples concern every output, and so does a residual
         of_all = record.solved != record.samples or all(
             each.sound for each in record.errors.values()
         )

@@ -1,4 +1,4 @@
-"""Markdown in which foreign text is text: messages come from files and simulators."""
+"""Escaping of foreign text for Markdown: messages come from files and simulators."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from ..case.io.escape import visible
 
 
 def escaped(text: str) -> str:
-    """Return text for Markdown to show unchanged, on a line or in a cell: no mark-up, no links, no
-    HTML, nobody notified.
+    """Return text that Markdown shows unchanged on a line or in a cell: without mark-up, links,
+    HTML or notified users.
     """
     plain = (
         visible(" ".join(text.split()))
@@ -18,13 +18,13 @@ def escaped(text: str) -> str:
         .replace("<", "&lt;")
         .replace(">", "&gt;")
     )
-    # an underscore inside a word, and brackets without a target, are text already
+    # an underscore inside a word and brackets without a target are plain text
     plain = re.sub(r"([\\`*~|]|(?<!\w)_|_(?!\w)|(?<=\])\()", r"\\\1", plain)
     return re.sub(r"(?<!\w)@(?=\w)", "@\N{WORD JOINER}", plain)
 
 
 def code(name: str) -> str:
-    """Return a name as code, in which nothing but a bar can be escaped."""
+    """Return a name as code, where only a bar can be escaped."""
     shown = visible(name).replace("`", "'").replace("|", "\\|")
     return f"`{shown}`"
 

@@ -1,5 +1,5 @@
-"""Every case against every engine, a cell each: the largest position, velocity and acceleration
-error, or why there is none.
+"""The matrix of cases and engines: each cell has the largest position, velocity and acceleration
+error, or the reason for none.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from .markdown import code, escaped, row
 from .table import COLOURS, LENGTH, messages, print_messages, print_signs, worst
 
 NOT_ASKED = "–"
-# Columns between two columns of a table without lines.
+# Characters between two columns of a table without rules.
 GAP = 2
 
 
 def print_matrix(results: Results, file: TextIO) -> None:
-    """Print the conventions of signs, a row per case and a column per engine, every message, and a
-    count of outcomes. Where the engines do not fit beside each other, a table follows another.
+    """Print the sign conventions, a row per case and a column per engine, every message, and a
+    count of outcomes. If the engines do not fit side by side, further tables follow.
     """
     console = terminal.console(file)
     print_signs(results.run, console)
@@ -52,8 +52,8 @@ def print_matrix(results: Results, file: TextIO) -> None:
 def _bands(
     engines: Sequence[str], rows: Mapping[str, Mapping[str, Record]], width: int
 ) -> list[list[str]]:
-    """Return the engines in groups whose columns fit beside that of the cases, at least one each:
-    errors cut short would be of no use.
+    """Return the engines in groups whose columns fit beside the column of cases, at least one each,
+    because truncated errors are useless.
     """
     left = width - max((cell_len(visible(case)) for case in ("case", *rows)), default=0)
     bands: list[list[str]] = [[]]
@@ -70,8 +70,8 @@ def _bands(
 
 
 def to_markdown(results: Results) -> str:
-    """Return the same in Markdown: the engines with their versions, and a line for every message
-    without those of passed pairs.
+    """Return the matrix in Markdown: engines with their versions, and a line for every message
+    except those of passed pairs.
     """
     engines, rows = _laid_out(results)
     versions = {record.engine: record.version for record in results.records if record.version}
@@ -84,7 +84,7 @@ def to_markdown(results: Results) -> str:
         )
         lines.append(row([code(case), *cells]))
     lines += ["", f"{escaped(_reading(results))}."]
-    lines += [escaped(f"{said}.") for said in [unread(results.run)] if said]
+    lines += [escaped(f"{sentence}.") for sentence in [unread(results.run)] if sentence]
     lines += [escaped(f"Note: {case}: {note}.") for case, note in notes(results.run)]
     lines += [escaped(f"Suspect: {case}: {why}.") for case, why in suspects(results)]
     lines += [
@@ -96,7 +96,7 @@ def to_markdown(results: Results) -> str:
 
 
 def cell(record: Record) -> str:
-    """Return the result of an engine for a case, in a few signs."""
+    """Return the result of an engine for a case as short text."""
     errors = [each for quantity in QUANTITIES if (each := worst(record, quantity)) is not None]
     if errors:
         verdict = "" if record.outcome is Outcome.PASS else f"{record.outcome.shown}: "
@@ -109,7 +109,7 @@ def cell(record: Record) -> str:
 
 
 def _laid_out(results: Results) -> tuple[list[str], dict[str, dict[str, Record]]]:
-    """The engines, and the records by case and engine."""
+    """Return the engines, and the records by case and engine."""
     rows: dict[str, dict[str, Record]] = {}
     for record in results.records:
         rows.setdefault(record.case, {})[record.engine] = record

@@ -1,10 +1,10 @@
 "use strict";
-// A mechanism that is played, turned and enlarged.
+// A drawn mechanism that the user can play, turn and enlarge.
 
 const FRAME_MS = 66; // sixty-one samples in four seconds
 
-// Draw a mechanism into a box, whose buttons, slider and keys obey from then on.
-// Returns what draws it again.
+// Draw a mechanism into a box, and connect its buttons, slider and keys.
+// Returns a function that draws it again.
 function mechanism(box, drawing) {
   const motion = motionOf(drawing);
   const bounds = boundsOf(motion);
@@ -84,7 +84,7 @@ function mechanism(box, drawing) {
   return draw;
 }
 
-// What plays the samples one after another, and pauses; nothing without a button.
+// The player of the samples, which can pause; none without a button.
 function player(box, current, show, last, closed) {
   const button = box.querySelector("[data-act=play]");
   let timer = 0;
@@ -114,7 +114,7 @@ function player(box, current, show, last, closed) {
   return { toggle, pause };
 }
 
-// The length of an arrow in words, for a force that is easy to compare.
+// The scale of the arrows as text, for a round force.
 function explainArrows(box, { perMetre, places }) {
   if (!perMetre) return;
   const length = niceStep(span(places.flat()) / 20);

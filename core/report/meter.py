@@ -14,19 +14,19 @@ from ..case.io.escape import visible
 
 
 class Meter:
-    """A bar on a terminal, elsewhere a line now and then.
+    """A bar on a terminal, elsewhere lines at intervals.
 
-    It is drawn only when it is called: a thread that draws would disturb what is timed.
+    Only calls draw it: a drawing thread would disturb measured times.
 
     Args:
-        name: of the command, before each line.
+        name: name of the command, before each line.
         quiet: print nothing.
-        every: seconds between lines without a terminal; 0 for all lines.
+        every: interval between lines without a terminal [s]; 0 for all lines.
     """
 
     def __init__(self, name: str, *, quiet: bool = False, every: float = 0.0) -> None:
         self.name, self.quiet, self.every = name, quiet, every
-        self.begun, self.told = perf_counter(), -every
+        self.begun, self.shown_at = perf_counter(), -every
         self.bar = None
         if sys.stderr.isatty() and not quiet:
             self.bar = Progress(
@@ -56,14 +56,14 @@ class Meter:
             self.bar.stop()
 
     def __call__(self, what: str, done: float) -> None:
-        """Show what is done now, and the part of all work that is finished, from 0 to 1."""
+        """Show the current work, and the finished share of all work, from 0 to 1."""
         if self.bar is not None:
             self.bar.update(self.task, description=visible(what), completed=done, refresh=True)
             return
         now = perf_counter() - self.begun
-        if self.quiet or now - self.told < self.every:
+        if self.quiet or now - self.shown_at < self.every:
             return
-        self.told = now
+        self.shown_at = now
         left = f", about {_time(now * (1.0 - done) / done)} left" if 0.0 < done < 1.0 else ""
         print(
             f"{self.name}: {visible(what)} ({100 * done:.0f} %{left})", file=sys.stderr, flush=True
@@ -71,7 +71,7 @@ class Meter:
 
 
 def _time(seconds: float) -> str:
-    """Return a time in words, to two units."""
+    """Return a time as text with at most two units."""
     whole = round(seconds)
     if whole < 60:
         return f"{whole} s"

@@ -1,7 +1,7 @@
 "use strict";
 // The motion of a mechanism: where its points, wheels and forces are at each sample.
 
-// Directions to look from: azimuth and elevation [rad].
+// Viewing directions: azimuth and elevation [rad].
 const PLANES = { "y z": [0, 0], "x z": [-Math.PI / 2, 0], "x y": [-Math.PI / 2, Math.PI / 2] };
 const OBLIQUE = [-2.2, -1.9, -1.2, -0.9, -0.6, -0.3]; // azimuths to choose from [rad]
 
@@ -35,7 +35,7 @@ function motionOf(drawing) {
   return { frames, moving, placed, rotated, places, wheels, forces, perMetre };
 }
 
-// Newtons that a metre of an arrow stands for; 0 without forces. The largest force is about a
+// Newtons per metre of an arrow; 0 without forces. The arrow of the largest force is about a
 // quarter of the mechanism long.
 function forceScale(arrows, length) {
   const sizes = arrows.flatMap(([, , , vectors]) =>
@@ -45,7 +45,7 @@ function forceScale(arrows, length) {
   return largest && niceStep(largest / (0.25 * length));
 }
 
-// All that a picture has to hold at any sample, so that nothing leaves it or changes its size.
+// The extent of a picture over all samples, so that the view keeps everything at one size.
 // Returns `reach`, the largest distance from the `middle` along an axis, and the `size` of all.
 function boundsOf({ places, wheels, forces }) {
   const rounds = wheels.flat().flatMap(({ tyre, road }) => [...tyre, ...road]);
@@ -57,19 +57,19 @@ function boundsOf({ places, wheels, forces }) {
   return { middle, reach, sizes, size: span(all) };
 }
 
-// The directions to look from by name, with the oblique one that shows the mechanism widest.
+// The viewing directions by name, with the oblique one that shows the mechanism widest.
 function viewsOf({ reach }) {
   const width = (azimuth) => reach([-Math.sin(azimuth), Math.cos(azimuth), 0]);
   const widest = OBLIQUE.reduce((best, each) => (width(each) > 1.05 * width(best) ? each : best));
   return { ...PLANES, oblique: [widest, 0.35] };
 }
 
-// The name of the first view: what lies in a plane is looked at squarely.
+// The name of the first view: perpendicular to the plane of a planar mechanism.
 function firstView({ sizes, size }) {
   return Object.keys(PLANES).find((_, k) => sizes[k] < 0.01 * size) || "oblique";
 }
 
-// Whether a motion comes back to where it began, and so goes on; another one goes to and fro.
+// Whether a motion ends where it began, so that it repeats; other motions go to and fro.
 function isClosed({ frames, places }) {
   const moved = (f, g) =>
     Math.max(...places[f].map((at, k) => Math.hypot(...sum(at, places[g][k], -1))));

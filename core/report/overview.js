@@ -4,8 +4,8 @@
 const isPressed = (button) => button.getAttribute("aria-pressed") === "true";
 const press = (button, pressed) => button.setAttribute("aria-pressed", String(pressed));
 
-// Rows by words and outcome, columns by engine; a case that is not shown above is not shown below
-// either.
+// Rows by words and outcome, columns by engine. A case hidden in the overview is hidden below,
+// too.
 function overview() {
   const form = document.querySelector(".filters");
   if (!form) return;
@@ -63,7 +63,7 @@ function overview() {
   });
 }
 
-// Fade the cells of a row that have none of the outcomes; whether a cell that is seen has one.
+// Fade the cells of a row that have none of the outcomes; return whether a visible cell has one.
 function markCells(row, outcomes) {
   let found = false;
   for (const cell of row.querySelectorAll("td[data-engine]")) {

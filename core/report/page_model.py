@@ -1,4 +1,4 @@
-"""The cases of a report as its page shows them: the text and the figures of each."""
+"""The cases of a report for its page: text and figures of each."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Judged:
 
     @property
     def word(self) -> str:
-        """The motion, as messages call it."""
+        """The motion, as in messages."""
         return motion_word(self.motion, self.unit)
 
     @property
@@ -50,7 +50,7 @@ class Judged:
 
 
 def judged(records: Sequence[Record]) -> list[Judged]:
-    """Every deviation of the records."""
+    """Return every deviation of the records."""
     return [
         Judged(r, output, motion, d)
         for r in records
@@ -60,13 +60,13 @@ def judged(records: Sequence[Record]) -> list[Judged]:
 
 
 def worst(deviations: Sequence[Judged]) -> Judged | None:
-    """The deviation closest to its tolerance, or beyond it most."""
+    """Return the deviation closest to its tolerance, or farthest beyond it."""
     return max(deviations, key=lambda each: each.ratio, default=None)
 
 
 @dataclass(frozen=True)
 class Plot:
-    """A figure of the page: its key, a title to read aloud, and its caption."""
+    """A figure of the page: its key, a title for screen readers, and its caption."""
 
     figure: str
     title: str
@@ -78,8 +78,8 @@ class OutputView:
     """One output of a case: its curves against the driver, and their differences to the standard.
 
     Attributes:
-        errors: a figure for each quantity that was compared.
-        rates: the quantities of those figures but the first.
+        errors: a figure for each compared quantity.
+        rates: the quantities of these figures after the first.
     """
 
     name: str
@@ -94,10 +94,10 @@ class CaseView:
     """One case of the page.
 
     Attributes:
-        evidence: of the reference; None without a reference.
-        worst: the deviation closest to its tolerance, or beyond it most.
-        account: the degrees of freedom, counted as in the paper and by rank.
-        scene: the mechanism to be drawn; None if the results have none.
+        evidence: evidence on the reference; None without a reference.
+        worst: the deviation closest to its tolerance, or farthest beyond it.
+        account: the degrees of freedom, as counted in the paper and by rank.
+        scene: the drawn mechanism; None if the results have none.
         trends: error and time over earlier runs; empty without a history.
         precision: error against time at several effort settings, by mode; empty if not measured.
     """
@@ -123,8 +123,8 @@ class CaseView:
 
 @dataclass(frozen=True)
 class Material:
-    """The material of a report: a run, further knowledge by case, and further limits, each a title
-    and a sentence.
+    """The material of a report: a run, further data by case, and further limits, each a title and a
+    sentence.
     """
 
     results: Results
@@ -136,7 +136,7 @@ class Material:
 def case_view(
     given: Material, name: str, anchor: str, styles: Mapping[str, Style], figures: dict[str, Figure]
 ) -> CaseView:
-    """One case of the page; its figures are added to `figures`."""
+    """Return one case of the page; add its figures to `figures`."""
     results = given.results
     records = [record for record in results.records if record.case == name]
     facts: Mapping[str, Any] = results.run.get("cases", {}).get(name, {})
@@ -173,7 +173,7 @@ def case_view(
 
 
 def _values(records: Sequence[Record]) -> dict[str, Sequence[float | None]]:
-    """Return the values of the first engine with outputs, the native one if it has any: the scene
+    """Return the values of the first engine with outputs, the native engine if possible: the scene
     shows its poses.
     """
     solved = sorted(
@@ -214,13 +214,15 @@ def _output(
     standard = _standard(positions, records, references)
     band = (standard, positions[0].deviation.tolerance) if standard else None
     figures[key] = output_figure(output, axis, curves, truth, band)
-    said = [
+    sentences = [
         f"{sense[0].upper()}{sense[1:]}." for _, series in curves[:1] if (sense := series.sense)
     ]
-    said += [] if truth else ["No reference."]
-    said += [_band_caption(*band, against(positions[0].deviation.against))] if band else []
+    sentences += [] if truth else ["No reference."]
+    sentences += [_band_caption(*band, against(positions[0].deviation.against))] if band else []
     plot = Plot(
-        key, f"{label} against {axis.name}, all engines", " ".join([*said, axis.besides]).strip()
+        key,
+        f"{label} against {axis.name}, all engines",
+        " ".join([*sentences, axis.besides]).strip(),
     )
     return OutputView(output, label, plot, errors, compared[1:])
 
@@ -229,7 +231,7 @@ def _trends(
     anchor: str, history: Sequence[Past], styles: Mapping[str, Style], figures: dict[str, Figure]
 ) -> list[Plot]:
     runs = len(dict.fromkeys(each.run for each in history))
-    if runs < 2:  # the report's own
+    if runs < 2:  # the report's own run
         return []
     made = trend_figures(history, styles)
     figures.update({f"{anchor}-trend-{what}": figure for what, figure in made.items()})
@@ -250,7 +252,9 @@ def _precision(
     for mode in dict.fromkeys(each.mode for each in efforts):
         key = f"{anchor}-precision-{mode}"
         figures[key] = precision_figure([each for each in efforts if each.mode == mode], styles)
-        caption = f"Mode {mode}. Left is faster, down is more exact; a point is one effort setting."
+        caption = (
+            f"Mode {mode}. Left is faster, down is more accurate; a point is one effort setting."
+        )
         plots.append(Plot(key, f"{mode}: error against time per sample, both log axes", caption))
     return plots
 
@@ -258,8 +262,8 @@ def _precision(
 def _standard(
     deviations: Sequence[Judged], records: Sequence[Record], references: Mapping[str, OutputSeries]
 ) -> OutputSeries | None:
-    """Return the standard of one motion of one output: the reference, or the output of the engine
-    named instead.
+    """Return the standard of one motion of one output: the reference, or the output of an engine
+    that replaces it.
     """
     if not deviations:
         return None

@@ -1,4 +1,4 @@
-"""The parts that all pages share: style sheet, scripts, packed data, and the templates' filters."""
+"""Parts shared by all pages: style sheet, scripts, packed data, and filters of the templates."""
 
 from __future__ import annotations
 
@@ -34,17 +34,17 @@ SCRIPTS = (
     "overview.js",
     "report.js",
 )
-"""Scripts of a page with figures, in their order: each uses only those before it as it loads."""
+"""Scripts of a page with figures, in loading order: each depends only on earlier ones."""
 
 LONG = 300
-"""Characters of a message that the page shows at once; the rest unfolds."""
+"""Characters of a message that the page shows at once; the rest is folded."""
 
 
 @cache
 def environment(*folders: Path) -> Environment:
     """Return the templates of these folders and of this one, with the filters of the macros.
 
-    Kept for the process: templates take longer to compile than to render.
+    The process keeps them: templates take longer to compile than to render.
     """
     made = Environment(
         loader=FileSystemLoader([*folders, _HERE]),
@@ -81,7 +81,7 @@ def figure_parts(
     """Return style sheet, script and data of a page with figures, by their names in templates.
 
     Args:
-        drivers: values for "driver" in traces, by section.
+        drivers: values that replace "driver" in traces, by section.
         scenes: drawings of mechanisms, by section.
     """
     data = {"drivers": drivers or {}, "figures": figures, "scenes": scenes or {}}
@@ -93,15 +93,13 @@ def figure_parts(
 
 
 def _script(name: str) -> str:
-    """Return a script of the pages without indentation and lines of comment, which a page need not
-    carry.
-    """
+    """Return a script of the pages without indentation and comment lines."""
     lines = [line.strip() for line in (_HERE / name).read_text("utf-8").splitlines()]
     return "\n".join(line for line in lines if line and not line.startswith("//"))
 
 
 def parted(message: str) -> tuple[str, str]:
-    """Return the start of a long message, to the end of a line or sentence, and its rest."""
+    """Return the start of a long message, up to the end of a line or sentence, and the rest."""
     if len(message) <= LONG:
         return message, ""
     ends = [found.end() for found in re.finditer(r"\n+|[.;:] +", message) if found.end() <= LONG]
@@ -109,7 +107,7 @@ def parted(message: str) -> tuple[str, str]:
 
 
 def packed(text: str) -> str:
-    """Return text as base64 of its zlib stream: a third of the size, and nothing in it can end its
+    """Return text as base64 of its zlib stream, which has a third of the size and cannot end its
     script element.
     """
     return base64.b64encode(zlib.compress(text.encode(), 9)).decode("ascii")

@@ -5,7 +5,7 @@
 const DRAG = 12; // the least size of a box to zoom to [px]
 let clips = 0;
 
-// Draw a figure into a box, and again when the box changes its size.
+// Draw a figure into a box, and draw it again when the size of the box changes.
 //   data: the traces, with their values in place of "driver".
 // Returns `reset` (the zoom), `show` (a series, or hide it) and `fit` (the figure to a width and
 // height for paper, or to the box without them).
@@ -46,7 +46,7 @@ function plot(box, { data, layout }) {
     draw();
   }
 
-  // What a box was drawn around fills the figure; a flat or a narrow one enlarges one axis alone.
+  // A dragged box fills the figure; a flat or narrow box enlarges only one axis.
   function enlarge([x0, y0], [x1, y1]) {
     const ends = { x: [x0, x1], y: [y0, y1] };
     const drag = ([from, to]) => Math.abs(to - from) > DRAG;

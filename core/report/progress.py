@@ -1,4 +1,4 @@
-"""Progress of the command line, and its messages on missing engines."""
+"""Progress display of the command line, and messages on missing engines."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ if TYPE_CHECKING:
 
 
 def complain(lines: Iterable[str]) -> None:
-    """Print problems on standard error, a line each, with the name of the tool."""
+    """Print each problem on a line of standard error, after the name of the tool."""
     for line in lines:
         print(f"kincheck: {visible(line)}", file=sys.stderr)
 
 
 def progress(records: list[Record], *, quiet: bool = False) -> Callable[[Record, int, int], None]:
-    """Return a function that collects records and shows them on standard error: a changing line on
-    a terminal, plain lines elsewhere; nothing if quiet.
+    """Return a function that collects records and shows them on standard error: as one changing
+    line on a terminal, as plain lines elsewhere, not at all if quiet.
     """
     terminal = sys.stderr.isatty()
 
-    def tell(record: Record, done: int, total: int) -> None:
+    def show(record: Record, done: int, total: int) -> None:
         records.append(record)
         if quiet:
             return
@@ -35,11 +35,11 @@ def progress(records: list[Record], *, quiet: bool = False) -> Callable[[Record,
             line = f"\r\x1b[2K{line}" if done < total else "\r\x1b[2K"
         print(line, end="" if terminal else "\n", file=sys.stderr, flush=True)
 
-    return tell
+    return show
 
 
 def lacking(results: Results, required: Sequence[str], named: Sequence[str] = ()) -> list[str]:
-    """Return the failures of required engines and the named engines that are missing."""
+    """Return messages on failures of required engines and on named engines that are missing."""
     from ..harness.record import Outcome
 
     lines = [
@@ -57,7 +57,7 @@ def lacking(results: Results, required: Sequence[str], named: Sequence[str] = ()
         and record.outcome in (Outcome.UNAVAILABLE, Outcome.UNSUPPORTED)
     ]
     lines += [
-        f"engine {record.engine!r} is named and missing: {record.message};"
+        f"engine {record.engine!r} is requested, but missing: {record.message};"
         f" {how_to_install(record.engine)}"
         for record in results.records
         if record.engine in named
@@ -68,7 +68,7 @@ def lacking(results: Results, required: Sequence[str], named: Sequence[str] = ()
 
 
 def uncompared(results: Results) -> list[str]:
-    """Return why a run has compared nothing: then no result deviates, and none is right."""
+    """Return the reason if a run has compared nothing, so that no result is right or wrong."""
     from ..harness.record import Outcome
 
     counts = Counter(record.outcome for record in results.records)
@@ -76,10 +76,10 @@ def uncompared(results: Results) -> list[str]:
         return []
     if not counts[Outcome.UNJUDGED] and any(outcome.bad for outcome in counts):
         return [
-            "nothing was solved: every engine that was there and able ended in an error, a timeout"
-            " or a crash"
+            "nothing was solved: every installed engine that supports a case ended in an error, a"
+            " timeout or a crash"
         ]
-    # it was stopped, or its cases cannot be read, which is said already
+    # the run was stopped, or its cases cannot be read, which another message reports
     if not counts or results.missing:
         return []
     found = ", ".join(

@@ -1,5 +1,5 @@
 "use strict";
-// What a figure shows of its values where a pointer is, or where the arrow keys went.
+// The values of a figure at the pointer, or at the place that the arrow keys reached.
 
 const REACH = 60; // from a pointer to the sample that it shows [px]
 
@@ -68,7 +68,7 @@ function readout(box, layout, current) {
     return made;
   }
 
-  // The sample before or after the one pointed at; the first or last one where none is.
+  // The sample before or after the current one; without one, the first or the last.
   function step(by) {
     const { frame, traces } = current();
     const trace = pointed ? pointed.trace : traces[0];

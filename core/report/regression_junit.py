@@ -1,5 +1,5 @@
-"""The report as JUnit XML: one test case per case, engine and output, failed for a failure of the
-run or a regression.
+"""The regression report as JUnit XML: one test case per case, engine and output, which fails for a
+failure or a regression.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from .junit import FORBIDDEN, count_tests, to_junit
 def to_regression_junit(results: Results, found: Regressions) -> bytes:
     """Return the XML of `to_junit`, with a failure for every regression of a passed pair.
 
-    A finding on a pair and not on one of its outputs (a phase lost, a time) is a test case of its
-    own, named by its kind.
+    A finding on a pair as a whole (a lost phase, a time) is a separate test case, named by its
+    kind.
     """
     root = ElementTree.fromstring(to_junit(results))
     tests = {(test.get("classname"), test.get("name")): test for test in root.iter("testcase")}
@@ -23,11 +23,11 @@ def to_regression_junit(results: Results, found: Regressions) -> bytes:
     unmade = set(results.missing)
     for finding in found.regressions:
         pair = (finding.case, finding.engine, finding.mode)
-        if finding.kind is Kind.FAILURE or pair in unmade:  # these are in there
+        if finding.kind is Kind.FAILURE or pair in unmade:  # the XML has these already
             continue
         place = ".".join(pair)
         name = finding.output or str(finding.kind)
-        if finding.case not in suites:  # a case that only the earlier run has
+        if finding.case not in suites:  # a case of the earlier run only
             suites[finding.case] = ElementTree.SubElement(root, "testsuite", name=finding.case)
         if (place, name) not in tests:
             tests[place, name] = ElementTree.SubElement(

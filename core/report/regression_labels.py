@@ -1,5 +1,5 @@
-"""Texts of a report, the same in every format: its headline, its findings in groups, and the
-changed versions.
+"""Texts of a regression report, the same in every format: headline, findings in groups, and changed
+versions.
 """
 
 from __future__ import annotations
@@ -14,10 +14,12 @@ from ..history.regression.findings import Finding, Kind, Loose, Regressions, Ste
 from ..unit_text import value_text
 
 LONGEST = 12
-"""Rows of a group that are shown; a broken engine has one for every case. The JSON has all."""
+"""Largest number of rows shown in a group; a broken engine has one for every case. The JSON has
+all.
+"""
 
 NAMED = 4
-"""Cases that are named where a row is of several."""
+"""Largest number of cases named in a row."""
 
 
 COUNTED: Mapping[Kind, str] = {
@@ -28,7 +30,7 @@ COUNTED: Mapping[Kind, str] = {
     Kind.DRIFTED: "less accurate",
     Kind.RESIDUAL: "with a larger residual",
 }
-"""What follows the number of pairs with a finding, where it is not the name of the kind."""
+"""Words after the number of pairs with a finding, if they differ from the name of the kind."""
 
 
 @dataclass(frozen=True)
@@ -48,18 +50,18 @@ class Row:
 
     @property
     def where(self) -> str:
-        """The cases, the first of many."""
+        """The cases; of many, the first ones."""
         return shortened(self.cases, NAMED)
 
     @property
     def what(self) -> str:
-        """The message, and how many more the pair has."""
+        """The message, and the number of further findings of the pair."""
         since = f" · since run {self.since}" if self.since is not None else ""
         return self.message + (f" · and {self.more} more like it" if self.more else "") + since
 
 
 def headline(found: Regressions) -> str:
-    """The report in one sentence."""
+    """Return the report in one sentence."""
     if found.against is None:
         judged = found.pairs - len(found.unjudged)
         failing = (
@@ -67,10 +69,10 @@ def headline(found: Regressions) -> str:
             if found.failing
             else f"all {judged} right"
         )
-        # with nothing to compare with there are no other regressions
+        # without a run to compare with there are no other regressions
         never = _counted(found, Kind.LOST)
         rest = [f"{len(found.unjudged)} not judged"] if found.unjudged else []
-        rest += [f"{never} never made"] if never else []
+        rest += [f"{never} not run"] if never else []
         absent = _counted(found, Kind.ABSENT)
         rest += [f"{absent} {Kind.ABSENT}"] if absent else []
         rest += [unread_count(len(found.unread))] if found.unread else []
@@ -99,7 +101,7 @@ def headline(found: Regressions) -> str:
 
 
 def versions(found: Regressions) -> list[str]:
-    """Return the changed versions, without those of the machine and the settings."""
+    """Return the changed versions, without changes of the machine and the settings."""
     return [
         str(change)
         for change in found.changes
@@ -124,8 +126,8 @@ def _plural(kind: Kind, found: Regressions) -> str:
 
 
 def rows(findings: Iterable[Finding]) -> list[Row]:
-    """Return rows of one kind: a pair once, with the worst of its ratios; cases, then engines, of
-    the same text together.
+    """Return the rows of one kind: each pair once, with its worst ratio; cases, then engines, with
+    the same text are merged.
     """
     by_pair: dict[tuple[str, str, str], list[Finding]] = {}
     for finding in findings:
@@ -143,7 +145,7 @@ def rows(findings: Iterable[Finding]) -> list[Row]:
 
 
 def step_says(step: Step) -> str:
-    """Return the text of a step, its first run and the changes in it."""
+    """Return the text of a step, with its first run and the changes in that run."""
     name = f"{step.output} {step.quantity} error" if step.output else step.quantity
     if step.before is None or step.now is None:
         what = "bad" if step.worse else "good again"
@@ -159,7 +161,7 @@ def step_says(step: Step) -> str:
 
 
 def loose_says(loose: Sequence[Loose]) -> list[str]:
-    """Return the tolerances to tighten, a line a case: by its output with the least reduction."""
+    """Return the tolerances to tighten, one line per case: its output with the least reduction."""
     by_case: dict[str, list[Loose]] = {}
     for each in loose:
         by_case.setdefault(each.case, []).append(each)
@@ -171,7 +173,7 @@ def loose_says(loose: Sequence[Loose]) -> list[str]:
         factor = (
             f"{number(least.factor)} times or more"
             if least.factor
-            else "as far as you like, all errors are zero"
+            else "by any factor, since all errors are zero"
         )
         lines.append(f"{case}: {many}, {factor}, by {least.runs} runs{reason}")
     return lines

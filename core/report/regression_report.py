@@ -1,4 +1,4 @@
-"""Changes since another run, from the two runs and the history around them."""
+"""Regression report: changes since another run, from both runs and the history around them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ..history.regression.thresholds import slowest
 from ..history.store import Store
 
 RECENT = 20
-"""Runs that the spread of times is taken from: what the machine is like lately."""
+"""Number of latest runs that give the spread of times on the machine."""
 
 
 def regressions(
@@ -33,7 +33,7 @@ def regressions(
     """Return all changes.
 
     Args:
-        reason: the reason without a run to compare with.
+        reason: the reason why there is no run to compare with.
         missing_is_failure: whether a pair of an earlier run, missing in this one, is a regression.
 
     Raises:
@@ -78,7 +78,7 @@ def regressions(
 
 
 def _around(subject: Subject, store: Store | None) -> History:
-    """Return the runs up to the subject, with the subject if the history has it."""
+    """Return the runs up to the subject, including the subject if the history has it."""
     if store is None:
         return NOTHING
     cases = list(dict.fromkeys(record.case for record in subject.results.records))

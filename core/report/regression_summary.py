@@ -1,5 +1,5 @@
-"""The report as Markdown, for a pull request, a job's page or a mail, and as one part of the HTML
-report.
+"""The regression report as Markdown, for a pull request, a job summary or an e-mail, and as a part
+of the HTML report.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 "use strict";
-// The page: its packed data, when its figures are drawn, and what its buttons do.
+// The page: its packed data, the drawing of its figures, and the actions of its buttons.
 
 const MARGIN = 600; // of the view, within which figures are drawn [px]
 const PAPER = [330, 270]; // size of a figure on paper [px]
@@ -51,7 +51,7 @@ function onClick(selector, act) {
     if (drawn.has(box)) return;
     const section = box.closest("[data-case]");
     const { data, layout } = figures[box.dataset.figure];
-    // samples at the driver's values say "driver"
+    // "driver" stands for the driver's values
     const values = (given) => (given === "driver" ? drivers[section.dataset.case] : given);
     const whole = data.map((trace) => ({ ...trace, x: values(trace.x), y: values(trace.y) }));
     try {
@@ -96,8 +96,8 @@ function onClick(selector, act) {
     }
   });
 
-  // Paper is light and narrower than the screen, and sends no resize event. What the filters hide
-  // stays away.
+  // Paper is light and narrower than the screen, and sends no resize event. Hidden cases
+  // stay hidden.
   window.addEventListener("beforeprint", () => {
     document.documentElement.dataset.paper = "";
     for (const rest of document.querySelectorAll(".problems details")) rest.open = true;

@@ -33,9 +33,9 @@ BROKEN = (Outcome.ERROR, Outcome.TIMEOUT, Outcome.CRASHED)
 
 WITHOUT_TRENDS = (
     "No trends",
-    "The history cannot be read, so that this page says nothing of earlier runs.",
+    "The history cannot be read, so this page shows no earlier runs.",
 )
-"""Limit of a report whose history has a fault."""
+"""Limit of a report whose history is damaged."""
 FAULTS = (
     ("is", "are", "outside tolerance"),
     ("contradicts", "contradict", "the native engine"),
@@ -43,7 +43,7 @@ FAULTS = (
     ("has", "have", "a residual above the tolerance"),
     ("lacks", "lack", "samples"),
 )
-"""What is wrong with records that fail, as the headline says it of one and of several."""
+"""Words of the headline for the fault of one failing record and of several."""
 
 
 def write_report(
@@ -58,13 +58,13 @@ def write_report(
     """Write the report as one HTML file with all scripts, styles and data inside.
 
     Args:
-        results: a run. Of `results.run`, "cases" may give each case's "source", "driver" (its name,
-            type, point and direction) and "motions" of further drivers by case name; everything
-            else is printed as it is.
+        results: a run. In `results.run`, "cases" may give each case's "source", "driver" (name,
+            type, point and direction) and "motions" of further drivers, by case name; everything
+            else is printed unchanged.
         path: the file to write, in an existing folder.
         history: results of the engines in earlier runs and this one, oldest first, by case name.
         precision: error against time at several efforts, by case name.
-        changes: the first section: changes since another run.
+        changes: the first section, with changes since another run.
         limits: further limits of the report, each a title and a sentence.
 
     Raises:
@@ -76,7 +76,7 @@ def write_report(
 
 
 def render(given: Material, changes: Markup | None = None) -> str:
-    """The report as HTML text."""
+    """Return the report as HTML text."""
     records = given.results.records
     never = {(case, product(engine, mode)) for case, engine, mode in given.results.missing}
     names = dict.fromkeys(
@@ -142,10 +142,10 @@ def render(given: Material, changes: Markup | None = None) -> str:
 
 
 def headline(results: Results) -> str:
-    """The run in one sentence."""
+    """Return the run in one sentence."""
     records, unread = results.records, len(results.unread)
     missing = sum(case not in results.unread for case, _, _ in results.missing)
-    # of a failure there may be no deviation at all: no sample, or no output, has a value
+    # a failure may have no deviation at all, if no sample or no output has a value
     compared = [record for record in records if judged([record]) or record.outcome is Outcome.FAIL]
     broken = _count(records, *BROKEN)
     failed = [record for record in compared if record.outcome is Outcome.FAIL]
@@ -156,25 +156,27 @@ def headline(results: Results) -> str:
         if (n := faults[what])
     ]
     if not compared:
-        said = "Nothing was compared"
+        sentence = "Nothing was compared"
     elif failed:
-        said = ", ".join(counts)
+        sentence = ", ".join(counts)
     else:
-        said = (
+        sentence = (
             f"All {len(compared)} comparisons are within tolerance"
             if len(compared) > 1
             else "The one comparison is within tolerance"
         )
-    said += f", {broken} could not be completed" if broken else ""
+    sentence += f", {broken} could not be completed" if broken else ""
     unjudged = _count(records, Outcome.UNJUDGED)
-    said += f", {unjudged} {Outcome.UNJUDGED.shown}" if unjudged else ""
-    said += f"; suspect the reference of {', '.join(results.suspects)}" if results.suspects else ""
-    said += f"; {unread_count(unread)}" if unread else ""
-    return said + (f"; the run ended before {missing} more" if missing else "")
+    sentence += f", {unjudged} {Outcome.UNJUDGED.shown}" if unjudged else ""
+    sentence += (
+        f"; suspect the reference of {', '.join(results.suspects)}" if results.suspects else ""
+    )
+    sentence += f"; {unread_count(unread)}" if unread else ""
+    return sentence + (f"; the run ended before {missing} more" if missing else "")
 
 
 def _fault(record: Record, tol: float) -> str:
-    """Return the fault of a failing record, one of `FAULTS`; of several, the first."""
+    """Return the fault of a failing record, the first one of `FAULTS` that applies."""
     errors = record.errors.values()
     holds = (
         any(not each.within for each in errors),
@@ -187,8 +189,8 @@ def _fault(record: Record, tol: float) -> str:
 
 
 def _worst_of(record: Record, motion: str | None = None) -> Judged | None:
-    """Return the deviation of a record, of one motion or any, closest to its tolerance or farthest
-    beyond it.
+    """Return the deviation of a record, in one motion or any, that is closest to its tolerance or
+    farthest beyond it.
     """
     return worst([each for each in judged([record]) if motion in (None, each.motion)])
 
@@ -200,7 +202,7 @@ def severity(case: CaseView) -> float:
 
 
 def searched(case: CaseView) -> str:
-    """The words by which the overview finds a case."""
+    """Return the words by which the overview finds a case."""
     words = [case.name, case.source, TRUTHS[case.truth], *(output.name for output in case.outputs)]
     words += [
         text
@@ -211,14 +213,14 @@ def searched(case: CaseView) -> str:
 
 
 def _model(record: Record) -> dict[str, Any]:
-    """Return an engine's facts on its model, without those in tables of their own."""
+    """Return an engine's facts on its model, without those in separate tables."""
     return {
         key: value for key, value in record.details.items() if key not in ("dof_account", "program")
     }
 
 
 def _grouped(records: Iterable[Record]) -> list[tuple[Outcome, str, str, list[str]]]:
-    """Outcome, engine and message, with the cases they were the same for."""
+    """Return outcome, engine and message, each with the cases that share them."""
     groups: dict[tuple[Outcome, str, str], list[str]] = {}
     for record in records:
         groups.setdefault((record.outcome, engine_name(record), record.message), []).append(
@@ -228,7 +230,7 @@ def _grouped(records: Iterable[Record]) -> list[tuple[Outcome, str, str, list[st
 
 
 def _settings(records: Sequence[Record]) -> list[tuple[str, dict[str, Any], list[str]]]:
-    """Each engine's distinct settings, with the cases they were the same for."""
+    """Return each engine's distinct settings, with the cases that share them."""
     groups: dict[str, tuple[str, dict[str, Any], list[str]]] = {}
     for record in records:
         group = groups.setdefault(

@@ -1,4 +1,4 @@
-"""Benchmarks: figures of the program itself, shown as tables on the terminal, as JSON and as a
+"""Benchmark reports: measurements of kincheck itself as tables on the terminal, as JSON and as a
 page.
 """
 
@@ -37,10 +37,10 @@ class Section:
     """One table of a benchmark, with its conclusions.
 
     Attributes:
-        verdict: the conclusions, in sentences.
+        verdict: the conclusions as sentences.
         notes: the method of measurement.
-        columns: headings; the first `labels` of them are over words, the others over numbers.
-        diagrams: drawn above the table, on the page only.
+        columns: headings; the first `labels` of them head words, the others numbers.
+        diagrams: diagrams above the table, only on the page.
     """
 
     title: str
@@ -54,7 +54,7 @@ class Section:
 
 @dataclass(frozen=True)
 class Report:
-    """A benchmark's results for people. `name` is also the name of its files."""
+    """A benchmark's results for readers. `name` is also the name of its files."""
 
     name: str
     headline: str
@@ -67,7 +67,7 @@ def deliver(report: Report, results: msgspec.Struct, *, out: Path | None, json: 
 
     Args:
         out: folder for NAME.json and NAME.html.
-        json: a file, or "-" for standard output, which then has nothing else.
+        json: a file, or "-" for standard output, which then holds nothing else.
 
     Raises:
         KincheckError: a file cannot be written.
@@ -78,7 +78,7 @@ def deliver(report: Report, results: msgspec.Struct, *, out: Path | None, json: 
             (out / f"{report.name}.json", to_json(results)),
             (out / f"{report.name}.html", page(report).encode()),
         ]
-    problems = write_all(contents)  # before anything is printed: who reads it may have gone
+    problems = write_all(contents)  # before printing, since the reader of the tables may end early
     print_report(report, sys.stderr if json == "-" else sys.stdout)
     if json == "-":
         to_standard_output(to_json(results))
@@ -87,7 +87,7 @@ def deliver(report: Report, results: msgspec.Struct, *, out: Path | None, json: 
 
 
 def print_report(report: Report, file: TextIO) -> None:
-    """Print the tables, each with its verdict and notes below."""
+    """Print the tables, each with its verdict and notes."""
     console = terminal.console(file)
     console.print(Text(report.headline, style="bold"))
     console.print(Text(" · ".join(report.facts)), soft_wrap=True)
@@ -107,7 +107,7 @@ def print_report(report: Report, file: TextIO) -> None:
 
 
 def page(report: Report) -> str:
-    """The report as one HTML file, in the look of a run's."""
+    """Return the report as one HTML file in the style of a run's report."""
     figures = {
         diagram.plot.figure: diagram.figure
         for section in report.sections

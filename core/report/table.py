@@ -1,4 +1,4 @@
-"""The records of a run as a table for people."""
+"""The records of a run as a printed table."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ HEADS = (
 
 
 def print_table(results: Results, file: TextIO) -> None:
-    """Print the conventions of signs, a line per record, every message, and outcome counts.
+    """Print the sign conventions, a line per record, every message, and outcome counts.
 
-    Where the console is too narrow for a line per record, the records stand below their case.
+    If the console is too narrow for a line per record, the records stand below their case.
     """
     console = terminal.console(file)
     print_signs(results.run, console)
@@ -53,10 +53,10 @@ def print_table(results: Results, file: TextIO) -> None:
 
 
 def print_outputs(results: Results, file: TextIO) -> None:
-    """Print a line for each output of each record, its largest errors and their tolerances, the
-    reasons of those that are missing, then what `print_table` prints.
+    """Print a line for each output of each record with its largest errors and their tolerances, the
+    reasons for missing errors, then the messages of `print_table`.
 
-    Where the console is too narrow, the outputs stand below their case and engine.
+    If the console is too narrow, the outputs stand below their case and engine.
     """
     console = terminal.console(file)
     rows = [
@@ -81,8 +81,8 @@ def print_outputs(results: Results, file: TextIO) -> None:
 
 
 def _output_heads(units: Collection[str]) -> tuple[str, ...]:
-    """Return the heads of the table of outputs in these units; among forces, which have no
-    position, the first number of every output is its value.
+    """Return the heads of the table of outputs in these units; with forces, which have no position,
+    the first error is called value.
     """
     words = {motion_word(QUANTITIES[0], unit) for unit in units} or {QUANTITIES[0]}
     first = words.pop() if len(words) == 1 else "value"
@@ -100,7 +100,7 @@ def _of_output(record: Record, name: str) -> tuple[Text, ...]:
 def _missing(record: Record) -> dict[str, list[str]]:
     """Return the reasons why quantities are not compared or have no values, each with its outputs.
 
-    What a message on the comparison repeats of the values is left out.
+    A reason about the comparison that only repeats the reason about the values is left out.
     """
     found: dict[str, list[str]] = {}
     for name, errors in record.errors.items():
@@ -115,7 +115,7 @@ def _missing(record: Record) -> dict[str, list[str]]:
 
 
 def print_summary(results: Results, file: TextIO) -> None:
-    """Print the messages and the counts of outcomes alone."""
+    """Print only the messages and the counts of outcomes."""
     print_messages(results, terminal.console(file))
 
 
@@ -127,7 +127,7 @@ def _of_tolerance(error: Deviation | None) -> Text:
 
 
 def _cells(record: Record, several: bool) -> tuple[Text, ...]:
-    """Return the cells of `HEADS`, as texts; with the engine's mode if there are several."""
+    """Return the cells of `HEADS` as text, with the engine's mode if there are several."""
     engine = f"{record.engine} · {record.mode}" if several else record.engine
     outcome = Text(record.outcome.shown, style=COLOURS.get(record.outcome, "bold red"))
     errors = (_error(record, quantity) for quantity in QUANTITIES)
@@ -147,7 +147,7 @@ def _print_by_case(rows: Sequence[tuple[Record, tuple[Text, ...]]], console: Con
 def _print_below_titles(
     rows: Sequence[tuple[str, str, tuple[Text, ...]]], heads: Sequence[str], console: Console
 ) -> None:
-    """Print rows below their titles and remarks, all in the same columns."""
+    """Print rows below their titles and remarks, in common columns."""
     lines = [head.removeprefix(">").split("\n") for head in heads]
     texts = [[*head, *(cells[k].plain for *_, cells in rows)] for k, head in enumerate(lines)]
     widths = [max(map(cell_len, column)) for column in texts]
@@ -168,7 +168,7 @@ def _print_below_titles(
 
 
 def _standard(records: Sequence[Record]) -> str:
-    """Return the standard of the records of a case; of several notes, with their engines."""
+    """Return the standard of the records of a case; if engines have different ones, name them."""
     engines: dict[str, list[str]] = {}
     for record in records:
         engines.setdefault(truth(record), []).append(record.engine)
@@ -184,7 +184,7 @@ def _time(us: float | None) -> str:
 
 
 def print_signs(run: Mapping[str, Any], console: Console) -> None:
-    """Print the heading of every table of outputs with a convention of signs."""
+    """Print the sign conventions above a table of outputs."""
     for line in signs(run):
         console.print(Text(visible(line)), soft_wrap=True)
 
@@ -212,9 +212,7 @@ def print_messages(results: Results, console: Console) -> None:
 
 
 def truth(record: Record) -> str:
-    """Return the standard of a record; "validated" is kept for agreement with truths from
-    elsewhere.
-    """
+    """Return the standard of a record; "validated" means agreement with an independent truth."""
     said = "validated" if record.validated else unsound(record)
     return against(record.truth) + (f" ({said})" if said else "")
 
@@ -233,8 +231,8 @@ def worst(record: Record, quantity: str) -> tuple[Deviation, str] | None:
     """Return the largest error of a quantity over the outputs, and its output's unit, empty for the
     metre of the heads.
 
-    Out of tolerance comes first, then lengths: errors in different units are not to be compared.
-    None if nothing was compared.
+    Errors out of tolerance come first, then lengths, because errors in different units cannot be
+    compared. Return None if nothing was compared.
     """
     found: list[tuple[Deviation, str]] = []
     for output, errors in record.errors.items():
@@ -250,8 +248,8 @@ def worst(record: Record, quantity: str) -> tuple[Deviation, str] | None:
 
 
 def messages(results: Results) -> dict[tuple[str, Outcome, str], list[str]]:
-    """Messages, and the cases they are about; a missing engine says so once, and a suspected
-    reference in a line of its own.
+    """Return the messages and their cases; a missing engine has one message, and a suspected
+    reference has a separate line.
     """
     said: dict[tuple[str, Outcome, str], list[str]] = {}
     for record in results.records:

@@ -1,6 +1,4 @@
-"""Answers for people, as text and tables, and the same for programs, as JSON: commands print the
-one and write the other.
-"""
+"""Output of commands: text and tables on the terminal, and the same data as JSON for programs."""
 
 from __future__ import annotations
 
@@ -19,14 +17,14 @@ from ..case.io.atomic_files import to_standard_output, write
 from ..harness.record import to_json
 from .fitting_table import FittingTable
 
-# Columns for a log or a pipe, unless the environment variable COLUMNS says how many: they have no
-# width of their own, and the table's lines are not to be broken there.
+# Width for a log or a pipe, unless the environment variable COLUMNS sets it: they have no width,
+# and must not break the lines of a table.
 LOG_WIDTH = 200
 
 
 class _Console(Console):
-    """A console whose reader may end early: further output is dropped, and the command goes on to
-    the status of its results.
+    """A console whose reader may end early: it drops further output, and the command still exits
+    with the status of its results.
     """
 
     def on_broken_pipe(self) -> None:
@@ -35,13 +33,13 @@ class _Console(Console):
 
 
 def print_no_more(file: IO[str]) -> None:
-    """Drop further output of a stream: the interpreter would complain of it at its end."""
+    """Drop further output of a stream: the interpreter would report it as an error at exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), file.fileno())
 
 
 def console(file: TextIO) -> Console:
-    """Return a console for unchanged text: rich takes square brackets and colons in names for
-    colours and pictures.
+    """Return a console for unchanged text: rich would read square brackets and colons in names as
+    colours and emoji.
     """
     return _Console(
         file=file,
@@ -53,20 +51,21 @@ def console(file: TextIO) -> Console:
 
 
 def page(json: str | None) -> Console:
-    """Return the console for tables: standard output, unless the JSON has it."""
+    """Return the console for tables: standard output, unless the JSON goes there."""
     return console(sys.stderr if json == "-" else sys.stdout)
 
 
 def columns(*heads: str, title: str | None = None) -> FittingTable:
-    """Return a table without lines that fits the console.
+    """Return a table without rules that fits the console.
 
     Args:
-        heads: of the columns. Those that begin with ">" stand right and are never wrapped.
+        heads: heads of the columns. A column whose head begins with ">" is right-aligned and never
+            wrapped.
     """
     table = FittingTable(title=title)
     for head in heads:
         right = head.startswith(">")
-        # a text, not a string: that would be taken for mark-up, in which [red] is a colour
+        # a Text, since rich reads a string as mark-up, in which [red] is a colour
         table.add_column(
             Text(head.removeprefix(">")),
             justify="right" if right else "left",
@@ -77,7 +76,7 @@ def columns(*heads: str, title: str | None = None) -> FittingTable:
 
 
 def unheaded(rows: Sequence[Sequence[str]]) -> FittingTable:
-    """Return rows of as many cells each, without heads, as a table that fits the console."""
+    """Return rows with equal numbers of cells as a table without heads that fits the console."""
     table = columns(*[""] * max(map(len, rows), default=0))
     table.show_header = False
     for row in rows:
@@ -86,12 +85,12 @@ def unheaded(rows: Sequence[Sequence[str]]) -> FittingTable:
 
 
 def indented(table: FittingTable) -> Padding:
-    """Return the table below a line of text."""
+    """Return the table, indented below a line of text."""
     return Padding(table, (0, 0, 0, 2), expand=False)
 
 
 def write_json(found: msgspec.Struct | Mapping[str, Any], json: str | None) -> None:
-    """Write the answer as JSON to a file, or for "-" to standard output. Call it before printing:
+    """Write the answer as JSON to a file, or for "-" to standard output. Call this before printing:
     the reader of the tables may end early.
 
     Raises:
@@ -104,5 +103,5 @@ def write_json(found: msgspec.Struct | Mapping[str, Any], json: str | None) -> N
 
 
 def listed(names: Sequence[str]) -> str:
-    """Names, one after the other."""
+    """Return the names as one text."""
     return ", ".join(names) or "none"

@@ -45,7 +45,7 @@ function zeros(trace, frame) {
   return svgElement("path", { "data-series": trace.meta, class: "zeros", d, ...line });
 }
 
-// The markers of a trace; of a line those samples that have no neighbour to draw it to.
+// The markers of a trace; of a line, the samples without a neighbour.
 function marks(trace, places) {
   const all = has(trace, "markers");
   if (!all && (trace.fill || !isLine(trace))) return [];

@@ -1,6 +1,4 @@
-"""Trends of a history as the report draws them: errors and times of each engine on each case, over
-the runs.
-"""
+"""Trends of a history for the report: errors and times of each engine and case over the runs."""
 
 from __future__ import annotations
 
@@ -26,17 +24,19 @@ def trends(history: History) -> dict[str, list[Past]]:
 
 
 def run_name(row: RunRow) -> str:
-    """Return a run on an axis: its date, and its number, for there may be several a minute."""
+    """Return the label of a run on an axis: its date and its number, since a minute may have
+    several runs.
+    """
     return f"{row.started[:16].replace('T', ' ')} #{row.id}"
 
 
 def largest_length(entry: Entry, case: str, row: RunRow) -> float | None:
-    """Return the largest position error of the outputs in metres [m]; None if none was compared."""
+    """Return the largest position error of the outputs in metres [m]; None without any."""
     return largest_errors(entry, case, row).get("m")
 
 
 def largest_errors(entry: Entry, case: str, row: RunRow) -> dict[str, float]:
-    """Return the largest error of the outputs by unit: of values, velocities and accelerations."""
+    """Return the largest errors of the outputs by unit: of values, velocities and accelerations."""
     found: dict[str, float] = {}
     for name, deviations in entry.errors.items():
         for quantity, deviation in deviations.items():

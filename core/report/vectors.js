@@ -1,5 +1,5 @@
 "use strict";
-// Vectors in space, and outlines that are made of them.
+// Vectors in space, and outlines of points.
 
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const sum = (a, b, factor = 1) => a.map((value, k) => value + factor * b[k]);
@@ -27,7 +27,7 @@ function extent(points) {
   );
 }
 
-// The diagonal of the box around points; 1 where they are one.
+// The diagonal of the box around points; 1 if they coincide.
 function span(points) {
   return Math.hypot(...extent(points).map(([low, high]) => high - low)) || 1;
 }

@@ -10,7 +10,7 @@ from kincheck.core.errors import CaseError
 
 pytest.importorskip("mujoco")
 
-from kincheck.adapters.mujoco.soft_constraints import main, rod_forces, told
+from kincheck.adapters.mujoco.soft_constraints import main, report_lines, rod_forces
 
 STRUT = cases.load("mcpherson_strut_loaded")
 
@@ -30,7 +30,7 @@ def test_the_tendon_has_no_acceleration_of_its_own():
     # nearly rigid equalities give what rigid rows without Jdot v give
     off = fast.forward["stiff"] - fast.rigid
     assert np.abs(off + missing).max() < 0.1 * np.abs(missing).max()
-    assert "off by up to" in told(fast, "tie_rod")
+    assert "off by up to" in report_lines(fast, "tie_rod")
 
 
 def test_wrong_input_is_told():

@@ -393,7 +393,7 @@ def test_export_writes_what_the_writer_writes(to, endings, tmp_path, monkeypatch
     ("argv", "said"),
     [
         (["--to", "mjfc"], "there is no format 'mjfc'; did you mean 'mjcf'?"),
-        (["--to", "mjcf"], "mcpherson_strut.xml is there already"),
+        (["--to", "mjcf"], "mcpherson_strut.xml exists already"),
         (["--to", "mjcf", "--at", "nan"], "'nan' is not a number"),
         (
             ["--to", "mjcf", "--out", "nowhere/strut.xml"],

@@ -100,7 +100,7 @@ def test_what_was_made_is_written(tmp_path):
     assert status == 130
     (said,) = lines(err)
     assert said.startswith("kincheck: interrupted: ")
-    assert said.endswith(" records were made and are kept")
+    assert said.endswith(" records were finished and are kept")
     found = json.loads((out / "results.json").read_text())
     assert found["records"]
     assert found["run"]["missing"]

@@ -13,7 +13,7 @@ VARY = (
 
 WITHOUT_EFFECT = [
     ("assemblies rssr --number 2",
-     "--number: found without --export, expected with it, to say what it writes;"),
+     "--number: found without --export, which it belongs to;"),
     ("assemblies rssr --out x.xml --number 1", "--number, --out: found without --export"),
     ("assemblies rssr --export mjcf --number 0", "'0' is not a whole number of 1 or more"),
     ("explain rssr --samples 0", "'0' is not a whole number of 1 or more"),
@@ -24,15 +24,15 @@ WITHOUT_EFFECT = [
     ("stress --list --engine native --mode projection",
      "--list runs nothing; leave out --engine, --mode"),
     ("stress --replay x.toml --seed 0",
-     "--replay judges files as they are, which are of no family; leave out --seed"),
+     "--replay judges files, which belong to no family; leave out --seed"),
     ("stress --replay x.toml --samples 2000 --no-proofs --family units",
      "leave out --family, --samples, --no-proofs"),
     ("stress --family units --tol 1e-12",
-     "--tol is for replayed files, and families have tolerances of their own; leave it"),
+     "--tol is for replayed files, and families have their own tolerances; leave it"),
     ("run rssr --memory 1e300",
-     "argument --memory: '1e300' is more than can be counted, expected 1e+09 at most; give less"),
+     "argument --memory: '1e300' is too large, expected 1e+09 at most; give less"),
     ("run rssr --timeout 2e9",
-     "argument --timeout: '2e9' is more than can be counted, expected 1e+09 at most; give less"),
+     "argument --timeout: '2e9' is too large, expected 1e+09 at most; give less"),
 ]  # fmt: skip
 ONE_FILE = [
     ("run rssr --json a --junit a", "--junit", "--json"),

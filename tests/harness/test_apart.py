@@ -96,6 +96,6 @@ def test_a_run_with_a_history_outlives_a_simulator_that_cannot_be_loaded(deed, t
 
 
 def test_a_command_that_is_ended_from_within_is_no_success(monkeypatch, capsys):
-    monkeypatch.setattr(main, "house", lambda: sys.exit(0))
+    monkeypatch.setattr(main, "registry", lambda: sys.exit(0))
     assert main.main(["list"]) == Status.FAILED
     assert "ended the program with status 0" in capsys.readouterr().err

@@ -305,7 +305,7 @@ def test_a_derivative_has_one_less_of_what_the_engine_gives(rates):
     assert not known.lost
     assert lost.lost == (SAMPLES if rates else UNSET)
     assert (
-        "position: the engine gives no velocities to make it of" in (lost.reason or "")
+        "position: the engine gives no velocities, on which it depends" in (lost.reason or "")
     ) is not bool(rates)
 
 

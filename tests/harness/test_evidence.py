@@ -125,7 +125,7 @@ def test_kincheck_s_own_result_is_recognised(engines):
     assert not any(record.validated for record in results.records)
     assert all(record.evidence.own for record in results.records)
     (note,) = results.run["cases"]["crank"]["notes"]
-    assert "identical to native's own result in every bit" in note
+    assert "equals native's own result in every bit" in note
     assert from_json(to_json(results)) == results
 
 
@@ -187,4 +187,4 @@ def test_feeding_back_what_was_computed_is_not_called_validated(tmp_path, capsys
     assert main.main(["run", str(tmp_path / "case.toml"), "--engine", "native"]) == 0
     out = capsys.readouterr().out
     assert "(validated)" not in out
-    assert "identical to native's own result in every bit" in out
+    assert "equals native's own result in every bit" in out

@@ -143,7 +143,7 @@ def test_an_engine_that_is_named_is_required(kincheck_main, capsys):
     capsys.readouterr()
     assert kincheck_main("run", "--engine", "native", "missing", engines=engines) == 2
     assert (
-        "kincheck: engine 'missing' is named and missing: missing is not installed"
+        "kincheck: engine 'missing' is requested, but missing: missing is not installed"
         in capsys.readouterr().err
     )
     assert kincheck_main("run", "--engine", "missing", engines=engines) == 2

@@ -186,4 +186,4 @@ def test_a_file_that_holds_no_results_is_refused_in_one_line(tmp_path, capsys, t
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith(f"kincheck: {file}: found ")
     assert said in line
-    assert line.endswith("make it anew with kincheck run --json")
+    assert line.endswith("write the file again with kincheck run --json")

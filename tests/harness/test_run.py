@@ -9,7 +9,7 @@ from kincheck.core.case.case import Series, Truth
 from kincheck.core.errors import CaseError, SolveError
 from kincheck.core.harness.compare import output_series
 from kincheck.core.harness.record import Outcome
-from kincheck.core.harness.run import UNTOLD, run
+from kincheck.core.harness.run import NULL_REASONS, run
 
 from ..support.fakes import SAMPLES, Fake, at, crank, exact, off, partial, raising, solution
 
@@ -189,24 +189,24 @@ def test_missing_samples_fail_and_the_others_are_kept_and_compared():
     ("engine", "reasons"),
     [
         (Fake(), {}),
-        (Fake(answer=partial), {"us_per_step": UNTOLD["us_per_step"]}),
+        (Fake(answer=partial), {"us_per_step": NULL_REASONS["us_per_step"]}),
         (
             Fake(answer=lambda case: solution(case, solved=np.zeros(SAMPLES, dtype=bool))),
-            {key: UNTOLD[key] for key in ("residual_max", "iterations", "us_per_step")},
+            {key: NULL_REASONS[key] for key in ("residual_max", "iterations", "us_per_step")},
         ),
         (
             Fake(answer=lambda case: replace(solution(case), details={})),
-            {key: UNTOLD[key] for key in ("rank", "dof")},
+            {key: NULL_REASONS[key] for key in ("rank", "dof")},
         ),
-        (Fake(answer=raising(ValueError("no"))), dict.fromkeys(UNTOLD, "error: see message")),
-        (Fake(installed=None), dict.fromkeys(UNTOLD, "unavailable: see message")),
+        (Fake(answer=raising(ValueError("no"))), dict.fromkeys(NULL_REASONS, "error: see message")),
+        (Fake(installed=None), dict.fromkeys(NULL_REASONS, "unavailable: see message")),
     ],
     ids=["all", "some samples", "no sample", "no details", "error", "unavailable"],
 )
 def test_every_number_that_is_null_says_why(engine, reasons):
     record = record_of(engine)
     assert record.reasons == reasons
-    assert {key for key in UNTOLD if getattr(record, key) is None} == set(reasons)
+    assert {key for key in NULL_REASONS if getattr(record, key) is None} == set(reasons)
 
 
 def test_missing_samples_do_not_hide_a_deviation():
@@ -230,8 +230,8 @@ def test_nothing_solved_is_a_failure_without_numbers():
     record = record_of(Fake(answer=answer))
     assert (
         record.message
-        == "0 of 9 samples solved: the engine does not say why; ask it to; closed form has values"
-        " at 9 of the others"
+        == "0 of 9 samples solved: the engine gives no reason; its adapter must report one; closed"
+        " form has values at 9 of the others"
     )
     assert (record.residual_max, record.iterations, record.errors["x"].position) == (
         None,

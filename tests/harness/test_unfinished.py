@@ -29,7 +29,7 @@ from ..history.test_regression import kinds, reported
 from ..support.nights import FACTS, changed, keep, nights, records
 
 GONE = {"outcome": Outcome.UNAVAILABLE, "message": "not installed", "seconds": None, "errors": {}}
-UNMADE = "asked for and never made: the run ended before it"
+UNMADE = "not run: the run ended before this pair"
 
 
 @pytest.fixture
@@ -89,7 +89,7 @@ def test_a_run_of_which_nothing_was_made_is_judged_too(path):
 def test_what_was_never_made_counts_with_nothing_to_compare_with(path, capsys):
     killed(path, 1)
     assert main.main(["report", "--history", str(path)]) == 1
-    assert "all 1 right, 3 never made; compared with nothing" in capsys.readouterr().out
+    assert "all 1 right, 3 not run; compared with nothing" in capsys.readouterr().out
 
 
 def test_every_format_tells_of_pairs_that_were_never_made(path):
@@ -103,9 +103,9 @@ def test_every_format_tells_of_pairs_that_were_never_made(path):
         ("second", "mujoco", "projection"),
     ]
     assert headline(results).endswith("; the run ended before 3 more")
-    said = dict(caveats(results))["Never made: 3"]
+    said = dict(caveats(results))["Not run: 3"]
     assert said.endswith(
-        "nothing is said about mujoco on first; native on second; mujoco on second."
+        "There are no results for mujoco on first; native on second; mujoco on second."
     )
     for text in (to_junit(results), to_regression_junit(results, reported(path))):
         root = ET.fromstring(text)
@@ -119,7 +119,7 @@ def test_every_format_tells_of_pairs_that_were_never_made(path):
         assert {
             test.find("error").get("message")
             for test in root.iter("testcase")
-            if test.get("name") == "never made"
+            if test.get("name") == "not run"
         } == {UNMADE}
 
 
@@ -224,7 +224,7 @@ def test_a_history_where_nothing_can_be_written_is_read_whole_or_not_at_all(path
             else:
                 with pytest.raises(
                     HistoryError,
-                    match=r"its latest records are in history.sqlite-wal still, .* copy both files",
+                    match=r"its latest records are still in history.sqlite-wal, .* copy both files",
                 ):
                     Store(there, writable=False)
 

@@ -12,7 +12,7 @@ from kincheck.core.history.store import Store
 
 from ..support.nights import nights
 
-NO_TRENDS = "The history cannot be read, so that this page says nothing of earlier runs."
+NO_TRENDS = "The history cannot be read, so this page shows no earlier runs."
 
 
 @pytest.fixture
@@ -229,7 +229,7 @@ def test_damage_that_comes_while_records_are_added_costs_no_result(
     )
     said = [line for line in capsys.readouterr().err.splitlines() if not line.startswith("[")]
     assert len(said) == 1
-    assert "the records before bennett native are kept there as run 1" in said[0]
+    assert "the records before bennett native are stored as run 1" in said[0]
     assert len(json.loads((out / "results.json").read_text())["records"]) == 3
     assert NO_TRENDS in (out / "report.html").read_text()
 

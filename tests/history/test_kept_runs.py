@@ -61,7 +61,7 @@ def test_a_disk_that_fails_in_the_middle_is_a_message_and_the_results_are_delive
     out, err = process.communicate()
     assert process.returncode == 2
     assert (
-        f"kincheck: history {path}: cannot be written: disk I/O error; look at the disk: it may be"
+        f"kincheck: history {path}: cannot be written: disk I/O error; check the disk: it may be"
         " full" in err
     )
     assert len(msgspec.json.decode(out)["records"]) == 4
@@ -95,7 +95,7 @@ def test_resume_needs_a_history_and_the_environment_can_name_it(path):
     )
     assert process.returncode == 2
     process = kincheck("run", "first", "--engine", "native", "--resume", KINCHECK_HISTORY=str(path))
-    assert "no run of the same kind without an end: run 1 is new" in process.communicate()[1]
+    assert "no unfinished run to resume: run 1 is new" in process.communicate()[1]
     assert process.returncode == 0
     with Store(path) as store:
         assert len(store.runs()) == 1

@@ -150,7 +150,7 @@ def test_an_error_that_grows_little_by_little_is_told(path):
     for run in ("3", "4"):
         found = reported(path, run)
         assert told(found) == {(Kind.DRIFTED, *FIRST)}
-        assert "little by little since run 1" in found.regressions[0].message
+        assert "gradually since run 1" in found.regressions[0].message
     (finding,) = found.regressions
     assert finding.now == pytest.approx(125.0 * finding.before)
 
@@ -198,7 +198,7 @@ def test_a_run_that_is_being_made_is_not_reported(path, capsys):
     nights(path, 1)
     killed(path, 3, owner=None)
     assert main.main(["report", "2", "--history", str(path)]) == 2
-    assert "run 2 is being made now; report it when it has ended" in capsys.readouterr().err
+    assert "run 2 is still running; report it when it has ended" in capsys.readouterr().err
 
 
 def test_the_page_of_a_killed_run_says_what_was_never_made_and_has_the_references(path, tmp_path):
@@ -219,8 +219,8 @@ def test_the_page_of_a_killed_run_says_what_was_never_made_and_has_the_reference
         assert store.results(1).references["first"].keys() == case.reference.keys()
     assert main.main(["report", "--history", str(path), "--out", str(tmp_path)]) == 1
     page = (tmp_path / "report.html").read_text("utf-8")
-    assert "never made" in page
-    assert "not asked" not in page
+    assert "not run" in page
+    assert "not requested" not in page
     assert "Lost (3)" in page  # in two rows
 
 

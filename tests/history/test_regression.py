@@ -239,9 +239,10 @@ def test_a_changed_reference_is_said_and_no_regression(tmp_path, capsys):
     assert "Reference changed" not in capsys.readouterr().out
     assert main.main(["report", str(files[1]), "--against", str(files[0])]) == 0
     said = capsys.readouterr().out
-    assert "Reference changed (2): what passes now is judged by other true values" in said
+    assert "Reference changed (2): results are judged by other reference values" in said
     assert (
-        "| native, mujoco | first | x position differs by up to 1e-10 m from what it was |" in said
+        "| native, mujoco | first | x position differs by up to 1e-10 m from its earlier values |"
+        in said
     )
 
 
@@ -319,7 +320,7 @@ def test_files_can_be_compared_without_a_history(tmp_path, capsys, monkeypatch):
     assert main.main(["report", before, "--against", now]) == 0
     assert main.main(["report", before]) == 0
     assert (
-        "compared with nothing: last-green is found in a history, and there is none"
+        "compared with nothing: last-green needs a history, and none is given"
         in capsys.readouterr().out
     )
     assert main.main(["report"]) == 2

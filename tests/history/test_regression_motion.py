@@ -72,7 +72,7 @@ def test_a_force_that_changes_is_told_with_its_unit(path):
         keep(path, changed(records(), driver=driver, outputs=outputs, errors={}))
     (found,) = reported(path, against="1").findings
     assert (found.kind, found.output) == (Kind.MOVED, "load")
-    assert "differs by up to 10 N m from what it was" in found.message
+    assert "differs by up to 10 N m from its earlier values" in found.message
 
 
 def test_round_off_and_missing_samples_are_no_other_motion(path):

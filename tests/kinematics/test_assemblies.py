@@ -164,7 +164,7 @@ def test_beyond_its_reach_it_has_none(capsys):
     assert main(["assemblies", "mcpherson_strut", "--at", "0.6", "--samples", "20"]) == 1
     out = capsys.readouterr().out
     assert "0 assemblies" in out
-    assert "no assembly is the intended one" in out
+    assert "none is the intended assembly" in out
     assert "stroke = 0.29333" in out
 
 

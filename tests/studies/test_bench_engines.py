@@ -168,7 +168,7 @@ def test_a_case_without_a_reference_is_proved():
 # The whole
 
 
-def measured(tell=print):
+def measured(progress=print):
     """Of fake engines in both modes."""
     both = [
         Measured("native"),
@@ -183,7 +183,7 @@ def measured(tell=print):
         rounds=1,
         parts=("work",),
         command="kincheck bench",
-        tell=tell,
+        progress=progress,
     )
 
 
@@ -281,10 +281,10 @@ def test_an_engine_that_is_named_and_missing_is_no_success(monkeypatch, capsys):
         result = found if status else msgspec.structs.replace(found, entries=there)
         monkeypatch.setattr(engines, "measure", lambda *given, found=result, **options: found)
         monkeypatch.setattr(
-            "kincheck.core.cli.registry.House.find_engines", lambda house, names, *rest: []
+            "kincheck.core.cli.registry.Registry.find_engines", lambda registry, names, *rest: []
         )
         assert main.main(["bench", "engines", "--engine", name, "--cases", "rssr"]) == status
-        assert ("engine 'gone' is named and missing" in capsys.readouterr().err) is (status == 2)
+        assert ("'gone' is requested, but missing" in capsys.readouterr().err) is (status == 2)
 
 
 def test_an_effort_leaves_a_residual_on_purpose():
@@ -304,7 +304,7 @@ def test_run_refuses_what_is_no_benchmark(tmp_path, capsys):
         main.main(["run", "rssr", "--engine", "native", "--bench", bad, "--out", str(tmp_path)])
         == 2
     )
-    assert "kincheck bench wrote" in capsys.readouterr().err
+    assert "written by kincheck bench" in capsys.readouterr().err
 
 
 @pytest.mark.usefixtures("one_thread")

@@ -83,7 +83,7 @@ def test_what_is_outside_the_protocol_ends_the_check(few):
     ("where", "message"),
     [
         (f"{HERE}:Fauly", "has no class 'Fauly'; did you mean 'Faulty'?"),
-        (f"{HERE}:PointMotion", "PointMotion cannot be made: TypeError"),
+        (f"{HERE}:PointMotion", "PointMotion cannot be created: TypeError"),
         (
             f"{HERE}:np",
             "np is no engine: name, mode, loop, settings, unsupported, build, solve missing",
@@ -128,7 +128,7 @@ def offered(monkeypatch):
 
 def test_other_packages_offer_engines(offered, capsys):
     offered(sound=f"{HERE}:Sound", broken="tests.nothing:Engine")
-    assert "sound" in main.house().engines
+    assert "sound" in main.registry().engines
     assert main.main(["run", "rssr", "--jobs", "0", "--engine", "sound"]) == 0
     assert main.main(["run", "rssr", "--jobs", "0", "--engine", "broken"]) == 2
     assert "No module named 'tests.nothing'" in capsys.readouterr().out

@@ -265,12 +265,12 @@ def test_case_files_name_a_type_that_the_command_line_has_loaded(
         ),
         (
             'type = "gear"',
-            "own:Mine: the type 'gear' is that of joints that couple two others; give it another",
+            "own:Mine: the type 'gear' belongs to joints that couple two others; give it another",
         ),
         (
             "pass",
             (
-                'own:Mine has no type, the name of joints like it in case files; write type = "..."'
+                'own:Mine has no type, the name of such joints in case files; write type = "..."'
                 " in the class"
             ),
         ),

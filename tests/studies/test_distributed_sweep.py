@@ -69,7 +69,7 @@ def test_a_cluster_that_goes_is_a_message(cluster, tmp_path, monkeypatch):
         if progress.done == 4096:
             cluster.close()
 
-    with pytest.raises(ClusterError, match=r"scheduler tcp://.+: (has gone|every worker that had)"):
+    with pytest.raises(ClusterError, match=r"scheduler tcp://.+: (was lost|every worker that had)"):
         sweep_designs(
             case,
             vary(tmp_path, case, tip={"at": "tip", "sigma": 1}),

@@ -30,8 +30,8 @@ def test_the_strut_names_what_is_not_in_its_programs():
     lines = explain(replace(case, mechanism=mechanism))
     assert lines[0] == "mcpherson_strut: 18 unknowns for lca, knuckle, strut"
     assert "  fixed, in no program: chassis, rack" in lines
-    assert "  rows solved 18, redundant and only checked: none" in lines
-    assert "  points computed: wheel_center; not read by an output, not computed: unread" in lines
+    assert "  rows solved: 18; redundant rows, only checked: none" in lines
+    assert "  points computed: wheel_center; read by no output, not computed: unread" in lines
     positions, velocities, accelerations = totals(lines)
     assert positions < velocities < accelerations
     # the unread point cost nothing
@@ -40,7 +40,7 @@ def test_the_strut_names_what_is_not_in_its_programs():
 
 def test_redundant_rows_and_held_drivers_are_named():
     (line,) = (line for line in explain(cases.load("four_bar")) if "redundant" in line)
-    assert line.count(":") == 4  # three rows, each JOINT: PRIMITIVE
+    assert line.count(":") == 5  # three rows, each JOINT: PRIMITIVE
     assert "none" not in line
 
 
@@ -69,7 +69,7 @@ def test_joints_between_fixed_bodies_are_named_and_in_no_engine(tmp_path, capsys
         == 0
     )
     assert (
-        "  joints between fixed bodies, which hold at the design: left out: bolt, stay"
+        "  joints between fixed bodies, satisfied at design, left out: bolt, stay"
         in capsys.readouterr().out.splitlines()
     )
     for record in read_results(tmp_path / "out.json").records:

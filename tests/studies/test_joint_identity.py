@@ -61,8 +61,8 @@ def killed(folder):
 
 
 EDITS = {
-    None: "run 1 goes on, 1 records are there",
-    "elsewhere.py": "run 1 goes on, 1 records are there",
+    None: "run 1 is resumed after 1 records",
+    "elsewhere.py": "run 1 is resumed after 1 records",
     "beside.py": "run 2 is new",
     "pin_in_slot.py": "run 3 is new",
 }

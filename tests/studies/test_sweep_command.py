@@ -209,7 +209,7 @@ WRONG = [
     ),
     (
         ["--samples", "5", "--check", "native:2"],
-        "--check native:2: found the share '2', expected a part of one",
+        "--check native:2: found the share '2', expected a fraction",
     ),
     (
         ["--samples", "5", "--output", "toe"],
@@ -217,12 +217,12 @@ WRONG = [
     ),
     (
         ["--samples", "5", "--replay", "3"],
-        "--replay: a variant is known by seed and index; leave out --samples",
+        "--replay: seed and index identify a variant; leave out --samples",
     ),
-    (["--replay", "3", "--store", "x.parquet"], "--replay solves here, and stores nothing"),
+    (["--replay", "3", "--store", "x.parquet"], "in this process and stores nothing"),
     (
         ["--samples", "5", "--jobs", "2", "--scheduler", "tcp://127.0.0.1:1"],
-        "how many threads is the cluster's matter",
+        "the cluster decides the number of threads",
     ),
     (
         ["--samples", "5", "--store", "no/such/folder.parquet"],

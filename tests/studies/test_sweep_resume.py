@@ -84,7 +84,7 @@ def test_a_sweep_that_is_taken_up_has_the_same_bits(
     assert f"{part} variants of mcpherson_strut, partial: the sweep was stopped" in told
     assert (
         said.splitlines()[-1]
-        == f"kincheck: interrupted: {part} variants are solved; --resume goes on from there"
+        == f"kincheck: interrupted: {part} variants are solved; --resume continues from there"
     )
     assert (numbers(out)["samples"], numbers(out)["asked"]) == (chunks * CHUNK, VARIANTS)
     with (out / "envelope.csv").open() as lines:
@@ -178,7 +178,7 @@ def test_a_part_that_was_cut_off_or_damaged_is_used_as_far_as_it_is_whole(
 def test_resume_begins_anew_where_there_is_no_part(arguments, tmp_path, capsys):
     assert main([*arguments, "--out", str(tmp_path / "out"), "--resume"]) == 0
     assert main([*arguments, "--resume"]) == 2
-    assert "--resume goes on from a folder of results: give --out DIR" in capsys.readouterr().err
+    assert "--resume continues from a folder of results: give --out DIR" in capsys.readouterr().err
 
 
 def test_an_interrupt_before_the_first_chunk_is_one_line(arguments, tmp_path, capsys, stop):

@@ -1,1 +1,3 @@
-"""Address of the report before version 0.2; `kincheck.core.report` has it now."""
+"""Former package of the report, kept for scripts written before version 0.2; see
+`kincheck.core.report`.
+"""

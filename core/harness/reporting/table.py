@@ -1,4 +1,4 @@
-"""Old address of `print_table`, for scripts written after the README of versions before 0.2; see
+"""Former module of `print_table`, kept for scripts written before version 0.2; see
 `kincheck.core.report.table`.
 """
 

@@ -1,1 +1,1 @@
-"""Worker processes: pairs solved in isolation. A crash, a hang or a flood costs only the pair."""
+"""Worker processes isolate pairs: a crash, a hang or a flood of output costs only its pair."""

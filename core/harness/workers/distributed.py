@@ -1,5 +1,5 @@
-"""Pairs solved on a dask.distributed cluster: one task per pair, each in a worker process on its
-machine, so that limits hold there too.
+"""Solution of pairs on a dask.distributed cluster: one task per pair, each in a worker process on
+the cluster's machine, so that limits hold there too.
 """
 
 from __future__ import annotations
@@ -15,27 +15,27 @@ from uuid import uuid4
 from ...errors import KincheckError
 from ...extras import library
 from ...version import VERSION
-from ..execution import Attempt, Attempts, Failure, Pair, Solver, said
+from ..execution import Attempt, Attempts, Failure, Pair, Solver, error_text
 from ..record import Outcome
 from ..resource_limits import Limits
 from .messages import pack
-from .worker import Seat
+from .worker import WorkerSlot
 
-# Longest time for a port to answer [s], and again for the scheduler behind it. Each takes
-# milliseconds unless packets are lost; those are sent again after 1 s and after 3 s.
+# Longest time for a port to answer [s], and then for its scheduler. Each takes milliseconds unless
+# packets are lost, which are sent again after 1 s and after 3 s.
 ANSWER = 5.0
-# Longest time for a scheduler that has answered to do so again, if a packet is lost [s].
+# Longest time for a second answer of the scheduler, if a packet is lost [s].
 CONNECT = 20.0
 
 
 class ClusterError(KincheckError):
-    """There is no cluster to solve on, or it was lost."""
+    """A cluster cannot be reached, or was lost."""
 
 
 def on_cluster(address: str, limits: Limits) -> Solver:
     """Return the solver on the workers of a scheduler.
 
-    If a worker is lost, another one solves its pair; each result comes once.
+    If a worker is lost, another one solves its pair; each result is yielded once.
 
     Raises:
         ClusterError: dask.distributed is not installed, the scheduler does not answer, or it was
@@ -51,13 +51,13 @@ def on_cluster(address: str, limits: Limits) -> Solver:
 
 
 def connected(distributed: Any, address: str) -> Any:
-    """Return a client of the scheduler, to be used in a `with`.
+    """Return a client of the scheduler, for use in a `with` statement.
 
     Raises:
         ClusterError: the address is invalid, or no scheduler answers there.
     """
     try:
-        # before the client, since a client without a scheduler never ends; in a thread, since a
+        # before the client, which waits for its scheduler without end; in a thread, since a
         # notebook's thread already has an event loop
         with ThreadPoolExecutor(1) as aside:
             aside.submit(
@@ -66,12 +66,13 @@ def connected(distributed: Any, address: str) -> Any:
         return distributed.Client(address, timeout=CONNECT, set_as_default=False)
     except OSError as error:
         raise ClusterError(
-            f"scheduler {address}: does not answer ({said(error)}); start one with `dask scheduler`"
-            " and workers with `dask worker ADDRESS`, where kincheck and the engines are installed"
+            f"scheduler {address}: does not answer ({error_text(error)}); start one with"
+            " `dask scheduler` and workers with `dask worker ADDRESS`, where kincheck and the"
+            " engines are installed"
         ) from error
     except (ValueError, TypeError) as error:
         raise ClusterError(
-            f"scheduler {address}: found no address ({said(error)}), expected HOST:PORT or"
+            f"scheduler {address}: found no address ({error_text(error)}), expected HOST:PORT or"
             " tcp://HOST:PORT; write it as `dask scheduler` prints it"
         ) from error
 
@@ -103,7 +104,7 @@ def _gathered(
                     None,
                     Failure(
                         Outcome.ERROR,
-                        f"cannot be sent to a cluster: {said(error)}; define it in a module",
+                        f"cannot be sent to a cluster: {error_text(error)}; define it in a module",
                     ),
                 ),
             )
@@ -118,17 +119,21 @@ def _gathered(
             found: Attempt = task.result()
         except distributed.scheduler.KilledWorker as error:
             found = Attempt(
-                None, Failure(Outcome.CRASHED, f"every worker that had it was lost: {said(error)}")
+                None,
+                Failure(
+                    Outcome.CRASHED, f"every worker that tried it was lost: {error_text(error)}"
+                ),
             )
         except (OSError, distributed.CancelledError) as error:
             raise ClusterError(
-                f"scheduler {address}: has gone ({said(error)}); run again with --resume when it is"
-                " back"
+                f"scheduler {address}: was lost ({error_text(error)}); run again with --resume when"
+                " it is back"
             ) from error
         # from the cluster, around the worker process, e.g. no process can be started
         except Exception as error:
             found = Attempt(
-                None, Failure(Outcome.ERROR, f"the cluster's worker cannot solve: {said(error)}")
+                None,
+                Failure(Outcome.ERROR, f"the cluster's worker cannot solve: {error_text(error)}"),
             )
         task.release()
         yield tasks[task], found
@@ -146,7 +151,7 @@ def loaded() -> Any:
         raise ClusterError(str(error)) from error
 
 
-_idle: dict[tuple[str, Limits], list[Seat]] = {}
+_idle: dict[tuple[str, Limits], list[WorkerSlot]] = {}
 _lock = Lock()
 
 
@@ -160,8 +165,8 @@ def solve_there(packed: bytes, engine: str, limits: Limits, version: str) -> Att
         return Attempt(None, Failure(Outcome.ERROR, message))
     with _lock:
         idle = _idle.setdefault((engine, limits), [])
-        seat = idle.pop() if idle else Seat(limits)
-    found = seat.solve(packed)
+        slot = idle.pop() if idle else WorkerSlot(limits)
+    found = slot.solve(packed)
     with _lock:
-        idle.append(seat)
+        idle.append(slot)
     return found

@@ -1,4 +1,4 @@
-"""Messages between parent and worker: pickled objects, each after its length."""
+"""Messages between parent and worker: the length of a pickled object, then the object."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Any, BinaryIO
 
 LENGTH = struct.Struct("<Q")
 
-# Longest message [bytes]; no answer reaches it (a million samples of a thousand outputs are 24 GB,
-# and no case). A larger length is foreign data, written into the channel by mistake.
+# Longest message [bytes]; no answer reaches it (a million samples of a thousand outputs take 24 GB,
+# and no case has them). A larger length is foreign data, written into the channel by mistake.
 LONGEST = 1 << 34
 
 

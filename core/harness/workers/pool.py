@@ -1,4 +1,4 @@
-"""Pairs solved in worker processes of this machine, several at a time."""
+"""Solution of pairs in worker processes of this machine, several at a time."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from queue import SimpleQueue
 from threading import Lock, Thread
 
 from ..engine import Engine, may_run_here
-from ..execution import Attempt, Attempts, Failure, Pair, Solver, here, said
+from ..execution import Attempt, Attempts, Failure, Pair, Solver, error_text, here
 from ..record import Outcome
 from ..resource_limits import Limits, default_jobs
 from .messages import pack
-from .worker import Seat
+from .worker import WorkerSlot
 
 
 def solver_for(
@@ -36,10 +36,12 @@ def in_workers(jobs: int, limits: Limits) -> Solver:
     def solve(pairs: Sequence[Pair]) -> Attempts:
         waiting = _Waiting(pairs)
         through: SimpleQueue[tuple[int, Attempt] | BaseException] = SimpleQueue()
-        slots = [_Slot(waiting, pairs, limits, through) for _ in range(min(jobs, len(pairs)))]
+        threads = [
+            _SlotThread(waiting, pairs, limits, through) for _ in range(min(jobs, len(pairs)))
+        ]
         try:
-            for slot in slots:
-                slot.start()
+            for thread in threads:
+                thread.start()
             for _ in pairs:
                 found = through.get()
                 if isinstance(found, BaseException):
@@ -47,10 +49,10 @@ def in_workers(jobs: int, limits: Limits) -> Solver:
                 yield found
         finally:
             waiting.clear()
-            for slot in slots:
-                slot.stop()
-            for slot in slots:
-                slot.join()
+            for thread in threads:
+                thread.stop()
+            for thread in threads:
+                thread.join()
 
     return solve
 
@@ -66,7 +68,9 @@ class _Waiting:
             self.queues.setdefault(f"{pair.engine.name} {pair.engine.mode}", deque()).append(index)
 
     def take(self, engine: str | None) -> tuple[str, int] | None:
-        """Return the next pair of the engine; if it has none, of the one with the fewest takers."""
+        """Return the next pair of the engine; if it has none left, one of the engine with the
+        fewest workers.
+        """
         with self.lock:
             if engine is None or not self.queues.get(engine):
                 left = [name for name, queue in self.queues.items() if queue]
@@ -82,8 +86,8 @@ class _Waiting:
             self.queues.clear()
 
 
-class _Slot(Thread):
-    """Solves one pair at a time. Its worker lives and dies with it: see `Worker`."""
+class _SlotThread(Thread):
+    """Thread that solves one pair at a time with one worker; see `Worker`."""
 
     def __init__(
         self,
@@ -94,36 +98,36 @@ class _Slot(Thread):
     ) -> None:
         super().__init__(daemon=True)
         self.waiting, self.pairs, self.through = waiting, pairs, through
-        self.seat = Seat(limits)
+        self.slot = WorkerSlot(limits)
 
     def run(self) -> None:
         engine: str | None = None
         try:
             while taken := self.waiting.take(engine):
                 if taken[0] != engine:
-                    self.seat.close()
+                    self.slot.close()
                 engine, index = taken
-                self.through.put((index, solve_packed(self.pairs[index], self.seat)))
+                self.through.put((index, solve_packed(self.pairs[index], self.slot)))
         except (
             BaseException
-        ) as error:  # a defect of kincheck: the run must see it, since a thread's exception is lost
+        ) as error:  # a defect of kincheck, for the run: exceptions end in their thread
             self.through.put(error)
         finally:
-            self.seat.close()
+            self.slot.close()
 
     def stop(self) -> None:
-        """Stop soon, whatever is being solved."""
-        self.seat.stop()
+        """Stop soon, even during a solve."""
+        self.slot.stop()
 
 
-def solve_packed(pair: Pair, seat: Seat) -> Attempt:
-    """Solve a pair at a seat. A pair that cannot be pickled fails."""
+def solve_packed(pair: Pair, slot: WorkerSlot) -> Attempt:
+    """Solve a pair with a worker; a pair that cannot be pickled fails."""
     try:
         packed = pack(pair)
     except Exception as error:  # from the engine's own pickling
         message = (
-            f"cannot be sent to a worker process: {said(error)}; define it in a module, or solve in"
-            " this process (--jobs 0)"
+            f"cannot be sent to a worker process: {error_text(error)}; define it in a module, or"
+            " solve in this process (--jobs 0)"
         )
         return Attempt(None, Failure(Outcome.ERROR, message))
-    return seat.solve(packed)
+    return slot.solve(packed)

@@ -1,5 +1,5 @@
-"""A worker process, inside view: it reads pairs from its standard input and answers on its standard
-output until the input ends.
+"""The worker's side of a worker process: it reads pairs from its standard input and answers on its
+standard output until the input ends.
 
 Output printed by engines, from Python or from C, goes to standard error, which the parent always
 reads to its end.
@@ -16,7 +16,7 @@ import sys
 from dataclasses import dataclass
 from typing import Any, BinaryIO
 
-from ..execution import Attempt, Failure, attempt, said
+from ..execution import Attempt, Failure, attempt, error_text
 from ..record import Outcome
 from ..resource_limits import restrict
 from .messages import pack, read, write
@@ -29,8 +29,8 @@ class Setup:
     """The first message to a worker.
 
     Attributes:
-        parent: process number of the parent.
-        path: the parent's search path for modules.
+        parent: process id of the parent.
+        path: the parent's module search path.
         memory: largest memory of a pair [GB].
     """
 
@@ -61,7 +61,7 @@ def serve() -> None:
 
 
 def _channel() -> tuple[BinaryIO, BinaryIO]:
-    """Return the pipes to the parent, out of the engines' reach."""
+    """Return the pipes to the parent, which engines cannot reach."""
     requests, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     nothing = os.open(os.devnull, os.O_RDONLY)
     os.dup2(nothing, 0)
@@ -73,10 +73,10 @@ def _channel() -> tuple[BinaryIO, BinaryIO]:
 def _solve(packed: bytes, answers: BinaryIO) -> Attempt:
     try:
         pair = pickle.loads(packed)  # imports the engine's module, which may run any code
-        return attempt(pair, tell=lambda facts: write(answers, pack(facts)))
-    # KeyboardInterrupt too: the terminal's goes to the parent, so this one is the engine's
+        return attempt(pair, report=lambda facts: write(answers, pack(facts)))
+    # KeyboardInterrupt too: the parent gets the terminal's, so this one is the engine's
     except BaseException as error:
-        return Attempt(None, Failure(Outcome.ERROR, said(error)))
+        return Attempt(None, Failure(Outcome.ERROR, error_text(error)))
 
 
 def _packed(found: Attempt) -> bytes:
@@ -85,7 +85,8 @@ def _packed(found: Attempt) -> bytes:
     except Exception as error:
         return pack(
             Attempt(
-                found.facts, Failure(Outcome.ERROR, f"the answer cannot be sent: {said(error)}")
+                found.facts,
+                Failure(Outcome.ERROR, f"the answer cannot be sent: {error_text(error)}"),
             )
         )
 
@@ -97,12 +98,12 @@ def _flush() -> None:
         except Exception:  # an engine has closed or replaced it: there is nothing to flush
             continue
     if os.name == "posix":
-        ctypes.CDLL(None).fflush(None)  # C prints only full buffers
+        ctypes.CDLL(None).fflush(None)  # C prints only when its buffer is full
 
 
 def _end_with(parent: int) -> None:
-    """End this process with the parent, even during a pair that never ends; except on Linux, only
-    between pairs.
+    """End this process with the parent: on Linux at once, even during a solve; elsewhere between
+    pairs.
     """
     if sys.platform == "linux":
         library: Any = ctypes.CDLL(None)

@@ -1,6 +1,4 @@
-"""A worker process, outside view, and the seat that always has one: warm in normal operation, a new
-one after a failure.
-"""
+"""The parent's side of a worker process, and a slot that replaces its worker after a failure."""
 
 from __future__ import annotations
 
@@ -26,15 +24,15 @@ from .serve import READY, Setup
 COMMAND = "from kincheck.core.harness.workers.serve import serve; serve()"
 
 # Bytes of output kept: the stack of a crash and the lines before it. The rest is read, so that no
-# writer blocks, and dropped.
+# writer blocks, and discarded.
 TAIL = 8192
 
-# Longest time for an ended process and its output to close [s].
+# Longest wait for the output of an ended process to close [s].
 GOING = 5.0
 
 
 class _Tail(Thread):
-    """Reads a stream to its end, and keeps the last part of it."""
+    """Thread that reads a stream to its end and keeps the last part."""
 
     def __init__(self, stream: IO[bytes]) -> None:
         super().__init__(daemon=True)
@@ -47,12 +45,12 @@ class _Tail(Thread):
 
     @property
     def text(self) -> str:
-        """The kept text, without addresses, which differ every time."""
+        """The kept text without memory addresses, which differ from run to run."""
         return re.sub(r"0x[0-9a-f]{6,}", "0x...", self.kept.decode("utf-8", "replace")).strip()
 
 
 class Worker:
-    """A process that solves one pair at a time. It dies with the thread that started it."""
+    """A process that solves one pair at a time. It ends with the thread that started it."""
 
     def __init__(self, limits: Limits) -> None:
         self.limits = limits
@@ -63,11 +61,11 @@ class Worker:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
-            # otherwise times would include threads that wait for each other and for other workers'
-            # threads
+            # otherwise threads wait for each other and for other workers' threads, and times
+            # include this
             env={**dict.fromkeys(THREADS, "1"), **os.environ},
-            # the terminal's interrupt is for the parent; the group allows its children to be killed
-            # too
+            # the terminal's interrupt is for the parent; the group lets the parent kill children of
+            # the worker too
             start_new_session=True,
         )
         self._in, self._out = (
@@ -78,7 +76,7 @@ class Worker:
         self._tail.start()
 
     def solve(self, packed: bytes) -> Attempt:
-        """Solve a packed pair. After a harmful failure the process has ended or must be closed."""
+        """Solve a packed pair. After a harmful failure the process must be closed."""
         facts: Facts | None = None
         try:
             if self.fresh:
@@ -99,7 +97,7 @@ class Worker:
         """Kill the process and its children, and return the end of their output."""
         self.kill()
         self.process.wait()
-        # longer only if a process outside the group keeps the pipe open
+        # it stays open only if a process outside the group holds the pipe
         self._tail.join(GOING)
         for stream in (self._in, self._out):
             with suppress(OSError):  # unsent data has no receiver
@@ -146,10 +144,11 @@ class Worker:
         return Failure(Outcome.CRASHED, how + _last(printed), readable(printed))
 
 
-class Seat:
-    """A slot for a worker of one engine. A failure in a used worker is repeated once in a new one.
+class WorkerSlot:
+    """A slot for a worker of one engine.
 
-    So no pair suffers from an earlier one, and outcomes do not depend on the pairs before.
+    A pair that fails in a used worker is repeated once in a new one, so no outcome depends on
+    earlier pairs.
     """
 
     def __init__(self, limits: Limits) -> None:
@@ -185,13 +184,13 @@ class Seat:
             return self._worker
 
     def close(self) -> str:
-        """Remove the worker, and return the end of its output."""
+        """Remove the worker and return the end of its output."""
         with self._lock:
             worker, self._worker = self._worker, None
         return worker.close() if worker else ""
 
     def stop(self) -> None:
-        """Stop the worker from another thread: the present pair fails, and the solving thread
+        """Stop the worker from another thread: the current pair fails, and the solving thread
         cleans up.
         """
         with self._lock:

@@ -1,1 +1,1 @@
-"""Regression: changes between two runs, their first run, and whether they are for the worse."""
+"""Regression: changes between two runs, their first runs, and whether they are for the worse."""

@@ -24,24 +24,24 @@ from .thresholds import DRIFT, DRIFT_FLOOR, TIME_FLOOR
 OUTCOME, TIME = "outcome", "time"
 
 LASTING = 3
-"""Runs that make a level of times: one slow night is none, and two may be one busy afternoon."""
+"""Fewest runs of a level of times: one slow night is no level, and two may be a busy afternoon."""
 
 PACE = 1.5
-"""Ratio of levels of times, at least. In 26 equal runs of 20 pairs, a quarter of a minute each, on
-a busy machine, the largest ratio of three or more successive runs to those before was 1.44; nights
-have less in common than minutes. One run: see `thresholds`."""
+"""Smallest ratio of two levels of times. In 26 equal runs of 20 pairs on a busy machine, a quarter
+of a minute each, the largest ratio of three or more successive runs to earlier ones was 1.44, and
+nights differ more than minutes. For one run, see `thresholds`.
+"""
 
 _Series: TypeAlias = Sequence[tuple[Entry, float]]
 
 
 @dataclass(frozen=True)
 class _Found:
-    """A change of level: indices into the series of the values before it and of those after it, and
-    the levels.
+    """A change of level: indices of the values before and after it in the series, and the levels.
 
     Attributes:
-        repaired: index of the first value of a later level as low as the level before; None without
-            such a level.
+        repaired: index of the first value of a later level that is as low as the level before; None
+            without one.
     """
 
     earlier: range
@@ -55,8 +55,8 @@ def steps(history: History, *, standing: bool = False) -> list[Step]:
     """Return the steps of all pairs, the latest first.
 
     Args:
-        standing: only the last step for the worse of each series, unless a later run has repaired
-            it.
+        standing: return only the last step for the worse of each series, unless a later run has
+            repaired it.
     """
     found: list[Step] = []
     for pair, entries in history.pairs.items():
@@ -72,8 +72,8 @@ def steps(history: History, *, standing: bool = False) -> list[Step]:
 
 
 def _outcomes(pair: Pair, entries: Sequence[Entry], history: History) -> list[Step]:
-    """Return the runs in which a pair became bad, or good again. Runs without a verdict do not
-    count.
+    """Return the runs in which a pair began to fail, or to pass again. Runs without a verdict do
+    not count.
     """
     able = [entry for entry in entries if entry.outcome not in (*IDLE, Outcome.UNJUDGED)]
     turns = [(a, b) for a, b in pairwise(able) if a.outcome.bad is not b.outcome.bad]
@@ -85,7 +85,7 @@ def _outcomes(pair: Pair, entries: Sequence[Entry], history: History) -> list[St
 
 
 def _times(pair: Pair, entries: Sequence[Entry], history: History) -> list[Step]:
-    """Return the changes of the time in calibration loops, of the runs with a calibration."""
+    """Return the changes of the time, in calibration loops, over the runs with a calibration."""
     series: list[tuple[Entry, float]] = []
     for entry in entries:
         loop = calibration(history.runs[entry.run])
@@ -101,7 +101,7 @@ def _times(pair: Pair, entries: Sequence[Entry], history: History) -> list[Step]
 
 
 def _errors(pair: Pair, entries: Sequence[Entry], history: History, motion: str) -> list[Step]:
-    """Return the changes of an output's error; of several outputs in a run, the largest."""
+    """Return the changes of outputs' errors; if several outputs change in a run, the largest."""
     largest: dict[tuple[int, bool, int | None], tuple[float, Step]] = {}
     for output in dict.fromkeys(output for entry in entries for output in entry.errors):
         errors = errors_of(entries, output, motion)
@@ -132,8 +132,8 @@ def errors_of(entries: Sequence[Entry], output: str, motion: str) -> list[tuple[
 
 
 def above_floor(errors: Sequence[tuple[Entry, Deviation]]) -> list[float]:
-    """Return sizes of errors, each at least the common floor, below which errors do not differ
-    whatever their tolerance was.
+    """Return the sizes of errors, raised to a common floor: smaller errors do not differ, whatever
+    their tolerance.
     """
     floor = DRIFT_FLOOR * min(
         (each.tolerance for _, each in errors if each.tolerance > 0.0), default=0.0
@@ -216,7 +216,9 @@ def _step(
 
 
 def _between(engine: str, a: Entry, b: Entry, history: History) -> list[Change]:
-    """Return the other differences of two runs; the engine's by its own records."""
+    """Return the other differences between two runs; versions of the engine come from its own
+    records.
+    """
     versions = (
         [Change(what=engine, before=a.version, now=b.version)] if a.version != b.version else []
     )

@@ -1,4 +1,4 @@
-"""Changes of the circumstances of two runs: versions, machine, commit, settings."""
+"""Changes of circumstances between two runs: versions, machine, commit, settings."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def changes(now: Mapping[str, Any], before: Mapping[str, Any]) -> list[Change]:
     """
     old: dict[str, Any] = before.get("engines") or {}
     new: dict[str, Any] = now.get("engines") or {}
-    # an engine that only one of the runs has was not asked for in the other
+    # an engine in only one of the runs was not requested in the other
     pairs: list[tuple[str, Any, Any]] = [
         (name, old[name], new[name]) for name in new if name in old
     ]
@@ -32,13 +32,14 @@ def _git(facts: Mapping[str, Any], what: str) -> Any:
 
 
 def _edits(facts: Mapping[str, Any]) -> str | None:
-    """Return the mark of uncommitted edits: a digest, or without one the fact of edits."""
+    """Return the mark of uncommitted edits: a digest, or True without a digest."""
     return _git(facts, "edits") or ("some" if _git(facts, "changed") else None)
 
 
 def same_machine(now: Mapping[str, Any], before: Mapping[str, Any]) -> bool:
-    """Return whether both runs had equal processors: only then are times compared by the clock.
+    """Return whether both runs had equal processors, so that their times can be compared by the
+    clock.
 
-    Names of machines do not count: hosted runners have another one every night.
+    Names of machines do not count: a hosted runner has another name every night.
     """
     return now.get("processor") == before.get("processor")

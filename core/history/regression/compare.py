@@ -29,8 +29,8 @@ def compare(now: Subject, before: Subject, history: History, slowest: float) -> 
     """Return the differences, in the order of the records.
 
     Args:
-        history: runs on the same machine up to the run compared with, for the usual times.
-        slowest: the largest ratio of times of a pair not called slower.
+        history: runs on the same machine up to the run compared with, which give the usual times.
+        slowest: the largest ratio of times that is not reported as slower.
     """
     earlier = by_pair(before.results.records)
     findings: list[Finding] = []
@@ -39,7 +39,7 @@ def compare(now: Subject, before: Subject, history: History, slowest: float) -> 
         if old is None:
             findings.append(
                 finding_of(
-                    Kind.FAILURE if record.outcome.bad else Kind.ADDED, record, _said(record)
+                    Kind.FAILURE if record.outcome.bad else Kind.ADDED, record, _result(record)
                 )
             )
             continue
@@ -55,17 +55,17 @@ def compare(now: Subject, before: Subject, history: History, slowest: float) -> 
             now.facts,
             slowest,
         )
-    asked = set(now.results.missing)
+    unfinished = set(now.results.missing)
     findings += [
         finding_of(Kind.ABSENT, old, f"{old.outcome.shown} there")
         for pair, old in earlier.items()
-        if pair not in asked
+        if pair not in unfinished
     ]
     return findings
 
 
 def unmade(now: Subject) -> list[Finding]:
-    """Return the planned pairs without a record; nothing checks them in any comparison."""
+    """Return the planned pairs without a record, which no comparison checks."""
     pairs, why = now.results.missing, now.results.unread
     return [
         Finding(kind=Kind.LOST, case=case, engine=engine, mode=mode, message=why.get(case, UNMADE))
@@ -80,11 +80,11 @@ def by_pair(records: Sequence[Record]) -> dict[Pair, Record]:
 
 def _outcomes(now: Record, before: Record) -> Iterator[Finding]:
     if now.outcome.bad and not before.outcome.bad:
-        yield finding_of(Kind.FAILURE, now, f"{before.outcome.shown} → {_said(now)}")
+        yield finding_of(Kind.FAILURE, now, f"{before.outcome.shown} → {_result(now)}")
     elif before.outcome.bad and now.outcome is Outcome.PASS:
         yield finding_of(Kind.FIXED, now, f"{before.outcome} → {now.outcome}")
     elif before.outcome.judged and now.outcome is Outcome.UNJUDGED:
-        yield finding_of(Kind.UNJUDGED, now, f"{before.outcome} → {_said(now)}")
+        yield finding_of(Kind.UNJUDGED, now, f"{before.outcome} → {_result(now)}")
     elif before.outcome is Outcome.UNJUDGED and now.outcome is Outcome.PASS:
         yield finding_of(Kind.JUDGED, now, f"{before.outcome.shown} → {now.outcome}")
 
@@ -93,23 +93,23 @@ def _lost(now: Record, before: Record) -> Iterator[Finding]:
     """Return findings on lost phases, samples, motions and standards."""
     phases = [phase for phase in PHASES if _reached(before, phase) and not _reached(now, phase)]
     if phases:
-        why = f": {_said(now)}" if now.outcome is not Outcome.PASS else ""
+        why = f": {_result(now)}" if now.outcome is not Outcome.PASS else ""
         yield finding_of(Kind.LOST, now, f"{', '.join(phases)} no longer reached{why}")
         return
     if (now.solved or 0) < (before.solved or 0):
-        asked = "" if now.samples == before.samples else f" of {before.samples}"
+        total = "" if now.samples == before.samples else f" of {before.samples}"
         yield finding_of(
             Kind.LOST,
             now,
-            f"{now.solved} of {now.samples} samples solved, {before.solved}{asked} before",
+            f"{now.solved} of {now.samples} samples solved, {before.solved}{total} before",
         )
-    # the pair as a whole is no longer judged, which is a finding of its own
+    # the whole pair is no longer judged, which is a separate finding
     if now.outcome is Outcome.UNJUDGED:
         return
     for output, old in before.errors.items():
         new = now.errors.get(output)
-        gone = [motion for motion, _ in old.items() if getattr(new, motion, None) is None]
-        if gone:
+        lost = [motion for motion, _ in old.items() if getattr(new, motion, None) is None]
+        if lost:
             why = (
                 f"the case has no output {output!r} now"
                 if new is None
@@ -118,9 +118,9 @@ def _lost(now: Record, before: Record) -> Iterator[Finding]:
             yield finding_of(
                 Kind.LOST,
                 now,
-                f"{output}: {', '.join(gone)} no longer compared: {why}",
+                f"{output}: {', '.join(lost)} no longer compared: {why}",
                 output=output,
-                motion=gone[0],
+                motion=lost[0],
             )
     if before.validated and not now.validated and now.outcome is Outcome.PASS:
         against, was = (each.truth.replace("_", " ") for each in (now, before))
@@ -133,8 +133,8 @@ def _lost(now: Record, before: Record) -> Iterator[Finding]:
 
 
 def _moved(now: Record, before: Record) -> Iterator[Finding]:
-    """Return the outputs with changed values or samples; without a reference nothing else shows
-    them.
+    """Return the outputs with changed values or samples, which only this comparison shows if there
+    is no reference.
     """
     if not (now.driver and before.driver):
         return
@@ -145,7 +145,7 @@ def _moved(now: Record, before: Record) -> Iterator[Finding]:
         for motion in QUANTITIES:
             off = _apart(values_of(old, motion), values_of(now.outputs.get(output), motion))
             judged = getattr(now.errors.get(output), motion, None)
-            # as far as two values can be that are within a tolerance of one standard
+            # largest distance of two values within the tolerance of one standard
             limit = (
                 2.0 * judged.tolerance
                 if judged
@@ -154,16 +154,16 @@ def _moved(now: Record, before: Record) -> Iterator[Finding]:
             if off > limit:
                 size = value_text(number(off), motion_unit(old.unit, motion))
                 word = motion_word(motion, old.unit)
-                told = f"{output} {word} differs by up to {size} from what it was"
+                message = f"{output} {word} differs by up to {size} from its earlier values"
                 yield finding_of(
-                    Kind.MOVED, now, told, now=off, limit=limit, output=output, motion=motion
+                    Kind.MOVED, now, message, now=off, limit=limit, output=output, motion=motion
                 )
                 break
 
 
 def same_samples(now: Record, before: Record) -> bool:
-    """Return whether all drivers have equal values, up to the last digits of sines and splines
-    on another processor.
+    """Return whether all drivers have equal values, up to last digits of sines and splines that
+    differ between processors.
     """
     here, there = now.driver, before.driver
     if {name: len(values) for name, values in here.items()} != {
@@ -177,7 +177,7 @@ def same_samples(now: Record, before: Record) -> bool:
 
 
 def values_of(series: OutputSeries | None, motion: str) -> Sequence[float | None]:
-    """Return the values of a motion over the samples; none without such a series."""
+    """Return the values of a motion over the samples; empty without such a series."""
     return getattr(series, motion, None) or ()
 
 
@@ -190,7 +190,7 @@ def _apart(a: Sequence[float | None], b: Sequence[float | None]) -> float:
 
 
 def _largest(record: Record, motion: str, unit: str) -> float:
-    """Return the largest value of any output of a unit: forces say nothing of displacements."""
+    """Return the largest value of all outputs of a unit: forces set no scale for lengths."""
     outputs = (output for output in record.outputs.values() if output.unit == unit)
     values = (x for output in outputs for x in values_of(output, motion))
     return max((abs(x) for x in values if x is not None), default=0.0)
@@ -210,21 +210,21 @@ def _errors(now: Record, before: Record) -> Iterator[Finding]:
             base = now.outputs[output].unit if output in now.outputs else ""
             word = motion_word(motion, base)
             if a.tolerance != b.tolerance:
-                told = f"{output} {word}: {number(a.tolerance)} → {number(b.tolerance)}"
+                message = f"{output} {word}: {number(a.tolerance)} → {number(b.tolerance)}"
                 yield finding_of(
-                    Kind.TOLERANCE, now, told, before=a.tolerance, now=b.tolerance, **about
+                    Kind.TOLERANCE, now, message, before=a.tolerance, now=b.tolerance, **about
                 )
-            # what is out of tolerance is a failure, and named there
+            # an error out of tolerance is a failure, which is reported there
             if b.within and a.against == b.against and drifted(a.max_abs, b.max_abs, b.tolerance):
                 unit = motion_unit(base, motion) if base else ""
                 times = f"×{number(b.max_abs / a.max_abs)}, " if a.max_abs else ""
                 size = f"{number(a.max_abs)} → {value_text(number(b.max_abs), unit)}"
-                told = f"{output} {word} error {size} ({times}tolerance {number(b.tolerance)})"
+                message = f"{output} {word} error {size} ({times}tolerance {number(b.tolerance)})"
                 ratio = b.max_abs / a.max_abs if a.max_abs else None
                 yield finding_of(
                     Kind.DRIFTED,
                     now,
-                    told,
+                    message,
                     before=a.max_abs,
                     now=b.max_abs,
                     ratio=ratio,
@@ -234,7 +234,7 @@ def _errors(now: Record, before: Record) -> Iterator[Finding]:
 
 
 def _references(record: Record, now: References, before: References) -> Iterator[Finding]:
-    """Return the changed reference values; new and missing ones show in the comparison."""
+    """Return the changed reference values; other findings show new and missing ones."""
     for output, old in before.get(record.case, {}).items():
         new = now.get(record.case, {}).get(output)
         for motion in QUANTITIES:
@@ -243,15 +243,15 @@ def _references(record: Record, now: References, before: References) -> Iterator
                 _apart(values_of(old, motion), values_of(new, motion)),
             )
             if off > SAME_SAMPLE * max((abs(x) for x in was if x is not None), default=0.0):
-                told = (
+                message = (
                     f"{output} {motion_word(motion, old.unit)} differs by up to {number(off)}"
-                    f" {motion_unit(old.unit, motion)} from what it was"
+                    f" {motion_unit(old.unit, motion)} from its earlier values"
                 )
                 yield finding_of(
-                    Kind.REFERENCE, record, told, now=off, output=output, motion=motion
+                    Kind.REFERENCE, record, message, now=off, output=output, motion=motion
                 )
                 break
 
 
-def _said(record: Record) -> str:
+def _result(record: Record) -> str:
     return f"{record.outcome.shown}: {record.message}" if record.message else record.outcome.shown

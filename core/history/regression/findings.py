@@ -54,38 +54,30 @@ REGRESSIONS = frozenset(
 )
 
 WHY: Mapping[Kind, str] = {
-    Kind.FAILURE: (
-        "these results were right, or at least not wrong, and are not to be relied on now"
-    ),
+    Kind.FAILURE: ("these results were right, or at least not wrong, and are no longer reliable"),
     Kind.LOST: (
-        "what is no longer reached or compared is no longer checked: a fault there would go unseen"
+        "results that are no longer reached or compared are not checked: a fault there goes unseen"
     ),
-    Kind.UNJUDGED: "solved, but nothing is compared any more: a fault there would go unseen",
-    Kind.GONE: (
-        "values that were numbers are null now: whoever reads the results has less than before"
-    ),
-    Kind.MOVED: "the case is another than it was, or its solution is of another assembly",
+    Kind.UNJUDGED: "solved, but no longer compared: a fault there goes unseen",
+    Kind.GONE: ("values that were numbers are null now: readers of the results lose data"),
+    Kind.MOVED: "the case has changed, or its solution belongs to another assembly",
     Kind.FREEDOM: (
-        "the mechanism can move in other ways than before: it is another, or it is counted wrongly"
+        "the mechanism has other degrees of freedom: it has changed, or the count is wrong"
     ),
-    Kind.UNIT: "whoever reads the numbers takes them for something else",
-    Kind.DRIFTED: (
-        "within tolerance, but a decimal digit worse: something computes differently than it did"
-    ),
-    Kind.RESIDUAL: (
-        "the constraints are met three digits worse: the solution is less converged than it was"
-    ),
+    Kind.UNIT: "readers misread numbers in another unit or sense",
+    Kind.DRIFTED: ("within tolerance, but a decimal digit worse: a computation has changed"),
+    Kind.RESIDUAL: ("the constraints are met three digits worse: the solution is less converged"),
     Kind.SLOWER: "slower by more than this machine's spread from run to run",
     Kind.FIXED: "they failed in the run compared with",
     Kind.JUDGED: "nothing was compared in the run compared with",
-    Kind.TOLERANCE: "what passes now need not have passed before, or the reverse",
+    Kind.TOLERANCE: "a result may pass now that failed before, or the reverse",
     Kind.REFERENCE: (
-        "what passes now is judged by other true values than it was: somebody has edited them, or"
-        " the case"
+        "results are judged by other reference values than before: the reference or the case was"
+        " edited"
     ),
-    Kind.RANK: "the engine solves other rows than before; where dof is the same, so is the motion",
+    Kind.RANK: "the engine solves other rows than before; with equal dof, the motion is the same",
     Kind.ADDED: "nothing to compare with",
-    Kind.ABSENT: "not asked for, or gone from the library: nothing is known of them",
+    Kind.ABSENT: "not requested, or removed from the library: nothing is known of them",
 }
 """Why a kind matters."""
 
@@ -97,10 +89,10 @@ class Finding(msgspec.Struct, frozen=True, kw_only=True):
         output, motion: the subject; null for a finding on the whole pair.
         before, now: errors [SI], residuals, seconds, tolerances, dof or rank, by the kind; null
             without a number.
-        ratio: of now to before, for a time corrected for the pace of the machine; null
+        ratio: ratio of now to before, for a time corrected for the speed of the machine; null
             without one.
-        limit: the smallest ratio of a finding.
-        since: the first run with it, if the history knows it.
+        limit: the smallest ratio that is reported.
+        since: the first run with the finding, if the history has it.
     """
 
     kind: Kind
@@ -118,7 +110,7 @@ class Finding(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Change(msgspec.Struct, frozen=True, kw_only=True):
-    """A changed version, machine or setting; null if it was absent."""
+    """A changed version, machine or setting; a side is null if it was absent."""
 
     what: str
     before: Any
@@ -129,7 +121,7 @@ class Change(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def _short(value: Any) -> str:
-    """Return a value for a line of text: commits by their first digits."""
+    """Return a value as short text: a commit by its first digits."""
     text = "none" if value is None else str(value)
     return text[:10] if len(text) == 40 and text.isalnum() else text
 
@@ -139,14 +131,14 @@ class Step(msgspec.Struct, frozen=True, kw_only=True):
 
     Attributes:
         quantity: position, velocity or acceleration (errors), time, or outcome.
-        output: of the error with the largest step; null for time and outcome.
-        unit: of the output; empty for an error without a unit, for time and outcome.
-        first: number of the first run of the new level; `started` is when it began.
-        last: number of the last run of the level before.
+        output: output whose error has the largest step; null for time and outcome.
+        unit: unit of the output; empty for an error without a unit, for time and for outcome.
+        first: number of the first run of the new level, which began at `started`.
+        last: number of the last run of the previous level.
         before, now: the levels: errors [SI], seconds; null for an outcome.
-        repaired: number of the first later run as good as before; null for a change to the better,
-            and while the step stands.
-        changes: other differences of these two runs.
+        repaired: number of the first later run that is as good as before; null for a change to the
+            better, and while the step stands.
+        changes: other differences between these two runs.
     """
 
     case: str
@@ -166,12 +158,12 @@ class Step(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Loose(msgspec.Struct, frozen=True, kw_only=True):
-    """A tolerance not needed by any engine.
+    """A tolerance that no engine needs.
 
     Attributes:
         largest: the largest error in tolerances over all engines, motions and runs.
         factor: the possible reduction of the tolerance; null if all errors are exactly zero.
-        why: the case's reason for its tolerance; it may be the better one.
+        why: the case's reason for its tolerance, which may justify it.
     """
 
     case: str
@@ -183,7 +175,7 @@ class Loose(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class RunName(msgspec.Struct, frozen=True, kw_only=True):
-    """The name of a run for people, its number in the history if it has one, and the time of its
+    """The displayed name of a run, its number in the history if it has one, and the time of its
     start.
     """
 
@@ -198,12 +190,12 @@ class Regressions(msgspec.Struct, frozen=True, kw_only=True):
     """Changes between two runs.
 
     Attributes:
-        against: the run compared with; null without one, and `reason` says why.
+        against: the run compared with; null without one, for the reason in `reason`.
         pairs: number of records of the run.
-        failing: case, engine and mode of all pairs out of tolerance or broken, new or not.
-        unjudged: the same of all pairs solved and compared with nothing, new or not.
-        unread: requested cases without a meaning; their pairs are among the findings, as lost.
-        time_limit: the smallest ratio of a time called slower.
+        failing: case, engine and mode of all pairs that failed or broke, new or not.
+        unjudged: case, engine and mode of all solved pairs without a comparison, new or not.
+        unread: requested cases that cannot be read; their pairs are findings, as lost.
+        time_limit: the smallest ratio of times that is reported as slower.
         missing_is_failure: whether a pair of an earlier run, missing in this one, is a regression.
     """
 

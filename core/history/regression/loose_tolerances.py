@@ -1,4 +1,4 @@
-"""Tolerances to tighten: no engine has come near them in any run."""
+"""Tolerances to tighten: in no run does an engine come near them."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""Pairs of the last run of the same command without a record in a run: a case or an engine left
-out in silence.
+"""Pairs of the last run of the same command that a run lacks: a case or an engine left out in
+silence.
 """
 
 from __future__ import annotations
@@ -11,20 +11,22 @@ from .findings import Finding, Kind
 from .run_selection import Subject, pairs_of
 
 
-def missing(subject: Subject, store: Store | None, told: Sequence[Finding]) -> Iterator[Finding]:
-    """Yield the missing pairs in every kind of comparison: the last run may have more pairs than
+def missing(
+    subject: Subject, store: Store | None, findings: Sequence[Finding]
+) -> Iterator[Finding]:
+    """Yield the missing pairs, whatever run is compared with: the last run may have more pairs than
     the last green one.
 
-    A run of another command had another task and does not count.
+    A run of another command has another task and does not count.
 
     Args:
-        told: the findings on the subject so far.
+        findings: the findings on the subject so far.
     """
     last = _last(subject, store) if store else None
     if last is None:
         return
     known = pairs_of(subject) | {
-        (each.case, each.engine, each.mode) for each in told if each.kind is Kind.ABSENT
+        (each.case, each.engine, each.mode) for each in findings if each.kind is Kind.ABSENT
     }
     for case, engine, mode in last.plan:
         if (case, engine, mode) not in known:
@@ -45,7 +47,7 @@ def _last(subject: Subject, store: Store) -> RunRow | None:
             query, (subject.facts.get("command"), subject.before, subject.before)
         ).fetchall()
     for (number,) in numbers:
-        with store.sparing():  # a damaged run is passed over, and named at the end
+        with store.sparing():  # a damaged run is skipped, and named at the end
             if (row := store.run(number)).status != "running":
                 return row
     return None

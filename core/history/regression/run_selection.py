@@ -1,4 +1,4 @@
-"""The run of a report and the run compared with: by number, by file, by a rule."""
+"""Selection of the run of a report and of the run compared with: by number, by file, by a rule."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ class Subject:
     """A run to be compared.
 
     Attributes:
-        number: in the history; None for a run outside it.
-        before: runs with smaller numbers are earlier; None: all runs.
+        number: number in the history; None for a run outside it.
+        before: runs with smaller numbers are earlier; None if all runs are.
     """
 
     name: str
@@ -46,10 +46,10 @@ class Subject:
 
 
 def find(name: str | None, store: Store | None) -> Subject:
-    """Return the run of a number or of a results.json; None: the latest run of the history without
-    a writer.
+    """Return the run of a number or of a results.json; for None, the latest run of the history that
+    no process writes.
 
-    A killed run without an end counts too: judging the run before it would hide the fault.
+    A killed run counts, too: judging the run before it would hide the fault.
 
     Raises:
         KincheckError: there is none, or it cannot be read.
@@ -65,31 +65,31 @@ def find(name: str | None, store: Store | None) -> Subject:
         row = store.run(int(name))
         if row.status == "running":
             raise KincheckError(
-                f"report: run {row.id} is being made now; report it when it has ended"
+                f"report: run {row.id} is still running; report it when it has ended"
             )
         return _kept(store, row)
     row = next((row for row in store.runs() if row.status != "running"), None)
     if row is None:
         raise KincheckError(
             f"history {store.path}: no run to report; `kincheck run --history {store.path}`"
-            " makes one"
+            " records one"
         )
     return _kept(store, row)
 
 
 def find_against(name: str, subject: Subject, store: Store | None) -> tuple[Subject | None, str]:
-    """Return the run to compare with, or the reason without one. A named run must exist; a run by a
-    rule need not exist yet.
+    """Return the run to compare with, or the reason why there is none. A named run must exist; a
+    run by a rule may not exist yet.
 
     Raises:
-        KincheckError: the one named is not there, or it is the subject itself.
+        KincheckError: the named run does not exist, or is the subject itself.
     """
     if name == LAST_GREEN or (name.endswith(BASELINE) and not Path(name).exists()):
         if store is None:
-            return None, f"{name} is found in a history, and there is none"
+            return None, f"{name} needs a history, and none is given"
         branch = name.removesuffix(BASELINE)
         if name == LAST_GREEN:
-            # what is not compared any more would be told of once, and never again
+            # otherwise a lost comparison would be reported once, and never again
             row = _most(
                 green(store, before=subject.before), lambda row: _compared(store, row, subject)
             )
@@ -131,15 +131,15 @@ def _in_file(file: Path, store: Store | None) -> Subject:
         known = f"a number of the history, a results.json, {LAST_GREEN} or BRANCH{BASELINE}"
         raise KincheckError(f"report: there is no run {str(file)!r}; give {known}")
     results = read_results(file)
-    rows, told = store.runs() if store else [], results.run
+    rows, facts = store.runs() if store else [], results.run
     same = [
         row.id
         for row in rows
         if all(
-            row.circumstances.get(key) == told.get(key) for key in ("started", "host", "command")
+            row.circumstances.get(key) == facts.get(key) for key in ("started", "host", "command")
         )
     ]
-    later = [row.id for row in rows if row.started > str(told.get("started", "~"))]
+    later = [row.id for row in rows if row.started > str(facts.get("started", "~"))]
     return Subject(
         str(file), max(same, default=None), results, max(same, default=min(later, default=None))
     )
@@ -160,7 +160,7 @@ def _kept(store: Store, row: RunRow, rule: str = "") -> Subject:
 
 
 def _of_branch(store: Store, branch: str, subject: Subject) -> list[RunRow]:
-    """Return finished runs of a branch without uncommitted edits, which are no baseline."""
+    """Return the finished runs of a branch; runs with uncommitted edits are no baseline."""
 
     def fits(row: RunRow) -> bool:
         git: dict[str, Any] = row.circumstances.get("git") or {}
@@ -183,7 +183,7 @@ def pairs_of(subject: Subject) -> set[Pair]:
 
 
 def _compared(store: Store, row: RunRow, subject: Subject) -> int:
-    """Return the number of the subject's planned comparisons made in a run; outputs removed from a
+    """Return the number of the subject's planned comparisons that a run has; outputs removed from a
     case do not count.
     """
     outputs = {
@@ -193,13 +193,13 @@ def _compared(store: Store, row: RunRow, subject: Subject) -> int:
     there = compared(store, row.id)
     shared = 0
     for pair in pairs_of(subject) & there.keys():
-        still = outputs.get(pair)  # none at all where it was not made
+        still = outputs.get(pair)  # empty if the comparison is missing
         shared += 1 + sum(not still or output in still for output, _ in there[pair])
     return shared
 
 
 def _most(rows: list[RunRow], shared: Callable[[RunRow], int]) -> RunRow | None:
-    """Return the run with the most common pairs, the latest of several; None without any."""
+    """Return the run with the most shared comparisons, the latest of several; None without any."""
     amounts = {row.id: shared(row) for row in rows}
     best = max(rows, key=lambda row: (amounts[row.id], row.id), default=None)
     return best if best is not None and amounts[best.id] else None

@@ -1,7 +1,7 @@
-"""Levels of a series: the exact division into parts of steady level, under L1 cost.
+"""Levels of a series: the exact segmentation into parts of constant level, with L1 cost.
 
-`ruptures` divides exactly too. It cannot demand certainty of each change, and its wheels end at
-Python 3.13.
+`ruptures` also segments exactly, but cannot require each change to be significant, and has no
+wheels after Python 3.13.
 """
 
 from __future__ import annotations
@@ -14,26 +14,28 @@ import numpy as np
 from ...case.case import Array
 
 SURE = 6.0
-"""Distance of two levels in standard errors of a median. In 24 runs whose times were not freed of
-waiting, where any level is chance, the largest was 4.4. A change of level must also bring the
-values closer to their medians by as many, in sum."""
+"""Smallest distance of two levels in standard errors of a median. In 24 runs with times that
+include waiting, where any level is due to chance, the largest was 4.4. A change of level must also
+reduce the sum of distances from the medians by this many.
+"""
 
-# Of normal values with standard deviation 1: standard error of a median times the root of their
-# number, mean |difference| of two values, and distance of the quartiles.
+# For normal values with standard deviation 1: standard error of a median times the root of their
+# number, mean |difference| of two values, and interquartile range.
 MEDIAN_ERROR, DIFFERENCE, QUARTILES = 1.253, 1.128, 1.349
 
 
 def change_points(values: Array, *, least: float, lasting: int) -> list[int]:
     """Return the indices at which the level of a series changes.
 
-    Of all divisions whose every change is sure, the result has the least sum of distances from the
-    medians of the parts, plus a penalty for each change. A change is sure if
-    - the medians of `lasting` values before and after it differ by `least`: a slow drift is none;
-    - three quarters of the shorter part lie beyond the median of the longer by `least`: of three
-      values, all;
+    Among all segmentations with only significant changes, the result has the least sum of distances
+    from the medians of the parts, plus a penalty for each change. A change is significant if
+    - the medians of `lasting` values before and after it differ by `least`: a slow drift is
+      no change;
+    - three quarters of the shorter part (of three values, all) lie beyond the median of the longer
+      by `least`;
     - the medians of the parts differ by `SURE` standard errors.
 
-    Medians and distances, not means and squares: one outlier is not a level.
+    Medians and distances, instead of means and squares, keep one outlier from being a level.
 
     Args:
         values: shape (n,).
@@ -79,11 +81,11 @@ def change_points(values: Array, *, least: float, lasting: int) -> list[int]:
 
 
 def _deviation(values: Array) -> float:
-    """Return the standard deviation by the mean difference of successive values, without the
+    """Return the standard deviation from the mean difference of successive values, without the
     largest two.
 
-    A passing level makes two large differences. Single outliers make more: with many of them, three
-    in a row are chance, and a median would not know of them.
+    A temporary level makes two large differences, and single outliers make more. With many
+    outliers, three in a row may be chance, which a median would ignore.
     """
     differences = np.sort(np.abs(np.diff(values)))
     calm = differences[: -2 if len(differences) > 3 else -1]
@@ -91,10 +93,10 @@ def _deviation(values: Array) -> float:
 
 
 def _parts(values: Array, ends: list[int], lasting: int) -> Array:
-    """Return cost, median, lower and upper quartile, and distance of the quartiles of all parts
-    from one end to another.
+    """Return cost, median, lower and upper quartile, and interquartile range of all parts from one
+    end to another.
 
-    The quartiles are values of the part, the outer ones; their distance is interpolated. A part
+    The quartiles are values of the part, rounded outwards; their distance is interpolated. A part
     below the shortest length costs infinity.
     """
     table = np.zeros((5, len(ends), len(ends)))

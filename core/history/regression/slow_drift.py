@@ -1,6 +1,7 @@
-"""Slow drift: errors grow by less than a digit a night, and by more than one over many nights.
+"""Slow drift: errors grow by less than a digit per night, but by more than a digit over many
+nights.
 
-Neither a step nor the comparison with last night shows it.
+Neither steps nor the comparison with the last night show it.
 """
 
 from __future__ import annotations
@@ -21,16 +22,16 @@ from .segmentation import change_points
 from .thresholds import DRIFT, drifted
 
 
-def crept(subject: Subject, around: History, told: Sequence[Finding]) -> Iterator[Finding]:
-    """Return the subject's errors a digit above the least since their last step, with the same
-    tolerance and standard.
+def crept(subject: Subject, around: History, findings: Sequence[Finding]) -> Iterator[Finding]:
+    """Yield the subject's errors that are a digit above the least error since their last step, with
+    the same tolerance and standard.
 
     Args:
-        told: the findings on the subject so far.
+        findings: the findings on the subject so far.
     """
     known = {
         (each.case, each.engine, each.mode, each.output, each.motion)
-        for each in told
+        for each in findings
         if each.kind is Kind.DRIFTED
     }
     for record in subject.results.records:
@@ -70,7 +71,7 @@ def crept(subject: Subject, around: History, told: Sequence[Finding]) -> Iterato
                     engine=record.engine,
                     mode=record.mode,
                     message=(
-                        f"{output} {motion_word(motion, unit)} error {size}, little by little "
+                        f"{output} {motion_word(motion, unit)} error {size}, gradually "
                         f"since run {entry.run} "
                         f"(tolerance {number(now.tolerance)})"
                     ),

@@ -1,4 +1,4 @@
-"""Times of solves against the usual times of earlier runs."""
+"""Comparison of solve times with the usual times of earlier runs."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ def usual_times(
 ) -> tuple[float | None, float | None]:
     """Return the usual time of a warm solve [s] and in calibration loops of its run.
 
-    Both are None for machines without a common measure. The time is the median of the latest runs
-    up to the run compared with: the noise of one run would be in every comparison with it. With few
-    runs it is the time of this run alone.
+    Both are None if the machines cannot be compared. The time is the median over the latest runs up
+    to the run compared with, whose own noise would affect every comparison. With few runs it is the
+    time of this run alone.
     """
     latest = [entry for entry in entries if entry.seconds][-ENOUGH:]
     if len(latest) < ENOUGH:
@@ -57,7 +57,7 @@ def slower(
     if seconds > limit * should and seconds - should > TIME_FLOOR:
         ratio = seconds / should
         spread = f"×{number(ratio)}; by the spread from run to run, ×{number(limit)} may be chance"
-        told = f"{number(1e3 * should)} → {number(1e3 * seconds)} ms a sweep ({spread})"
+        message = f"{number(1e3 * should)} → {number(1e3 * seconds)} ms a sweep ({spread})"
         yield finding_of(
-            Kind.SLOWER, now, told, before=should, now=seconds, ratio=ratio, limit=limit
+            Kind.SLOWER, now, message, before=should, now=seconds, ratio=ratio, limit=limit
         )

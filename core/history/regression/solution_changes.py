@@ -29,7 +29,7 @@ def differing(now: Subject, before: Subject) -> Iterator[Finding]:
 
 
 def _numbers(now: Record, before: Record) -> Iterator[Finding]:
-    """Yield changes of dof and rank, and numbers now null."""
+    """Yield changes of dof and rank, and numbers that are null now."""
     for name, kind in (("dof", Kind.FREEDOM), ("rank", Kind.RANK)):
         old, new = getattr(before, name), getattr(now, name)
         if None not in (old, new) and new != old:
@@ -50,12 +50,12 @@ def _residual(now: Record, before: Record) -> Iterator[Finding]:
         return
     ratio = new / old if old else None
     times = f" (×{number(ratio)})" if ratio else ""
-    told = f"largest residual {number(old)} → {number(new)}{times}"
-    yield finding_of(Kind.RESIDUAL, now, told, before=old, now=new, ratio=ratio, limit=RESIDUAL)
+    message = f"largest residual {number(old)} → {number(new)}{times}"
+    yield finding_of(Kind.RESIDUAL, now, message, before=old, now=new, ratio=ratio, limit=RESIDUAL)
 
 
 def _units(now: Record, before: Record) -> Iterator[Finding]:
-    """Yield outputs with another unit, or with another positive sense."""
+    """Yield outputs with a changed unit or positive sense."""
     for output, old in before.outputs.items():
         new = now.outputs.get(output)
         for what in ("unit", "sense"):
@@ -67,8 +67,8 @@ def _units(now: Record, before: Record) -> Iterator[Finding]:
 
 
 def _gone(now: Record, before: Record) -> Iterator[Finding]:
-    """Yield motions of outputs with null in place of earlier numbers, unless another finding tells
-    it already.
+    """Yield motions of outputs with null in place of earlier numbers, unless another finding
+    reports it.
     """
     if not same_samples(now, before):
         return
@@ -78,33 +78,33 @@ def _gone(now: Record, before: Record) -> Iterator[Finding]:
         for motion in QUANTITIES:
             judged = getattr(before.errors.get(output), motion, None)
             if judged is not None and getattr(now.errors.get(output), motion, None) is None:
-                continue  # no longer compared, which is told with its reason
+                continue  # no longer compared, which another finding reports
             there, here = values_of(old, motion), values_of(new, motion)
             had = [k for k, value in enumerate(there) if value is not None]
-            gone = [k for k in had if (k >= len(here) or here[k] is None) and k not in unsolved]
-            if gone:
+            lost = [k for k in had if (k >= len(here) or here[k] is None) and k not in unsolved]
+            if lost:
                 at = [
-                    f"{name} = {number(values[gone[0]])}"
+                    f"{name} = {number(values[lost[0]])}"
                     for name, values in now.driver.items()
-                    if gone[0] < len(values)
+                    if lost[0] < len(values)
                 ]
-                first = at[0] if at else f"sample {gone[0]}"
+                first = at[0] if at else f"sample {lost[0]}"
                 why = (
                     "the case has no such output now"
                     if new is None
                     else new.reason or "no reason is given"
                 )
                 word = motion_word(motion, old.unit)
-                told = (
-                    f"{output} {word} has no value at {len(gone)} of {len(had)} samples that had"
+                message = (
+                    f"{output} {word} has no value at {len(lost)} of {len(had)} samples that had"
                     f" one, first at {first}: {why}"
                 )
-                yield finding_of(Kind.GONE, now, told, output=output, motion=motion)
+                yield finding_of(Kind.GONE, now, message, output=output, motion=motion)
 
 
 def _unsolved(record: Record) -> set[int]:
-    """Return the samples at which no output has a position: fewer samples solved are told by
-    themselves.
+    """Return the samples at which no output has a position; another finding reports unsolved
+    samples.
     """
     count = max((len(output.position) for output in record.outputs.values()), default=0)
     series = [output.position for output in record.outputs.values()]

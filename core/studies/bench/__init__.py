@@ -1,1 +1,1 @@
-"""Benchmarks: the paper's claims, measured."""
+"""Benchmarks: run time, accuracy, memory, and the paper's claims."""

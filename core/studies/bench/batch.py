@@ -1,6 +1,4 @@
-"""Cost against batch size: variants of a mechanism's hardpoints, solved together, lanes being
-variants.
-"""
+"""Cost against batch size: variants of a mechanism's hardpoints, solved together, one per lane."""
 
 from __future__ import annotations
 
@@ -20,7 +18,7 @@ from .peak import Peak
 from .rounds import Spread, Work, take_turns
 
 SIZES = (1, 4, 16, 64, 256, 1024, 4096)
-# Standard deviation of the hardpoints' coordinates, relative to the mechanism's size: that of a
+# Standard deviation of the hardpoints' coordinates, relative to the mechanism's size, as in a
 # tolerance study.
 SCATTER = 1e-3
 SEED = 943745
@@ -30,12 +28,13 @@ class Batch(msgspec.Struct, frozen=True, kw_only=True):
     """A number of variants solved together.
 
     Attributes:
-        solved: share of samples reached; retried: variants solved again alone.
-        error: of the first variant, which is the case itself: largest position error of the outputs
-            in metres [m].
-        us_per_sample: by sample and variant.
-        flops_per_sample, gflops: of the programs, for accepted samples; and by nanosecond.
-        of_peak: share of the measured peak of a core; null if the peak is unknown.
+        solved: share of the samples reached; retried: number of variants solved again alone.
+        error: largest position error of the first variant, the case itself, over the outputs in
+            metres [m].
+        us_per_sample: time per sample and variant [us].
+        flops_per_sample, gflops: operations of the programs for an accepted sample, and per
+            nanosecond.
+        of_peak: fraction of the measured peak of a core; null if the peak is unknown.
     """
 
     case: str
@@ -64,10 +63,10 @@ class _Batch:
 
 
 def measure_batches(case: Case, tol: float, rounds: int, peak: Peak | None) -> list[Batch]:
-    """Solve batches of all sizes, the peak kernel taking turns with them.
+    """Solve batches of all sizes in turns with the peak kernel.
 
     Args:
-        case: with its truth.
+        case: the case with its reference.
     """
     values = places(case.mechanism)
     varied = tuple(
@@ -113,7 +112,7 @@ def _batch(case: Case, batch: _Batch, seconds: Spread, peak: float | None) -> Ba
 
 
 def _error(case: Case, designs: PreparedDesigns, found: Variants) -> float | None:
-    """Of the first variant."""
+    """Return the position error of the first variant [m]."""
     points = {
         name: PointMotion(*(each[:, :, 0].T for each in designs.motion(found, name)))
         for name in case.points

@@ -1,4 +1,4 @@
-"""The first use of the native engine in a process of its own, timed stage by stage."""
+"""The first use of the native engine in a new process, timed stage by stage."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ STAGES = (
     "solve anew",
 )
 FIRST = STAGES[1:4]
-"""Those to the first solution, beyond numpy."""
+"""The stages after the import of numpy, up to the first solution."""
 
 
 def first_use(clock: Sequence[float]) -> None:
-    """Build and solve the pickled case on standard input; print the seconds of all stages as a line
-    of JSON.
+    """Build and solve the pickled case from standard input; print the seconds of all stages as a
+    line of JSON.
 
-    The last stage asks for the same case again, as repeated calls of `solve` do.
+    The last stage solves the same case again, as repeated calls of `solve` do.
 
     Args:
         clock: times of the start of the process, the import of numpy and the import of the solver.
@@ -39,12 +39,12 @@ def first_use(clock: Sequence[float]) -> None:
     whole = level()
     model = whole.build(case)
     now = [begin, perf_counter()]
-    for solves in (1, 1, 10):  # in the course of ten more, programs are compiled
+    for solves in (1, 1, 10):  # during ten more solves, programs are compiled
         for _ in range(solves):
             whole.solve(model, case, tol)
         now.append(perf_counter())
     anew, recent = 0.0, NativeEngine(every_body=True)
-    for _ in range(2):  # the first time nothing of it is among what is kept
+    for _ in range(2):  # so far nothing of this case is cached
         begin = perf_counter()
         recent.solve(recent.build(case), case, tol)
         anew = perf_counter() - begin

@@ -1,4 +1,4 @@
-"""The costs found by the benchmark of engines, for people: by batch, by size, and of a process."""
+"""Tables of costs of the engine benchmark: by batch size, by mechanism size, and per process."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from .scaling import exponent
 from .size import growth
 
 TIMED = (
-    "Median and quartiles over the rounds, in µs a sample: warm, contestants taking turns in one"
+    "Median and quartiles over the rounds, in µs per sample: warm, contestants in turns in one"
     " process. Errors are the largest over samples and outputs. An outcome is by the tolerances of"
     " the case, which a coarse effort is expected to miss."
 )
 
 
 def cells(us: Spread | None) -> tuple[str, str]:
-    """Median and quartiles."""
+    """Return median and quartiles as text."""
     return (
         ("–", "–")
         if us is None
@@ -28,7 +28,7 @@ def cells(us: Spread | None) -> tuple[str, str]:
 
 
 def loops(found: Bench) -> Section:
-    """Whole loops of the engines against each other, over all cases."""
+    """Return the comparison of the engines' whole loops over all cases."""
     rows = [
         (
             each.engine,
@@ -53,7 +53,7 @@ def loops(found: Bench) -> Section:
 
 
 def batches(found: Bench) -> Section:
-    """Cost against batch size."""
+    """Return cost against batch size."""
     rows = [
         (
             str(each.variants),
@@ -95,7 +95,7 @@ def batches(found: Bench) -> Section:
 
 
 def studies(found: Bench) -> Section:
-    """Cost of a tolerance study by threads."""
+    """Return the cost of a tolerance study against the number of threads."""
     rows = [
         (
             str(each.jobs),
@@ -128,7 +128,7 @@ def studies(found: Bench) -> Section:
 
 
 def sizes(found: Bench, family: str) -> Section:
-    """Cost against the size of one family of mechanisms, by engine."""
+    """Return cost against the size of one family of mechanisms, by engine."""
     sizes = [each for each in found.sizes if each.mechanism == family]
     many = family.rpartition(" ")[2]
     rows = [
@@ -144,16 +144,16 @@ def sizes(found: Bench, family: str) -> Section:
         )
         for e in sizes
     ]
-    said: list[str] = []
+    sentences: list[str] = []
     for engine in dict.fromkeys(each.engine for each in sizes):
         mine = [each for each in sizes if each.engine == engine]
         if (grown := growth(mine)) is not None:
             n, m, power = grown
-            said.append(
+            sentences.append(
                 f"{engine}: from {n} to {m} {many} the cost grows as their number to the power of"
                 f" {power:.2f}."
             )
-        said += [
+        sentences += [
             f"{engine}, {each.loops} {many}: {each.message}"
             for each in mine
             if each.us_per_sample is None
@@ -171,7 +171,7 @@ def sizes(found: Bench, family: str) -> Section:
     )
     return Section(
         f"Cost against size: {family}",
-        said,
+        sentences,
         (TIMED,),
         headings,
         2,
@@ -181,7 +181,7 @@ def sizes(found: Bench, family: str) -> Section:
 
 
 def scalings(found: Bench) -> Section:
-    """Large mechanisms."""
+    """Return cost against size for large mechanisms."""
     rows = [
         (
             e.mechanism,
@@ -195,11 +195,11 @@ def scalings(found: Bench) -> Section:
         )
         for e in found.scalings
     ]
-    said: list[str] = []
+    sentences: list[str] = []
     for mechanism in dict.fromkeys(each.mechanism for each in found.scalings):
         small, *_, large = (each for each in found.scalings if each.mechanism == mechanism)
         power = exponent(small, large)
-        said.append(
+        sentences.append(
             f"{mechanism}: from {small.size} to {large.size} the cost grows as the unknowns to the"
             f" power of {power:.2f}."
         )
@@ -221,12 +221,17 @@ def scalings(found: Bench) -> Section:
         "quartiles",
     )
     return Section(
-        "Cost against size: large mechanisms as one sparse system", said, notes, headings, 1, rows
+        "Cost against size: large mechanisms as one sparse system",
+        sentences,
+        notes,
+        headings,
+        1,
+        rows,
     )
 
 
 def processes(found: Bench) -> Section:
-    """First use and memory."""
+    """Return the costs of first use, and memory."""
     rows = [
         (
             each.what,

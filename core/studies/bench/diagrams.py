@@ -16,7 +16,9 @@ from .size import Size
 
 
 def precision_diagram(found: Bench, case: str, mode: str) -> Diagram:
-    """Error against time of the engines of one mode on a case; beside each simulator, its floor."""
+    """Return error against time for the engines of one mode on a case, with the floor of each
+    simulator.
+    """
     entries = [entry for entry in found.entries if (entry.case, entry.mode) == (case, mode)]
     efforts = [each for entry in entries for each in effort(entry)]
     styles, floors = _styles(each.engine for each in efforts), ""
@@ -35,9 +37,9 @@ def precision_diagram(found: Bench, case: str, mode: str) -> Diagram:
             )
             own = next(style for style in styles if style.name == best.engine)
             styles.append(replace(own, name=name, symbol="x-thin-open", dash="3px,3px"))
-            floors = " A cross is a simulator's floor: a bound, no solver."
+            floors = " A cross is a simulator's floor: a lower bound, not a solver."
     drawn = [each for each in efforts if each.us_per_sample > 0.0]
-    caption = f"Left is faster, down is more exact; a point is one effort.{floors}"
+    caption = f"Left is faster, down is more accurate; a point is one effort.{floors}"
     plot = Plot(
         f"{case}-{mode}", f"{case}, {mode}: error against time per sample, both log axes", caption
     )
@@ -45,7 +47,7 @@ def precision_diagram(found: Bench, case: str, mode: str) -> Diagram:
 
 
 def size_diagram(family: str, sizes: Sequence[Size]) -> Diagram:
-    """Time against the number of loops."""
+    """Return time against the number of loops."""
     timed = [
         (each.engine, each.loops, each.us_per_sample.median)
         for each in sizes
@@ -61,7 +63,7 @@ def size_diagram(family: str, sizes: Sequence[Size]) -> Diagram:
 
 
 def batch_diagram(found: Bench) -> Diagram:
-    """Time against the size of the batch."""
+    """Return time against batch size."""
     timed = [(STANDARD, each.variants, each.us_per_sample.median) for each in found.batches]
     caption = "Variants of all hardpoints, solved together on one core; time by sample and variant."
     plot = Plot("batch", "time per sample against variants in a batch, both log axes", caption)
@@ -69,7 +71,7 @@ def batch_diagram(found: Bench) -> Diagram:
 
 
 def stage_diagram(found: Bench) -> Diagram:
-    """Stages of the first use, empty and filled cache side by side."""
+    """Return the stages of the first use, with empty and with filled cache side by side."""
     processes = [each for each in found.processes if each.stages]
     styles = _styles(name for name in processes[0].stages)
     bars: list[Figure] = [
@@ -98,7 +100,7 @@ def stage_diagram(found: Bench) -> Diagram:
 
 
 def entries_of(found: Bench) -> list[tuple[str, str, list[Entry]]]:
-    """Return the comparable entries, by case and mode."""
+    """Return the comparable entries by case and mode."""
     keys = dict.fromkeys((entry.case, entry.mode) for entry in found.entries)
     return [
         (*key, [entry for entry in found.entries if (entry.case, entry.mode) == key])

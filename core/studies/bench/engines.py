@@ -1,4 +1,4 @@
-"""The benchmark of run time against error, and of other influences on time and memory."""
+"""The engine benchmark: run time against error, and other influences on time and memory."""
 
 from __future__ import annotations
 
@@ -43,22 +43,21 @@ from .study_throughput import StudyRate, measure_studies
 
 NAME = "bench"
 PARTS = ("work", "loop", "batch", "study", "size", "processes")
-"""What may be measured: work against precision, whole loops by engine, cost of batches, of a study,
-and against mechanism size, first use and memory.
+"""Parts of the benchmark: work against precision, whole loops by engine, cost of batches and of a
+study, cost against mechanism size, first use and memory.
 """
 
-# Sizes of chain and ring as one sparse system. A round of them takes seconds, which few
-# interruptions are long against.
+# Sizes of chain and ring as one sparse system. A round takes seconds: interruptions hardly matter.
 LARGE, LARGE_ROUNDS = (100, 1000), 3
 
 
 class Rate(msgspec.Struct, frozen=True, kw_only=True):
-    """Arithmetic by time.
+    """Rate of arithmetic operations.
 
     Attributes:
-        us_per_sample: median; null for the peak.
-        flops_per_sample: of the programs, for accepted samples.
-        gflops: a nanosecond; of_peak: part of the peak in the same rounds.
+        us_per_sample: median time [us]; null for the peak.
+        flops_per_sample: operations of the programs for an accepted sample.
+        gflops: operations per nanosecond; of_peak: fraction of the peak in the same rounds.
     """
 
     case: str
@@ -73,9 +72,9 @@ class Bench(msgspec.Struct, frozen=True, kw_only=True):
     """The results of this benchmark; a part not requested is empty.
 
     Attributes:
-        run: circumstances; load: of the machine over the last minute, before and after.
-        vector_width: doubles in a vector of the compiled code; null without a compiler.
-        entries: engines at their efforts, on each case; levels: the native engine in detail.
+        run: circumstances; load: load of the machine over the last minute, before and after.
+        vector_width: number of doubles in a vector of compiled code; null without a compiler.
+        entries: each engine at each effort, on each case; levels: the native engine in detail.
     """
 
     schema: Literal["kincheck-bench/1"] = "kincheck-bench/1"
@@ -105,18 +104,18 @@ def measure(
     rounds: int,
     parts: Collection[str],
     command: str,
-    tell: Callable[[str, float], object],
+    progress: Callable[[str, float], object],
 ) -> Bench:
-    """Measure the requested parts of the motion; batches, studies and processes of the first case.
+    """Measure the requested parts; batches, studies and processes use only the first case.
 
     Args:
-        cases: by name as on the command line; at least one.
-        engines: in both modes.
+        cases: cases by their names on the command line; at least one.
+        engines: engines of both modes.
         tol: largest accepted constraint residual, as for `Engine.solve`.
-        tell: called with the name of each measurement and the finished part of all, from 0 to 1.
+        progress: called with the name of each measurement and the finished share, from 0 to 1.
 
     Raises:
-        KincheckError: a case has no reference and cannot be given one.
+        KincheckError: a case has no reference, and none can be proved.
     """
     started, before = datetime.now(UTC), _load()
     found: dict[str, list[Any]] = {}
@@ -132,8 +131,8 @@ def measure(
 
     def begin(what: str) -> Callable[[float], object]:
         number = next(numbers)
-        tell(what, number / steps)
-        return lambda done: tell(what, (number + done) / steps)
+        progress(what, number / steps)
+        return lambda done: progress(what, (number + done) / steps)
 
     if "work" in parts:
         for case in true.values():
@@ -155,8 +154,8 @@ def measure(
             begin("large mechanisms")
             add("scalings", scaling.measure(LARGE, LARGE, min(rounds, LARGE_ROUNDS)))
     if "processes" in parts:
-        begin(f"{first.name}: processes of their own")
-        # variants of a simulator take the memory that it takes
+        begin(f"{first.name}: separate processes")
+        # variants of a simulator need the same memory
         names = {engine.name for engine in projections}
         own = [engine for engine in engines if engine.name in names]
         add("processes", measure_processes(first, name, own, tol, rounds))
@@ -185,7 +184,7 @@ def _measure_work(
     add: Callable[[str, Sequence[Any]], object],
     begin: Callable[[str], Callable[[float], object]],
 ) -> None:
-    """Measure a case's work and precision, its floors, and the native engine in detail: all in the
+    """Measure work and precision of a case, its floors, and the native engine in detail, all in the
     same rounds.
     """
     entering: dict[tuple[str, str], Contestant] = {}
@@ -256,26 +255,26 @@ def _rates(case: Case, native: Mapping[str, Entry], peak: Peak, seconds: Spread)
 
 
 def _load() -> float | None:
-    """Return the number of runnable processes over the last minute; None if the system hides it."""
+    """Return the number of runnable processes over the last minute; None if it is unknown."""
     return os.getloadavg()[0] if hasattr(os, "getloadavg") else None
 
 
 def _threads() -> str:
-    return os.environ.get(THREADS[0], "as many as it likes")
+    return os.environ.get(THREADS[0], "not limited")
 
 
 def efforts_in(file: Path) -> dict[str, list[Effort]]:
-    """Return the diagrams' data in a file of this benchmark: error and time of each engine's
+    """Return the diagram data from a file of this benchmark: error and time of each engine's
     efforts, by case.
 
     Raises:
-        KincheckError: the file cannot be read, or is not of this benchmark.
+        KincheckError: the file cannot be read, or holds no results of this benchmark.
     """
     try:
         found = msgspec.json.decode(file.read_bytes(), type=Bench)
     except (OSError, msgspec.DecodeError) as error:
         raise KincheckError(
-            f"--bench {file}: {error}; give a bench.json that kincheck bench wrote"
+            f"--bench {file}: {error}; give a bench.json written by kincheck bench"
         ) from None
     efforts: dict[str, list[Effort]] = {}
     for entry in found.entries:
@@ -284,7 +283,7 @@ def efforts_in(file: Path) -> dict[str, list[Effort]]:
 
 
 def effort(entry: Entry) -> list[Effort]:
-    """Return the entry's point in a diagram of error against time; none without a time or an
+    """Return the entry's point in a diagram of error against time; empty without a time or an
     error.
     """
     if entry.us_per_sample is None or entry.errors.position is None:
@@ -296,5 +295,5 @@ def effort(entry: Entry) -> list[Effort]:
 
 
 def with_formulation(found: Bench, formulation: Formulation) -> Bench:
-    """The results with those of the formulation's benchmark."""
+    """Return the results with those of the formulation benchmark."""
     return msgspec.structs.replace(found, formulation=formulation)

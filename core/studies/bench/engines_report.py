@@ -1,4 +1,4 @@
-"""The benchmark of engines for people: tables, conclusions, diagrams. Modes never share a table."""
+"""The report of the engine benchmark: tables, conclusions, diagrams. Modes never share a table."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ LOOPS_RUN = {
     "simulator": "inside the simulator",
     "compiled": "in machine code",
 }
-"""Where the loop over samples and iterations runs, in words."""
+"""Phrases for the place of the loop over samples and iterations."""
 
 
 def report(found: Bench) -> Report:
-    """The results for people."""
+    """Return the results as a report."""
     run = found.run
     facts = [
         f"kincheck {run['kincheck']}, numpy {run['numpy']}, Python {run['python']}",
@@ -79,21 +79,21 @@ def _precision(found: Bench, case: str, mode: str, entries: Sequence[Entry]) -> 
         for entry in entries
     ]
     truths = [entry.against.split(", ") for entry in entries if entry.against]
-    said = [
+    sentences = [
         (
             f"Errors are against: {', '.join(map(against, truths[0]))}."
             if truths
-            else "There was nothing to compare with."
+            else "No reference was available."
         )
     ]
-    said += [
+    sentences += [
         f"{loop}:"
         f" {', '.join(dict.fromkeys(entry.engine for entry in entries if entry.loop == loop))}: the"
         f" loop runs {words}."
         for loop, words in LOOPS_RUN.items()
         if any(entry.loop == loop for entry in entries)
     ]
-    said += [
+    sentences += [
         f"{each.engine}: {each.outcome}: {each.message}" for each in entries if each.solved is None
     ]
     counted = "iterations" if mode == "projection" else "steps"
@@ -112,7 +112,7 @@ def _precision(found: Bench, case: str, mode: str, entries: Sequence[Entry]) -> 
     )
     return Section(
         f"{case}, {mode}: work and precision",
-        said,
+        sentences,
         (TIMED,),
         (*headings, "µs", "quartiles"),
         4,
@@ -129,13 +129,13 @@ def _needed(found: Bench, case: str, mode: str) -> Section:
         rows.append((engine, here[0].loop, *(_time_needed(each) for each in here)))
     notes = (
         (
-            "µs a sample of the fastest effort whose largest position error is not above, all"
-            " samples reached, and that effort."
+            "Time per sample [µs] of the fastest effort that reaches all samples within this"
+            " position error, and that effort."
         ),
     )
     headings = ("engine", "loop", *(f"{required:g} m" for required in REQUIRED))
-    said = _faster(mine) if mode == "projection" else []
-    return Section(f"{case}, {mode}: time at a required error", said, notes, headings, 2, rows)
+    sentences = _faster(mine) if mode == "projection" else []
+    return Section(f"{case}, {mode}: time at a required error", sentences, notes, headings, 2, rows)
 
 
 def _time_needed(each: Needed) -> str:
@@ -145,8 +145,8 @@ def _time_needed(each: Needed) -> str:
 
 
 def _faster(mine: Sequence[Needed]) -> list[str]:
-    """The native engine against the fastest other at each error."""
-    said: list[str] = []
+    """Compare the native engine with the fastest other engine at each error, in sentences."""
+    sentences: list[str] = []
     for required in REQUIRED:
         times = {
             each.engine: each.us_per_sample
@@ -157,16 +157,16 @@ def _faster(mine: Sequence[Needed]) -> list[str]:
         if ours is None or not times:
             continue
         best = min(times, key=lambda name: times[name])
-        said.append(
+        sentences.append(
             f"At {required:g} m the native engine is {times[best] / ours:.0f} times as fast as the"
             f" fastest other, {best}."
         )
-    return said
+    return sentences
 
 
 def _floors(found: Bench, case: str) -> Section:
     rows: list[tuple[str, ...]] = []
-    said: list[str] = []
+    sentences: list[str] = []
     alone = _level(found, case, native_breakdown.ALONE)
     for floor in (each for each in found.floors if each.case == case):
         times = [
@@ -177,19 +177,19 @@ def _floors(found: Bench, case: str) -> Section:
         beside = times[-1] if times else None
         ratio = None if alone is None else floor.us_per_sample / alone
         rows.append((floor.engine, number(beside), number(floor.us_per_sample), number(ratio)))
-        said.append(f"{floor.counted}.")
+        sentences.append(f"{floor.counted}.")
     notes = (
         (
-            "A floor is what the simulator's compiled code alone needs for a sample at its finest"
-            " effort: a bound from below for any loop around it, in any language; the adapter's"
-            " time beside it has its loop in Python. The last column: the floor by what the native"
+            "A floor is the time of the simulator's compiled code alone, for a sample at its finest"
+            " effort: a lower bound for any loop around it, in any language. The adapter's time"
+            " includes a loop in Python. The last column is the floor over the time that the native"
             f" loops alone take{'' if alone is None else f', {number(alone)} µs'}, all bodies and"
             " tests included."
         ),
     )
     return Section(
         f"{case}: floors",
-        said,
+        sentences,
         notes,
         ("engine", "adapter [µs]", "floor [µs]", "floor / native loops"),
         1,
@@ -217,7 +217,7 @@ def _levels(found: Bench, case: str) -> Section:
             (entry.setting, entry.loop, str(entry.outcome), *errors, *cells(us), number(part))
         )
     headings = (
-        "asked for",
+        "requested",
         "loop",
         "outcome",
         *(with_unit(name, motion_unit("m", name)).replace(" [", "\n[") for name in QUANTITIES),
@@ -227,8 +227,8 @@ def _levels(found: Bench, case: str) -> Section:
     )
     notes = (
         (
-            "Whole calls, Python included, but for the loops alone; of the same rounds as the"
-            " engines. Part: of the first line."
+            "Whole calls including Python, except for the loops alone, in the same rounds as the"
+            " engines. Part: fraction of the first line."
         ),
     )
     others = [
@@ -238,15 +238,15 @@ def _levels(found: Bench, case: str) -> Section:
         and e.engine != STANDARD
         and e.us_per_sample is not None
     ]
-    said: list[str] = []
+    sentences: list[str] = []
     if others and whole is not None:
         us, best = min(others, key=lambda each: each[0])
-        said.append(
-            f"With every body asked for it is {us / whole:.0f} times as fast as the fastest other"
+        sentences.append(
+            f"With every body requested it is {us / whole:.0f} times as fast as the fastest other"
             f" engine that reaches {best.required:g} m, which gives the compared points only:"
             f" {best.engine}, {best.setting}."
         )
-    return Section(f"{case}: the native engine in detail", said, notes, headings, 3, rows)
+    return Section(f"{case}: the native engine in detail", sentences, notes, headings, 3, rows)
 
 
 def _rates(found: Bench) -> Section:
@@ -263,9 +263,8 @@ def _rates(found: Bench) -> Section:
     ]
     notes = (
         (
-            "Operations of the programs for samples that were accepted, roots, comparisons and"
-            " signs included; a fused multiplication and addition are two. The peak is measured in"
-            " the same rounds."
+            "Operations of the programs for accepted samples, including roots, comparisons and"
+            " signs; a fused multiply-add counts as two. The peak is measured in the same rounds."
         ),
     )
     return Section(

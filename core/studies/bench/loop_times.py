@@ -12,18 +12,19 @@ from ...harness.engine import Engine
 from ...trajectory import Trajectory
 from .rounds import take_turns
 
-# The loop that others are measured by: its simulator does the least beside its kinematics.
+# Base of the ratios: its simulator adds the least work to its kinematics.
 BASE = "pinocchio"
 
 
 class LoopTime(msgspec.Struct, frozen=True, kw_only=True):
-    """Time of an engine in projection mode over the cases that it and the base solve.
+    """Time of an engine in projection mode over the cases that both it and the base solve.
 
     Attributes:
-        base: name of the engine that the ratios are to.
-        cases: their number.
-        us_per_sample: median over the cases, warm.
-        ratio, lower, upper: of the time to the base's on the same case: median and extremes.
+        base: name of the engine that the ratios refer to.
+        cases: number of the cases.
+        us_per_sample: warm time per sample, median over the cases [us].
+        ratio, lower, upper: ratio of the time to the base's time on the same case, median and
+            extremes.
     """
 
     engine: str
@@ -41,12 +42,12 @@ def measure_loops(
     engines: Sequence[Engine],
     tol: float,
     rounds: int,
-    tell: Callable[[str], object],
+    progress: Callable[[str], object],
 ) -> list[LoopTime]:
-    """Return the times of all engines, taking turns on each case; the base is the first engine
-    where Pinocchio is none of them.
+    """Return the times of all engines, which take turns on each case; without Pinocchio the base is
+    the first engine.
 
-    The least time of the rounds counts: what another process takes is no part of a ratio.
+    The least time of the rounds counts, so that other processes do not affect the ratios.
     """
     able = [engine for engine in engines if engine.version() is not None]
     names = [engine.name for engine in able]
@@ -55,7 +56,7 @@ def measure_loops(
     base = BASE if BASE in names else names[0]
     found: dict[str, list[tuple[float, float]]] = {name: [] for name in names}
     for case in cases:
-        tell(f"{case.name}: loops of {len(able)} engines")
+        progress(f"{case.name}: loops of {len(able)} engines")
         work = {e.name: _work(case, e, tol) for e in able if e.unsupported(case) is None}
         if base not in work:
             continue

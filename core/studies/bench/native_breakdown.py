@@ -1,5 +1,5 @@
-"""The native engine in detail: by request, by executor, and with and without the Python around its
-loops.
+"""The native engine in detail: by requested quantities, by executor, and with or without the Python
+around its loops.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from ...kinematics import Method, NativeSolver, ProgramSize
 from ...trajectory import Array
 
 EVERYTHING = "every body and point: position, velocity, acceleration"
-"""The level that all others are compared with."""
+"""The base level of the comparison."""
 ALONE = f"{EVERYTHING}; loops alone"
 NUMPY = f"{EVERYTHING}; numpy executor"
 FORCES = f"{EVERYTHING}; all forces"
@@ -21,13 +21,13 @@ FORCES = f"{EVERYTHING}; all forces"
 def level(
     *, order: int = 2, bodies: bool = True, compiled: bool = True, forces: bool = False
 ) -> NativeEngine:
-    """Return the native engine, asked for more or less: as one program, made ready anew.
+    """Return the native engine with requested quantities, as one program, prepared again.
 
     Args:
-        order: 0 positions, 1 and velocities, 2 and accelerations.
-        bodies: of every body too, in the paper's variables, and not of the compared points only.
-        compiled: by machine code, else by numpy.
-        forces: of all joints, drivers and force elements too.
+        order: 0 for positions, 1 also velocities, 2 also accelerations.
+        bodies: also solve every body in the paper's variables, instead of only the compared points.
+        compiled: run machine code; else numpy.
+        forces: also solve the forces of all joints, drivers and force elements.
     """
     solver = NativeSolver(order=order, compiled=compiled, method=Method.ONE_PROGRAM)
     return NativeEngine(solver, every_body=bodies, every_force=forces)
@@ -42,27 +42,27 @@ LEVELS: Mapping[str, NativeEngine] = {
     NUMPY: level(compiled=False),
     "every body and point: position; numpy executor": level(order=0, compiled=False),
 }
-"""What is timed as a whole call, by what is asked."""
+"""Levels that are timed as a whole call, by requested quantities."""
 WITH_FORCES: Mapping[str, NativeEngine] = {
     FORCES: level(forces=True),
     f"{FORCES}; numpy executor": level(forces=True, compiled=False),
 }
-"""The same of cases with masses or force elements."""
+"""Further levels for cases with masses or force elements."""
 
 
 def levels(case: Case) -> Mapping[str, NativeEngine]:
-    """Return what is timed of a case."""
+    """Return the timed levels of a case."""
     return {**LEVELS, **(WITH_FORCES if case.mechanism.has_loads else {})}
 
 
 def loops_alone(case: Case, tol: float) -> Callable[[], Array]:
-    """Return a call of the executor's loops over all samples, everything requested: no Python but
-    two calls, no result built.
+    """Return a function that runs the executor's loops over all samples with everything requested:
+    two calls from Python, without results.
 
-    It is the native engine's floor, tests and copying included.
+    It is the native engine's floor, including tests and copying.
 
     Raises:
-        SolveError: a step has to be divided, which needs Python.
+        SolveError: a step must be halved, which needs Python.
     """
     whole = level()
     return whole.solver.loops(case.mechanism, case.sweep.path, case.points, whole.bodies(case), tol)

@@ -1,8 +1,7 @@
 """The peak arithmetic of one core: independent multiplications and additions of vectors, fused if
-the processor can.
+the processor supports it.
 
-The same compiler makes the code as for the programs, for the same width; its loop loads and stores
-nothing.
+The compiler and the vector width are those of the programs; the loop loads and stores nothing.
 """
 
 from __future__ import annotations
@@ -17,20 +16,20 @@ from ...program.llvm import code_cache, compiler
 from ...trajectory import Array
 from .rounds import Spread
 
-# As many as hide the latency of two units (2 x 4 cycles), and no more than fit into 16 registers
-# beside two factors.
+# Independent chains: enough to hide the latency of two units (2 x 4 cycles), and few enough for 16
+# registers with two factors.
 CHAINS = 12
 STEPS = 20_000
-"""Of a call: about a hundred microseconds."""
+"""Steps of a call: about a hundred microseconds."""
 
 
 @dataclass(frozen=True, eq=False)
 class Peak:
-    """The kernel, ready to be called.
+    """The compiled kernel.
 
     Attributes:
-        width: doubles in a vector.
-        flops: of a call; a fused multiplication and addition are two.
+        width: number of doubles in a vector.
+        flops: operations of a call; a fused multiply-add counts as two.
     """
 
     width: int
@@ -40,16 +39,16 @@ class Peak:
     owner: Any
 
     def rate(self, seconds: Spread) -> float:
-        """Return flops a second, by the fastest of the turns: nothing has delayed it."""
+        """Return operations per second of the fastest turn, which nothing has delayed."""
         return self.flops / seconds.least
 
     def __call__(self) -> None:
-        """Do all the steps."""
+        """Run all steps."""
         self.function(self.memory.ctypes.data, STEPS)
 
 
 def prepare() -> Peak:
-    """Compile the kernel. Raises ImportError without llvmlite."""
+    """Compile the kernel; raise ImportError without llvmlite."""
     width = compiler.vector_width()
     text = _text(width)
     code = code_cache.load(text, lambda: text, {"peak": 2})

@@ -1,5 +1,5 @@
-"""Work and precision: error and work of each engine on a case at each of its efforts, judged as in
-a run.
+"""Work and precision: error and run time of each engine on a case at each effort, judged as in a
+run.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from ...trajectory import Trajectory
 from ..verified_reference import prove_case
 from .rounds import Spread
 
-# Digits to which a case without a reference is proved: more than a double has.
+# Digits of a proved reference: more than a double has.
 DIGITS = 20
 
 REQUIRED = (1e-3, 1e-6, 1e-9, 1e-12)
-"""Position errors [m] for which the least time is looked up."""
+"""Position errors for which the table gives the least time [m]."""
 
 
 class Errors(msgspec.Struct, frozen=True, kw_only=True):
@@ -41,13 +41,13 @@ class Entry(msgspec.Struct, frozen=True, kw_only=True):
     """The result of an engine for a case at one effort.
 
     Attributes:
-        setting: the effort, in words; settings: all settings of the engine.
-        outcome, message: as in a run, by the tolerances of the case: a coarse effort is expected to
-            fail them.
+        setting: the effort as text; settings: all settings of the engine.
+        outcome, message: as in a run, by the tolerances of the case, which a coarse effort is
+            expected to exceed.
         against: the standard of the errors.
         residual: the engine's own largest constraint residual [m or -].
-        iterations: by sample: Newton's; in simulate mode, steps.
-        us_per_sample: warm; null unless all samples were reached.
+        iterations: Newton iterations per sample; in simulate mode, steps.
+        us_per_sample: warm time per sample [us]; null unless all samples were reached.
     """
 
     case: str
@@ -69,10 +69,11 @@ class Entry(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Needed(msgspec.Struct, frozen=True, kw_only=True):
-    """The least time of an engine for a required error; null with the reason if it is not met.
+    """The least time of an engine for a required error; null, with the reason, if no effort reaches
+    it.
 
     Attributes:
-        required: largest position error allowed [m].
+        required: largest allowed position error [m].
     """
 
     case: str
@@ -98,13 +99,13 @@ class FloorOf(msgspec.Struct, frozen=True, kw_only=True):
 
 @dataclass(frozen=True)
 class Contestant:
-    """An entry and its work: one warm solve of all samples; None without anything to time."""
+    """An entry and its work: one warm solve of all samples; None if nothing can be timed."""
 
     entry: Entry
     work: Callable[[], Trajectory] | None
 
     def timed(self, seconds: Spread | None) -> Entry:
-        """The entry with the time of its work."""
+        """Return the entry with the time of its work."""
         if seconds is None:
             return self.entry
         return msgspec.structs.replace(
@@ -113,10 +114,10 @@ class Contestant:
 
 
 def with_truth(case: Case, tol: float) -> Case:
-    """Return the case with a reference for its positions: its own, or one proved here.
+    """Return the case with a reference for its positions: its own, or a proved one.
 
     Raises:
-        KincheckError: there is none, and python-flint is missing to prove one.
+        KincheckError: there is none, and proving one needs python-flint, which is missing.
     """
     if all(output.name in case.reference for output in case.outputs):
         return case
@@ -126,16 +127,16 @@ def with_truth(case: Case, tol: float) -> Case:
 
 
 def efforts_of(engine: Engine) -> Mapping[str, Engine]:
-    """Return the engine at all its efforts; an engine without efforts alone."""
-    return engine.efforts() if isinstance(engine, Measurable) else {"as it comes": engine}
+    """Return the engine at all its efforts, or alone if it has no efforts."""
+    return engine.efforts() if isinstance(engine, Measurable) else {"default": engine}
 
 
 def contestants(case: Case, engines: Mapping[str, Engine], tol: float) -> list[Contestant]:
-    """Return an engine at several efforts, each after a solve of the case; one alone if it cannot
-    solve it.
+    """Return each engine at several efforts, after one solve of the case; only one effort if it
+    cannot solve the case.
 
     Args:
-        case: with its truth.
+        case: the case with its reference.
     """
     found: list[Contestant] = []
     for setting, engine in engines.items():
@@ -213,7 +214,7 @@ def _fastest(mine: Sequence[Entry], required: float) -> Needed:
         return Needed(**of, setting=best.setting, us_per_sample=us)
     errors = [e.errors.position for _, e in timed if e.errors.position is not None]
     if errors:
-        reason = f"none of its efforts: the best has {min(errors):.1e} m"
+        reason = f"no effort reaches it: the best error is {min(errors):.1e} m"
     elif timed:
         reason = "no position error is known"
     else:

@@ -1,4 +1,4 @@
-"""Cost of the first use, and memory: each figure is of a fresh process, and the kinds of processes
+"""Cost of the first use, and memory: each measurement is a new process, and the kinds of processes
 take turns.
 """
 
@@ -22,12 +22,12 @@ from ...harness.engine import Engine, may_run_here
 from .cold_start import FIRST, STAGES
 from .rounds import Spread, spread
 
-# A process takes a second: as many rounds as of solves would take minutes.
+# Fewer rounds than for solves: a process takes a second.
 MOST_ROUNDS = 5
 
 NUMPY = "import numpy"
 EMPTY, CACHED = "native, first use, empty code cache", "native, first use, code from the cache"
-# On Linux; getrusage there counts the memory of the process that it was started from as well.
+# For Linux, where getrusage also counts the memory of the parent process.
 _TELL = """
 try:
     with open("/proc/self/status") as lines:
@@ -45,7 +45,7 @@ from kincheck.core import solve
 clock.append(perf_counter())
 from kincheck.core.studies.bench import cold_start
 cold_start.first_use(clock){_TELL}"""
-# what the console script does, with everything in one process, so that its memory is all there is
+# as the console script, but in one process, so that its memory is the total
 _RUN = f"""
 import sys
 from kincheck.core.cli.main import main
@@ -56,10 +56,10 @@ class Process(msgspec.Struct, frozen=True, kw_only=True):
     """A kind of process.
 
     Attributes:
-        seconds: from its start to its end.
-        status: exit status of the last: of a run, 1 is a deviation.
-        stages: seconds of its parts, for the first use of the native engine.
-        peak_mb: the largest memory held [MB]; null if the system hides it.
+        seconds: time from start to end [s].
+        status: exit status of the last process; 1 of a run is a deviation.
+        stages: time of each stage, for the first use of the native engine [s].
+        peak_mb: largest memory [MB]; null if the system does not report it.
     """
 
     what: str
@@ -70,13 +70,13 @@ class Process(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def beyond_numpy(self) -> float | None:
-        """Seconds from the import of numpy to the first solution."""
+        """Time from the import of numpy to the first solution [s]."""
         return sum(self.stages[name].median for name in FIRST) if self.stages else None
 
 
 @dataclass
 class _Kind:
-    """The command of a kind of process, and its findings so far."""
+    """The command of a kind of process, and its measurements so far."""
 
     what: str
     code: str
@@ -93,11 +93,11 @@ class _Kind:
 def measure_processes(
     case: Case, name: str, engines: Sequence[Engine], tol: float, rounds: int
 ) -> list[Process]:
-    """Start processes: importing numpy, the first use of the native engine, and `kincheck run` with
-    each engine.
+    """Measure processes that import numpy, that use the native engine for the first time, and that
+    run `kincheck run` with each engine.
 
     Args:
-        name: of the case, as on the command line.
+        name: name of the case on the command line.
     """
     rounds = min(rounds, MOST_ROUNDS)
     given = pickle.dumps((case, tol))
@@ -110,17 +110,17 @@ def measure_processes(
         ]
         for engine in engines:
             mode = "" if engine.mode == "projection" else f" --mode {engine.mode}"
-            asked = f"--engine {engine.name}{mode}"
-            arguments = ["run", name, *asked.split(), "--jobs", "0"]
+            options = f"--engine {engine.name}{mode}"
+            arguments = ["run", name, *options.split(), "--jobs", "0"]
             kinds.append(
                 _Kind(
-                    f"kincheck run {asked}",
+                    f"kincheck run {options}",
                     _RUN,
                     arguments,
                     rounds=rounds if may_run_here(engine) else 1,
                 )
             )
-        # fills the cache, and the system's of files
+        # fills the code cache, and the file cache of the system
         _once(_Kind(CACHED, _FIRST_USE, given=given, folder=kept), kept)
         for turn in range(rounds):
             for kind in kinds:
@@ -131,7 +131,7 @@ def measure_processes(
 
 def _once(kind: _Kind, cache: Path) -> None:
     environment = {key: value for key, value in os.environ.items() if key != "KINCHECK_HISTORY"}
-    if kind.given:  # `kincheck run` is timed as a user has it, with the user's own cache
+    if kind.given:  # `kincheck run` is timed as for a user, with the user's cache
         environment["XDG_CACHE_HOME"] = str(cache)
     begin = perf_counter()
     done = subprocess.run(

@@ -1,4 +1,4 @@
-"""A ring of coupled loops of any size with a known motion: no loop can be solved by itself."""
+"""A ring of coupled loops of any size with a known motion: no loop can be solved alone."""
 
 from __future__ import annotations
 
@@ -9,36 +9,36 @@ from ...mechanism.drivers import JointAngle
 from ...mechanism.mechanism import Body, Mechanism, Point, Vector
 
 LEAN = 0.3
-"""Of the cranks at design [rad]; a quarter turn from upright the ring is singular."""
+"""Angle of the cranks at design [rad]; a quarter turn from upright the ring is singular."""
 BEFORE, AFTER = 1.0, 0.25
-"""Heights of a plate's pins above its ball [m]; were they alike, errors would grow by the square of
-the ring's length.
+"""Heights of a plate's pins above its ball [m]; with equal heights, errors would grow with the
+square of the ring's length.
 """
 UP: Vector = (0.0, 0.0, 1.0)
 
 
 def pivot(k: int, cranks: int) -> float:
-    """Return the pivot of a crank along x [m]: out in steps of two, and back between them, so the
-    last is near the first.
+    """Return the position of a crank's pivot along x [m]: outwards in steps of two and back in
+    between, so that the last is near the first.
     """
     return 2.0 * k if 2 * k < cranks else 2.0 * (cranks - k) - 1.0
 
 
 def tip(k: int, cranks: int, turn: float = 0.0) -> Vector:
-    """Return the tip of a crank at a turn of the driver [m]: all turn alike."""
+    """Return the tip of a crank at a turn of the driver [m]; all cranks turn alike."""
     return pivot(k, cranks) + math.sin(LEAN - turn), math.cos(LEAN - turn), 0.0
 
 
 def ring(cranks: int) -> Mechanism:
-    """N parallel unit cranks in a ring, three or more, all but the first tied to both neighbours by
-    a plate; the first is driven.
+    """Return three or more parallel unit cranks in a ring; a plate ties each crank but the first,
+    which is driven, to both neighbours.
 
     A plate holds a ball of its crank, and by two pins in grooves along the tips of the cranks
     before and after it. Ball and pins leave one equation between three angles, BEFORE d_k+1 =
     -AFTER d_k between their differences at design, so none of the 2 N - 2 loops can be solved
-    before the others. There are 12 N - 6 unknowns and as many rows. As the chain of IFToMM's
-    benchmark A02, made of parallelograms, it moves in a known way: every crank turns as the first,
-    every plate goes round without turning.
+    before the others. There are 12 N - 6 unknowns and as many rows. Like the chain of
+    parallelograms of IFToMM's benchmark A02, it has a known motion: every crank turns like the
+    first, and every plate moves without turning.
     """
     tips = [tip(k, cranks) for k in range(cranks)]
     joints: list[Joint] = [

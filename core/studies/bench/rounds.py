@@ -1,5 +1,5 @@
-"""Comparable times: contestants take turns in one process, so other load of the machine meets all
-of them.
+"""Comparable times: contestants take turns in one process, so that other load of the machine
+affects all of them.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from typing import TypeVar
 import msgspec
 import numpy as np
 
-# A turn is long against the clock's resolution and short against what interrupts a process: quick
-# work is done several times.
+# Duration of a turn [s]: long against the clock's resolution, short against interruptions. Quick
+# work is repeated in a turn.
 TURN = 2e-3
-# Of the first calls one is as quick as all that follow, if programs are compiled at once. What is
-# slow is called less [s].
+# Number of first calls, one of which runs at full speed if programs are compiled at once; and the
+# budget that limits slow work [s].
 FIRST, PATIENCE = 16, 0.5
 
 Key = TypeVar("Key")
@@ -25,7 +25,7 @@ Work = Callable[[], object]
 
 
 class Spread(msgspec.Struct, frozen=True, kw_only=True):
-    """A time over several rounds: median, quartiles and the least, all in the unit of its place."""
+    """A time over several rounds: median, quartiles and minimum; the owner states the unit."""
 
     least: float
     median: float
@@ -34,9 +34,7 @@ class Spread(msgspec.Struct, frozen=True, kw_only=True):
     rounds: int
 
     def times(self, factor: float) -> Spread:
-        """Return the same spread in another unit, or of another amount: all times multiplied by the
-        factor.
-        """
+        """Return the spread with all times multiplied by a factor, for another unit or amount."""
         least, median, lower, upper = (
             factor * each for each in (self.least, self.median, self.lower, self.upper)
         )
@@ -44,7 +42,7 @@ class Spread(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def spread(values: Sequence[float]) -> Spread:
-    """Return the spread of values, one a round."""
+    """Return the spread of values, one per round."""
     least, lower, median, upper = np.percentile(values, (0.0, 25.0, 50.0, 75.0)).tolist()
     return Spread(least=least, median=median, lower=lower, upper=upper, rounds=len(values))
 
@@ -52,21 +50,20 @@ def spread(values: Sequence[float]) -> Spread:
 def take_turns(
     contestants: Mapping[Key, Work],
     rounds: int,
-    tell: Callable[[float], object] = lambda done: None,
+    progress: Callable[[float], object] = lambda done: None,
 ) -> dict[Key, Spread]:
-    """Return the seconds of one call of each contestant, over rounds with a turn of each.
+    """Return the seconds of one call of each contestant, over rounds in which each has a turn.
 
-    Each is called before all rounds. Quick work is called once more before each of its turns,
-    untimed: this fills the caches after the contestant before it, for all alike.
-    Python's garbage is collected between rounds only. `tell` is called before each round, with the
-    finished part of all.
+    Each is called before all rounds. Quick work is also called before each turn, untimed, to refill
+    the caches after the previous contestant. Python's garbage is collected only between rounds.
+    `progress` is called before each round with the finished share.
     """
     calls = {key: _calls(work) for key, work in contestants.items()}
     times: dict[Key, list[float]] = {key: [] for key in contestants}
     enabled = gc.isenabled()
     try:
         for number in range(rounds):
-            tell(number / rounds)
+            progress(number / rounds)
             gc.collect()
             gc.disable()
             for key, work in contestants.items():
@@ -83,9 +80,7 @@ def _calls(work: Work) -> int:
 
 
 def warmed(work: Work, clock: Callable[[], float] | None = None) -> float:
-    """Seconds of a call by a clock, the least of some: in the first, programs may be compiled, once
-    for all.
-    """
+    """Return the least time of several calls by a clock [s]: a first call may compile."""
     least, begin, clock = math.inf, perf_counter(), clock or perf_counter
     for _ in range(FIRST):
         before = clock()

@@ -19,19 +19,19 @@ from .rounds import Spread, take_turns
 from .size import LEAN, chain
 
 TURN, SAMPLES = 0.8, 64
-"""Angle to both sides [rad] and driver values of a sweep."""
+"""Range to both sides [rad] and number of driver values of a sweep."""
 TOL = 1e-12
 """Largest accepted residual, relative to the mechanism's size."""
 
 
 class Scaling(msgspec.Struct, frozen=True, kw_only=True):
-    """A mechanism of one size, solved in one way: position, velocity and acceleration of one point
-    far from the driver.
+    """A mechanism of one size, solved by one method: position, velocity and acceleration of one
+    point far from the driver.
 
     Attributes:
-        size: number of loops of the chain, of cranks of the ring.
-        residual: largest of a constraint [m].
-        error: of the point's position [m].
+        size: number of loops of the chain, or of cranks of the ring.
+        residual: largest constraint residual [m].
+        error: position error of the point [m].
     """
 
     mechanism: str
@@ -95,6 +95,6 @@ def _row(name: str, n: int, mechanism: Mechanism, found: Trajectory, seconds: Sp
 
 
 def exponent(small: Scaling, large: Scaling) -> float:
-    """Return the power of the size by which the cost grows between two rows."""
+    """Return the exponent of the size in the growth of the cost between two rows."""
     ratio = large.us_per_value.median / small.us_per_value.median
     return math.log(ratio) / math.log(large.unknowns / small.unknowns)

@@ -1,10 +1,10 @@
 """Cost against the size of a mechanism: a chain and a ring of loops, solved by every engine in
 projection mode.
 
-The loops of the chain are those of IFToMM's benchmark A02, unit cranks and couplers, with a ball
-and a cross at each coupler in place of revolutes, so no row is redundant. In the ring (see
-`ring`) none can be solved before the others. Every crank turns as the first one does: the truth is
-a closed form.
+The chain has the loops of IFToMM's benchmark A02, unit cranks and couplers, with a ball and a
+universal joint at each coupler in place of revolutes, so no row is redundant. In the ring (see
+`ring`) no loop can be solved before the others. Every crank turns like the first: the truth is a
+closed form.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ from .rounds import Spread, take_turns, warmed
 LOOPS = (1, 2, 4, 8, 16)
 CRANKS = (4, 8, 16, 24, 48)
 MANY = (16, 100, 1000, 5000)
-"""For what solves a chain loop by loop."""
-# Of the cranks at design [rad]; a quarter turn from upright the links are in line and the motion
-# branches.
+"""Chain lengths for an engine that solves loop by loop."""
+# Angle of the cranks at design [rad]; a quarter turn from upright the links are in line and the
+# motion branches.
 LEAN, TURN = 0.3, 0.8
 SAMPLES = 64
-# An engine that has taken longer than this for all samples of one size is not tried with the next
-# [s]: it would fill the rounds.
+# Largest time for all samples of one size [s]; a slower engine is not tried with the next size,
+# which would fill the rounds.
 LONGEST = 0.1
 CHAIN, RING = "chain of four-bar loops", "ring of cranks"
 
@@ -48,9 +48,9 @@ class Size(msgspec.Struct, frozen=True, kw_only=True):
     """A mechanism of a number of loops, or cranks, solved by an engine.
 
     Attributes:
-        outcome: null if it was not tried, and the message says why.
-        error: largest position error of the last crank's end [m]; residual: the engine's own; null
-            if it was not solved.
+        outcome: null if the engine was not tried, for the reason in the message.
+        error: largest position error of the last crank's end [m]; residual: the engine's residual;
+            null if not solved.
         us_per_sample: null unless all samples were reached.
     """
 
@@ -68,7 +68,7 @@ class Size(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def chain(loops: int) -> Case:
-    """Return parallel cranks at (k, 0), tied by couplers; the first one turns to both sides."""
+    """Return parallel cranks at (k, 0) with couplers in between; the first turns to both sides."""
     s, c, n, z = math.sin(LEAN), math.cos(LEAN), range(loops), (0.0, 0.0, 1.0)
     cranks = [
         Revolute(f"pivot{k}", "ground", f"crank{k}", (float(k), 0.0, 0.0), z)
@@ -92,7 +92,7 @@ def chain(loops: int) -> Case:
 
 
 def circle(cranks: int) -> Case:
-    """The ring; its crank farthest from the driver is looked at."""
+    """Return the ring; its output is the crank farthest from the driver."""
     far = cranks // 2
     return _turned(
         ring(cranks),
@@ -103,10 +103,10 @@ def circle(cranks: int) -> Case:
 
 
 def _turned(mechanism: Mechanism, tip: str, at: float, source: str) -> Case:
-    """Return a case whose driver turns to both sides; the tip's crank has its pivot at `at` [m]."""
+    """Return a case whose driver turns to both sides; `at` is the pivot of the tip's crank [m]."""
     turn = np.linspace(-TURN, TURN, SAMPLES)
     x, y = np.sin(LEAN - turn), np.cos(LEAN - turn)
-    why = "a thousand round-offs of a loop, by the number of loops they add up over"
+    why = "a thousand round-offs per loop, summed over the loops"
     atol = 1e-12 * len(mechanism.moving)
     outputs = tuple(
         Output(name, tip, direction, False, atol, 0.0, why)
@@ -127,21 +127,24 @@ def _turned(mechanism: Mechanism, tip: str, at: float, source: str) -> Case:
 BY_COMPONENTS = NativeEngine(
     NativeSolver(method=Method.BY_COMPONENTS), name=f"{STANDARD}, by components"
 )
-"""The native engine, a component of the mechanism after the other, similar ones by the same
-code.
+"""The native engine, one component of the mechanism after another; similar components share code.
 """
 
 
 def measure_sizes(engines: Sequence[Engine], tol: float, rounds: int) -> list[Size]:
-    """Solve chains and rings of all lengths with all engines, in turns; the native engine long
-    chains, too, by components.
+    """Solve chains and rings of all lengths with all engines, in turns, and long chains with the
+    native engine by components.
     """
-    asked: list[tuple[str, Engine, Sequence[int]]] = [(CHAIN, engine, LOOPS) for engine in engines]
+    requested: list[tuple[str, Engine, Sequence[int]]] = [
+        (CHAIN, engine, LOOPS) for engine in engines
+    ]
     if any(isinstance(engine, NativeEngine) for engine in engines):
-        asked.insert(1, (CHAIN, BY_COMPONENTS, MANY))
-    asked += [(RING, engine, CRANKS) for engine in engines]
+        requested.insert(1, (CHAIN, BY_COMPONENTS, MANY))
+    requested += [(RING, engine, CRANKS) for engine in engines]
     found = [
-        each for family, engine, ladder in asked for each in _solved(family, engine, ladder, tol)
+        each
+        for family, engine, ladder in requested
+        for each in _solved(family, engine, ladder, tol)
     ]
     work = {
         k: each.work
@@ -159,7 +162,7 @@ def measure_sizes(engines: Sequence[Engine], tol: float, rounds: int) -> list[Si
 def _solved(
     family: str, engine: Engine, ladder: Sequence[int], tol: float
 ) -> Iterator[tuple[Size, Contestant | None]]:
-    """Return an engine's chains or rings, the shortest first, solved and not yet timed."""
+    """Return an engine's chains or rings, the shortest first, solved but not timed."""
     slow = ""
     for loops in ladder:
         case = chain(loops) if family == CHAIN else circle(loops)
@@ -184,7 +187,7 @@ def _solved(
         }
         yield msgspec.structs.replace(size, **facts, error=entry.errors.position), each
         if each.work is not None:
-            # on a busy machine no other engine drops out than on a quiet one
+            # processor time, so that the same engines drop out on a busy machine as on a quiet one
             seconds = warmed(each.work, process_time)
             slow = (
                 f"not tried: {loops} took {seconds:.2g} s for {SAMPLES} samples"
@@ -194,10 +197,11 @@ def _solved(
 
 
 def growth(sizes: Sequence[Size]) -> tuple[int, int, float] | None:
-    """Two numbers of loops and the exponent of an engine's cost between them; None where it was not
-    timed twice.
+    """Return two numbers of loops, and the exponent of an engine's cost between them; None without
+    two times.
 
-    The larger is its largest, the smaller its first of a hundred or more, or else the next.
+    The larger is its largest, the smaller its first of a hundred or more, or else the one before
+    the largest.
     """
     timed = [
         (each.loops, each.us_per_sample.median) for each in sizes if each.us_per_sample is not None

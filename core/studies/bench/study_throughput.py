@@ -1,5 +1,5 @@
-"""Cost of a tolerance study by threads: variants drawn, solved and reduced, as `kincheck sweep`
-does it.
+"""Cost of a tolerance study against threads: variants are drawn, solved and reduced, as by
+`kincheck sweep`.
 """
 
 from __future__ import annotations
@@ -22,12 +22,11 @@ from .batch import SCATTER, SEED
 from .peak import Peak
 from .rounds import Spread, spread
 
-# Chunks as large as those of a million variants, and as many for each thread to end beside the
-# other.
+# Chunks of the size for a million variants, enough of them to let all threads end together.
 VARIANTS = 262_144
-# Of some seconds each: their median is known well.
+# Rounds take some seconds each, so a few give a good median.
 MOST_ROUNDS = 8
-# Of the peak kernel in a round: as long as some chunks of a study take.
+# Calls of the peak kernel in a round: as long as several chunks of a study.
 CALLS = 1000
 
 
@@ -35,11 +34,11 @@ class StudyRate(msgspec.Struct, frozen=True, kw_only=True):
     """A study on a number of threads.
 
     Attributes:
-        us_per_sample: of the whole machine, by sample and variant.
-        times: as fast as on one thread, by round; that of one thread is one.
-        peak_times: the same of the peak kernel, which needs no memory: the machine's share; null if
-            unknown.
-        unsolved: variants without a solution somewhere.
+        us_per_sample: time of the whole machine per sample and variant [us].
+        times: speed relative to one thread, by round; 1 for one thread.
+        peak_times: relative speed of the peak kernel, which needs no memory: the machine's share;
+            null if unknown.
+        unsolved: number of variants without a solution at some sample.
     """
 
     case: str
@@ -52,8 +51,8 @@ class StudyRate(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def measure_studies(case: Case, tol: float, rounds: int, peak: Peak | None) -> list[StudyRate]:
-    """Sweep over designs on one thread and on two, in turns; on one only without a second
-    processor.
+    """Sweep over designs on one thread and on two, in turns; without a second processor only on
+    one.
     """
     variation, jobs = _every_hardpoint(case), range(1, 1 + min(2, os.cpu_count() or 1))
     seconds: dict[int, list[float]] = {each: [] for each in jobs}
@@ -91,7 +90,7 @@ def _times(seconds: dict[int, list[float]], jobs: int) -> Spread:
 
 
 def _side_by_side(work: Callable[[], object], jobs: int) -> float:
-    """Seconds of as many calls in each of some threads."""
+    """Return the time of equally many calls in each thread [s]."""
     begin = perf_counter()
     with ThreadPoolExecutor(jobs) as pool:
         for done in [pool.submit(lambda: [work() for _ in range(CALLS)]) for _ in range(jobs)]:
@@ -100,7 +99,7 @@ def _side_by_side(work: Callable[[], object], jobs: int) -> float:
 
 
 def _every_hardpoint(case: Case) -> Variation:
-    """Return all points and lengths by themselves, as in batches."""
+    """Return variations of all points and lengths, independent as in batches."""
     known, scale = places(case.mechanism), SCATTER * size(case)
     varied = [name for name, kind in kinds(case.mechanism).items() if kind is not Kind.DIRECTION]
     coordinates = [

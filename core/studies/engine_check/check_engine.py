@@ -1,8 +1,8 @@
-"""Examination of an engine from outside, against the promises of the engine protocol.
+"""Check of an engine from outside against the engine protocol.
 
 The engine solves a probe of every joint type, mechanisms of several topologies, a motion up to a
-fold and a joint unknown to all engines, always in a worker process. Each check is a row of the
-report: the worst number found, the limit with its reason, the place.
+fold and a joint that no engine knows, always in a worker process. Each check is a row of the
+report: the worst number, the limit with its reason, the place.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from .unknown_joint import UnknownJoint
 MODES = ("projection", "simulate")
 LOOPS = ("python", "simulator", "compiled")
 REACH = np.linspace(-3.0, 3.0, 61)
-"""Angles of the probe of a revolute joint [rad]: rods lock it at -1.8 and 2.4."""
+"""Angles of the probe of a revolute joint [rad]; rods lock it at -1.8 and 2.4."""
 AGREE_WHY = "largest error over the tolerance of its output"
 SAME_WHY = "the same bits from a new model, in another process and order"
 VERDICTS = {
@@ -57,7 +57,7 @@ def check_engine(
         native: the native engine, the standard of cases without a reference.
         topologies: further cases, by a word on their structure.
         tol: largest accepted constraint residual, as for `Engine.solve`.
-        limits: of a pair; those of the command line by default.
+        limits: limits of a pair; by default those of the command line.
         progress: called with each record.
     """
     found = [*_protocol(engine)]
@@ -95,7 +95,7 @@ def _beyond() -> Case:
 
 def _protocol(engine: Engine) -> Iterator[Finding]:
     """Check attributes, version and transport; the rest needs all of them."""
-    given: Any = engine  # not known yet to be one
+    given: Any = engine  # may lack members of the protocol
     facts = (
         ("name", given.name, isinstance(given.name, str) and given.name, "a text"),
         ("mode", given.mode, given.mode in MODES, " or ".join(MODES)),
@@ -109,14 +109,16 @@ def _protocol(engine: Engine) -> Iterator[Finding]:
     try:
         pickle.loads(pickle.dumps(engine))
     except Exception as error:  # any error of the engine's own code
-        told = f"{type(error).__name__}: {error}; worker processes need an engine that pickle takes"
-        yield Finding("isolation: pickle", Verdict.FAIL, message=told)
+        message = (
+            f"{type(error).__name__}: {error}; worker processes need an engine that pickle takes"
+        )
+        yield Finding("isolation: pickle", Verdict.FAIL, message=message)
         return
     yield Finding("isolation: pickle", Verdict.PASS)
     (version,) = versions([engine])
-    told = "version() gives none: it is not installed, or cannot be imported"
+    message = "version() returns None: the engine is not installed, or cannot be imported"
     verdict = Verdict.FAIL if version is None else Verdict.PASS
-    yield Finding("version", verdict, message=told if version is None else version)
+    yield Finding("version", verdict, message=message if version is None else version)
 
 
 def _compared(name: str, record: Record) -> Finding:
@@ -128,14 +130,14 @@ def _compared(name: str, record: Record) -> Finding:
     ]
     worst, where = max(shares, default=(None, ""))
     verdict = VERDICTS.get(record.outcome, Verdict.FAIL)
-    told = "" if record.outcome is Outcome.PASS else f"{record.outcome.shown}: {record.message}"
+    message = "" if record.outcome is Outcome.PASS else f"{record.outcome.shown}: {record.message}"
     limit = None if worst is None else 1.0
     why = "" if worst is None else AGREE_WHY
-    return Finding(name, verdict, worst, limit, why, row=where, message=told)
+    return Finding(name, verdict, worst, limit, why, row=where, message=message)
 
 
 def _folded(record: Record, attempt: Attempt) -> Finding:
-    """Check samples behind a fold: no values, and a message with the reason."""
+    """Check samples beyond a fold: they have no values, and a message gives the reason."""
     if record.outcome is Outcome.UNSUPPORTED:
         return Finding(BEYOND, Verdict.SKIP, message=record.message)
     beyond = sum(each.contradicted or 0 for each in record.errors.values())
@@ -144,42 +146,42 @@ def _folded(record: Record, attempt: Attempt) -> Finding:
     problems = [
         f"ends with {record.outcome.shown}: {record.message}" if record.solved is None else "",
         "has values at samples that cannot be reached; mark them unsolved" if beyond else "",
-        "" if reached else "reaches no sample, though the design is among them",
+        "" if reached else "reaches no sample, although the design is one of them",
         "gives no message" if silent else "",
     ]
-    told = "; ".join(filter(None, problems))
+    message = "; ".join(filter(None, problems))
     return Finding(
         BEYOND,
-        Verdict.FAIL if told else Verdict.PASS,
+        Verdict.FAIL if message else Verdict.PASS,
         float(beyond),
         0.0,
         "values at samples that cannot be reached",
-        message=told or f"reaches {reached} of {len(REACH)} samples",
+        message=message or f"reaches {reached} of {len(REACH)} samples",
     )
 
 
 def _unknown(record: Record) -> Finding:
-    """Check a joint of an unknown type: refused with a reason, or solved rightly."""
+    """Check a joint of an unknown type: it is refused with a reason, or solved correctly."""
     solved = record.outcome in (Outcome.PASS, Outcome.UNJUDGED)
     good = solved or (record.outcome is Outcome.UNSUPPORTED and record.message)
-    told = record.outcome.shown + (f": {record.message}" if record.message else "")
+    message = record.outcome.shown + (f": {record.message}" if record.message else "")
     remedy = "" if good else "; unsupported() is to return the reason"
-    return Finding(UNKNOWN, Verdict.PASS if good else Verdict.FAIL, message=told + remedy)
+    return Finding(UNKNOWN, Verdict.PASS if good else Verdict.FAIL, message=message + remedy)
 
 
 def _same(
     name: str, pairs: Sequence[Pair], first: Mapping[str, Attempt], solver: Solver
 ) -> Finding:
-    """Check the answers of repeated solves: they are the same."""
+    """Check that repeated solves give the same answers."""
     worst, where = 0.0, ""
     for index, attempt in solver(pairs):
         case = pairs[index].case.name
         off = _difference(first[case], attempt)
         if off > worst:
             worst, where = off, case
-    told = "keeps a state from one case to the next, or uses random numbers" if worst else ""
+    message = "keeps a state from one case to the next, or uses random numbers" if worst else ""
     verdict = Verdict.FAIL if worst else Verdict.PASS
-    return Finding(name, verdict, worst, 0.0, SAME_WHY, row=where, message=told)
+    return Finding(name, verdict, worst, 0.0, SAME_WHY, row=where, message=message)
 
 
 def _difference(one: Attempt, other: Attempt) -> float:

@@ -1,4 +1,4 @@
-"""Velocities and accelerations of an engine against differences of its own positions."""
+"""Check of an engine's velocities and accelerations against differences of its positions."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from ..findings import Finding, Verdict
 from ..joint_check.loop import WEIGHTS, differences
 
 NOISE = 1e-9
-"""Error of the compared values, over their largest one: a thousand times the residual tolerance."""
-RATES_WHY = "over what the differences change by as their step is doubled"
+"""Error of the compared values relative to the largest: a thousand times the residual tolerance."""
+RATES_WHY = "over the change of the differences with a doubled step"
 
 
 def rates(solved: Sequence[tuple[Case, Record]]) -> Iterator[Finding]:
@@ -38,12 +38,14 @@ def rates(solved: Sequence[tuple[Case, Record]]) -> Iterator[Finding]:
             yield Finding(f"rates: {after}", Verdict.SKIP, message="the engine gives none")
             continue
         verdict = Verdict.PASS if worst <= 1.0 else Verdict.FAIL
-        told = "" if worst <= 1.0 else f"is not the rate of its {before}"
-        yield Finding(f"rates: {after}", verdict, worst, 1.0, RATES_WHY, row=where, message=told)
+        message = "" if worst <= 1.0 else f"is not the rate of its {before}"
+        yield Finding(f"rates: {after}", verdict, worst, 1.0, RATES_WHY, row=where, message=message)
 
 
 def _step(case: Case) -> float | None:
-    """Return the time between samples [s]; None if the sweep is short, uneven or of several."""
+    """Return the time between samples [s]; None if the sweep is short, uneven or has several
+    drivers.
+    """
     steps = np.diff(case.sweep.path.times)
     if case.sweep.driver == TIME or case.sweep.motions or len(steps) < 3 * len(WEIGHTS):
         return None
@@ -64,5 +66,5 @@ def _share(output: OutputSeries, before: str, after: str, dt: float) -> float | 
 
 
 def _beside(slopes: Array, coarse: Array) -> Array:
-    """Return the fine differences at the samples of the coarse ones."""
+    """Return the fine differences at the samples of the coarse differences."""
     return slopes[3::2][: len(coarse)]

@@ -1,4 +1,4 @@
-"""A joint unknown to all engines, and not equivalent to a chain of known joints."""
+"""A joint that no engine knows, and that no chain of known joints replaces."""
 
 from __future__ import annotations
 
@@ -31,4 +31,4 @@ class UnknownJoint(Joint):
         return p.Dot20(normal, i.arm(point), j.arm(point), ZERO), p.Dot10(normal, along)
 
 
-UnknownJoint.type = "unknown_to_engines"  # set here, it is not registered for case files
+UnknownJoint.type = "unknown_to_engines"  # set here, so that it is not registered for case files

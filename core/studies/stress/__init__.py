@@ -1,3 +1,3 @@
-"""Stress: situations that break kinematic solvers, independent reference
-motions, engines' outcomes.
+"""Stress test: situations that break kinematic solvers, independent reference motions, and the
+outcomes of engines.
 """

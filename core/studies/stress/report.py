@@ -1,6 +1,4 @@
-"""Tables of a stress run: shares by family and engine, findings, proofs,
-accepted contradictions.
-"""
+"""Report of a stress run: shares by family and engine, findings, proofs, contradictions."""
 
 from __future__ import annotations
 
@@ -15,8 +13,8 @@ from .verdicts import ELSEWHERE, SILENT, Verdict
 NAME = "stress"
 SHORT = {
     Verdict.RIGHT: "right",
-    Verdict.REFUSED_RIGHTLY: "refused rightly",
-    Verdict.REFUSED_WRONGLY: "refused wrongly",
+    Verdict.REFUSED_RIGHTLY: "correctly refused",
+    Verdict.REFUSED_WRONGLY: "wrongly refused",
     Verdict.SILENTLY_WRONG: "silently wrong",
     Verdict.WRONG_FORCE: "wrong force",
     Verdict.UNDETERMINED_FORCE: "undetermined force given",
@@ -25,7 +23,7 @@ SHORT = {
     Verdict.UNSUPPORTED: "unsupported",
 }
 OF_FORCES = (Verdict.WRONG_FORCE, Verdict.UNDETERMINED_FORCE, Verdict.MISSING_FORCE)
-"""Verdicts with a column only if there are any."""
+"""Verdicts that have a column only if they occur."""
 ERRORS = (*QUANTITIES, "force")
 NOTES = (
     (
@@ -35,8 +33,8 @@ NOTES = (
         " that."
     ),
     (
-        "Refused rightly: nothing, or a singular pose, is there, and the message says so. Not"
-        " judged: nearer to the end of the motion than the truth can tell, or behind a bifurcation."
+        "Correctly refused: no pose or a singular pose is there, and the message says so. Not"
+        " judged: too near to the end of the motion for the truth, or behind a bifurcation."
         " Shares are of the samples that the engine supports."
     ),
 )
@@ -63,9 +61,7 @@ def report(found: Stress) -> Report:
 
 
 def headline(cells: Sequence[Cell]) -> str:
-    """Return the number of silently wrong samples among the examined ones, and the
-    number not examined.
-    """
+    """Return a phrase with the numbers of silently wrong, examined and unexamined samples."""
     count = {verdict: sum(cell.samples.get(verdict, 0) for cell in cells) for verdict in Verdict}
     apart = [
         f"{count[verdict]} {SHORT[verdict]}"
@@ -73,16 +69,16 @@ def headline(cells: Sequence[Cell]) -> str:
         if count[verdict]
     ]
     wrong, examined = sum(count[each] for each in SILENT), sum(map(_examined, cells))
-    said = (
+    sentence = (
         f"{wrong or 'None'} of {examined} samples silently wrong"
         if examined
         else "No sample was examined"
     )
-    return ", ".join([said, *apart])
+    return ", ".join([sentence, *apart])
 
 
 def _examined(cell: Cell) -> int:
-    """Return the number of samples with a verdict on an answer."""
+    """Return the number of samples whose answer has a verdict."""
     return (
         sum(cell.samples.values())
         - cell.samples.get(Verdict.UNJUDGED, 0)
@@ -91,7 +87,7 @@ def _examined(cell: Cell) -> int:
 
 
 def idle(found: Stress) -> list[str]:
-    """Return a line with the reason for each engine without any examined sample."""
+    """Return a line with the reason for each engine without an examined sample."""
     lines: list[str] = []
     for engine in dict.fromkeys(map(_engine, found.cells)):
         cells = [cell for cell in found.cells if _engine(cell) == engine]
@@ -163,7 +159,7 @@ def _verdict(found: Stress) -> str:
 
 
 def _counts(cell: Cell, shown: Sequence[Verdict]) -> list[str]:
-    """Return the number of samples by verdict, with the share of the supported ones."""
+    """Return the number of samples by verdict, with the share of the supported samples."""
     supported = sum(cell.samples.values()) - cell.samples.get(Verdict.UNSUPPORTED, 0)
     texts: list[str] = []
     for verdict in shown:
@@ -187,7 +183,7 @@ def _families(found: Stress) -> Section:
     return Section(
         "Families",
         [],
-        ["Made at random from the seed; a specimen is the same whatever else is run."],
+        ["Random, from the seed; a specimen does not depend on the rest of the run."],
         ["family", "what"],
         2,
         rows,
@@ -203,7 +199,7 @@ def _findings(findings: Sequence[Finding]) -> Section:
             f"{each.specimen} (number {each.number})",
             f"{each.value:.9g}",
             " ".join(map(_ratio, each.worst)),
-            each.message[:300] or "says nothing",
+            each.message[:300] or "no message",
             " ".join(filter(None, (each.file, *each.reduced))),
         ]
         for each in findings
@@ -229,11 +225,11 @@ def _proofs(found: Stress) -> Section:
         for p in found.proofs
     ]
     notes = [
-        "Krawczyk's test in ball arithmetic, about the engine's equations; the distance is over"
-        " what is round-off of an engine."
+        "Krawczyk's test in ball arithmetic on the engine's equations; the distance is relative"
+        " to the round-off bound of an engine."
     ]
     columns = ["family", "samples", "proved", "distance of the truth", "not proved"]
-    return Section("The truth, proved at random samples", [], notes, columns, 1, rows)
+    return Section("Proof of the truth at random samples", [], notes, columns, 1, rows)
 
 
 def _acceptances(found: Stress) -> Section:
@@ -250,14 +246,19 @@ def _acceptances(found: Stress) -> Section:
                 engine,
                 f"{accepted[-1].tilt:.1e} rad" if accepted else "never",
                 f"{min(refused):.1e} rad" if refused else "never",
-                told[-1] if told else "nothing is left over",
+                told[-1] if told else "no residual",
             ]
         )
-    columns = ["engine", "accepted up to", "refused from", "residual told, at the largest accepted"]
+    columns = [
+        "engine",
+        "accepted up to",
+        "refused from",
+        "reported residual, at the largest accepted",
+    ]
     return Section(
         "Contradictory hinges",
         [],
-        ["Of what cannot be avoided, by least squares over all rows."],
+        ["Unavoidable residual: by least squares over all rows."],
         columns,
         1,
         rows,

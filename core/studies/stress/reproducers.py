@@ -1,4 +1,4 @@
-"""Bad cases reduced and saved as case files, and case files judged again."""
+"""Reduction of bad cases to case files, and judgement of case files."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def judge(
 
 
 def judge_as(specimen: Specimen, case: Case, engine: Engine) -> Judgement:
-    """Judge a case in place of a specimen's own, by the specimen's reference and excuses."""
+    """Judge a case in place of a specimen's case, by the specimen's reference and excuses."""
     (answer,) = solve_all([Pair(case, engine, specimen.tol)])
     return judged(specimen, case, specimen.truth(case) if specimen.truth else None, answer)
 
@@ -64,7 +64,7 @@ def save(example: Example, folder: Path) -> Finding:
     if len(case.sweep.values) < len(example.case.sweep.values):
         words.append(f"samples {len(example.case.sweep.values)} to {len(case.sweep.values)}")
     if example.verdict is Verdict.SILENTLY_WRONG or not specimen.excused:
-        # a reduced case no longer has the closed form: its reference is the followed motion
+        # a reduced case has no closed form: its reference is the followed motion
         try:
             known = bad_by_itself(case)
         except KincheckError:
@@ -74,7 +74,7 @@ def save(example: Example, folder: Path) -> Finding:
             words += more
         else:
             words.append(
-                "judged by the family's own truth only: following the motion does not lead there"
+                "judged only by the truth of the family: following the motion does not lead there"
             )
     verdict = str(example.verdict).replace(",", "").replace(" ", "_")
     name = f"{finding.family}_{finding.engine}_{finding.mode}_{finding.number}_{verdict}.toml"

@@ -11,15 +11,15 @@ class Finding(msgspec.Struct, frozen=True, kw_only=True):
     """The smallest example of a bad outcome of an engine in a family.
 
     Attributes:
-        specimen, number: its name, and its number in the family; with the seed of the run, the
-            number reproduces it.
+        specimen, number: name, and number in the family, which with the seed of the run reproduces
+            the specimen.
         sample: number of the first bad sample; `value` is its value of the swept driver [m,
             rad or s].
         message: message of the engine.
         tol: largest accepted residual.
         worst: see `Cell`.
-        file: name of the case file, if one was written.
-        reduced: reductions of the case, in words.
+        file: name of the case file, if one is written.
+        reduced: reductions of the case, as text.
     """
 
     family: str
@@ -38,12 +38,12 @@ class Finding(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Cell(msgspec.Struct, frozen=True, kw_only=True):
-    """An engine in a family.
+    """Results of an engine in a family.
 
     Attributes:
         samples: number of samples by verdict.
         elsewhere: number of silently wrong samples in another assembly, or in none.
-        worst: largest error of position, velocity, acceleration and force of right samples, over
+        worst: largest errors of position, velocity, acceleration and force at correct samples, over
             the round-off bound.
         bad: number of specimens with a bad sample.
     """
@@ -78,8 +78,8 @@ class Proofs(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Acceptance(msgspec.Struct, frozen=True, kw_only=True):
-    """A specimen of contradictory geometry: whether it was accepted, the reported residual, and the
-    unavoidable one [m].
+    """A specimen of contradictory geometry: whether it was accepted, its reported residual, and its
+    unavoidable residual [m].
     """
 
     engine: str
@@ -90,12 +90,12 @@ class Acceptance(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Stress(msgspec.Struct, frozen=True, kw_only=True):
-    """A run.
+    """Results of a stress run.
 
     Attributes:
         abouts: description of each family.
         seconds: time of each part of the run [s].
-        unfinished: families that could not be run, with the reason.
+        unfinished: families that could not be run, with the reasons.
     """
 
     schema: Literal["kincheck-stress/1"] = "kincheck-stress/1"

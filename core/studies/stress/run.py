@@ -25,11 +25,10 @@ from .truth.proofs import distance_from_proof
 from .truth.reference_motion import Reach, Truth
 from .verdicts import BAD, Judgement, Verdict, described_wrong, judged
 
-# Smallest number of specimens of a small share, and smallest number of samples of each.
+# Fewest specimens of a small share, and fewest samples of each.
 FEWEST_SPECIMENS, FEWEST_SAMPLES = 4, 3
 COARSEST = 5
-# A proof takes milliseconds, and its equations take 100 times as long. Every other mechanism with
-# at most this many bodies is proved.
+# Every other mechanism of up to this many bodies is proved: setting up a proof takes long.
 LARGEST_PROVED = 6
 
 
@@ -46,7 +45,7 @@ class Example:
 
 @dataclass(frozen=True, eq=False)
 class Made:
-    """A specimen with its case, or the reason of its refusal, and its reference."""
+    """A specimen with its case, or the reason for its refusal, and its reference."""
 
     number: int
     samples: int
@@ -73,11 +72,11 @@ def stress(
     seed: int,
     command: str = "",
     prove: bool = True,
-    tell: Callable[[str, float], object] = lambda what, done: None,
+    progress: Callable[[str, float], object] = lambda what, done: None,
 ) -> tuple[Stress, list[Example]]:
     """Run all families; return the results and the smallest example of each bad engine and outcome.
 
-    `prove` proves a share of the followed samples and needs python-flint. `tell` gets the next
+    `prove` proves a share of the followed samples and needs python-flint. `progress` gets the next
     task and the finished part. A KincheckError is raised if this machine has no extended precision.
     """
     require_extended()
@@ -92,11 +91,13 @@ def stress(
                 samples=max(1, samples // len(families)),
                 seed=seed,
                 prove=prove,
-                tell=lambda what, done, before=number: tell(what, (before + done) / len(families)),
+                progress=lambda what, done, before=number: progress(
+                    what, (before + done) / len(families)
+                ),
             )
-        except KincheckError as error:  # the results of the other families are kept
+        except KincheckError as error:  # the other families keep their results
             found.unfinished[family.name] = str(error)
-            tell(f"{family.name}: not finished: {error}", (number + 1) / len(families))
+            progress(f"{family.name}: not finished: {error}", (number + 1) / len(families))
     results = Stress(
         kincheck=VERSION,
         command=command,
@@ -122,10 +123,10 @@ def _family(
     samples: int,
     seed: int,
     prove: bool,
-    tell: Callable[[str, float], object],
+    progress: Callable[[str, float], object],
 ) -> None:
     begun, parts = perf_counter(), 1 + len(engines)
-    tell(f"{family.name}: making {samples} samples", 0.0)
+    progress(f"{family.name}: making {samples} samples", 0.0)
     made = specimens(family, seed, samples)
     seconds["truth"] += (now := perf_counter()) - begun
     if prove:
@@ -133,13 +134,13 @@ def _family(
     seconds["proofs"] += (then := perf_counter()) - now
     count = f"{sum(each.samples for each in made)} samples of {len(made)} specimens"
     for number, engine in enumerate(engines, 1):
-        tell(f"{family.name}: {count} by {engine.name}", number / parts)
+        progress(f"{family.name}: {count} by {engine.name}", number / parts)
         _solve(family, engine, made, found)
     seconds["engines"] += perf_counter() - then
 
 
 def specimens(family: Family, seed: int, share: int) -> list[Made]:
-    """Return specimens with a share of samples in all."""
+    """Return specimens with a share of samples in total."""
     most = max(FEWEST_SAMPLES, share // FEWEST_SPECIMENS) if family.several else share
     found: list[Made] = []
     while (done := sum(one.samples for one in found)) < share:
@@ -150,9 +151,9 @@ def specimens(family: Family, seed: int, share: int) -> list[Made]:
 
 
 def specimen(family: Family, seed: int, number: int, most: int) -> Made:
-    """Return specimen `number` of a family; the rest of the run does not affect its mechanism."""
+    """Return specimen `number` of a family; its mechanism is independent of the rest of the run."""
     rng = np.random.default_rng([seed, zlib.crc32(family.name.encode()), number])
-    # a coarse sweep is harder to solve, a fine one has more samples to judge
+    # a coarse sweep is harder to solve, a fine sweep has more samples to judge
     fineness = float(rng.random()) ** 0.5
     wanted = int(COARSEST * (family.samples / COARSEST) ** fineness) if family.several else most
     samples = min(wanted, most)
@@ -290,7 +291,7 @@ def _proofs(family: str, made: Sequence[Made], seed: int) -> list[Proofs]:
         except (
             UnprovedError,
             SolveError,
-        ) as error:  # also: too near to a singular design
+        ) as error:  # also raised too near to a singular design
             reasons.append(f"{one.specimen.name}: {error}")
     return (
         [Proofs(family=family, tried=tried, proved=proved, worst=worst, reasons=reasons)]

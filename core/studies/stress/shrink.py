@@ -1,4 +1,4 @@
-"""Reduction of a bad case with the same outcome: fewer samples, points, bodies and digits."""
+"""Reduction of a bad case that keeps its outcome: fewer samples, points, bodies and digits."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from ...kinematics import require_driven
 from ...mechanism.mechanism import Mechanism
 
 Bad = Callable[[Case], bool]
-"""Function to tell whether a case still has the outcome; False if it cannot be judged."""
+"""Function that returns whether a case still has the outcome; False if it cannot be judged."""
 
-# Judging a candidate takes 0.1 s to a few seconds: a minute in all.
+# Largest number of candidates: each takes 0.1 s to a few seconds, all take about a minute.
 TRIES = 150
 
 
@@ -62,7 +62,7 @@ def fewer_samples(case: Case, sample: int, bad: Bad) -> Case:
 
 
 def reduced(case: Case, bad: Bad) -> tuple[Case, list[str]]:
-    """Return the smallest case found with the outcome, and the reductions in words."""
+    """Return the smallest case found with the outcome, and the reductions as text."""
     still, words = _Budget(bad), list[str]()
     before = len(case.mechanism.bodies), len(case.mechanism.joints)
     going = True
@@ -82,7 +82,7 @@ def reduced(case: Case, bad: Bad) -> tuple[Case, list[str]]:
 
 
 def _smaller(case: Case) -> Iterator[Case]:
-    """Yield cases with one force element, point or body less and one freedom per driver; the
+    """Yield cases with one force element, point or body less and as many freedoms as drivers; the
     largest steps first.
     """
     mechanism = case.mechanism

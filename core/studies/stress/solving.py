@@ -1,5 +1,5 @@
-"""Solution of specimens: by the native engine in this process, compiled and by numpy, and by
-simulators in worker processes.
+"""Solution of specimens: by the native engine in this process, with machine code and with numpy,
+and by simulators in worker processes.
 """
 
 from __future__ import annotations
@@ -11,13 +11,13 @@ from ...case.case import Case
 from ...errors import KincheckError
 from ...harness.compare import output_series
 from ...harness.engine import Engine, may_run_here
-from ...harness.execution import Answer, Failure, Pair, bounded, check, said
+from ...harness.execution import Answer, Failure, Pair, bounded, check, error_text
 from ...harness.native_engine import NativeEngine
 from ...harness.provenance import plain
 from ...harness.record import Outcome
 from ...harness.resource_limits import Limits
 
-# Time limit of a sweep of this size; a slower simulator hangs [s].
+# Time limit of a sweep of this size [s]; a slower simulator counts as hanging.
 PATIENCE = 60.0
 MEMORY = 4.0
 # Numpy solves one mechanism in four up to this number of bodies: around singular poses it takes up
@@ -28,7 +28,7 @@ MOST_INTERPRETED = 2000
 
 
 def suited(engine: Engine, case: Case, number: int) -> Engine:
-    """Return the native engine, interpreted for a part of the small mechanisms: this tests both
+    """Return the native engine, interpreted for some of the small mechanisms, which tests both
     executors. Return simulators unchanged.
     """
     small = (
@@ -41,14 +41,14 @@ def suited(engine: Engine, case: Case, number: int) -> Engine:
 
 
 def interpreted(engine: NativeEngine) -> NativeEngine:
-    """Return the native engine with its programs run by numpy: compilation does not pay for a
-    single solution.
+    """Return the native engine with numpy as executor: compilation does not pay for a single
+    solution.
     """
     return replace(engine, solver=replace(engine.solver, compiled=False))
 
 
 def solve_all(pairs: Sequence[Pair]) -> list[Answer | Failure]:
-    """Return the answers in order; any error becomes a failure."""
+    """Return the answers in order; an error becomes a failure."""
     found: dict[int, Answer | Failure] = {}
     away = [k for k, pair in enumerate(pairs) if not may_run_here(pair.engine)]
     for k, pair in enumerate(pairs):
@@ -63,7 +63,7 @@ def solve_all(pairs: Sequence[Pair]) -> list[Answer | Failure]:
 
 
 def once(pair: Pair) -> Answer | Failure:
-    """Solve a pair in this process, once and without timing."""
+    """Solve a pair once in this process, without timing."""
     case, engine = pair.case, pair.engine
     try:
         reason = engine.unsupported(case)
@@ -74,7 +74,7 @@ def once(pair: Pair) -> Answer | Failure:
     except KincheckError as error:
         return Failure(Outcome.ERROR, str(error), kind=error.kind)
     except Exception as error:  # a defect
-        return Failure(Outcome.ERROR, said(error))
+        return Failure(Outcome.ERROR, error_text(error))
     return Answer(
         outputs={output.name: output_series(case, output, trajectory) for output in case.outputs},
         solved=int(trajectory.solved.sum()),

@@ -1,5 +1,5 @@
-"""Verdicts on the samples of a specimen: right, refused with the right or a wrong reason,
-or silently wrong.
+"""Verdicts on the samples of a specimen: correct, refused with the right or a wrong reason, or
+silently wrong.
 """
 
 from __future__ import annotations
@@ -39,13 +39,13 @@ class Verdict(StrEnum):
 SILENT = (Verdict.SILENTLY_WRONG, Verdict.WRONG_FORCE, Verdict.UNDETERMINED_FORCE)
 """The verdicts on wrong numbers without a message."""
 BAD = (*SILENT, Verdict.REFUSED_WRONGLY, Verdict.MISSING_FORCE)
-"""The bad verdicts, the worst first."""
+"""Bad verdicts, the worst first."""
 
-# A larger error, relative to the mechanism's size, means another assembly or none, not a lack of
-# digits.
+# An error above this, relative to the mechanism's size, means another assembly or none, not
+# round-off.
 ELSEWHERE = 1e-3
-# The residual of contradictory geometry may be spread over the rows or lie in one. Within this
-# factor of ten, both count as the same residual.
+# Factor between residuals of contradictory geometry that count as equal: the residual may be spread
+# over the rows or lie in one.
 SPREAD = 10.0
 
 
@@ -81,8 +81,8 @@ class Judgement:
 
 
 def described_wrong(specimen: Specimen, samples: int, error: KincheckError) -> Judgement:
-    """Return the judgement of a specimen whose description was refused; it is the same
-    for every engine.
+    """Return the judgement of a specimen with a refused description, which is the same for every
+    engine.
     """
     right = specimen.truth is None and error.kind in specimen.reasons
     verdict = Verdict.REFUSED_RIGHTLY if right else Verdict.REFUSED_WRONGLY
@@ -92,14 +92,14 @@ def described_wrong(specimen: Specimen, samples: int, error: KincheckError) -> J
 def judged(
     specimen: Specimen, case: Case, truth: Truth | None, result: Answer | Failure
 ) -> Judgement:
-    """Compare an answer, or a refusal, with the reference; None stands for a specimen without
-    any valid sample.
+    """Compare an answer or a refusal with the reference; a None reference means that no sample is
+    valid.
     """
     n = len(case.sweep.values)
     if isinstance(result, Failure):
         if result.outcome in (Outcome.UNSUPPORTED, Outcome.UNAVAILABLE):
             return _all(n, Verdict.UNSUPPORTED, result.message)
-        if result.outcome is not Outcome.ERROR:  # a crash or a hang is no valid refusal
+        if result.outcome is not Outcome.ERROR:  # a crash or a hang is not a valid refusal
             return _all(n, Verdict.REFUSED_WRONGLY, result.message)
         kinds = [] if result.kind is None else [result.kind]
         return _refused(specimen, truth, n, kinds, result.message)
@@ -146,7 +146,7 @@ def judged(
     verdicts[beyond] = Verdict.SILENTLY_WRONG
     far = (errors > ELSEWHERE * truth.system.rows.stated.unit) | beyond
     worst = tuple(float(ratios[k].max()) if compared[k] and known.any() else None for k in range(4))
-    # notes of an engine beside its samples warn no reader of the samples, but explain the outcome
+    # an engine's notes do not warn a reader of the samples, but explain the outcome
     message = "; ".join(
         [*filter(None, [result.message]), *map(str, result.details.get("notes", []))]
     )
@@ -161,7 +161,7 @@ def _judged_forces(
     """Return masks of the samples with wrong forces, by verdict, the worst first.
 
     Args:
-        known: samples with the right motion.
+        known: samples with the correct motion.
         ratios: largest errors over the round-off bound, filled in here, shape (n,).
     """
     found = {each: np.zeros(len(known), np.bool_) for each in (*SILENT[1:], Verdict.MISSING_FORCE)}

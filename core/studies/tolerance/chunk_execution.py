@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 from uuid import uuid4
 
 from ...errors import KincheckError
-from ...harness.execution import said
+from ...harness.execution import error_text
 from ...harness.workers.distributed import ClusterError, connected, loaded
 from ...harness.workers.messages import pack
 from ...version import VERSION
@@ -90,14 +90,16 @@ def _explained(distributed: Any, address: str) -> Generator[None]:
         raise
     except distributed.scheduler.KilledWorker as error:
         raise ClusterError(
-            f"scheduler {address}: every worker that had some chunks was lost: {said(error)}"
+            f"scheduler {address}: every worker that had some chunks was lost: {error_text(error)}"
         ) from error
     except (OSError, distributed.CancelledError, TimeoutError) as error:
         raise ClusterError(
-            f"scheduler {address}: has gone ({said(error)}); sweep again when it is back"
+            f"scheduler {address}: was lost ({error_text(error)}); sweep again when it is back"
         ) from error
     except Exception as error:
-        raise ClusterError(f"scheduler {address}: a worker cannot solve: {said(error)}") from error
+        raise ClusterError(
+            f"scheduler {address}: a worker cannot solve: {error_text(error)}"
+        ) from error
 
 
 _ready: OrderedDict[bytes, Ready] = OrderedDict()

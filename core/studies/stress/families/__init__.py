@@ -1,5 +1,5 @@
-"""Families of hard situations, by theme. The study loads every module in this folder, so a new
-class in a new file is a new family.
+"""Families of difficult situations. The study loads every module in this folder, so a new class in
+a new file is a new family.
 """
 
 import importlib

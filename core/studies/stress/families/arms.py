@@ -1,4 +1,4 @@
-"""Arms driven at every joint: their poses are products of turns, for any number of bodies."""
+"""Arms driven at every joint: their poses are products of rotations, for any number of bodies."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ LARGEST = 30
 
 
 class Arms(Family):
-    """Trees of bodies with all drivers moving at once, each in its own way."""
+    """Trees of bodies whose drivers all move at once, each with another motion."""
 
     name = "arms"
     about = (
@@ -34,7 +34,7 @@ class Arms(Family):
     samples = 41
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
-        """Return a random tree or a chain, its joints 0.1 to 0.3 m apart."""
+        """Return a random tree or chain with joints 0.1 to 0.3 m apart."""
         count = bodies(rng, LARGEST)
         chain = rng.random() < 0.3
         parts, joints, drivers = list[Body](), list[Joint](), list[Driver]()
@@ -48,7 +48,7 @@ class Arms(Family):
             parts.append(Body(name))
             joints.append(joint)
             ends[name] = place
-            # a screw's turn determines its shift
+            # the rotation of a screw determines its translation
             for freedom in joint.freedoms[:1] if kind is Screw else joint.freedoms:
                 of = JointAngle if freedom == "rotation" else JointDisplacement
                 drivers.append(of(f"{joint.name}_{freedom}", joint.name))
@@ -92,7 +92,7 @@ def _joint(
 
 
 def forward(mechanism: Mechanism) -> Closed:
-    """Return the closed form of a tree; joints must stand in the order from parents to children."""
+    """Return the closed form of a tree; the joints must be ordered from parents to children."""
 
     def motion(drives: Real) -> Mapping[str, tuple[Real, Real, Real]]:
         values = {
@@ -144,7 +144,7 @@ def _swing(q: Real, a: Real) -> Real:
 
 
 def _product(p: Real, q: Real) -> Real:
-    """Return the turn q followed by p, in the axes at design, shape (4, n)."""
+    """Return the rotation q followed by p, in the axes at design, shape (4, n)."""
     a, b = p[1:], q[1:]
     vector = p[0] * b + q[0] * a + np.cross(a, b, axis=0)
     return np.concatenate([(p[0] * q[0] - (a * b).sum(axis=0))[None], vector])

@@ -1,5 +1,5 @@
-"""The base of families: a family makes random specimens, each with a case, its truth and its right
-refusals.
+"""Base of the families: a family makes random specimens, each with a case, its truth and its
+correct refusals.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from ..truth.reference_motion import followed
 TOL = 1e-12
 """Largest accepted residual, as in `kincheck run`."""
 
-# Right kinds of refusal at or behind a singular pose, or beyond the end of the motion: Newton's
+# Correct kinds of refusal at or behind a singular pose, or beyond the end of the motion: Newton's
 # iteration finds no pose there, or a pose of another motion.
 MOTION_ENDS = frozenset(
     {
@@ -52,12 +52,11 @@ class Specimen:
     """One mechanism and its sweep.
 
     Attributes:
-        describe: makes the case. It may raise KincheckError; this is then the outcome for every
+        describe: makes the case. It may raise KincheckError, which is then the outcome for every
             engine.
         truth: computes the reference of the case; None if every answer is wrong.
-        reasons: further right kinds of failure, beside those of singular poses and the end of the
-            motion.
-        excused: whether a refusal for these reasons is right although solutions exist.
+        reasons: further correct kinds of refusal, besides singular poses and the end of the motion.
+        excused: whether a refusal for these reasons is correct although solutions exist.
         reported: whether an answer must report the contradiction of the geometry
             (`Known.violated`).
         facts: properties of the specimen, by name.
@@ -77,9 +76,9 @@ class Family(ABC):
     """Base of the families. Declaring one with a name registers it.
 
     Attributes:
-        about: the hard situation and its sizes, in a sentence.
-        samples: largest number of samples of a specimen. It limits the fineness of the sweep;
-            coarse sweeps are drawn as often as fine ones.
+        about: sentence on the situation and its sizes.
+        samples: largest number of samples of a specimen, which limits the fineness of the sweep;
+            coarse sweeps are as frequent as fine ones.
         several: whether several specimens share the samples; else one specimen has them all.
     """
 
@@ -108,7 +107,7 @@ def as_case(
     motions: dict[str, Motion] | None = None,
     source: str = "kincheck stress",
 ) -> Case:
-    """Return the case of a mechanism, all coordinates of all its points as outputs."""
+    """Return the case of a mechanism with all coordinates of all its points as outputs."""
     sweep = Sweep(driver, np.asarray(values, dtype=np.float64), rate, motions=motions or {})
     return with_all_coordinates(
         Case(mechanism.name, source, Truth.CONSENSUS_ONLY, mechanism, sweep, ())
@@ -128,6 +127,6 @@ def power(rng: Rng, low: float, high: float) -> float:
 
 def bodies(rng: Rng, most: int) -> int:
     """Return a random number of bodies, from 3 to the most. Half of the numbers are five or less,
-    because the cost grows with the square.
+    because the cost grows with the square of the number.
     """
     return int(3.0 * ((most + 1) / 3.0) ** (rng.random() ** 2))

@@ -1,5 +1,5 @@
-"""Four-bars near their change points, in coarse steps: sharp corners of their motion, not to be
-hidden by redundant rows or a second loop.
+"""Four-bars near their change points, in coarse steps: redundant rows or a second loop must not
+hide the sharp corners of their motion.
 """
 
 from __future__ import annotations
@@ -16,8 +16,7 @@ from .dimensions import crank_rocker
 from .pairs import beside, beside_motion
 from .planar import JOINTS_OF_A_LOOP, Plan, any_plane, flats, four_bar, four_bar_motion, meet
 
-# The design must not be near a corner itself: the coordinates of a nearly folded shape hold too few
-# digits of it.
+# Smallest relative area of a design: the coordinates of a nearly folded shape have too few digits.
 FOLDED = 0.05
 SMALL = "small "
 
@@ -53,7 +52,8 @@ class Corners(Family):
         last = float(rng.uniform(2.0, 6.2) * rng.choice([-1.0, 1.0]))
         mechanism, motion = four_bar(plane, b, d, c, way), four_bar_motion(plane, b, d, c)
         name, facts = f"{kind} with {way}, off by {off:.2g}", [("off", off)]
-        # the small loop's singular values are small everywhere, and hide those of the large loop
+        # the small loop's singular values are always small, and hide the singular values of the
+        # large loop
         if rng.random() < 0.5:
             ratio, hung = power(rng, -3.0, -0.5), str(rng.choice(JOINTS_OF_A_LOOP))
             small = crank_rocker(rng, ratio)

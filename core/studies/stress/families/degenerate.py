@@ -40,7 +40,9 @@ NOT_CLOSED = frozenset({FailureKind.NOT_CLOSED, FailureKind.NO_POSE})
 
 
 class Degenerate(Family):
-    """Refuse an invalid mechanism, naming its defect; solve a valid one of odd appearance."""
+    """Invalid mechanisms, to be refused with their defect, and valid mechanisms of unusual
+    appearance, to be solved.
+    """
 
     name = "degenerate"
     about = (
@@ -50,7 +52,7 @@ class Degenerate(Family):
     samples = 21
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
-        """Return an invalid mechanism (70 %) or a valid one of odd appearance."""
+        """Return an invalid mechanism (70 %) or a valid one of unusual appearance."""
         make, reasons = (
             WRONG[int(rng.integers(len(WRONG)))]
             if rng.random() < 0.7
@@ -72,7 +74,7 @@ def _described(make: Callable[[Rng], Mechanism], rng: Rng, values: Values) -> Ca
 
 
 def _pair(joint: Callable[..., Joint], **given: Any) -> Mechanism:
-    """Return a driven crank with a second body, joined to it by a joint."""
+    """Return a driven crank with a second body on it, connected by a joint."""
     return Mechanism(
         "pair",
         [Body("a"), Body("b")],
@@ -187,11 +189,11 @@ WRONG: tuple[tuple[Callable[[Rng], Mechanism], frozenset[FailureKind]], ...] = (
     (_rod_too_long_to_close, NOT_CLOSED),
     (_same_ball_twice, FREE),
 )
-"""Makers of invalid mechanisms, each with the kinds of its right refusals."""
+"""Makers of invalid mechanisms, each with the kinds of its correct refusals."""
 
 
 def _crank_of_length_zero(rng: Rng) -> Mechanism:
-    """Return a slider-crank with a turning crank and nothing else in motion."""
+    """Return a slider-crank in which only the crank moves."""
     return slider_crank(
         any_plane(rng), (0.0, 0.0), (1.0, float(rng.uniform(0.1, 0.5))), "rod", "turn"
     )
@@ -228,4 +230,4 @@ SOUND: tuple[Callable[[Rng], Mechanism], ...] = (
     _hinges_the_other_way_round,
     _bodies_far_from_their_joints,
 )
-"""Makers of valid mechanisms of odd appearance."""
+"""Makers of valid mechanisms of unusual appearance."""

@@ -44,8 +44,8 @@ def nearly_kite(rng: Rng) -> tuple[Plan, Plan, Plan, float]:
 
 
 def rockers(rng: Rng) -> tuple[Plan, Plan, Plan]:
-    """Return B, D and C of a four-bar. Its longest bar is between the pivots: neither the crank nor
-    the rocker turns fully.
+    """Return B, D and C of a four-bar whose longest bar is between the pivots: neither the crank
+    nor the rocker turns fully.
     """
     b = (float(rng.uniform(-0.2, 0.2)), float(rng.uniform(0.4, 0.6)))
     d: Plan = (float(rng.uniform(1.0, 1.1)), 0.0)
@@ -53,7 +53,7 @@ def rockers(rng: Rng) -> tuple[Plan, Plan, Plan]:
 
 
 def crank_rocker(rng: Rng, scale: float = 1.0, grid: float = 0.0) -> tuple[Plan, Plan, Plan]:
-    """Return B, D and C of a four-bar, far from its change points; its crank turns freely.
+    """Return B, D and C of a four-bar far from its change points, whose crank turns fully.
 
     The points lie on a grid, unless the grid is zero.
     """
@@ -76,8 +76,8 @@ def crank_rocker(rng: Rng, scale: float = 1.0, grid: float = 0.0) -> tuple[Plan,
 
 
 def turning_crank(rng: Rng, grid: float = 0.0) -> tuple[Plan, Plan]:
-    """Return B and C of a slider-crank; its crank turns freely. The guide along the first axis may
-    pass the pivot.
+    """Return B and C of a slider-crank whose crank turns fully. The guide along the first axis may
+    miss the pivot.
     """
     turn, crank, offset = (
         rng.uniform(0.0, 2.0 * np.pi),

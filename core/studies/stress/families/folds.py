@@ -15,14 +15,14 @@ LARGEST, DRIVERS = 4, 3
 # The search for a fold ends after this multiple of the reach. Over one reach, the rates at design
 # would turn or shift something by 0.3 to 1 [rad or m].
 FARTHER = 5.0
-# Way from a sample to the fold ahead of it, and way from that sample to the next: both as parts of
-# the way from the design to the fold [powers of ten].
+# Distance from a sample to the fold ahead of it, and from this sample to the next, as fractions of
+# the distance from the design to the fold [powers of ten].
 BEFORE, STEP = (-4.0, -0.3), (-1.0, 0.7)
 
 
 class Folds(Family):
-    """Steps so long as to span a fold: the motion turns back between two samples, and another
-    assembly may go on.
+    """Steps that span a fold: the motion turns back between two samples, where another assembly may
+    continue.
     """
 
     name = "folds"

@@ -1,4 +1,4 @@
-"""Mechanisms with loads: reactions, efforts and forces of elements, determined or not."""
+"""Mechanisms with loads: determined and undetermined reactions, efforts and element forces."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ from .loops import random_mechanism
 from .planar import any_plane, four_bar
 
 LARGEST = 8
-# Minimum length of springs [m]: a small error turns the direction of a shorter one far.
+# Minimum length of springs [m]: a small error changes the direction of a shorter spring much.
 SHORTEST = 0.1
-# Part of the reach of loops: most specimens meet no singular pose there; forces grow without limit
-# near one.
+# Fraction of the reach of loops: most specimens meet no singular pose there, near which forces grow
+# without limit.
 NEAR = 0.1
-# Tolerance of force outputs, required by the case. The truth has its own bounds for forces.
+# Tolerance of force outputs, which a case requires. The truth has its own bounds for forces.
 TOLERANCE = (1e-6, 1e-9, "the stress truth has bounds of its own")
 
 
@@ -51,8 +51,8 @@ class Forces(Family):
     samples = 11
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
-        """Return a loaded mechanism: one third are four-bars of four hinges; half of the others
-        have a hinge twice.
+        """Return a loaded mechanism: one third are four-bars with four hinges; half of the others
+        have one hinge twice.
         """
         if rng.random() < 1.0 / 3.0:
             plane = any_plane(rng)
@@ -136,7 +136,7 @@ def _six(matrix: np.ndarray) -> Inertia:
 
 
 def _elements(rng: Rng, mechanism: Mechanism) -> list[ForceElement]:
-    """Return force elements: at least one, to load mechanisms without masses too."""
+    """Return force elements: at least one, so that mechanisms without masses are loaded, too."""
     names = [GROUND, *(body.name for body in mechanism.bodies)]
     found: list[ForceElement] = []
     for k in range(int(rng.integers(1, 3))):

@@ -1,4 +1,4 @@
-"""Suspensions with errors of their hardpoints, from the rounding of a table to a wrong cell."""
+"""Suspensions with errors in their hardpoints, from the rounding of a table to a wrong cell."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from .planar import JOINTS_OF_A_LOOP, any_plane, four_bar, four_bar_motion
 from .sizes import linkage
 
 TURNS = 1000
-# Right refusals of a tolerance below round-off; they name the residual.
+# Correct refusals of a tolerance below round-off, which name the residual.
 BELOW_ROUNDING = frozenset(
     {
         FailureKind.BELOW_ROUNDING,
@@ -67,15 +67,15 @@ class Rates(Family):
 
 
 class Tolerances(Family):
-    """Tolerances beyond the digits of doubles."""
+    """Tolerances below the precision of doubles."""
 
     name = "tolerances"
-    about = "four-bars and slider-cranks with residuals asked for of 1e-15 to 1e-300"
+    about = "four-bars and slider-cranks with requested residuals of 1e-15 to 1e-300"
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
         """Return a linkage with a tiny tolerance.
 
-        Right outcomes are the best possible solution, or a refusal with the reached residual.
+        Correct outcomes are the best possible solution, or a refusal with the reached residual.
         """
         tol = power(rng, -300.0, -15.0) if rng.random() < 0.2 else power(rng, -20.0, -15.0)
         found = linkage(rng, any_plane(rng), samples)

@@ -1,9 +1,9 @@
 """Random closed loops of every joint type. They close by construction: both bodies of a joint are
 at the design position.
 
-Random joints close a random tree of bodies, until the remaining freedoms are as few as the drivers.
-A joint is taken only if all its rows are independent of the rows so far; a basis of the remaining
-motions shows this. The reference is followed from the design.
+Random joints close a random tree of bodies until as many freedoms remain as there are drivers. A
+joint is accepted only if all its rows are independent of the earlier rows, by a basis of the
+remaining motions. The reference is followed from the design.
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ from ..truth.evaluation import Evaluator, Poses
 from .base import Family, Rng, Specimen, as_case, bodies, direction
 
 LARGEST = 30
-# Joint types for the tree, and for the closures. Types with five freedoms carry no body.
+# Joint types for the tree, and for the loop closures. Types with five freedoms carry no body.
 CARRIERS = (
     "revolute", "spherical", "universal", "translational", "cylindrical", "screw",
     "constant_velocity", "planar", "fixed", "inline", "orientation_lock", "revolute_spherical",
 )  # fmt: skip
 CLOSERS = (*CARRIERS, "distance", "distance", "in_plane", "parallel_axes", "perpendicular_axes")
-# Smallest trusted singular value. A joint or driver below it is not taken.
+# Smallest trusted singular value. A joint or driver below it is not accepted.
 SOUND = 0.02
 
 
 class Loops(Family):
-    """Any buildable mechanism."""
+    """Mechanisms of any topology."""
 
     name = "loops"
     about = (
@@ -48,7 +48,7 @@ class Loops(Family):
     samples = 81
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
-        """Return a loop, driven far enough to meet a dead centre in every second specimen."""
+        """Return a loop, driven far enough for a dead centre in every second specimen."""
         mechanism, reach = random_mechanism(rng, lambda: bodies(rng, LARGEST))
         count = len(mechanism.bodies)
         motions: dict[str, Motion] = {d.name: Sine(0.1 * reach, 0.7) for d in mechanism.drivers[1:]}
@@ -127,7 +127,9 @@ class Builder:
         drivers: Sequence[Driver] = (),
         couplers: Sequence[Coupler] = (),
     ) -> Mechanism:
-        """Return a mechanism with the same points for any joints, so the unknowns stay the same."""
+        """Return the mechanism of these joints, always with the same points, so that the unknowns
+        stay the same.
+        """
         points = [
             Point(f"p_{name}", name, triple(self.places[name]))
             for name in self.places
@@ -136,14 +138,14 @@ class Builder:
         return Mechanism("loop", self.bodies, joints, points, drivers, couplers)
 
     def _rows(self, mechanism: Mechanism, drop: int = 0) -> Array:
-        """Return rows of unit length, shifts in metres, without the first `drop` rows."""
+        """Return rows of unit length, translations in metres, without the first `drop` rows."""
         rows = Evaluator(conditions(mechanism))
         found = rows.jacobian(Poses.design(len(self.bodies), 1))[0][drop:]
         found[:, np.arange(found.shape[1]) % 6 < 3] /= rows.stated.unit
         return found / np.linalg.norm(found, axis=1, keepdims=True)
 
     def _take(self, rows: Array, leave: int) -> bool:
-        """Remove rows from the remaining motions; return whether they were taken.
+        """Remove rows from the remaining motions; return whether they were accepted.
 
         All rows must be independent, and at least `leave` motions must remain.
         """
@@ -219,7 +221,8 @@ class Builder:
         return True
 
     def _driven(self, count: int) -> tuple[Mechanism, float] | None:
-        """Return the mechanism with drivers of its remaining freedoms, and their reach.
+        """Return the mechanism with drivers of its remaining freedoms, and the reach of the
+        drivers.
 
         The rates at design turn or shift something by 0.3 to 1 over the reach [rad or m].
         """

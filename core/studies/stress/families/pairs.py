@@ -1,4 +1,4 @@
-"""Two loops on one crank: alike, or a small one beside a large one."""
+"""Two loops on one crank: equal loops, or a small loop beside a large one."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from .planar import Plan, Plane, coupled
 def beside(
     single: Mechanism, plane: Plane, b: Plan, d: Plan, c: Plan, way: str, label: str
 ) -> Mechanism:
-    """Return a four-bar with a second coupler and rocker on its crank, at other points; the label
-    begins their names.
+    """Return a four-bar with a second coupler and rocker on its crank at other points, whose names
+    begin with the label.
     """
     rocker = f"{label}rocker"
     bodies, joints = coupled(way, plane, ("crank", rocker, f"{label}coupler"), (b, c), label)
@@ -31,8 +31,8 @@ def beside(
 
 
 def beside_motion(first: Motion, second: Motion, label: str) -> Motion:
-    """Return the closed form of both loops, from those of the two four-bars; only the crank joins
-    the loops.
+    """Return the closed form of both loops from the closed forms of the two four-bars; only the
+    crank connects the loops.
     """
 
     def motion(drives: Real) -> Mapping[str, tuple[Real, Real, Real]]:

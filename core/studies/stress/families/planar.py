@@ -1,4 +1,4 @@
-"""Linkages in a plane with closed forms, for the families of sizes, offsets, rates and reaches."""
+"""Planar linkages with closed forms, for the families of sizes, offsets, rates and reaches."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Plane:
         )
 
     def lift(self, shift: Real) -> Real:
-        """Return global shifts from shifts in the plane, shape (3, n)."""
+        """Return global displacements from displacements in the plane, shape (3, n)."""
         e1, e2 = map(extended, (self.e1, self.e2))
         return e1[:, None] * shift[0] + e2[:, None] * shift[1]
 
@@ -52,7 +52,7 @@ class Plane:
         return triple(at[0] * self.e1 + at[1] * self.e2)
 
     def turned(self, angle: Real) -> Real:
-        """Return the quaternion of a turn in the plane, shape (4, n)."""
+        """Return the quaternion of a rotation in the plane, shape (4, n)."""
         h = unit(extended(np.cross(extended(self.e1), extended(self.e2))))
         return np.concatenate([np.cos(angle / 2)[None], h[:, None] * np.sin(angle / 2)])
 
@@ -68,7 +68,7 @@ def any_plane(rng: Rng, origin: Array | None = None) -> Plane:
 
 def flat_plane(rng: Rng, origin: Array) -> Plane:
     """Return a plane along two of the global axes: global coordinates are sums of two numbers,
-    exact for suitable numbers.
+    which are exact for suitable numbers.
     """
     first = int(rng.integers(3))
     e1, e2 = np.eye(3)[first], np.eye(3)[(first + 1) % 3]
@@ -76,7 +76,7 @@ def flat_plane(rng: Rng, origin: Array) -> Plane:
 
 
 def spin(angle: Real, at: Plan | Real) -> Real:
-    """Return a point of the plane turned about the origin, shape (2, n)."""
+    """Return a point of the plane after a rotation about the origin, shape (2, n)."""
     x, y = (extended(each) for each in at)
     c, s = np.cos(angle), np.sin(angle)
     return np.stack([c * x - s * y, s * x + c * y])
@@ -88,8 +88,8 @@ def heading(a: Real) -> Real:
 
 
 def meet(first: Real, p: Real, second: Real, q: Real, side: float) -> Real:
-    """Return the intersection of circles of squared radii p and q about two points, on one side of
-    the line between; NaN if there is none.
+    """Return the intersection of circles with squared radii p and q about two points, on one side
+    of the line through them; NaN if there is none.
     """
     d = second - first
     e = (d * d).sum(axis=0)
@@ -100,14 +100,14 @@ def meet(first: Real, p: Real, second: Real, q: Real, side: float) -> Real:
 
 
 JOINTS_OF_A_LOOP = ("revolutes", "balls", "rod", "cylinders")
-"""Ways to join the coupler of a loop to its neighbours, with three redundant rows or none."""
+"""Ways to connect the coupler of a loop to its neighbours, with or without redundant rows."""
 
 
 def coupled(
     way: str, plane: Plane, names: tuple[str, str, str], at: tuple[Plan, Plan], label: str = ""
 ) -> tuple[list[Body], list[Joint]]:
-    """Return bodies and joints of the coupler between two bodies at their points, or of a rod in
-    its place.
+    """Return bodies and joints of the coupler between two bodies at their points, or of a rod that
+    replaces it.
     """
     first, second, coupler = names
     start, end = map(plane.point, at)
@@ -159,7 +159,7 @@ def four_bar(
 
 
 def four_bar_motion(plane: Plane, b: Plan, d: Plan, c: Plan, parallel: bool = False) -> Motion:
-    """Return the closed form of a four-bar, on the side of the design, between the crank's
+    """Return the closed form of a four-bar in the assembly of the design, between the crank's
     turning points; a parallelogram passes them.
     """
     B, C, D = (extended(each)[:, None] for each in (b, c, d))
@@ -187,11 +187,11 @@ def four_bar_motion(plane: Plane, b: Plan, d: Plan, c: Plan, parallel: bool = Fa
 
 
 def turning_range(b: Real, d: Real, p: Real, q: Real) -> tuple[float, float]:
-    """Return the range of turns of a crank at b, from there, in both directions.
+    """Return the range of rotation of a crank at b, from there, in both directions.
 
     The coupler and the rocker have squared lengths p and q; the rocker's pivot is at d. The law of
     cosines gives the cosines of the crank's angle from the ground with coupler and rocker folded or
-    stretched out. A cosine between -1 and 1 is a turning point; other cosines limit nothing.
+    stretched out. A cosine between -1 and 1 is a turning point; other cosines are no limit.
     """
     r2, g2 = (b * b).sum(axis=0)[0], (d * d).sum(axis=0)[0]
     folded, stretched = ((np.sqrt(p[0]) + sign * np.sqrt(q[0])) ** 2 for sign in (-1.0, 1.0))
@@ -199,7 +199,7 @@ def turning_range(b: Real, d: Real, p: Real, q: Real) -> tuple[float, float]:
     at = heading(b)[0] - heading(d)[0]
     at = np.arctan2(np.sin(at), np.cos(at))
     low, high = (float(np.arccos(x)) if -1.0 < x < 1.0 else None for x in (nearest, farthest))
-    # all angles of turning points, on the circle and one circle to either side
+    # all angles of turning points, in the full turn and one full turn to either side
     stops = [
         k * 2.0 * np.pi + sign * stop
         for stop in (low, high)
@@ -215,8 +215,8 @@ def turning_range(b: Real, d: Real, p: Real, q: Real) -> tuple[float, float]:
 
 
 def flats(b: Plan, d: Plan) -> list[float]:
-    """Return the turns of a crank at b into the line of the ground, within two turns from b. The
-    crank points to the pivot at d, or away from it.
+    """Return the rotations of a crank at b, up to two turns, that bring it into the line of the
+    ground: it points to the pivot at d, or away from it.
     """
     at = float(heading(extended(b)) - heading(extended(d)))
     return [k * math.pi - at for k in range(-4, 5)]
@@ -246,8 +246,8 @@ def slider_crank(
 def slider_crank_motion(
     plane: Plane, b: Plan, c: Plan, drive: str, guide: Plan = (1.0, 0.0)
 ) -> Motion:
-    """Return the closed form of a slider-crank, the guide of length one: a quadratic gives the
-    slider, or two circles give the crank.
+    """Return the closed form of a slider-crank with a guide vector of length one: a quadratic
+    equation gives the slider, or two circles give the crank.
     """
     B, C, g = (extended(each)[:, None] for each in (b, c, guide))
     r2, l2 = (B * B).sum(axis=0), ((C - B) ** 2).sum(axis=0)
@@ -264,7 +264,7 @@ def slider_crank_motion(
                 s = -back + ahead * np.sqrt(back * back - ((C - now_b) ** 2).sum(axis=0) + l2)
             turn, now_c = value, C + s * g
         else:
-            # behind the pivot the linkage can be assembled again, but no motion leads there
+            # beyond the pivot the linkage can be assembled, but no motion leads there
             value = np.where(((C + value * g) * g).sum(axis=0) * (C * g).sum() > 0.0, value, np.nan)
             now_c = C + value * g
             now_b = meet(0.0 * now_c, r2 + 0.0 * value, now_c, l2 + 0.0 * value, side)

@@ -1,4 +1,4 @@
-"""Strokes beyond reach: no engine may answer at a pose without an assembly."""
+"""Strokes beyond reach: no engine may have values at a pose without an assembly."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Reach(Family):
     samples = 81
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
-        """Return a driven slider, or a four-bar with a driven bar unable to turn fully."""
+        """Return a driven slider, or a four-bar whose driven bar cannot turn fully."""
         plane, way = any_plane(rng), str(rng.choice(JOINTS_OF_A_LOOP))
         if rng.random() < 0.5:
             crank, rod = float(rng.uniform(0.2, 0.6)), float(rng.uniform(0.7, 1.3))

@@ -1,4 +1,4 @@
-"""Redundant, contradictory geometry: is it accepted, and is the contradiction reported?"""
+"""Redundant and contradictory geometry, whose contradiction an engine must report."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .base import TOL, Family, Rng, Specimen, as_case, direction, power
 from .dimensions import crank_rocker
 from .planar import any_plane, four_bar, four_bar_motion
 
-# Directions are given to 1e-16; a smaller tilt than this is rounding, no contradiction.
+# Directions have a precision of 1e-16; a smaller tilt than this is rounding, not a contradiction.
 ROUNDED = 1e-14
 
 CONTRADICTIONS = frozenset(
@@ -30,19 +30,19 @@ CONTRADICTIONS = frozenset(
         FailureKind.OVERDRIVEN,
     }
 )
-"""Right refusals of a loop with hinges that are not parallel."""
+"""Correct refusals of a loop whose hinges are not parallel."""
 
 
 class Redundant(Family):
-    """One hinge of four is not quite parallel to the others."""
+    """Four-bars with one hinge that is not exactly parallel to the others."""
 
     name = "redundant"
-    about = "four-bars of four hinges, one of them off by 1e-12 to 1e-3 rad, or by nothing"
+    about = "four-bars of four hinges, one of them off by 1e-12 to 1e-3 rad, or exact"
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
         """Return a four-bar with one tilted hinge.
 
-        Right outcomes are the best possible solution with its residual, or a refusal with the
+        Correct outcomes are the best possible solution with its residual, or a refusal with the
         contradiction.
         """
         tilt = 0.0 if rng.random() < 0.15 else power(rng, -12.0, -3.0)
@@ -66,10 +66,9 @@ class Redundant(Family):
 
 
 def _tilted(case: Case, sound: Mechanism, motion: Motion, tilt: float) -> Truth:
-    """Return the truth of the sound mechanism, with the bounds of another choice of rows.
-
-    Rows with an error of the tilt move the pose by K times the tilt. The inverse of another choice
-    of rows is at most K times larger.
+    """Return the truth of the untilted mechanism, with bounds that allow for another choice of
+    rows. Rows with an error of the tilt move the pose by K times the tilt. The inverse of another
+    choice of rows is at most K times larger.
     """
     found = closed(replace(case, mechanism=sound), motion)
     system = System(case)
@@ -82,7 +81,7 @@ def _tilted(case: Case, sound: Mechanism, motion: Motion, tilt: float) -> Truth:
         at = system.solved(poses, drives, system.path.times[sample], system.rows.angles(poses))
         violated[sample] = np.abs(system.rows.residual(at.poses, drives[0], at.angles)).max(axis=0)
     slack = found.condition * (1.0 + found.condition) * tilt * size
-    # rates follow from inexact poses and contradictory rows: they have no bounds
+    # rates depend on inexact poses and contradictory rows, and have no bounds
     bounds = {
         name: np.stack(
             [bound[0] + slack, *(bound[1:] if tilt <= ROUNDED else np.full_like(bound[1:], np.inf))]

@@ -1,5 +1,5 @@
 """Near-singular geometry: change points, dead centres, platforms, and overconstrained loops with
-little mobility.
+one freedom.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from .dimensions import nearly_kite, nearly_parallel
 from .planar import JOINTS_OF_A_LOOP, any_plane, flats, four_bar, four_bar_motion
 
 TURN = 0.97 * np.pi
-# A platform with a smaller error may be refused for a freedom too many: its smallest singular value
+# A platform with a smaller error may be refused for an excess freedom: its smallest singular value
 # is a tenth of the error or less, and the rank tolerance is 1e-9.
 UNTOLD = 3e-8
 
@@ -48,9 +48,9 @@ class Singular(Family):
 def _parallelogram(rng: Rng, samples: int) -> Specimen:
     """Return a parallelogram; it folds flat twice a turn.
 
-    An exact one is answered by the parallelogram or refused, never by the motion crossing it there.
-    With an error of one sign it becomes the antiparallel linkage, within the root of the error.
-    With an error of the other sign it cannot pass.
+    Correct answers for an exact parallelogram are its own motion or a refusal, never the motion
+    that crosses there. With an error of one sign it becomes the antiparallel linkage, within the
+    root of the error. With an error of the other sign it cannot pass.
     """
     plane, way = any_plane(rng), str(rng.choice(JOINTS_OF_A_LOOP))
     b, d, c, off = nearly_parallel(rng)
@@ -65,7 +65,7 @@ def _parallelogram(rng: Rng, samples: int) -> Specimen:
 
 
 def _kite(rng: Rng, samples: int) -> Specimen:
-    """Return a kite. Its crank is nearly as long as the ground and passes the rocker's pivot."""
+    """Return a kite, whose crank is nearly as long as the ground and passes the rocker's pivot."""
     plane, way = any_plane(rng), str(rng.choice(JOINTS_OF_A_LOOP))
     b, d, c, off = nearly_kite(rng)
     return Specimen(
@@ -77,7 +77,7 @@ def _kite(rng: Rng, samples: int) -> Specimen:
 
 
 def _bennett(rng: Rng, samples: int) -> Specimen:
-    """Return four skew hinges; they turn fully because sin(alpha) / a = sin(beta) / b."""
+    """Return four skew hinges, which turn fully because sin(alpha) / a = sin(beta) / b."""
     alpha, beta = float(rng.uniform(0.4, 1.2)), float(rng.uniform(1.3, 2.2))
     a = float(rng.uniform(0.3, 0.6))
     b = a * np.sin(beta) / np.sin(alpha)
@@ -104,7 +104,9 @@ def _bennett(rng: Rng, samples: int) -> Specimen:
 
 
 def _screwed(turn: float, length: float, twist: float) -> Array:
-    """Return the frame of the next hinge: turned about z, then along and about x."""
+    """Return the frame of the next hinge: a rotation about z, then a translation along and a
+    rotation about x.
+    """
     c, s, k, m = np.cos(turn), np.sin(turn), np.cos(twist), np.sin(twist)
     return np.array(
         [
@@ -117,7 +119,7 @@ def _screwed(turn: float, length: float, twist: float) -> Array:
 
 
 def _ring(name: str, hinges: list[tuple[Array, Array]]) -> Mechanism:
-    """Return bodies around a ring of hinges, the ground between the last hinge and the first; the
+    """Return bodies in a ring of hinges, with the ground between the last hinge and the first; the
     first is driven.
     """
     bodies = [Body(f"link_{k}") for k in range(1, len(hinges))]
@@ -152,7 +154,7 @@ def _bricard(rng: Rng, samples: int) -> Specimen:
 
 def _platform(rng: Rng, samples: int) -> Specimen:
     """Return a platform on five rods and a driven leg. Similar hexagons on base and platform would
-    give one freedom too many.
+    give an excess freedom.
     """
     off = power(rng, -8.0, -1.0)
     angles = np.sort(np.linspace(0.0, 2.0 * np.pi, 6, endpoint=False) + rng.uniform(-0.3, 0.3, 6))

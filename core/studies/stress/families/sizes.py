@@ -24,7 +24,7 @@ from .planar import (
 )
 
 TURN = np.pi
-"""Turn of a crank to either side of the design [rad]: one full turn in all."""
+"""Rotation of a crank to either side of the design [rad]: one full turn in total."""
 
 
 def linkage(
@@ -36,7 +36,7 @@ def linkage(
     grid: float = 0.0,
     rate: float = 1.0,
 ) -> Specimen:
-    """Return a four-bar or a slider-crank, its crank turning once fully."""
+    """Return a four-bar or a slider-crank, whose crank makes one full turn."""
     way, turn = str(rng.choice(JOINTS_OF_A_LOOP)), np.linspace(-TURN, TURN, samples)
     if rng.random() < 0.5:
         points = crank_rocker(rng, scale, grid)
@@ -60,10 +60,10 @@ class Units(Family):
     """Mechanisms from one micrometre to one kilometre."""
 
     name = "units"
-    about = "four-bars and slider-cranks of 1e-6 to 1e3 m, anyhow in space, one turn"
+    about = "four-bars and slider-cranks of 1e-6 to 1e3 m in any orientation, one turn"
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
-        """Return a linkage of random size; its plane's origin is about this size away."""
+        """Return a linkage of random size, at a similar distance from the origin."""
         scale, plane = power(rng, -6.0, 3.0), any_plane(rng)
         return linkage(rng, Plane(scale * plane.origin, plane.e1, plane.e2), samples, scale=scale)
 
@@ -73,15 +73,15 @@ class Offset(Family):
 
     name = "offset"
     about = (
-        "four-bars and slider-cranks of 1 m up to 1e7 m from the origin, coordinates on a grid so"
-        " that none is rounded"
+        "four-bars and slider-cranks of 1 m, up to 1e7 m from the origin, coordinates on a grid"
+        " that avoids rounding"
     )
     GRID: ClassVar[float] = 2.0**-20
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
         """Return a linkage in a plane along the global axes.
 
-        A double holds the 24 bits of the offset and the 20 bits of the grid.
+        A double holds both the 24 bits of the offset and the 20 bits of the grid.
         """
         origin = np.round(rng.uniform(-1.0, 1.0, 3) * power(rng, 0.0, 7.0) / self.GRID) * self.GRID
         return linkage(rng, flat_plane(rng, np.array(triple(origin))), samples, grid=self.GRID)

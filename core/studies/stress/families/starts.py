@@ -1,5 +1,5 @@
-"""Absolute drivers on motions through the design values at time zero: exactly, or up to rounding or
-typed digits.
+"""Absolute drivers whose motions pass the design values at time zero: exactly, up to rounding, or
+up to typed digits.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from .loops import random_mechanism
 from .planar import any_plane, flat_plane
 
 LARGEST, DRIVERS = 5, 3
-# Excursion of the drivers in a second, in parts of the reach: few motions meet a fold.
+# Excursion of the drivers in a second, as a fraction of the reach: few motions meet a fold.
 EXCURSION = 0.3
 # Below this slope of the sine at the design [-], the excursion grows with the square of time.
 TURNING = 0.1
 
 DIGITS = ("exact", "rounded", "typed")
-"""Ways to meet the design value: to the last bit, up to rounding, or with numbers of six digits."""
+"""Precision of the design value: to the last bit, up to rounding, or with six digits."""
 
 
 class Starts(Family):
-    """Starts of motions: the last bits of their numbers must not decide the result."""
+    """Starts of motions, where the last bits of numbers must not decide the result."""
 
     name = "starts"
     about = (
@@ -70,8 +70,8 @@ def _closed(rng: Rng, digits: str) -> tuple[Mechanism, dict[str, Motion]]:
 def _arm(rng: Rng, digits: str) -> tuple[Mechanism, dict[str, Motion]]:
     """Return two links and their motion; the tip circles the base once a second.
 
-    A straight path of the drivers from the design to a later sample passes near the base. Such a
-    path ends in the other assembly, in another turn, or at no pose.
+    A straight path of the drivers from the design to a later sample passes near the base, and may
+    end in the other assembly, in another turn, or at no pose.
     """
     origin, exact = np.zeros(3), digits == "exact"
     plane = flat_plane(rng, origin) if exact else any_plane(rng, origin)
@@ -114,7 +114,7 @@ def _sine(rng: Rng, design: float, excursion: float, digits: str) -> Motion:
     if not design:
         turns = 0 if digits == "exact" else int(rng.integers(-2, 3))
         phase, amplitude = np.pi * turns, excursion
-    elif digits == "exact":  # the sine of this phase is one to the last bit
+    elif digits == "exact":  # the sine of this phase is exactly one
         phase, amplitude = np.pi / 2.0, design
     else:
         phase = float(rng.uniform(0.2, np.pi - 0.2)) * float(rng.choice((-1.0, 1.0)))

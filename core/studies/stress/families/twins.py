@@ -1,5 +1,5 @@
-"""Two loops on one crank, singular at the same poses: the determinant of all rows changes its sign
-twice there, and keeps it.
+"""Two loops on one crank with the same singular poses: the determinant of all rows changes its sign
+twice there, so that it shows nothing.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ TURN, TWIN = 0.97 * np.pi, "twin "
 
 
 def _rockers(rng: Rng) -> tuple[Plan, Plan, Plan, float]:
-    """Return the points of a four-bar; its shape is not near any singular one."""
+    """Return the points of a four-bar that is far from any singular shape."""
     return *rockers(rng), 1.0
 
 
@@ -30,9 +30,9 @@ class Twins(Family):
 
     name = "twins"
     about = (
-        "two equal loops on one crank, hung alike or not, so that no sign of a whole determinant"
-        " tells singular poses: parallelograms (exact, and off by 1e-12 to 1e-2), kites, and"
-        " four-bars driven past their dead centres"
+        "two equal loops on one crank, with equal or different joints, so that the sign of the"
+        " whole determinant shows no singular pose: parallelograms (exact, and off by 1e-12 to"
+        " 1e-2), kites, and four-bars driven past their dead centres"
     )
 
     samples = 61

@@ -1,10 +1,10 @@
 """The conditions of a mechanism, written independently of the solver: full products of vectors, in
 extended precision, without simplification.
 
-They share only the meaning of a joint's fields with the tested primitives, rows and programs. Every
-joint is a few rows. A row is a sum of terms of four kinds, less a constant: the value at design, or
-zero. Here a and b are directions fixed in body i and j, and d leads from a point of body i to one
-of body j; the bodies carry them all.
+They share only the meaning of a joint's fields with the tested primitives, rows and programs. A
+joint consists of a few rows. A row is a sum of terms of four kinds, minus a constant: the value at
+design, or zero. Here a and b are directions fixed in bodies i and j, and d leads from a point of
+body i to a point of body j; all move with the bodies.
 
     dot     a . b
     slide   a . d
@@ -12,7 +12,7 @@ of body j; the bodies carry them all.
     turn    the angle from i to j about h
 
 Lengths are measured in a unit near the mechanism's size, so a row is about as large as its
-violation. A turn is the arc tangent plus whole turns, as near as possible to a given angle.
+violation. A turn is an arc tangent plus the full turns that bring it nearest to a given angle.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from .long_double import extended, unit
 
 
 class NotStatedError(KincheckError):
-    """A joint or driver without conditions here."""
+    """A joint or driver has no conditions here."""
 
 
 def conditions(mechanism: Mechanism) -> Conditions:

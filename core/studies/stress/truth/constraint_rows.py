@@ -36,10 +36,11 @@ class Conditions:
         bodies: names of the moving bodies; body k of a term is bodies[k - 1].
         centres: reference point of each moving body, from the global origin [units], shape (bodies,
             3).
-        origin: origin of the global positions before scaling [m]; it removes a far offset.
-        dots, slides, rods, turns: the terms; see `Writer` for their vectors.
+        origin: origin that is subtracted from global positions before scaling [m]; it removes a far
+            offset.
+        dots, slides, rods, turns: the terms by kind; see `Writer` for their vectors.
         constants: constant subtracted from each row.
-        driven: the row of each driver, in order, and the size of one unit of its value there.
+        driven: the row of each driver, in order, and the scale of the driver's value in it.
         turning: the joint of each turn.
         owners: joint, coupler or driver of each row.
     """
@@ -162,7 +163,7 @@ class Writer:
         )
 
     def coordinate(self, row: int, joint: Joint, freedom: str, weight: float) -> None:
-        """Add a coordinate of an axial joint: of its second body relative to the first."""
+        """Add a coordinate of an axial joint, of the second body relative to the first."""
         i, j = self.ends(joint)
         found: Any = joint
         f, g, h = triad(found.axis)

@@ -1,9 +1,9 @@
-"""Evaluation of the conditions at poses of many samples at once: residuals, Jacobian, and the part
-of the second derivative beyond J times the accelerations.
+"""Evaluation of the conditions at poses of many samples at once: residuals, Jacobian, and the
+second derivative without J times the accelerations.
 
-Quaternions give the rotations of bodies since the design. The unknowns of a body are its shift and
-its turn in global axes (dA = w x A). Let s be an arm, r = w x (w x s) and a' = w x a. The first
-derivatives and the parts beyond are
+Quaternions give the rotations of bodies since the design. The unknowns of a body are its
+translation and its rotation in global axes (dA = w x A). Let s be an arm, r = w x (w x s) and a' =
+w x a. The first derivatives and the parts beyond are
 
     dot     (a . b)'   = w_i . (a x b) + w_j . (b x a)
                        beyond: a'' . b + 2 a' . b' + a . b''
@@ -56,7 +56,7 @@ class Poses:
 
     @cached_property
     def turned(self) -> Real:
-        """R - I, shape (bodies + 1, 3, 3, n); zero at the design without rounding."""
+        """R - I, shape (bodies + 1, 3, 3, n); exactly zero at the design."""
         e0, x, y, z = np.moveaxis(self.q, 1, 0)
         rows = (
             (-(y * y + z * z), x * y - e0 * z, x * z + e0 * y),
@@ -70,7 +70,7 @@ class Poses:
         return Poses(self.u[..., samples], self.q[..., samples])
 
     def moved(self, step: Real) -> Poses:
-        """Return the poses after a shift and a turn of every body, shape (bodies, 6, n)."""
+        """Return the poses after a step of every body: translation, rotation, (bodies, 6, n)."""
         u, q = self.u.copy(), self.q.copy()
         u[1:] += step[:, :3]
         q[1:] += 0.5 * spun(step[:, 3:], q[1:])
@@ -202,8 +202,8 @@ class Evaluator:
         )
 
     def _gradients(self, poses: Poses) -> list[tuple[_Kind, list[tuple[Real | None, Real]]]]:
-        """Return for each kind the derivatives by shift and turn of body i, then of body j, each of
-        shape (m, 3, n).
+        """Return for each kind the derivatives by translation and rotation of body i, then of body
+        j, each of shape (m, 3, n).
         """
         found: list[tuple[_Kind, list[tuple[Real | None, Real]]]] = []
         if k := self.dots:
@@ -223,8 +223,7 @@ class Evaluator:
         return found
 
     def beyond(self, poses: Poses, rates: Real) -> Real:
-        """Return the rows' second derivative by time less J times the accelerations,
-        shape (rows, n).
+        """Return the rows' second time derivative minus J times the accelerations, shape (rows, n).
 
         Args:
             rates: rates of the unknowns, shape (bodies, 6, n).

@@ -1,6 +1,6 @@
-"""The first fold of a motion. Its curve is followed by arclength, which passes a fold easily.
+"""The first fold of a motion, found on its curve by arc length, which passes folds.
 
-The study places samples by the fold. It judges them by the truth, and the truth does not use it.
+The study places samples relative to the fold. The truth that judges them does not use it.
 """
 
 from __future__ import annotations
@@ -21,7 +21,9 @@ MOST_STEPS, CORRECTIONS, CLOSED = 400, 6, 1e-9
 
 
 def turning(case: Case, stop: float) -> float | None:
-    """Return the time of the first fold on the way from the design to a time [s], or None."""
+    """Return the time of the first fold between the design and a given time [s]; None without a
+    fold.
+    """
     system = System(case)
     turns = len(system.rows.stated.turns)
     at: Spot = Poses.design(system.rows.bodies, 1), 0.0, extended(np.zeros((turns, 1)))
@@ -40,7 +42,7 @@ def turning(case: Case, stop: float) -> float | None:
 def _fold(system: System, at: Spot, way: Array, ahead: Array) -> float | None:
     """Return the time of the fold on the curve, between a pose and a step ahead of it [s].
 
-    Time stands still at a fold.
+    The derivative of time along the curve is zero at a fold.
 
     Args:
         way, ahead: tangents at both ends of the step.
@@ -70,7 +72,7 @@ def _slopes(system: System, at: Spot) -> Array:
 
 
 def _tangent(system: System, at: Spot, before: Array | None) -> Array:
-    """Return the unit tangent of the curve, in the direction of the tangent before or, without
+    """Return the unit tangent of the curve, in the direction of the previous tangent or, without
     one, of growing time.
     """
     found = np.linalg.svd(_slopes(system, at))[2][-1]

@@ -16,7 +16,7 @@ from .long_double import GROUND_AXES, Real, extended, triad, unit
 def _meet(w: Writer, joint: Any) -> None:
     """Keep the point of both bodies together."""
     i, j = w.ends(joint)
-    # a fixed joint may have no point: any point serves
+    # a fixed joint may have no point: any point works
     point = joint.point if joint.point is not None else w.origin
     for axis in GROUND_AXES:
         w.slide(w.row(joint.name), 0, j, axis, point, point)
@@ -44,7 +44,7 @@ def _line(w: Writer, joint: Any) -> None:
 
 
 def _plane(w: Writer, joint: Any) -> None:
-    """Keep the point of j in the plane of i, or at its distance from the plane at design."""
+    """Keep the distance of the point of j from the plane of i at its design value."""
     first, second = getattr(joint, "points", None) or (joint.point, joint.point)
     w.slide(w.row(joint.name), *w.ends(joint), triad(joint.axis)[2], first, second, held=True)
 

@@ -1,4 +1,4 @@
-"""Extended precision, used to compute the truth."""
+"""Extended precision for the truth."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from ....errors import KincheckError
 
 Real: TypeAlias = NDArray[Any]
-"""Array of longdoubles; numpy's types lose them beside a plain number. On x86 they have 64 bits of
-mantissa: a two-thousandth of the round-off of the judged doubles."""
+"""Array of longdoubles, which numpy's own type hints lose next to a plain number. On x86 they have
+a 64-bit mantissa: a two-thousandth of the round-off of the judged doubles.
+"""
 
 
 def extended(values: Any) -> Real:
@@ -29,7 +30,7 @@ def require_extended() -> None:
     if np.finfo(np.longdouble).eps > 1e-18:
         raise KincheckError(
             "kincheck stress: numpy's longdouble is no wider than a double on this machine, so"
-            " there is nothing to judge by; run it on x86-64 Linux"
+            " the truth has no extra digits; run it on x86-64 Linux"
         )
 
 
@@ -39,7 +40,7 @@ def unit(a: Real) -> Real:
 
 
 def triad(axis: Sequence[float]) -> tuple[Real, Real, Real]:
-    """Return f, g, h: orthonormal and right-handed, h along the axis."""
+    """Return f, g, h: orthonormal and right-handed, with h along the axis."""
     h = unit(extended(axis))
     across: Real = np.cross(h, GROUND_AXES[int(np.abs(h).argmin())])
     f = unit(across)

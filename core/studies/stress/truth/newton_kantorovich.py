@@ -1,7 +1,7 @@
-"""A case as equations in extended precision: its samples polished, its rates, its condition, and
-its path from the design.
+"""A case as equations in extended precision: polished samples, rates, condition, and the path from
+the design.
 
-The path is followed here, without the predictor of any engine. A step dx from one knot to the next
+The path is followed independently of the engines' predictors. A step dx from one knot to the next
 is accepted if the norm of row sums of J0^-1 J1 - I is less than a half. The simplified iteration
 from the knot then contracts all along the step, so its solution continues the motion
 (Newton-Kantorovich). Near a singular pose this would need steps as small as the smallest singular
@@ -27,20 +27,21 @@ from .evaluation import Evaluator, Poses, spun
 from .long_double import Real, extended
 from .solutions import POLISHED, Solved, changes, condition, inverted
 
-# Largest change of J between neighbours. At 1 the simplified iteration may fail; a half leaves
-# an equal margin for the change of J between the two.
+# Largest change of J between neighbours. At 1 the simplified iteration may fail; a half leaves an
+# equal margin for the change of J in between.
 LARGEST_CHANGE = 0.5
-# Steps below this part of the path are tested along their direction only, not in all directions.
+# Steps below this fraction of the path are tested only along their direction, not in all
+# directions.
 SMALL_PART = 2.0**-6
-# Largest step, as a part of the path: a sweep of one or two turns has at least sixteen steps.
+# Largest step, as a fraction of the path: a sweep of one or two turns has at least sixteen steps.
 FIRST_PART = 1.0 / 16.0
-# A refused step below this part of the path shows a singular pose, not a coarse step: beside the
+# A refused step below this fraction of the path shows a singular pose, not a coarse step: near the
 # pose, the solution changes as the root of the remaining time.
 SMALLEST_PART = 2.0**-30
-# Number of knots for the test of the root law. Beside 30 random folds the law holds to 5 % over
-# them; two bifurcations missed it by a factor of 46 and more.
+# Number of knots for the test of the root law. Near 30 random folds the law holds to 5 %; two
+# bifurcations miss it by a factor of at least 46.
 ROOT_KNOTS = 7
-# Number of samples solved at once: the arrays of the largest mechanisms stay in the cache.
+# Number of samples solved at once: the arrays of the largest mechanisms fit in the cache.
 LANES = 256
 MOST_STEPS = 8
 
@@ -62,7 +63,7 @@ class System:
         return extended(self.path.drive(self.names, times))
 
     def sampled(self, samples: NDArray[np.intp]) -> Real:
-        """Return the same at samples of the sweep, with the swept value as given."""
+        """Return the drives at samples of the sweep, with the given swept values."""
         found = self.drives(self.path.times[samples])
         if self.case.sweep.driver in self.names:
             found[0, self.names.index(self.case.sweep.driver)] = extended(
@@ -84,7 +85,7 @@ class System:
             residual = self.rows.residual(poses, drives[0], near)
             step = -np.matmul(inverse, residual.T[..., None].astype(np.float64))[..., 0]
             size = np.abs(step).max(axis=1)
-            # a step turning a body over is no correction of a nearby pose
+            # a step that turns a body over is no correction of a nearby pose
             good = np.isfinite(size) & (size < 1.0)
             step[~good] = 0.0
             last = np.where(good, size / condition(inverse), np.inf)
@@ -92,7 +93,7 @@ class System:
             if (last[good] <= 1e-3 * POLISHED).all() or not good.any():
                 break
             before, largest = largest, float(size[good].max())
-            # else the old J still gains three digits or more a step
+            # else the old J still gains at least three digits per step
             if largest > 1e-5 or largest > 1e-3 * before:
                 jacobian = self.rows.jacobian(poses)
                 inverse = inverted(jacobian)
@@ -128,7 +129,7 @@ class System:
 
     def knots(self, stop: float) -> tuple[list[Solved], float | None]:
         """Return the knots from the design to a time, as far as the path goes, and the time of the
-        fold [s] if the path ends there.
+        fold [s] if the path ends at one.
         """
         found, h = [self.design()], stop * FIRST_PART
         if not found[0].step[0] <= POLISHED:
@@ -173,17 +174,17 @@ class System:
 
 
 def _fold(knots: Sequence[Solved], stop: float) -> float | None:
-    """Return the time of the motion's turning back [s]; None if the rates show no fold.
+    """Return the time at which the motion turns back [s]; None if the rates show no fold.
 
-    Beside a fold the unknowns follow the root of the remaining time tau. So v / 2a = tau, and v
-    times the root of tau is constant. At other singular poses, such as a bifurcation, the rates
-    stay finite and the motion passes.
+    Near a fold the unknowns follow the root of the remaining time tau, so v / 2a = tau, and v times
+    the root of tau is constant. At other singular poses, such as a bifurcation, the rates stay
+    finite and the motion passes.
     """
     at, earlier = knots[-1], knots[max(0, len(knots) - 1 - ROOT_KNOTS)]
     k = int(np.abs(at.a).argmax())
     v, a = float(at.v.ravel()[k]), float(at.a.ravel()[k])
     left = v / (2.0 * a) if a else np.inf
-    # the last step was refused, because it was too long a part of the remaining time
+    # the last step was refused as too large a fraction of the remaining time
     if not 0.0 < left * np.sign(stop) <= 64.0 * SMALLEST_PART * abs(stop):
         return None
     fold = float(at.times[0]) + left

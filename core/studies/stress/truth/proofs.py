@@ -1,5 +1,5 @@
-"""Proof of the truth itself: a share of its samples is proved to lie near exactly one solution of
-the engine's equations.
+"""Proof of the truth: a share of its samples is proved to lie near exactly one solution of the
+engine's equations.
 """
 
 from __future__ import annotations

@@ -1,15 +1,15 @@
 """The reference forces of a case: multipliers of the full rows, and their round-off bounds.
 
 They share only the meaning of a description with the tested equations of forces. The unknowns of a
-body are the shift of its centre and its turn. Its motion therefore demands generalised forces about
-the centre; J^T lambda balances them. A joint's rows give its wrench. A driver's row is its
-coordinate, so the multiplier is its effort.
+body are the translation of its centre and its rotation. Its motion therefore requires generalised
+forces about the centre, which J^T lambda balances. A joint's rows give its wrench. A driver's row
+is its coordinate, so the multiplier is its effort.
 
-The error of a right force is at most 1e-14 (1 + K)^3 S, of a right moment L times as much. The
-multipliers give one factor 1 + K and the accelerations two; S is the largest force demanded by
+The error of a correct force is at most 1e-14 (1 + K)^3 S, of a correct moment L times as much. The
+multipliers give one factor 1 + K and the accelerations two; S is the largest force required by
 masses and loads. Let B map the multipliers to a joint's force or moment, and let P project onto the
 self-balancing multipliers. A component along w is undetermined if w B P is not zero. The component
-is not judged if this is too near to zero for a decision.
+is not judged if w B P is too near to zero for a decision.
 """
 
 from __future__ import annotations
@@ -31,21 +31,22 @@ from .newton_kantorovich import System
 from .reference_motion import ROUND_OFF, Truth
 from .solutions import Solved
 
-# Parts of a unit multiplier: smaller ones than the first are round-off, larger ones than the second
-# are real.
+# Fractions of a unit multiplier: values below the first are round-off, values above the second are
+# real.
 ZERO, REAL = 1e-10, 1e-6
-# A larger angle may belong to another turn [rad].
+# Largest angle that is known without a count of turns [rad].
 SAME_TURN = 3.0
 
 
 @dataclass(frozen=True, eq=False)
 class KnownForce:
-    """A force output at n samples; a sample neither determined nor undetermined is not judged.
+    """A force output at n samples; a sample that is neither determined nor undetermined is not
+    judged.
 
     Attributes:
         values: NaN if unknown, shape (n,).
         bounds: largest errors due to round-off, shape (n,).
-        determined, undetermined: whether the force is so for certain, shape (n,).
+        determined, undetermined: whether the force certainly is, shape (n,).
     """
 
     values: Array
@@ -55,7 +56,7 @@ class KnownForce:
 
 
 def known_forces(case: Case, truth: Truth) -> Mapping[str, KnownForce]:
-    """Return the reference of every force output, at the samples kept by the truth."""
+    """Return the reference of every force output at the samples of the truth."""
     n = len(case.sweep.values)
     found = {
         output.name: KnownForce(
@@ -81,9 +82,10 @@ class _Loaded:
     """Solved samples with their loads.
 
     Attributes:
-        force, torque: demand of motion and loads on joints and drivers, about the centre of each
-            body [N, N m], shape (bodies + 1, 3, n); body 0 is the ground.
-        largest: largest of these forces and of spring forces over the size [N], shape (n,).
+        force, torque: force and torque that motion and loads require of joints and drivers, about
+            the centre of each body [N, N m], shape (bodies + 1, 3, n); body 0 is the ground.
+        largest: largest of these forces (torques over the size) and of spring forces [N], shape
+            (n,).
     """
 
     def __init__(self, system: System, solved: Solved, drives: Real) -> None:
@@ -108,7 +110,7 @@ class _Loaded:
         inverse = solved.inverse
         flat = demand.reshape(-1, n).T.astype(np.float64)
         self.multipliers: Array = np.einsum("nur,nu->nr", inverse, flat)
-        # combinations of multipliers beyond the reach of the unknowns: they balance themselves
+        # combinations of multipliers that balance themselves, in the null space of J^T
         self.balanced = np.eye(solved.jacobian.shape[1]) - solved.jacobian @ inverse
 
     def output(self, output: ForceMeasure) -> tuple[Array, Array, Array]:
@@ -140,7 +142,7 @@ class _Loaded:
     def _wrench(self, name: str) -> tuple[Array, Array]:
         """Return force and moment on a joint's second body per unit multiplier, shape (n, 3, rows).
 
-        The moment is about the joint's point, carried by this body.
+        The moment is about the joint's point on this body.
         """
         joint = self.mechanism.joint(name)
         i, j = (self._index(body) for body in joint.bodies)
@@ -184,7 +186,7 @@ class _Loaded:
     # Loads
 
     def _push(self, body: int, force: Real, at: Real) -> None:
-        """Let a force act on a body at the end of an arm; it reduces the demand."""
+        """Apply a force to a body at the end of an arm, which reduces the required force."""
         self.force[body] -= force
         self.torque[body] -= _cross(at, force)
         self._grow(force)
@@ -212,7 +214,7 @@ class _Loaded:
         self._grow(np.abs(change) / self.size)
 
     def _element(self, each: Any) -> Real:
-        """Let a force element act, and return its force."""
+        """Apply a force element, and return its force."""
         if isinstance(each, SpringDamper):
             return self._spring(each)
         if isinstance(each, TorsionSpringDamper):

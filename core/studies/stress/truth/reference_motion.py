@@ -1,14 +1,14 @@
-"""The reference motion of a case: its points at every reachable sample, and their round-off bounds.
+"""The reference motion of a case: its points at every reachable sample, with round-off bounds.
 
 An error up to 1e-14 of size times condition is round-off. This is 90 half units in the last place:
-a row is a sum of up to forty products of carried vectors, each with a rounding or two.
+a row is a sum of up to forty products of rotated vectors, each with one or two roundings.
 
     position        1e-14 (K_x L + |x|)       K_x: move of the point per unit error of each row
     velocity        1e-14 K_x (1 + K) V L     V: the fastest unknown
     acceleration    1e-14 K_x (1 + K)^2 A L   A: the largest second rate, or V^2
 
 L is the mechanism's size, K the condition of all unknowns. In J v = c_t, J has the error of the
-pose (one K); J a = ... also has the error of v. |x| is the rounding far from the origin. If two
+pose (one K); J a = ... also has the error of v. |x| is the rounding far from the origin. Where two
 solutions meet, errors are roots of the rows' errors: no position error may exceed sqrt(1e-14) L.
 """
 
@@ -35,13 +35,13 @@ AT_A_FOLD = ROUND_OFF**0.5
 # Above this condition, a residual of 1e-12 (tolerance of a run), times the condition squared,
 # exceeds 1e-9 of the rates (default tolerance of outputs): an engine may refuse, with the reason.
 SINGULAR = (1e-9 / 1e-12) ** 0.5
-# Above this condition a closed form beats Newton, limited by the mechanism's rounding (1e-16).
+# Above this condition a closed form is better than Newton's method, limited by rounding (1e-16).
 UNPOLISHED = 1e6
 
 
 class Reach(IntEnum):
-    """Whether a solution continuing the design is known (REACHED), does not exist (BEYOND), or may
-    exist (UNKNOWN).
+    """Whether a solution that continues the design is known (REACHED), does not exist (BEYOND), or
+    may exist (UNKNOWN).
     """
 
     REACHED = 0
@@ -54,14 +54,14 @@ class Truth:
     """The motion of the case's points.
 
     Attributes:
-        reach: knowledge of each sample, shape (n,): see `Reach`.
+        reach: knowledge of each sample, shape (n,); see `Reach`.
         singular: whether an engine may refuse the sample because of a pose before it, shape (n,).
         points: position [m], velocity and acceleration by point, each (n, 3); NaN if not reached.
         bounds: largest errors due to round-off, by point, shape (3, n).
         condition: condition of all unknowns, shape (n,).
         how: source of the motion.
         system, parts: the equations, and the solved samples by their numbers in the sweep.
-        violated: unavoidable residual of contradictory geometry by sample [m]; zero: not checked.
+        violated: unavoidable residual of contradictory geometry by sample [m]; zero if not checked.
     """
 
     reach: NDArray[np.int_]
@@ -83,7 +83,7 @@ design, a unit quaternion (4, n); a point of it at design [m], (3,); the point's
 
 
 class DefectError(KincheckError):
-    """A defect of the stress run itself: a closed form does not satisfy the equations."""
+    """Defect of the stress run: a closed form does not satisfy the equations."""
 
 
 def followed(case: Case) -> Truth:
@@ -109,7 +109,7 @@ def _follow(system: System, found: _Gathered, side: NDArray[np.intp]) -> None:
     for chunk in np.split(there, range(LANES, len(there), LANES)):
         if not len(chunk):
             continue
-        # only the design is known if nothing moves: all samples are there
+        # if nothing moves, only the design is known, and all samples are there
         solved = system.between(knots, chunk) if len(knots) > 1 else knots[0].repeated(len(chunk))
         found.reach[chunk] = np.where(solved.step <= POLISHED, Reach.REACHED, Reach.UNKNOWN)
         passed = worst[np.searchsorted(at, np.abs(system.path.times[chunk]))]
@@ -118,7 +118,7 @@ def _follow(system: System, found: _Gathered, side: NDArray[np.intp]) -> None:
     past = side[away > at[-1]]
     found.singular[past] = True
     if fold is not None:
-        # samples too near to the fold to tell their side stay unknown
+        # samples too near to the fold stay unknown, since their side is uncertain
         found.reach[past[np.abs(system.path.times[past]) > abs(fold) + abs(abs(fold) - at[-1])]] = (
             Reach.BEYOND
         )
@@ -146,7 +146,7 @@ def closed(case: Case, motion: Motion, nearest: Sequence[float] = ()) -> Truth:
             poses, system.sampled(chunk), system.path.times[chunk], system.rows.angles(poses)
         )
         moved = np.abs(solved.poses.u - poses.u).max(axis=(0, 1)).astype(np.float64)
-        # the closed form lacks the mechanism's rounding, 1e-16 of the rows
+        # the closed form does not include the rounding of the mechanism, 1e-16 of the rows
         bad = (moved > ROUND_OFF * solved.condition) & (solved.condition < UNPOLISHED)
         if bad.any():
             k = int(np.flatnonzero(bad)[0])
@@ -165,7 +165,7 @@ def closed(case: Case, motion: Motion, nearest: Sequence[float] = ()) -> Truth:
         if not condition(inverted(system.rows.jacobian(poses)))[0] < UNPOLISHED:
             found.singular |= system.path.times * time > time * time
     for side in outwards(system.path.times, 0.0):
-        # a formula may have values again beyond a gap, but no motion leads there
+        # beyond a gap a formula may have values, but no motion leads there
         gone = np.logical_or.accumulate(found.reach[side] == Reach.BEYOND)
         found.reach[side] = np.where(gone, Reach.BEYOND, found.reach[side])
         found.singular[side] = np.logical_or.accumulate(found.singular[side] | gone)
@@ -213,7 +213,7 @@ class _Gathered:
         self.bounds = {name: np.full((3, n), np.inf) for name in names}
 
     def add(self, samples: NDArray[np.intp], found: Solved, *, keep: bool) -> None:
-        """Add solved samples; keep the solutions for proofs, unless there are a million."""
+        """Add solved samples; keep the solutions for proofs, except in very large runs."""
         self.condition[samples] = found.condition
         for name, moved in self.points.items():
             for whole, part in zip(moved, _motion(self.system, found, name), strict=True):

@@ -14,23 +14,23 @@ from ....trajectory import Array
 from .evaluation import Poses, cross
 from .long_double import Real
 
-# Singular values below this part of the largest belong to redundant rows, as in
+# Singular values below this fraction of the largest belong to redundant rows, as in
 # `redundancy.RANK_TOLERANCE`.
 RANK = 1e-9
 
 
-# Largest error of a polished sample, as a part of its condition: a hundredth of the error allowed
-# to an engine.
+# Largest error of a polished sample, as a fraction of its condition: a hundredth of an engine's
+# allowed error.
 POLISHED = 1e-16
 
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """Samples on solutions of the equations.
+    """Solved samples.
 
     Attributes:
-        times: [s], shape (n,).
-        angles: angles of the turns, whole turns included [rad], shape (turns, n).
+        times: times of the samples [s], shape (n,).
+        angles: angles of the turns, including full turns [rad], shape (turns, n).
         inverse: inverse or pseudo-inverse of the Jacobian, shape (n, unknowns, rows).
         jacobian: shape (n, rows, unknowns).
         v, a: rates and accelerations of the unknowns, shape (bodies, 6, n).
@@ -66,7 +66,7 @@ class Solved:
         )
 
     def repeated(self, count: int) -> Solved:
-        """Return one sample a number of times."""
+        """Return copies of one sample."""
         lanes = [
             np.repeat(each, count, axis=-1)
             for each in (self.poses.u, self.poses.q, self.angles, self.v, self.a)
@@ -81,8 +81,8 @@ class Solved:
 
 
 def condition(inverse: Array) -> Array:
-    """Return the largest move of any unknown [units, rad] per unit error of
-    each row, shape (n,).
+    """Return the largest displacement of any unknown [units, rad] per unit error of each row, shape
+    (n,).
     """
     return np.maximum(1.0, np.abs(inverse).sum(axis=2).max(axis=1))
 
@@ -94,10 +94,10 @@ def inverted(jacobian: Array) -> Array:
     try:
         if jacobian.shape[1] == jacobian.shape[2]:
             found = np.linalg.inv(sound)
-        else:  # of full column rank: five times faster than by singular values
+        else:  # full column rank: five times faster than with singular values
             q, r = np.linalg.qr(sound)
             found = np.linalg.inv(r) @ np.moveaxis(q, 1, 2)
-    except np.linalg.LinAlgError:  # one matrix is singular; the others have an inverse
+    except np.linalg.LinAlgError:  # some matrix is singular; the others have inverses
         found = np.linalg.pinv(sound, rcond=RANK)
     return np.where(finite, found, np.nan)
 
