@@ -316,7 +316,7 @@ def test_plain_bench_is_everything(monkeypatch, tmp_path):
         "measure",
         lambda cases, engines, **options: asked.update(options, cases=cases) or found,
     )
-    monkeypatch.setattr(formulation, "STATES", 3)
+    monkeypatch.setattr(formulation, "STATES", 1)
     assert main.main(["bench", "--out", str(tmp_path)]) == 0
     assert (tuple(asked["cases"]), asked["parts"]) == (command.CASES, engines.PARTS)
     found = json.loads((tmp_path / "bench.json").read_text("utf-8"))

@@ -14,7 +14,7 @@ from pathlib import Path
 import kincheck.core
 import pytest
 from kincheck import adapters
-from kincheck.core import Body, Gear, InPlane, Joint, Revolute, Universal, check_joint
+from kincheck.core import Body, Gear, InPlane, Joint, Revolute, Spherical, Universal, check_joint
 from kincheck.core import primitives as p
 from kincheck.core.cli.joint_loading import load_joint
 from kincheck.core.cli.main import main
@@ -39,20 +39,6 @@ WITHOUT_EQUIVALENT = ("point_on_parabola", "line_no_twist")
 
 
 pytestmark = pytest.mark.usefixtures("own_joint_types")
-checking = importlib.import_module("kincheck.core.studies.joint_check.check_joint")
-
-
-@pytest.fixture
-def few(monkeypatch):
-    """One specimen of each type, and few starts of Newton's iteration."""
-    monkeypatch.setattr(checking, "SPECIMENS", 1)
-    monkeypatch.setattr(checking, "STARTS", 40)
-
-
-@pytest.fixture
-def loops_only(few, monkeypatch):
-    """The same without the search for branches, half of the work."""
-    monkeypatch.setattr(checking, "branches", lambda one, starts: [])
 
 
 @pytest.mark.parametrize("name", BUILT_IN)
@@ -128,7 +114,7 @@ def test_specimens_given_or_offered(loops_only):
 
 
 def test_the_seed_reproduces(few):
-    first, again, other = (check_joint(Revolute, seed=seed, samples=4) for seed in (3, 3, 4))
+    first, again, other = (check_joint(Spherical, seed=seed, samples=4) for seed in (3, 3, 4))
     assert first == again
     assert first.findings != other.findings
 
