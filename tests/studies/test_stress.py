@@ -198,7 +198,7 @@ def test_a_small_loop_hides_no_corner_of_the_large_one():
 @pytest.mark.parametrize("name", FAMILIES)
 def test_specimens_are_made_again_and_can_be_saved(name, tmp_path):
     """The same numbers for the same seed; and a case file says all of them."""
-    for number in range(3):
+    for number in range(2):
         one, again = (
             FAMILIES[name].specimen(np.random.default_rng([4, number]), 6) for _ in range(2)
         )
@@ -222,8 +222,10 @@ def test_specimens_are_made_again_and_can_be_saved(name, tmp_path):
 
 
 def test_no_family_is_silently_wrong_in_the_native_engine():
-    """All families; the share of each in a run of three hundred samples."""
-    found, _ = stress([*FAMILIES.values()], [NATIVE], samples=300, seed=0)
+    """All families; the share of each in a run of 160 samples. Compiled: without machine code is
+    another test.
+    """
+    found, _ = stress([*FAMILIES.values()], [NATIVE], samples=160, seed=0)
     assert [cell.family for cell in found.cells] == [*FAMILIES]
     assert {cell.family: cell.samples[Verdict.SILENTLY_WRONG] for cell in found.cells} == {
         cell.family: 0 for cell in found.cells
@@ -231,7 +233,7 @@ def test_no_family_is_silently_wrong_in_the_native_engine():
     assert {cell.family: cell.samples[Verdict.UNSUPPORTED] for cell in found.cells} == {
         cell.family: 0 for cell in found.cells
     }
-    assert sum(sum(cell.samples.values()) for cell in found.cells) > 270
+    assert sum(sum(cell.samples.values()) for cell in found.cells) > 144
     assert all(proof.proved == proof.tried and proof.worst < 1e-2 for proof in found.proofs)
     accepted = [each for each in found.acceptances if each.accepted]
     assert accepted
@@ -254,7 +256,7 @@ def test_errors_do_not_grow_over_a_thousand_turns():
 
 def test_nothing_nearly_singular_is_silently_wrong_without_machine_code():
     found, _ = stress(
-        [FAMILIES["singular"]], [interpreted(NATIVE)], samples=24, seed=0, prove=False
+        [FAMILIES["singular"]], [interpreted(NATIVE)], samples=12, seed=0, prove=False
     )
     assert found.cells[0].samples[Verdict.SILENTLY_WRONG] == 0
 
@@ -351,12 +353,12 @@ def test_what_cannot_be_proved_is_counted(monkeypatch):
 
 def test_the_family_of_starts_finds_a_start_that_rounding_decides(monkeypatch):
     """A tolerance of zero is the old rule: rounded and typed motions then start elsewhere."""
-    made = specimens(FAMILIES["starts"], 1, 240)  # once, with their references
+    made = specimens(FAMILIES["starts"], 1, 80)  # once, with their references
     monkeypatch.setattr("kincheck.core.studies.stress.run.specimens", lambda *_: made)
-    found, _ = stress([FAMILIES["starts"]], [NATIVE], samples=240, seed=1, prove=False)
+    found, _ = stress([FAMILIES["starts"]], [NATIVE], samples=80, seed=1, prove=False)
     assert found.cells[0].samples[Verdict.SILENTLY_WRONG] == 0
-    assert found.cells[0].samples[Verdict.RIGHT] > 200
+    assert found.cells[0].samples[Verdict.RIGHT] > 66
     monkeypatch.setattr("kincheck.core.kinematics.compiled.motion_start.TYPED", 0.0)
     clear_caches()
-    found, _ = stress([FAMILIES["starts"]], [NATIVE], samples=240, seed=1, prove=False)
-    assert found.cells[0].samples[Verdict.SILENTLY_WRONG] > 20
+    found, _ = stress([FAMILIES["starts"]], [NATIVE], samples=80, seed=1, prove=False)
+    assert found.cells[0].samples[Verdict.SILENTLY_WRONG] > 6
