@@ -13,7 +13,7 @@ from kincheck.core.caches import clear_caches
 from kincheck.core.cli.joint_loading import sources
 from kincheck.core.cli.main import main
 
-from .test_check_joint import SLOT
+from .test_check_joint_command import SLOT
 
 HERE = Path(__file__).parents[1]
 
