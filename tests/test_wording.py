@@ -4,7 +4,7 @@ import ast
 import re
 from collections import Counter
 
-from .test_architecture import SOURCES, tree
+from .support.sources import SOURCES, tree
 
 MOST = 12.0
 """In 1,000 words of docstrings; asv, QCEngine, Optimistix and scikit-fem have 4 to 10."""
