@@ -30,6 +30,14 @@ def tree(path):
     return ast.parse((ROOT / path).read_text(encoding="utf-8"))
 
 
+def statements(node: ast.AST) -> Iterator[ast.AST]:
+    """Yield all statements below a node, however deep; expressions are not read."""
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.stmt | ast.excepthandler | ast.match_case):
+            yield child
+            yield from statements(child)
+
+
 @cache
 def imported(path: Path, syntax: ast.AST) -> list[tuple[str, ...]]:
     """Return the imports of a file as paths from the top; relative ones are resolved, and those of
@@ -49,7 +57,7 @@ def _resolved(path: Path, syntax: ast.AST) -> Iterator[tuple[str, ...]]:
 
 
 def _named(path: Path, syntax: ast.AST) -> Iterator[tuple[str, ...]]:
-    for node in ast.walk(syntax):
+    for node in statements(syntax):
         if isinstance(node, ast.Import):
             yield from (tuple(alias.name.split(".")) for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
