@@ -9,7 +9,7 @@ import kincheck.adapters
 import kincheck.core
 import pytest
 
-from .test_architecture import ROOT
+from .support.sources import ROOT
 
 ONLY_NAMES = """
 import sys

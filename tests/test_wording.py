@@ -4,7 +4,7 @@ import ast
 import re
 from collections import Counter
 
-from .test_architecture import SOURCES, tree
+from .support.sources import SOURCES, statements, tree
 
 MOST = 12.0
 """In 1,000 words of docstrings; asv, QCEngine, Optimistix and scikit-fem have 4 to 10."""
@@ -18,7 +18,7 @@ def shares():
     """Occurrences in 1,000 words, by folder; FOLDER/*.py is without the folders in it."""
     words, heavy = Counter(), Counter()
     for path in SOURCES:
-        for node in ast.walk(tree(path)):
+        for node in (tree(path), *statements(tree(path))):
             text = ast.get_docstring(node) if isinstance(node, DOCUMENTED) else None
             for folder in {*map(str, path.parents), f"{path.parent}/*.py"} if text else ():
                 words[folder] += len(WORD.findall(text))

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from ..test_architecture import ROOT
+from ..support.sources import ROOT
 from .page import LANGUAGES, blocks, commands, differences
 
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]

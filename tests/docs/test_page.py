@@ -5,7 +5,7 @@ import importlib.util
 import pytest
 from kincheck.core.cli import COMMANDS, command_name
 
-from ..test_architecture import ROOT
+from ..support.sources import ROOT
 from .page import blocks, commands, differences
 
 PAGE = """

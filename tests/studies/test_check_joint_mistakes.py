@@ -202,14 +202,6 @@ MISTAKES = {
 }
 
 
-@pytest.fixture
-def few(monkeypatch):
-    """One specimen, few starts of Newton's iteration, and few aims of the walks from their ends."""
-    monkeypatch.setattr(checking, "SPECIMENS", 1)
-    monkeypatch.setattr(checking, "STARTS", 10)
-    monkeypatch.setattr("kincheck.core.studies.joint_check.branches.AIMS", 4)
-
-
 @pytest.mark.parametrize("mistake", MISTAKES)
 def test_mistakes_are_caught(mistake, few, monkeypatch):
     """Few poses find them; the two dear checks run where they must find one."""

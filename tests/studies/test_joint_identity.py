@@ -2,15 +2,18 @@
 joints into one run.
 """
 
+import importlib
 import shutil
-import subprocess
+import sqlite3
 import sys
 from pathlib import Path
 
 import pytest
+from kincheck.core.caches import clear_caches
 from kincheck.core.cli.joint_loading import sources
+from kincheck.core.cli.main import main
 
-from .test_check_joint import SLOT
+from .test_check_joint_command import SLOT
 
 HERE = Path(__file__).parents[1]
 
@@ -28,32 +31,30 @@ def folder(tmp_path):
     return tmp_path
 
 
-def run(folder, *arguments):
-    """Run as a user does, in the folder of the module."""
-    command = [
-        sys.executable,
-        "-m",
-        "kincheck",
-        "run",
-        "slot.toml",
-        "--joint-type",
-        "pin_in_slot:PinInSlot",
-        "--engine",
-        "native",
-    ]
-    done = subprocess.run(
-        [*command, *arguments], cwd=folder, capture_output=True, text=True, check=False
-    )
-    # only native knows the joint, so nothing is compared
-    assert done.returncode == 2, done.stderr
-    assert "nothing was compared" in done.stderr
-    return done.stderr
+@pytest.fixture
+def run(folder, monkeypatch, own_joint_types, capsys):
+    """Returns what a run says, in the folder of the module, which each run imports anew."""
+    monkeypatch.chdir(folder)
+    monkeypatch.setattr("sys.path", ["", *sys.path])
+
+    def run(*arguments):
+        for module in ("pin_in_slot", "beside"):
+            monkeypatch.delitem(sys.modules, module, raising=False)
+        importlib.invalidate_caches()
+        clear_caches()
+        joint = ("--joint-type", "pin_in_slot:PinInSlot")
+        status = main(["run", "slot.toml", *joint, "--engine", "native", "--jobs", "0", *arguments])
+        said = capsys.readouterr().err
+        # only native knows the joint, so nothing is compared
+        assert status == 2, said
+        assert "nothing was compared" in said
+        return said
+
+    return run
 
 
 def killed(folder):
-    """Have the last run of the history without an end."""
-    import sqlite3
-
+    """Leave the last run of the history without an end."""
     connection = sqlite3.connect(folder / "h.sqlite")
     connection.execute("UPDATE runs SET status = 'interrupted'")
     connection.commit()
@@ -61,20 +62,18 @@ def killed(folder):
 
 
 EDITS = {
-    None: "run 1 is resumed after 1 records",
     "elsewhere.py": "run 1 is resumed after 1 records",
     "beside.py": "run 2 is new",
     "pin_in_slot.py": "run 3 is new",
 }
 
 
-def test_an_edit_of_the_joints_code_makes_another_run(folder):
-    run(folder, "--history", "h.sqlite")
+def test_an_edit_of_the_joints_code_makes_another_run(folder, run):
+    run("--history", "h.sqlite")
     for edited, expected in EDITS.items():
         killed(folder)
-        if edited is not None:
-            (folder / edited).write_text((folder / edited).read_text() + "\n# edited\n")
-        assert expected in run(folder, "--history", "h.sqlite", "--resume"), edited
+        (folder / edited).write_text((folder / edited).read_text() + "\n# edited\n")
+        assert expected in run("--history", "h.sqlite", "--resume"), edited
 
 
 def test_installed_modules_and_kinchecks_own_are_not_among_the_sources():

@@ -38,29 +38,6 @@ def read(path: Path):
         return list(csv.DictReader(lines))
 
 
-def test_a_hardpoint_that_is_named_like_an_output_has_a_column_of_its_own(tmp_path):
-    parquet = pytest.importorskip("pyarrow.parquet")
-    file, stored = tmp_path / "hardpoints.json", tmp_path / "all.parquet"
-    for name in ("rocker_tip_y", "variant"):
-        varied = {name: {"at": "joints.rod.length", "half_width": 1.0}}
-        file.write_text(json.dumps({**HEAD, "mode": "monte_carlo", "hardpoints": varied}))
-        assert (
-            main(["sweep", "rssr", "--vary", str(file), "--samples", "20", "--store", str(stored)])
-            == 0
-        )
-        table = parquet.read_table(stored)
-        assert table.column_names[:2] == ["variant", f"{name}.offset"]
-        assert table.column_names.count("rocker_tip_y") == 1
-        offsets, values = (
-            table[f"{name}.offset"].to_numpy(),
-            np.array(table["rocker_tip_y"].to_pylist()),
-        )
-        assert 0.0 < np.abs(offsets).max() <= 1e-3
-        assert values.shape == (20, 181)
-        units = json.loads(table.schema.metadata[b"kincheck"])["units"]
-        assert (units[f"{name}.offset"], units["rocker_tip_y"]) == ("m", "m")
-
-
 def test_a_sweep_writes_what_it_has_found(file, tmp_path, capsys):
     out, stored = tmp_path / "out", tmp_path / "all.parquet"
     arguments = [

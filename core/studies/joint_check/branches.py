@@ -87,10 +87,12 @@ def connected(s: Specimen, state: Array) -> Mask:
     t = s.traced
     directions = s.rng.normal(size=(t.columns, WALKS))
     directions[:COLUMNS] = 0.0
+    there = _led(t, state, np.repeat(design(t, 1), state.shape[1], axis=1))
+    if there.all():
+        return there
     known = np.concatenate(
         walk(t, design(t, WALKS), straight(directions, STEP), STRIDES, MOVING), axis=1
     )
-    there = _led(t, state, np.repeat(design(t, 1), state.shape[1], axis=1))
     for k in range(AIMS):
         astray = np.flatnonzero(~there)
         if len(astray):

@@ -1,0 +1,93 @@
+"""Sensitivities and the budget of the closure, against mechanisms solved anew."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from kincheck import cases
+from kincheck.core import (
+    Point,
+)
+from kincheck.core.kinematics import NativeSolver, places
+from kincheck.core.studies.diagnosis import diagnose
+
+from ..support.mechanisms import four_bar, mcpherson
+from .test_diagnosis import case
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("mcpherson_strut", -0.08), ("rssr", 2.0), ("spatial_slider_crank", 0.7)]
+)
+def test_sensitivities_are_those_of_mechanisms_solved_anew(name, value):
+    """Against central differences of 1e-5 m: they are off by the third derivative, 1e-10, and
+    round-off, 1e-15 / 1e-5.
+    """
+    loaded = cases.load(name)
+    case, mechanism = (
+        replace(loaded, sweep=replace(loaded.sweep, values=np.array([value]))),
+        loaded.mechanism,
+    )
+    numbers = [
+        (place, k, x) for place, design in places(mechanism).items() for k, x in enumerate(design)
+    ]
+    h = 1e-5 * np.eye(len(numbers))
+    designs = np.array([x for _, _, x in numbers])[:, None] + np.concatenate([h, -h], axis=1)
+    ready = NativeSolver(order=0).prepare_designs(
+        mechanism, case.sweep.path, tuple(places(mechanism)), case.points
+    )
+    solved = ready.solve(designs, 1e-13)
+    assert solved.solved.all()
+    known = {
+        (each.output, each.number): each.by_sample[0]
+        for each in diagnose(case, samples=1, tol=1e-12).sensitivities
+    }
+    checked = 0
+    for output in case.outputs:
+        if output.forces:
+            continue
+        own = [place for place, _, _ in numbers].index(f"points.{output.point}.position")
+        designed = designs[own : own + 3] if output.relative else 0.0
+        found = np.array(output.direction) @ (
+            ready.motion(solved, output.point)[0][:, 0] - designed
+        )
+        differences = (found[: len(numbers)] - found[len(numbers) :]) / 2e-5
+        for (place, k, _), difference in zip(numbers, differences, strict=True):
+            vector = places(mechanism)[place]
+            number = place if len(vector) == 1 else f"{place} {'xyz'[k]}"
+            scale = np.linalg.norm(vector) if ".ax" in place else 1.0  # of directions, by the angle
+            assert known.get((output.name, number), 0.0) == pytest.approx(
+                scale * difference, abs=2e-8
+            ), (output.name, number)
+            checked += abs(difference) > 1e-3
+    assert checked >= 20
+
+
+@pytest.mark.parametrize("name", ["mcpherson_strut", "rssr", "chrono_multi_link"])
+def test_the_budget_is_the_one_that_the_cases_were_given(name):
+    loaded = cases.load(name)
+    found = diagnose(loaded, samples=41, tol=1e-12)
+    stated = float(re.search(r"at most ([\d.e+-]+) m", loaded.outputs[0].why)[1])
+    # its two or three digits, and what the samples that are not looked at may add
+    assert max(each.shift for each in found.budgets) == pytest.approx(stated, rel=0.02)
+    assert all(
+        99.999 * each.shift <= each.suggested <= 111.0 * each.shift for each in found.budgets
+    )
+    assert all(each.round_off < 1e-3 * each.shift for each in found.budgets)
+
+
+def test_a_changed_axis_that_would_bind_is_flagged():
+    found = diagnose(case(four_bar(), [0.0, 0.4, 0.8], "C"), samples=3, tol=1e-12)
+    assert "joints.C.axis x" in found.binding  # out of parallel
+    assert "joints.C.point x" not in found.binding  # another link length
+
+
+def test_points_that_are_fixed_do_not_depend_on_anything_but_themselves():
+    mechanism = replace(
+        mcpherson(), points=[*mcpherson().points, Point("bolt", "chassis", (0.0, 0.0, 0.0))]
+    )
+    found = diagnose(case(mechanism, [0.01], "bolt"), samples=1, tol=1e-12)
+    assert {each.number for each in found.sensitivities} == {
+        f"points.bolt.position {axis}" for axis in "xyz"
+    }
+    assert {each.shift for each in found.budgets} == {0.0}

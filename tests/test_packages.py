@@ -1,0 +1,125 @@
+"""Files and packages: sizes, names, what is packaged, and what loads when."""
+
+import ast
+import subprocess
+import sys
+import tomllib
+from collections import Counter
+from pathlib import Path
+
+from kincheck.core import kinematics
+
+from .support.sources import DOOR, PACKAGE, PAGES, ROOT, SOURCES, TESTS, folder_of, tree
+from .test_source_rules import SIMULATORS
+
+LONGEST = 300
+WIDEST = 100
+LARGEST_SHARE = 0.25
+
+
+def lines(path: Path) -> int:
+    return len((ROOT / path).read_text(encoding="utf-8").splitlines())
+
+
+def test_no_file_is_too_long():
+    assert {str(path): n for path in [*SOURCES, *PAGES] if (n := lines(path)) > LONGEST} == {}
+
+
+def test_no_line_of_a_page_is_too_wide():
+    """As ruff holds it for Python."""
+    wide = [
+        f"{path}:{number}"
+        for path in PAGES
+        for number, line in enumerate((ROOT / path).read_text("utf-8").splitlines(), 1)
+        if len(line) > WIDEST
+    ]
+    assert wide == []
+    assert {path.suffix for path in PAGES} == {".css", ".html", ".js"}
+
+
+def test_no_layer_is_too_large():
+    sizes = Counter()
+    for path in SOURCES:
+        if path.parts[0] == "core":
+            sizes[folder_of(path).split("/")[0]] += lines(path)
+    whole = sum(sizes.values())
+    assert {name: n / whole for name, n in sizes.items() if n > LARGEST_SHARE * whole} == {}
+
+
+def test_the_door_has_the_names_that_type_checkers_see():
+    """And none of a module, which would take its place once imported."""
+    seen = {
+        alias.asname: node.module
+        for node in ast.walk(tree(DOOR))
+        if isinstance(node, ast.ImportFrom) and node.level
+        for alias in node.names
+    }
+    assert seen == kinematics._MODULES
+    assert all(hasattr(kinematics, name) for name in seen)
+    assert [
+        name for name in seen if (ROOT / DOOR).with_name(name).with_suffix(".py").exists()
+    ] == []
+    assert [name for name in seen if (ROOT / DOOR).with_name(name).is_dir()] == []
+
+
+def test_the_harness_names_the_standard_in_one_place():
+    """Engines tell by attributes what the harness must know; none is asked for by its name."""
+    named = [
+        str(path.relative_to(ROOT))
+        for path in sorted((ROOT / "core" / "harness").rglob("*.py"))
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Constant) and node.value == "native"
+    ]
+    assert named == ["core/harness/standard.py"]
+
+
+def test_nothing_is_called_utils():
+    assert [path for path in SOURCES + TESTS if "util" in path.stem or "helper" in path.stem] == []
+
+
+def test_packages_are_the_folders():
+    """A folder that is not listed would be missing from a wheel, though an editable install finds
+    it.
+    """
+    setuptools = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"][
+        "setuptools"
+    ]
+    assert Path(setuptools["package-dir"]["kincheck"]) == PACKAGE
+    folders = {path.parent for path in SOURCES}
+    expected = [".".join(["kincheck", *each.parts]) for each in folders - {PACKAGE}]
+    assert sorted(setuptools["packages"]) == sorted(["kincheck", *expected])
+    assert all((ROOT / each / "__init__.py").exists() for each in folders)
+
+
+def test_packages_are_typed():
+    folders = (PACKAGE, "core", "adapters", "cases")
+    assert all((ROOT / folder / "py.typed").exists() for folder in folders)
+
+
+LOAD_EVERYTHING = """
+import importlib, pkgutil, sys
+for name in ("core", "adapters", "cases"):
+    package = importlib.import_module(f"kincheck.{name}")
+    for module in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
+        importlib.import_module(module.name)
+print(*sorted({name.split(".")[0] for name in sys.modules}))
+"""
+
+
+def test_importing_everything_loads_no_simulator_and_nothing_twice():
+    """In a fresh interpreter, away from the checkout: a bare "core" would be a second copy."""
+    loaded = subprocess.run(
+        [sys.executable, "-c", LOAD_EVERYTHING],
+        cwd=ROOT / "tests",
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout.split()
+    assert "kincheck" in loaded
+    assert "numpy" in loaded
+    assert SIMULATORS & set(loaded) == set()
+    assert {"core", "adapters", "cases"} & set(loaded) == set()
+
+
+def test_the_tests_load_nothing_twice():
+    assert {"core", "adapters", "cases"} & set(sys.modules) == set()

@@ -1,0 +1,140 @@
+"""Rules of source files, each a function of a file's path and syntax tree. Every rule finds an
+offender below.
+"""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+from .support.sources import DOOR, SOURCES, TESTS, imported, module_of, tree
+
+SIMULATORS = {"mujoco", "pinocchio", "exudyn", "opensim", "pydrake", "dartpy"}
+
+
+def past_the_door(path, syntax):
+    """Yield imports of the files behind core/kinematics: its public names are those of the folder
+    itself.
+    """
+    for target in imported(path, syntax):
+        own = target[1:] if target[0] == "kincheck" else target
+        if own[:2] == DOOR.parts[:2] != path.parts[:2] and module_of(own) != DOOR:
+            yield f"imports {'.'.join(target)}: say core.kinematics"
+
+
+def simulators_at_import(path, syntax):
+    """Yield simulators imported when the module loads, by a statement or by import_module."""
+    waiting = list(ast.iter_child_nodes(syntax))
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, ast.FunctionDef | ast.Lambda):
+            continue
+        names = []
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and not node.level:
+            names = [node.module or ""]
+        elif isinstance(node, ast.Call) and "import" in ast.unparse(node.func):
+            constants = [each.value for each in node.args if isinstance(each, ast.Constant)]
+            names = [value for value in constants if isinstance(value, str)]
+        yield from (
+            f"imports {name} at import" for name in names if name.split(".")[0] in SIMULATORS
+        )
+        waiting += ast.iter_child_nodes(node)
+
+
+def undocumented(path, syntax):
+    """Yield the module, public functions and public classes without a docstring."""
+    if not ast.get_docstring(syntax) and ast.unparse(syntax):
+        yield "has no docstring"
+    for node in syntax.body:
+        public = isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_")
+        if public and not ast.get_docstring(node):
+            yield f"{node.name} has no docstring"
+
+
+def bare_packages(path, syntax):
+    """Yield imports of the packages by their folder names, which would load them a second time."""
+    for target in imported(path, syntax):
+        if target[0] in ("core", "adapters", "cases"):
+            yield f"imports {'.'.join(target)}: say kincheck.{target[0]}"
+
+
+RULES = [past_the_door, simulators_at_import, undocumented]
+
+
+@pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.__name__)
+def test_sources(rule):
+    found = {str(path): offences for path in SOURCES if (offences := list(rule(path, tree(path))))}
+    assert found == {}
+
+
+INSIDE = {"kinematics", "program", "test_probe.py"}
+"""Below tests: those of the inside of kinematics, and of its programs."""
+
+
+def test_tests_of_anything_else_enter_kinematics_by_its_door():
+    found = {
+        str(path): offences
+        for path in TESTS
+        if INSIDE.isdisjoint(path.parts) and (offences := list(past_the_door(path, tree(path))))
+    }
+    assert found == {}
+
+
+def test_tests_use_the_installed_package():
+    found = {str(path): each for path in TESTS if (each := list(bare_packages(path, tree(path))))}
+    assert found == {}
+
+
+OFFENDERS = [
+    (past_the_door, "core/case/new.py", "from ..kinematics.solver_selection import prepare"),
+    (past_the_door, "core/case/io/new.py", "from ...kinematics import compiled"),
+    (past_the_door, "core/cli/new.py", "def f():\n    from ..kinematics.one_design import solve"),
+    (past_the_door, "core/kincheck/new.py", "import kincheck.core.kinematics.sparse.sweep"),
+    (past_the_door, "adapters/new.py", "from ..core.kinematics.compiled.request import Request"),
+    (simulators_at_import, "adapters/new.py", "import mujoco"),
+    (simulators_at_import, "adapters/new.py", "class A:\n    from mujoco.viewer import launch"),
+    (
+        simulators_at_import,
+        "adapters/new.py",
+        "try:\n    import exudyn as exu\nexcept ImportError:\n    exu = None",
+    ),
+    (simulators_at_import, "adapters/new.py", "mj = importlib.import_module('mujoco')"),
+    (undocumented, "core/new.py", "x = 1"),
+    (undocumented, "core/new.py", '"""Doc."""\ndef f(): ...'),
+    (undocumented, "core/new.py", '"""Doc."""\nclass A: ...'),
+    (bare_packages, "tests/test_new.py", "from core.mechanism import Body"),
+    (bare_packages, "tests/test_new.py", "import adapters.native"),
+]
+
+
+@pytest.mark.parametrize(("rule", "path", "text"), OFFENDERS)
+def test_offenders_are_found(rule, path, text):
+    assert list(rule(Path(path), ast.parse(text)))
+
+
+ALLOWED = [
+    (
+        past_the_door,
+        "adapters/shared/new.py",
+        "from ...core.kinematics import NativeSolver, solve\nfrom ...core import kinematics",
+    ),
+    (past_the_door, "core/kinematics/new.py", "from .compiled.request import Request"),
+    (
+        simulators_at_import,
+        "adapters/new.py",
+        "def f():\n    import mujoco\n    return importlib.import_module('exudyn')",
+    ),
+    (undocumented, "core/new.py", '"""Doc."""\ndef _f(): ...'),
+    (
+        bare_packages,
+        "tests/test_new.py",
+        "from kincheck.core.algebra import Vec3\nfrom .oracles.naive import A",
+    ),
+]
+
+
+@pytest.mark.parametrize(("rule", "path", "text"), ALLOWED)
+def test_allowed_code_passes(rule, path, text):
+    assert list(rule(Path(path), ast.parse(text))) == []
