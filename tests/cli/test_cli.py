@@ -255,8 +255,8 @@ def test_the_other_cases_of_a_bad_one_are_run_and_recorded(
     told = capsys.readouterr().out
     assert message.partition(":")[0].replace("_", r"\_") in told
     assert told.startswith(
-        "## run 2: all 2 right, 1 case could not be read; compared with nothing: no earlier run in"
-        " which"
+        "## run 2: all 2 right, 1 case could not be read; nothing to compare with: no earlier"
+        " green run"
     )
     # and is one fault, however many engines were to solve it
     engines = [RIGHT, Fake("other")]
@@ -300,7 +300,7 @@ def test_a_night_in_which_no_case_can_be_read_is_recorded(
     assert "1 case could not be read: nosuch" in Path("cases.md").read_text()
     assert kincheck_main("report", "--history", "history") == 1
     assert capsys.readouterr().out.startswith(
-        "## run 3: all 0 right, 1 case could not be read; compared with nothing"
+        "## run 3: all 0 right, 1 case could not be read; nothing to compare with"
     )
 
 

@@ -310,7 +310,7 @@ def test_an_upgrade_is_no_regression(path):
 def test_a_first_report_counts_only_what_was_judged(path, capsys):
     keep(path, bare(records()))
     assert main.main(["report", "--history", str(path)]) == 0
-    assert "all 3 right, 1 not judged; compared with nothing" in capsys.readouterr().out
+    assert "all 3 right, 1 not judged; nothing to compare with" in capsys.readouterr().out
 
 
 # Series with holes

@@ -204,5 +204,5 @@ def test_missing_pairs_count_with_nothing_to_compare_with(path, capsys):
     keep(path, changed(records(), outcome=Outcome.FAIL))
     keep(path, records()[:2])
     assert main.main(["report", "--history", str(path)]) == 0
-    assert "2 not in this run; compared with nothing" in capsys.readouterr().out
+    assert "2 not in this run; nothing to compare with" in capsys.readouterr().out
     assert main.main(["report", "--history", str(path), "--missing-is-failure"]) == 1
