@@ -43,9 +43,9 @@ def add(commands: Any) -> None:
         default="last-green",
         metavar="RUN",
         help=(
-            "the same, or last-green (the latest earlier run in which nothing went wrong, and no"
-            " engine was missing that is there otherwise), or BRANCH-baseline (the latest earlier"
-            " run of that branch, without changes to its files); default %(default)s"
+            "run to compare with: a number or file, last-green (an earlier run without faults and"
+            " with the most of the run's comparisons, the latest of several) or BRANCH-baseline"
+            " (likewise, on that branch without uncommitted changes); default %(default)s"
         ),
     )
     report.add_argument(

@@ -77,7 +77,7 @@ def headline(found: Regressions) -> str:
         rest += [f"{absent} {Kind.ABSENT}"] if absent else []
         rest += [unread_count(len(found.unread))] if found.unread else []
         return (
-            f"{found.run.name}: {', '.join([failing, *rest])}; compared with nothing:"
+            f"{found.run.name}: {', '.join([failing, *rest])}; nothing to compare with:"
             f" {found.reason}"
         )
     counts = [

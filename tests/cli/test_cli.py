@@ -255,7 +255,8 @@ def test_the_other_cases_of_a_bad_one_are_run_and_recorded(
     told = capsys.readouterr().out
     assert message.partition(":")[0].replace("_", r"\_") in told
     assert told.startswith(
-        "## run 2: all 2 right, 1 case could not be read; nothing to compare with: no earlier which"
+        "## run 2: all 2 right, 1 case could not be read; nothing to compare with: no earlier"
+        " green run"
     )
     # and is one fault, however many engines were to solve it
     engines = [RIGHT, Fake("other")]

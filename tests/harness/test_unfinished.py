@@ -89,7 +89,7 @@ def test_a_run_of_which_nothing_was_made_is_judged_too(path):
 def test_what_was_never_made_counts_with_nothing_to_compare_with(path, capsys):
     killed(path, 1)
     assert main.main(["report", "--history", str(path)]) == 1
-    assert "all 1 right, 3 not run; compared with nothing" in capsys.readouterr().out
+    assert "all 1 right, 3 not run; nothing to compare with" in capsys.readouterr().out
 
 
 def test_every_format_tells_of_pairs_that_were_never_made(path):

@@ -320,7 +320,7 @@ def test_files_can_be_compared_without_a_history(tmp_path, capsys, monkeypatch):
     assert main.main(["report", before, "--against", now]) == 0
     assert main.main(["report", before]) == 0
     assert (
-        "compared with nothing: last-green needs a history, and none is given"
+        "nothing to compare with: last-green needs a history, and none is given"
         in capsys.readouterr().out
     )
     assert main.main(["report"]) == 2

@@ -176,7 +176,7 @@ def measured(progress=print):
         rounds=1,
         parts=("work",),
         command="kincheck bench",
-        tell=tell,
+        progress=progress,
     )
 
 

@@ -102,7 +102,7 @@ def find_against(name: str, subject: Subject, store: Store | None) -> tuple[Subj
                 return _kept(store, row, name.replace("-", " ")), ""
             return find_against(name, subject, store)  # the next best
         if name == LAST_GREEN:
-            return None, "no earlier run in which nothing went wrong with any of its pairs"
+            return None, "no earlier green run has any of its pairs"
         known = sorted(
             {
                 str(git["branch"])
