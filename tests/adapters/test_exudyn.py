@@ -122,11 +122,11 @@ def strut(values, direction=(0.0, 0.0, 1.0), reverse=False, rate=1.0, design=0.0
 @pytest.mark.parametrize("rate", [1.0, -40.0])
 def test_strut_agrees_with_a_solution_in_40_digits(reverse, rate):
     table = np.array([line.split() for line in STRUT.strip().splitlines()], dtype=float)
-    found = solved(strut(np.linspace(-0.08, 0.08, 161), reverse=reverse, rate=rate))
+    found = solved(strut(np.linspace(-0.08, 0.08, 41), reverse=reverse, rate=rate))
     for motion in found.values():
-        assert_consistent(motion, 1e-3 / rate)
+        assert_consistent(motion, 4e-3 / rate)
     wheel = found["wheel"]
-    at = np.rint((table[:, 0] + 0.08) / 1e-3).astype(int)
+    at = np.rint((table[:, 0] + 0.08) / 4e-3).astype(int)
     assert np.abs(wheel.position[at, :2] - table[:, 1:3]).max() <= 1e-14
     assert np.abs(wheel.velocity[at, :2] / rate - table[:, 3:5]).max() <= 1e-13
     assert np.abs(wheel.acceleration[at, :2] / rate**2 - table[:, 5:]).max() <= 2e-12
@@ -135,7 +135,7 @@ def test_strut_agrees_with_a_solution_in_40_digits(reverse, rate):
 
 
 def test_any_direction_can_be_driven():
-    direction, values = np.array([0.2, -0.3, 2.0]), np.linspace(-0.05, 0.05, 201)
+    direction, values = np.array([0.2, -0.3, 2.0]), np.linspace(-0.05, 0.05, 26)
     points = solved(strut(0.7 + values, tuple(direction), rate=3.0, design=0.7))
     along = (
         (points["wheel"].position - [0.975, 0.715, 0.101]) @ direction / np.linalg.norm(direction)
@@ -146,7 +146,7 @@ def test_any_direction_can_be_driven():
 
 
 def test_unreachable_stroke_ends_with_a_message():
-    case = strut(np.linspace(-0.01, 0.6, 611))
+    case = strut([*np.linspace(-0.01, 0.28, 30), *np.linspace(0.281, 0.3, 20), 0.6])
     trajectory = solve(case)
     last = np.flatnonzero(trajectory.solved)[-1]
     assert trajectory.solved[: last + 1].all()
@@ -252,7 +252,7 @@ def test_universal_joint_turns_as_hooke_found(reverse, rounding):
     """Shaft 1 along x, shaft 2 at angle b to it; the cross holds the angle of its arms, rounded or
     not.
     """
-    b, values = 0.6, np.linspace(0.0, 2.0 * np.pi, 721)
+    b, values = 0.6, np.linspace(0.0, np.pi, 145)
     first, second = np.array([0.0, 0.0, 1.0]), np.array([-math.sin(b), math.cos(b), rounding])
     joints = [
         Revolute("in", "ground", "driving", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
@@ -295,7 +295,7 @@ def test_displacement_of_a_cylinder_that_turns(reverse):
         Translational("piston", "cylinder", "rod", tuple(D), tuple(tip - D)),
         Spherical("pin", "rod", "arm", tuple(tip)),
     ]
-    values, rate, sign = np.linspace(-0.1, 0.1, 201), 2.0, -1.0 if reverse else 1.0
+    values, rate, sign = np.linspace(-0.1, 0.1, 51), 2.0, -1.0 if reverse else 1.0
     bodies, points = (
         ["arm", "cylinder", "rod"],
         {"tip": ("rod", tip), "away": ("rod", (0.1, 0.2, 0.3))},
@@ -325,7 +325,7 @@ def test_fixed_joint_and_a_driver_that_holds(reverse, point):
         Revolute("second", "arm", "forearm", (0.3, 0.1, 0.0), (1.0, 0.0, 0.0)),
         Fixed("weld", *(("plate", "forearm") if reverse else ("forearm", "plate")), point),
     ]
-    P, values = np.array([0.7, 0.2, 0.4]), np.linspace(-3.0, 3.0, 401)
+    P, values = np.array([0.7, 0.2, 0.4]), np.linspace(-3.0, 3.0, 13)
     drivers = [JointAngle("sweep", "first"), JointAngle("hold", "second")]
     bodies = [
         Body("arm"),

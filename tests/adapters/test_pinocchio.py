@@ -31,6 +31,8 @@ from kincheck.core.case.case import Case, Output, Sweep, Truth
 from kincheck.core.mechanism.drivers import Driver
 from kincheck.core.trajectory import Trajectory
 
+from ..support.joint_loops import CRANK, HINGE
+
 pytest.importorskip("pinocchio")
 
 TOL = 1e-12
@@ -230,10 +232,6 @@ def test_two_revolutes_and_a_rod() -> None:
     )
     found = solved(mechanism, turn)
     np.testing.assert_allclose(found.points["rod end"].position, C, rtol=0, atol=1e-11)
-
-
-HINGE = (0.2, -0.1, 0.3)
-CRANK = Revolute("crank", GROUND, "A", (0.0, 0.1, -0.1), (0.3, -0.2, 2.0))
 
 
 @pytest.mark.parametrize("bodies", [(GROUND, "B"), ("B", GROUND)])

@@ -25,7 +25,7 @@ from kincheck.core import (
     Translational,
     solve,
 )
-from kincheck.core.case.case import Case, Output, Sweep, Truth
+from kincheck.core.case.case import Case, Output, Series, Sweep, Truth
 from kincheck.core.cli import main
 from kincheck.core.harness.record import Outcome, from_json
 from kincheck.core.harness.run import run
@@ -198,6 +198,11 @@ def test_projection_has_efforts_with_the_same_predictor(name):
     if engine.version() is None:
         pytest.skip(f"{name} is not installed")
     case = cases.load("mcpherson_strut")
+    few, reference = case.sweep.values[::4], {}
+    for output, series in case.reference.items():
+        orders = (series.position, series.velocity, series.acceleration)
+        reference[output] = Series(*(None if each is None else each[::4] for each in orders))
+    case = replace(case, sweep=replace(case.sweep, values=few), reference=reference)
     errors = [worst(record(case, effort))[0] for effort in engine.efforts().values()]
     assert errors[-1] < 1e-13
     assert name == "native" or (errors[0] > 1e-6 > 1e-8 > errors[1] > errors[-1])

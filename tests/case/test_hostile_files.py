@@ -8,6 +8,7 @@ import json
 import os
 import subprocess
 import sys
+import tomllib
 import zipfile
 from collections.abc import Callable
 from io import BytesIO
@@ -81,7 +82,7 @@ TEXTS: dict[str, tuple[str, str | bytes, str]] = {
     ),
     "a long header": (
         "a.toml",
-        filled('"a" . ', "# [a.a\n[{}a]", LARGEST),
+        filled('"a" . ', "# [a.a\n[{}a]"),
         "line 2: found a key nested more than 16 deep",
     ),
     "deep elements": ("a.xml", filled("<a>"), "nested more than 200 deep"),
@@ -92,9 +93,9 @@ TEXTS: dict[str, tuple[str, str | bytes, str]] = {
         "larger than 4000000 bytes",
     ),
     "bodies": (
-        "a.toml",
-        BASE + "\n".join(f"[bodies.b{k}]" for k in range(61_000)),
-        "bodies: found 61001, expected 60000",
+        "a.json",
+        json.dumps({**tomllib.loads(BASE), "bodies": {f"b{k}": {} for k in range(61_000)}}),
+        "bodies: found 61000, expected 60000",
     ),
     "points in JSON": (
         "a.json",
@@ -176,7 +177,7 @@ TEXTS: dict[str, tuple[str, str | bytes, str]] = {
         "expected a body",
     ),
     "a long field": ("a.csv", f"name,x,y,z\n{'a' * 1_000_000},1,2,3\n", "line 2: not valid CSV"),
-    "open comments": ("a.json", filled("/* ", size=LARGEST), "not valid JSON"),
+    "open comments": ("a.json", filled("/* "), "not valid JSON"),
     "open strings": ("a.json", '"' + filled('\\"')[:-100], "not valid JSON"),
     "open strings in TOML": ("a.toml", filled('"', "a = {}"), "not valid TOML"),
     "blanks": ("a.sub", filled(" ", "[UNITS]\nLENGTH = {}a'b'c"), "no row in a block"),
@@ -278,7 +279,7 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     with (inside / "large.csv").open("wb") as file:
         file.truncate(1 << 40)  # a terabyte of nothing
     (inside / "lines.csv").write_text("\n" * 2_000_001)
-    (inside / "wide.csv").write_text(",".join(map(str, range(500_000))))
+    (inside / "wide.csv").write_text(",".join(map(str, range(50_000))))
     (inside / "deep.json").write_text('{"a": ' + "[" * 1_000_000)
     (inside / "words.json").write_text(proved("1_5"))
     return inside, outside

@@ -330,6 +330,8 @@ def test_signs_head_everything(results, tmp_path):
 
 def test_signs_head_the_tables_of_other_commands(tmp_path, capsys):
     parquet = pytest.importorskip("pyarrow.parquet")
+    file = tmp_path / "strut.json"
+    file.write_text(json.dumps(unreferenced(changed("sweep", steps=3)) | TOE))
     varied = {"ball": {"at": "ball", "sigma": 1.0}}
     (tmp_path / "vary.json").write_text(
         json.dumps({**HEAD, "mode": "monte_carlo", "hardpoints": varied})
@@ -337,7 +339,7 @@ def test_signs_head_the_tables_of_other_commands(tmp_path, capsys):
     sweep = [
         "sweep",
         "--samples",
-        "4",
+        "2",
         "--out",
         str(tmp_path),
         "--store",
@@ -349,7 +351,7 @@ def test_signs_head_the_tables_of_other_commands(tmp_path, capsys):
         (["reference"], "native error"),
         ([*sweep, str(tmp_path / "vary.json")], "output"),
     ):
-        assert main.main([*command, "mcpherson_suspension"]) == 0
+        assert main.main([*command, str(file)]) == 0
         lines = capsys.readouterr().out.splitlines()
         tables = [k for k, line in enumerate(lines) if line.strip().startswith(first)]
         assert tables
