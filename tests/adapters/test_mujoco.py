@@ -30,7 +30,7 @@ TOL = 1e-12
 RATE = 3.0
 # One crank turn, the last sample left out: periodic, so that differentiation by FFT is exact to
 # round-off.
-TURN = np.linspace(-math.pi, math.pi, 144, endpoint=False)
+TURN = np.linspace(-math.pi, math.pi, 100, endpoint=False)
 
 
 def case(joints, points, drivers, values, rate=1.0, design=0.0, fixed=()):

@@ -94,7 +94,7 @@ def test_joint_moves_as_natively(kind, bodies, closing):
 # Coordinates of joints: driven, coupled, over several turns
 
 
-TURNS = np.linspace(-7.0, 7.0, 36)
+TURNS = np.linspace(-7.0, 7.0, 29)
 CUTS = pytest.mark.parametrize("closing", [False, True], ids=["tree", "cut"])
 
 
