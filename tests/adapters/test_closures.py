@@ -35,7 +35,7 @@ from ..support.joint_loops import (
     crank_only,
     on_crank,
 )
-from .test_pinocchio import rotation, solved
+from ..support.pinocchio_cases import rotation, solved
 
 
 def derivative(x: np.ndarray, h: float) -> np.ndarray:
