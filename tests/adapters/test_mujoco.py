@@ -23,6 +23,7 @@ from ..support.mujoco_cases import (
     CRANK_PIN,
     RATE,
     RSSR,
+    TOL,
     TURN,
     assert_motion,
     case,
@@ -45,6 +46,24 @@ def four_bar(angle):
     s = np.linalg.norm(e, axis=1, keepdims=True)
     along = (s**2 + 0.9**2 - 0.8**2) / (2 * s)
     return B, B + along * e / s + np.sqrt(0.9**2 - along**2) * np.cross([0.0, 0.0, 1.0], e) / s
+
+
+@pytest.mark.parametrize("failing", [False, True])
+def test_solving_again_gives_the_same_numbers(failing):
+    """Nothing is left in the model by what it solved before, reached or not."""
+    if failing:
+        whole = strut(np.linspace(-0.08, 0.08, 5))
+        before = replace(whole, sweep=replace(whole.sweep, values=np.linspace(0.0, 0.6, 13)))
+    else:
+        whole = before = slider_crank()
+    engine = adapter.MuJoCo()
+    model = engine.build(whole)
+    first = engine.solve(model, whole, TOL)
+    assert engine.solve(model, before, TOL).solved.all() != failing
+    again = engine.solve(model, whole, TOL)
+    for name, motion in again.points.items():
+        # made of all before it
+        np.testing.assert_array_equal(motion.acceleration, first.points[name].acceleration)
 
 
 def test_four_bar_of_spatial_revolutes_in_a_tilted_plane():

@@ -45,17 +45,13 @@ def case(joints, points, drivers, values, rate=1.0, design=0.0, fixed=()):
 
 
 def solve(case, complete=True):
-    """Solved twice with one model, to the same numbers; complete: every sample is there."""
+    """The trajectory; complete: every sample is there."""
     engine = adapter.MuJoCo()
     assert engine.unsupported(case) is None
-    model = engine.build(case)
-    first, again = (engine.solve(model, case, TOL) for _ in range(2))
-    for name, motion in again.points.items():
-        # made of all before it
-        np.testing.assert_array_equal(motion.acceleration, first.points[name].acceleration)
-    assert again.solved.all() or not complete, again.message
-    assert again.residual <= TOL or not again.solved.any()
-    return again
+    found = engine.solve(engine.build(case), case, TOL)
+    assert found.solved.all() or not complete, found.message
+    assert found.residual <= TOL or not found.solved.any()
+    return found
 
 
 def assert_motion(motion, *expected, atol=(1e-13, 1e-11, 1e-9)):
