@@ -10,7 +10,7 @@ import pytest
 from kincheck.core import Joint
 from kincheck.core.caches import clear_caches
 from kincheck.core.cli import main as cli
-from kincheck.core.harness import provenance
+from kincheck.core.harness import execution, provenance
 from kincheck.core.harness.provenance import truth_of
 
 from .support.fakes import Fake, crank
@@ -46,6 +46,16 @@ def no_calibration():
     """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(provenance, "calibration", lambda: 0.02)
+        yield
+
+
+@pytest.fixture(autouse=True, scope="session")
+def one_warm_solve():
+    """A timed solve is repeated once: most tests have no use for a more certain time. Those of the
+    times repeat it as often as a user's run does.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(execution, "WARM_SOLVES", 1)
         yield
 
 

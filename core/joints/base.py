@@ -11,7 +11,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import MISSING, dataclass, fields
-from functools import partial
+from functools import cache, partial
 from inspect import get_annotations
 from typing import Any, ClassVar, Self
 
@@ -162,15 +162,8 @@ class Joint(ABC):
 
     def geometry(self) -> Sequence[tuple[str, Kind, Any]]:
         """Return name, kind and value of every geometry field with a value."""
-        found = [
-            (each.name, each.metadata.get("kind"), getattr(self, each.name))
-            for each in fields(self)
-        ]
-        return [
-            (name, kind, value)
-            for name, kind, value in found
-            if kind is not None and value is not None
-        ]
+        found = [(name, kind, getattr(self, name)) for name, kind in _geometry_fields(type(self))]
+        return [(name, kind, value) for name, kind, value in found if value is not None]
 
     def parts(self, body: str | None = None) -> Sequence[tuple[str, Kind, Any]]:
         """Return the same for single values, of a pair as "points.0" and "points.1"; only those on
@@ -294,6 +287,13 @@ class AxialJoint(Joint):
         equal to zero.
         """
         return ()
+
+
+@cache
+def _geometry_fields(joint: type[Joint]) -> Sequence[tuple[str, Kind]]:
+    """Return name and kind of every geometry field of a joint type."""
+    kinds = [(each.name, each.metadata.get("kind")) for each in fields(joint)]
+    return [(name, kind) for name, kind in kinds if kind is not None]
 
 
 def _times(factor: float, value: float | Sequence[float]) -> Any:

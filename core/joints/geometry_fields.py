@@ -25,7 +25,10 @@ class Kind(Enum):
     @property
     def single(self) -> Kind:
         """Kind of each value of a pair; the kind itself if it is no pair."""
-        return {Kind.POSITIONS: Kind.POSITION, Kind.DIRECTIONS: Kind.DIRECTION}.get(self, self)
+        return _SINGLE.get(self, self)
+
+
+_SINGLE = {Kind.POSITIONS: Kind.POSITION, Kind.DIRECTIONS: Kind.DIRECTION}
 
 
 def _geometry(kind: Kind, **options: Any) -> Any:

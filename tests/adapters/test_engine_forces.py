@@ -15,8 +15,8 @@ from kincheck.core.mechanism.loads import TorsionSpringDamper
 from kincheck.core.mechanism.mechanism import GROUND, Mechanism
 
 from ..support.engine_forces import Beside, force_case, pushed, values
+from ..support.joint_loops import TYPES, crank_only, on_crank
 from ..support.loads import loaded
-from .test_closures import TYPES, crank_only, on_crank
 
 ENGINES = ["exudyn", "mujoco", "pinocchio", "dart", "drake", "simbody"]
 # Of the largest force. Exudyn has no acceleration: it is a difference of Jacobians.

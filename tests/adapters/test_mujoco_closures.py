@@ -20,7 +20,17 @@ from kincheck.core.mechanism.drivers import JointDisplacement, PointCoordinate
 from kincheck.core.mechanism.mechanism import Body
 from kincheck.core.mechanism.topology import SpanningTree, spanning_tree
 
-from .test_mujoco import B0, C0, SLIDER, assert_motion, case, change, periodic, slider_crank, solve
+from ..support.mujoco_cases import (
+    B0,
+    C0,
+    SLIDER,
+    assert_motion,
+    case,
+    change,
+    periodic,
+    slider_crank,
+    solve,
+)
 
 pytest.importorskip("mujoco", reason="MuJoCo is not installed")
 

@@ -3,127 +3,38 @@ forms.
 """
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck.adapters.mujoco import spec
 from kincheck.core import Body, JointAngle, JointDisplacement, Mechanism, Point
-from kincheck.core import solve as solve_natively
-from kincheck.core.case.case import Case, Output, Sweep, Truth
 from kincheck.core.joints import (
     ConstantVelocity,
     Cylindrical,
-    Distance,
-    Gear,
-    Joint,
-    RackPinion,
     Revolute,
     Screw,
-    Spherical,
-    Translational,
 )
-from kincheck.core.mechanism.topology import SpanningTree, spanning_tree
 
-from ..joints.test_joints import EXAMPLES, TYPES
-from .test_mujoco import assert_motion, solve
+from ..support.joint_loops import (
+    RATE,
+    TOO_LOOSE,
+    TURN,
+    TYPES,
+    assert_moves_natively,
+    on_crank,
+)
+from ..support.mujoco_agreement import AXIS, CUTS, TIP, TOLERANCES, TURNS, assert_agrees, solved
+from ..support.mujoco_cases import assert_motion
 
 pytest.importorskip("mujoco", reason="MuJoCo is not installed")
 
-# Position, velocity and acceleration, m and s: round-off, amplified at most a thousandfold by the
-# mechanisms at these speeds.
-TOLERANCES = (1e-13, 1e-12, 1e-11)
-
-
-def assert_agrees(mechanism, driver, values, rate=1.0):
-    """The motions of all points are those of the native solver; returned is MuJoCo's solution."""
-    outputs = tuple(
-        Output(point.name, point.name, (1.0, 0.0, 0.0), False, 0.0, 0.0, "")
-        for point in mechanism.points
-    )
-    sweep = Sweep(driver, np.array(values), rate)
-    found = solve(Case("test", "test", Truth.CONSENSUS_ONLY, mechanism, sweep, outputs))
-    expected = solve_natively(mechanism, driver, values, rate=rate)
-    assert expected.solved.all()
-    for name, motion in expected.points.items():
-        assert_motion(
-            found.points[name],
-            motion.position,
-            motion.velocity,
-            motion.acceleration,
-            atol=TOLERANCES,
-        )
-    return found
-
-
-def cut(monkeypatch, *names):
-    """These joints close loops; their bodies hang on others, or are free."""
-
-    def tree(mechanism):
-        kept = [each for each in mechanism.joints if each.name not in names]
-        rest = spanning_tree(replace(mechanism, joints=kept, drivers=(), couplers=()))
-        return SpanningTree(rest.branches, (*rest.cut, *map(mechanism.joint, names)))
-
-    monkeypatch.setattr(spec, "spanning_tree", tree)
-
-
-# Ends of rods on a body and on the ground, chosen so that any joint with its number of them is far
-# from a lock-up.
-ON_BODY = ((-0.4, 0.7, 0.4), (-0.3, -0.4, 1.3), (0.6, 0.6, 0.1), (0.4, -0.8, 0.7), (0.0, -0.7, 0.1))
-ON_GROUND = (
-    (-1.4, -0.6, 0.0),
-    (-1.9, 0.6, 1.4),
-    (-0.7, 0.1, -0.9),
-    (0.2, -2.7, 2.1),
-    (-1.0, -0.9, 1.8),
-)
-
-
-def between(joint, mirrored):
-    """A body on a driven revolute, the joint, and a second body on as many rods as the joint has
-    freedoms.
-    """
-    joint = replace(joint, name="tested", i="a", j="b")
-    rods = [
-        Distance(f"rod {k}", "b", "ground", (ON_BODY[k], ON_GROUND[k]))
-        for k in range(6 - joint.rows)
-    ]
-    return Mechanism(
-        "tested",
-        [Body("a", (0.1, 0.2, 0.3)), Body("b", (0.5, -0.1, 0.6), (0.5, 0.5, -0.5, 0.5))],
-        [
-            Revolute("pivot", "ground", "a", (0.1, 0.0, 0.4), (0.3, 1.0, -0.4)),
-            joint.reversed() if mirrored else joint,
-            *rods,
-        ],
-        [
-            Point("p", "b", (0.9, 0.2, 0.4)),
-            Point("q", "b", (0.2, -0.4, 0.9)),
-            Point("r", "b", (0.3, 0.3, 0.0)),
-        ],
-        [JointAngle("turn", "pivot")],
-    )
-
-
-ANGLES = np.linspace(-0.4, 0.4, 17)
-
 
 @pytest.mark.parametrize("closing", [False, True], ids=["tree", "cut"])
-@pytest.mark.parametrize("mirrored", [False, True], ids=["ij", "ji"])
-@pytest.mark.parametrize("name", TYPES)
-def test_joint_moves_as_natively(name, mirrored, closing, monkeypatch):
-    joint = EXAMPLES[name](Joint.registry[name])
-    if closing:
-        cut(monkeypatch, "tested")
-    found = assert_agrees(between(joint, mirrored), "turn", ANGLES)
-    assert ("tested" in found.details["closures"]) == (closing or joint.rows < 3)
-
-
-# Coordinates of joints: driven, coupled, over several turns
-
-
-TURNS = np.linspace(-15.0, 15.0, 31)
-CUTS = pytest.mark.parametrize("closing", [False, True], ids=["tree", "cut"])
+@pytest.mark.parametrize("bodies", [("A", "B"), ("B", "A")], ids=["ij", "ji"])
+@pytest.mark.parametrize("kind", TYPES)
+def test_joint_moves_as_natively(kind, bodies, closing):
+    found = solved(on_crank(kind, *bodies), "turn", TURN, RATE, ["tested"] if closing else [])
+    assert ("tested" in found.details["closures"]) == (closing or kind in TOO_LOOSE)
+    assert_moves_natively(found, kind, bodies)
 
 
 def on_screw(theta, axis, point, lead, rate):
@@ -141,19 +52,14 @@ def on_screw(theta, axis, point, lead, rate):
     )
 
 
-AXIS, TIP = (1.0, 2.0, -2.0), np.array([0.3, -0.2, 0.4])
-
-
 @CUTS
 @pytest.mark.parametrize("mirrored", [False, True], ids=["ij", "ji"])
 @pytest.mark.parametrize("lead", [0.05, -9.0])
 @pytest.mark.parametrize("kind", [JointAngle, JointDisplacement])
-def test_a_screw_driven_over_several_turns(kind, lead, mirrored, closing, monkeypatch):
+def test_a_screw_driven_over_several_turns(kind, lead, mirrored, closing):
     """Both ways round, by either of its coordinates, with a lead above and below one radian a
     metre.
     """
-    if closing:
-        cut(monkeypatch, "thread")
     thread = Screw("thread", "ground", "nut", (0.0, 0.0, 0.0), AXIS, lead)
     mechanism = Mechanism(
         "screw",
@@ -163,7 +69,9 @@ def test_a_screw_driven_over_several_turns(kind, lead, mirrored, closing, monkey
         [kind("drive", "thread")],
     )
     unit = 1.0 if kind is JointAngle else lead / (2.0 * math.pi)
-    found = assert_agrees(mechanism, "drive", unit * TURNS, unit * 2.0)
+    found = assert_agrees(
+        mechanism, "drive", unit * TURNS, unit * 2.0, cut=["thread"] if closing else []
+    )
     sign = -1.0 if mirrored else 1.0
     assert_motion(
         found.points["tip"],
@@ -176,9 +84,7 @@ def test_a_screw_driven_over_several_turns(kind, lead, mirrored, closing, monkey
 @CUTS
 @pytest.mark.parametrize("mirrored", [False, True], ids=["ij", "ji"])
 @pytest.mark.parametrize("driver", ["turn", "push"])
-def test_both_coordinates_of_a_cylindrical_joint_are_driven(driver, mirrored, closing, monkeypatch):
-    if closing:
-        cut(monkeypatch, "sleeve")
+def test_both_coordinates_of_a_cylindrical_joint_are_driven(driver, mirrored, closing):
     sleeve = Cylindrical("sleeve", "ground", "rod", (0.0, 0.0, 0.0), AXIS)
     drivers = [JointAngle("turn", "sleeve"), JointDisplacement("push", "sleeve")]
     joints = [sleeve.reversed() if mirrored else sleeve]
@@ -186,139 +92,19 @@ def test_both_coordinates_of_a_cylindrical_joint_are_driven(driver, mirrored, cl
         Mechanism("cylindrical", [Body("rod")], joints, [Point("tip", "rod", tuple(TIP))], drivers),
         driver,
         TURNS,
+        cut=["sleeve"] if closing else [],
     )
-
-
-def test_a_nut_that_a_guide_keeps_from_turning():
-    """A shaft in bearings drives a nut: of the 15 rows of the loop four say what others say."""
-    joints = [
-        Revolute("bearing", "ground", "shaft", (0.0, 0.0, 0.0), AXIS),
-        Screw("thread", "nut", "shaft", (0.0, 0.0, 0.0), AXIS, 0.1),
-        Translational("guide", "ground", "nut", (0.2, 0.0, 0.1), AXIS),
-    ]
-    mechanism = Mechanism(
-        "jack",
-        [Body("shaft"), Body("nut")],
-        joints,
-        [Point("tip", "nut", tuple(TIP))],
-        [JointAngle("turn", "bearing")],
-    )
-    found = assert_agrees(mechanism, "turn", TURNS)
-    travel = -0.1 / (2.0 * math.pi) * np.array(AXIS) / 3.0
-    np.testing.assert_allclose(
-        found.points["tip"].position, TIP + np.outer(TURNS, travel), rtol=0, atol=1e-13
-    )
-
-
-@CUTS
-def test_a_train_of_gears_with_a_rack(closing, monkeypatch):
-    """A bearing that names its shaft first has the other sign of rotation. The last wheel slides
-    too, as driven.
-    """
-    if closing:
-        cut(monkeypatch, "b", "c", "rail")
-    axis, points = (
-        (0.0, 0.0, 2.0),
-        {"A": (0.1, 0.0, 0.0), "B": (0.6, 0.0, 0.0), "C": (1.0, 0.1, 0.0), "R": (1.0, 0.2, 0.0)},
-    )
-    joints = [
-        Revolute("a", "ground", "A", (0.0, 0.0, 0.0), axis),
-        Revolute("b", "B", "ground", (0.4, 0.0, 0.0), axis),
-        Cylindrical("c", "ground", "C", (1.0, 0.0, 0.0), axis),
-        Translational("rail", "ground", "R", (1.0, 0.2, 0.0), (1.0, 0.0, 0.0)),
-    ]
-    couplers = [
-        Gear("ab", ("b", "a"), 0.5),
-        Gear("bc", ("b", "c"), 3.0),
-        RackPinion("cr", ("c", "rail"), -0.2),
-    ]
-    drivers = [JointAngle("turn", "a"), JointDisplacement("shift", "c")]
-    mechanism = Mechanism(
-        "train",
-        [Body(n) for n in points],
-        joints,
-        [Point(n, n, p) for n, p in points.items()],
-        drivers,
-        couplers,
-    )
-    found = assert_agrees(mechanism, "turn", TURNS)
-    # b = a / 2 turns B by -a / 2; c = b / 3
-    x = {name: motion.position for name, motion in found.points.items()}
-    expected = {
-        "B": np.stack([0.4 + 0.2 * np.cos(TURNS / 2), -0.2 * np.sin(TURNS / 2), 0 * TURNS], axis=1),
-        "C": np.stack([1.0 - 0.1 * np.sin(TURNS / 6), 0.1 * np.cos(TURNS / 6), 0 * TURNS], axis=1),
-        "R": np.stack([1.0 - 0.2 * TURNS / 6, 0.2 + 0 * TURNS, 0 * TURNS], axis=1),
-    }
-    for name, wanted in expected.items():
-        np.testing.assert_allclose(x[name], wanted, rtol=0, atol=1e-13)
-    assert len(found.details["relations"]) == 3
-    assert_agrees(mechanism, "shift", TURNS)
-
-
-@CUTS
-def test_a_steering_gear(closing, monkeypatch):
-    """The pinion moves the rack, each end of which turns a wheel by a tie rod that cannot spin."""
-    if closing:
-        cut(monkeypatch, "rail")
-    joints = [
-        Revolute("column", "ground", "pinion", (0.2, 0.1, 0.3), (1.0, 0.2, 0.5)),
-        Translational("rail", "rack", "ground", (0.2, 0.0, 0.2), (0.0, 1.0, 0.0)),
-    ]
-    points = []
-    for side in (-1.0, 1.0):
-        wheel, rod, inner, outer = (
-            f"wheel {side:g}",
-            f"rod {side:g}",
-            (0.2, 0.35 * side, 0.2),
-            (0.15, 0.65 * side, 0.15),
-        )
-        joints += [
-            Revolute(
-                f"kingpin {side:g}",
-                "ground",
-                wheel,
-                (0.0, 0.7 * side, 0.1),
-                (-0.1, -0.2 * side, 1.0),
-            ),
-            ConstantVelocity(
-                f"inner {side:g}",
-                "rack",
-                rod,
-                inner,
-                ((0.0, side, 0.0), tuple(np.subtract(outer, inner))),
-            ),
-            Spherical(f"outer {side:g}", rod, wheel, outer),
-        ]
-        points += [
-            Point(wheel, wheel, (0.1, 0.8 * side, 0.0)),
-            Point(rod, rod, (0.2, 0.5 * side, 0.3)),
-        ]
-    bodies = [
-        Body(name)
-        for name in dict.fromkeys(body for joint in joints for body in joint.bodies)
-        if name != "ground"
-    ]
-    mechanism = Mechanism(
-        "steering",
-        bodies,
-        joints,
-        points,
-        [JointAngle("turn", "column")],
-        [RackPinion("gear", ("column", "rail"), 0.008)],
-    )
-    assert_agrees(mechanism, "turn", np.linspace(-6.0, 6.0, 25))
 
 
 @CUTS
 @pytest.mark.parametrize("mirrored", [False, True], ids=["ij", "ji"])
 @pytest.mark.parametrize("bend", [0.0, 0.6, 1.5])
-def test_a_constant_velocity_joint_keeps_the_velocity(bend, mirrored, closing, monkeypatch):
+def test_a_constant_velocity_joint_keeps_the_velocity(bend, mirrored, closing):
     """Two shafts in bearings, at an angle, over several turns: both have turned alike, which no
     universal joint does.
     """
-    if not closing:
-        # else the bearings carry both shafts, and the joint between them is cut
-        cut(monkeypatch, "out")
+    # else the bearings carry both shafts, and the joint between them is cut
+    cut = [] if closing else ["out"]
     k = (math.cos(bend), 0.6 * math.sin(bend), 0.8 * math.sin(bend))
     joint = ConstantVelocity("joint", "a", "b", (0.0, 0.0, 0.0), ((1.0, 0.0, 0.0), k))
     joints = [
@@ -333,6 +119,6 @@ def test_a_constant_velocity_joint_keeps_the_velocity(bend, mirrored, closing, m
         [Point("tip", "b", tuple(TIP))],
         [JointAngle("turn", "in")],
     )
-    found = assert_agrees(mechanism, "turn", TURNS, 2.0)
+    found = assert_agrees(mechanism, "turn", TURNS, 2.0, cut)
     assert ("joint" in found.details["closures"]) == closing
     assert_motion(found.points["tip"], *on_screw(TURNS, k, TIP, 0.0, 2.0), atol=TOLERANCES)

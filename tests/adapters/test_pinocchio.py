@@ -18,7 +18,6 @@ from kincheck.core import (
     Distance,
     Joint,
     JointAngle,
-    JointDisplacement,
     Mechanism,
     Point,
     PointCoordinate,
@@ -27,44 +26,12 @@ from kincheck.core import (
     Translational,
     Universal,
 )
-from kincheck.core.case.case import Case, Output, Sweep, Truth
 from kincheck.core.mechanism.drivers import Driver
-from kincheck.core.trajectory import Trajectory
+
+from ..support.joint_loops import CRANK, HINGE
+from ..support.pinocchio_cases import ENGINE, TOL, case_of, rotation, solved
 
 pytest.importorskip("pinocchio")
-
-TOL = 1e-12
-ENGINE = adapter.Pinocchio()
-
-
-def case_of(mechanism: Mechanism, values: Sequence[float] | np.ndarray, rate: float = 1.0) -> Case:
-    """Sweep of the first driver, with all points wanted."""
-    outputs = tuple(
-        Output(p.name, p.name, (1.0, 0.0, 0.0), False, 0.0, 0.0, "unused here")
-        for p in mechanism.points
-    )
-    sweep = Sweep(mechanism.drivers[0].name, np.asarray(values, dtype=float), rate)
-    return Case(mechanism.name, "made here", Truth.CONSENSUS_ONLY, mechanism, sweep, outputs)
-
-
-def solved(
-    mechanism: Mechanism, values: Sequence[float] | np.ndarray, rate: float = 1.0
-) -> Trajectory:
-    case = case_of(mechanism, values, rate)
-    assert ENGINE.unsupported(case) is None
-    found = ENGINE.solve(ENGINE.build(case), case, TOL)
-    assert found.message == ""
-    assert found.solved.all()
-    assert found.residual <= TOL
-    return found
-
-
-def rotation(axis: Sequence[float], angle: float | np.ndarray) -> np.ndarray:
-    """Rodrigues' formula, shape (..., 3, 3)."""
-    x, y, z = np.asarray(axis) / np.linalg.norm(axis)
-    k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    angle = np.asarray(angle)[..., None, None]
-    return np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * (k @ k)
 
 
 def strut() -> Mechanism:
@@ -230,81 +197,6 @@ def test_two_revolutes_and_a_rod() -> None:
     )
     found = solved(mechanism, turn)
     np.testing.assert_allclose(found.points["rod end"].position, C, rtol=0, atol=1e-11)
-
-
-HINGE = (0.2, -0.1, 0.3)
-CRANK = Revolute("crank", GROUND, "A", (0.0, 0.1, -0.1), (0.3, -0.2, 2.0))
-
-
-@pytest.mark.parametrize("bodies", [(GROUND, "B"), ("B", GROUND)])
-def test_joint_angle_is_that_of_the_second_body(bodies: tuple[str, str]) -> None:
-    """Several turns about an axis that is not a unit vector."""
-    hinge, P = Revolute("hinge", *bodies, HINGE, (0.4, 1.0, -0.7)), (0.5, 0.6, 0.1)
-    turn = np.linspace(-7.0, 7.0, 57)
-    found = solved(
-        Mechanism(
-            "pivot", [Body("B")], [hinge], [Point("P", "B", P)], [JointAngle("turn", "hinge")]
-        ),
-        turn,
-    )
-    sign = 1.0 if bodies[1] == "B" else -1.0
-    expected = HINGE + rotation(hinge.axis, sign * turn) @ np.subtract(P, HINGE)
-    np.testing.assert_allclose(found.points["P"].position, expected, rtol=0, atol=1e-14)
-
-
-@pytest.mark.parametrize("bodies", [(GROUND, "B"), ("B", GROUND)])
-def test_joint_displacement_is_that_of_the_second_body(bodies: tuple[str, str]) -> None:
-    slide, P = Translational("slide", *bodies, HINGE, (0.4, 1.0, -0.7)), (0.5, 0.6, 0.1)
-    mechanism = Mechanism(
-        "slider", [Body("B")], [slide], [Point("P", "B", P)], [JointDisplacement("push", "slide")]
-    )
-    push = np.linspace(-1.0, 1.0, 9)
-    found = solved(mechanism, push, 3.0).points["P"]
-    along = np.array(slide.axis) / np.linalg.norm(slide.axis) * (1.0 if bodies[1] == "B" else -1.0)
-    np.testing.assert_allclose(found.position, P + push[:, None] * along, rtol=0, atol=1e-15)
-    np.testing.assert_allclose(
-        found.velocity, np.broadcast_to(3.0 * along, (9, 3)), rtol=0, atol=1e-15
-    )
-
-
-def test_oblique_point_driver() -> None:
-    """A slider pushed along another direction k moves by c / (k . axis)."""
-    axis, k = np.array([0.4, 1.0, -0.7]), np.array([3.0, 2.0, 1.0])
-    slide, P = Translational("slide", GROUND, "B", HINGE, tuple(axis)), (0.5, 0.6, 0.1)
-    mechanism = Mechanism(
-        "slider",
-        [Body("B")],
-        [slide],
-        [Point("P", "B", P)],
-        [PointCoordinate("push", "P", tuple(k))],
-    )
-    push = np.linspace(-0.3, 0.3, 7)
-    expected = P + push[:, None] * axis / (k / np.linalg.norm(k) @ axis)
-    np.testing.assert_allclose(
-        solved(mechanism, push).points["P"].position, expected, rtol=0, atol=1e-14
-    )
-
-
-@pytest.mark.parametrize(
-    "hold", [JointAngle("hold", "elbow"), PointCoordinate("hold", "tip", (0.0, 0.0, 1.0))]
-)
-def test_other_drivers_hold_their_design_value(hold: Driver) -> None:
-    """Second arm about a horizontal axis: with its angle or its tip's height held, the tip
-    describes a circle.
-    """
-    joints = [
-        Revolute("shoulder", GROUND, "upper", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
-        Revolute("elbow", "lower", "upper", (0.4, 0.0, 0.1), (0.0, 1.0, 0.0)),
-    ]
-    tip, turn = (0.7, 0.0, 0.5), np.linspace(-1.0, 2.0, 7)
-    drivers = [JointAngle("turn", "shoulder"), hold]
-    mechanism = Mechanism(
-        "arm", [Body("upper"), Body("lower")], joints, [Point("tip", "lower", tip)], drivers
-    )
-    found = solved(mechanism, turn).points["tip"]
-    np.testing.assert_allclose(
-        found.position, rotation((0.0, 0.0, 1.0), turn) @ tip, rtol=0, atol=1e-14
-    )
 
 
 @pytest.mark.parametrize("second", [Revolute, Spherical, Universal])

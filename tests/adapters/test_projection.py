@@ -143,7 +143,7 @@ def test_a_fold_between_two_samples_is_not_stepped_over(name, loops, defect):
     if engine.version() is None:
         pytest.skip(f"{name} is not installed")
     axis, ground, coupler, rocker = (0.0, 0.0, 1.0), np.array([3.0, 0.0]), 3.0, 1.0 + defect
-    turns = np.linspace(0.0, 6.0, 31)
+    turns = np.linspace(0.0, 3.2, 17)
     pin = np.column_stack([np.cos(0.7 + turns), np.sin(0.7 + turns)])
     apart = ground - pin
     along = 0.5 * (1.0 + (coupler**2 - rocker**2) / (apart * apart).sum(axis=1))

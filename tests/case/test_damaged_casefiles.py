@@ -11,7 +11,7 @@ from kincheck.core.case.io.case_file import load_case
 from kincheck.core.errors import CaseError
 
 from ..support.case_texts import BASE, BY_FILE, INLINE, write
-from .test_broken_casefiles import DRIVEN
+from .test_broken_motions import DRIVEN
 
 ANYTHING = st.recursive(
     st.none()

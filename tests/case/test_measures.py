@@ -4,16 +4,12 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
-import kincheck.cases
 import numpy as np
 import pytest
-from kincheck import adapters
 from kincheck.adapters.native import Native
-from kincheck.core.case.case import Case, Sweep, Truth
+from kincheck.core.case.case import Case, Sweep
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.io.case_writer import case_text
-from kincheck.core.case.io.coordinates import with_all_coordinates, with_all_motions
-from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.measures import (
     Angle,
     Component,
@@ -23,45 +19,16 @@ from kincheck.core.case.measures import (
     Measure,
     Orientation,
 )
-from kincheck.core.case.models.files import load
-from kincheck.core.case.notes import notes
 from kincheck.core.case.quantity import with_markers
 from kincheck.core.harness.compare import output_series
-from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.run import run
-from kincheck.core.joints import Cylindrical, Fixed, Polynomial, Revolute
-from kincheck.core.mechanism.drivers import JointAngle as AngleDriver
-from kincheck.core.mechanism.drivers import JointDisplacement as DisplacementDriver
-from kincheck.core.mechanism.mechanism import Body, Mechanism, Point
+from kincheck.core.mechanism.mechanism import Point
 from kincheck.core.mechanism.motions import Ramp, Sine
 
 from ..support.case_texts import BASE, complains, edited, write
+from ..support.measure_cases import AXIS, RATE, arm
 
 TOLERANCE = (1e-9, 0.0, "test")
-AXIS = (1.0, 2.0, 2.0)
-RATE = 2.0
-
-
-def arm(values, **more) -> Case:
-    """A disc that turns about an oblique axis, and a slide that moves along it on the disc."""
-    mechanism = Mechanism(
-        "arm",
-        [Body("disc"), Body("slide"), Body("weld")],
-        [
-            Revolute("hinge", "ground", "disc", (1.0, 0.0, 0.0), AXIS),
-            Cylindrical("bore", "disc", "slide", (1.0, 0.5, 0.0), AXIS),
-            Fixed("glue", "slide", "weld"),
-        ],
-        [Point("A", "ground", (0.0, 0.0, 0.0)), Point("B", "disc", (1.0, 1.0, 0.0))],
-        [
-            AngleDriver("turn", "hinge"),
-            AngleDriver("spin", "bore"),
-            DisplacementDriver("push", "bore"),
-        ],
-    )
-    motions = {"spin": Ramp(-3.0 * RATE), "push": Ramp(0.25)}
-    sweep = Sweep("turn", np.array(values), RATE, 0.0, motions)
-    return replace(Case("arm", "test", Truth.CONSENSUS_ONLY, mechanism, sweep, ()), **more)
 
 
 def series(case: Case, *outputs: Measure):
@@ -243,9 +210,13 @@ directions = [[1, 0, 0], [0, 0.5, 0]]
 body = "ground"
 position = [0.0, 0.0, 0.0]
 """
+
+
 OUTPUT = (
     '[outputs.tip_x]\npoint = "tip"\ncomponent = "x"\natol = 1e-9\nwhy = "made up for this test"\n'
 )
+
+
 MM = BASE.replace(OUTPUT, '[units]\nlength = "mm"\nangle = "deg"\n')
 
 
@@ -292,81 +263,3 @@ WRONG = [
 @pytest.mark.parametrize(("change", "fragments"), WRONG)
 def test_wrong_measures_are_refused(tmp_path: Path, change, fragments):
     complains(write(tmp_path, edited(change, base=MM + MEASURES)), fragments)
-
-
-FOUR_BAR = """
-<mujoco model="four bar"><compiler angle="radian"/><worldbody>
- <body name="crank"><joint name="crank" axis="0 0 1"/><geom size=".01"/>
-  <body name="rod" pos="0.1 0 0"><joint name="rod" axis="0 0 1"/><geom size=".01"/></body></body>
- <body name="rocker" pos="0.4 -0.1 0"><joint name="rocker" axis="0 0 1"/><geom size=".01"/></body>
- </worldbody><equality><connect body1="rod" body2="rocker" anchor="0.3 0.15 0"/></equality></mujoco>
-"""
-
-
-def test_every_joint_and_body_of_a_model_is_compared_in_every_engine(tmp_path: Path):
-    file = write(tmp_path, FOUR_BAR, "four_bar.xml")
-    case = load(file, Supplied(drive=("crank:-0.3:6.6:24",)))
-    names = [output.name for output in case.outputs]
-    for each in ("crank", "rod", "rocker"):
-        assert f"{each}.angle" in names
-        assert [f"{each}.e{k}" in names for k in range(4)] == [True] * 4
-    assert notes(case) == []
-    every = [adapters.engine(name) for name in adapters.ENGINES]
-    results = run([case], [each for each in every if each.version()], tol=1e-10)
-    assert [record.outcome for record in results.records] == [Outcome.UNJUDGED] + [Outcome.PASS] * (
-        len(results.records) - 1
-    )
-    for record in results.records:
-        rocker = np.array(record.outputs["rocker.angle"].position)
-        e0, e3 = (np.array(record.outputs[f"rocker.{each}"].position) for each in ("e0", "e3"))
-        np.testing.assert_allclose(2.0 * np.arctan2(e3, e0), rocker, atol=1e-9)
-
-
-def test_a_run_whose_outputs_no_closure_enters_says_so(tmp_path: Path):
-    case = load(write(tmp_path, FOUR_BAR, "four_bar.xml"), Supplied(drive=("crank:-0.3:0.3:7",)))
-    vacuous = tuple(each for each in case.outputs if each.name.startswith("crank"))
-    (note,) = notes(replace(case, outputs=vacuous))
-    assert "no output depends on a closure" in note
-    rocking = tuple(each for each in case.outputs if each.name == "rocker.angle")
-    assert notes(replace(case, outputs=rocking)) == []
-
-
-def test_a_coordinate_that_is_driven_is_no_result_of_a_closure():
-    case = load_case(kincheck.cases.FOLDER / "mcpherson_strut.toml")
-    driven = case.mechanism.drivers[0]
-    up = with_all_coordinates(case, [driven.point]).outputs[2]
-    (note,) = [n for n in notes(replace(case, outputs=(up,), reference={})) if "closure" in n]
-    assert "follow from the drivers" in note
-    assert not [n for n in notes(case) if "closure" in n]
-
-
-def test_an_open_chain_has_no_closure_to_depend_on():
-    assert notes(with_all_motions(arm([0.0, 1.0]))) == []
-
-
-def test_a_coupler_that_moves_the_design_is_told():
-    """In the file's unit; a coupler through zero is not."""
-    for coefficients, told in (
-        ((0.2, 0.5), ["'lever' begins at 0.2 rad, zero as given"]),
-        ((0.0, 0.5), []),
-    ):
-        case = arm([0.0])
-        levers = [
-            Revolute("lever", "ground", "lever", (3.0, 0.0, 0.0), AXIS),
-            Cylindrical("slide", "ground", "rack", (5.0, 0.0, 0.0), AXIS),
-        ]
-        knee = Polynomial("knee", ("lever", "hinge"), coefficients)
-        cam = Polynomial(
-            "cam", ("slide", "hinge"), coefficients, freedoms=("translation", "rotation")
-        )
-        mechanism = replace(
-            case.mechanism,
-            bodies=(*case.mechanism.bodies, Body("lever"), Body("rack")),
-            joints=(*case.mechanism.joints, *levers),
-            couplers=(knee, cam),
-        )
-        found = notes(replace(case, mechanism=mechanism, length_unit="mm"))
-        wanted = [*told, *(["'slide' begins at 200 mm, zero as given"] if told else [])]
-        begins = [note for note in found if "begins" in note]
-        assert len(begins) == len(wanted)
-        assert all(text in note for text, note in zip(wanted, begins, strict=True))

@@ -2,44 +2,12 @@
 file, line, found and remedy.
 """
 
-from pathlib import Path
-
 import pytest
-from kincheck.core.case.io.reader_options import Supplied
-from kincheck.core.case.models.files import load
-from kincheck.core.errors import CaseError
 
-GRIPPER = Path(__file__).parents[1] / "data" / "mjcf" / "robotiq_2f85.xml"
-SPRINGS = ("right_spring_link_joint", "left_spring_link_joint")
-DRIVEN = Supplied(drive=("right_driver_joint:0:0.8:17",), hold=SPRINGS)
+from ..support.mjcf_complaints import COUPLING, DRIVEN, GRIPPER, complains, edited
 
-
-def complains(file, supplied, *fragments):
-    """Exactly a CaseError, on one line, that begins with the file and contains all the
-    fragments.
-    """
-    with pytest.raises(CaseError) as caught:
-        load(file, supplied)
-    message = str(caught.value)
-    assert message.startswith(f"{file}: ")
-    assert "\n" not in message
-    assert [fragment for fragment in fragments if fragment not in message] == [], message
-
-
-def edited(tmp_path, *edits):
-    text = GRIPPER.read_text()
-    for old, new in edits:
-        assert old in text
-        text = text.replace(old, new, 1)
-    file = tmp_path / GRIPPER.name
-    file.write_text(text)
-    return file
-
-
-COUPLING = '<joint joint1="right_driver_joint" joint2="left_driver_joint" polycoef="0 1 0 0 0"'
 FIRST = '<connect anchor="0 0 0" body1="right_follower"'
 BASE = '<body name="base_mount" pos="0 0 0.007" quat="1 0 0 1"'
-
 FAULTS = {
     "misspelt attribute": (
         ('axis="1 0 0"/>', 'axes="1 0 0"/>'),
@@ -223,6 +191,8 @@ FAULTS = {
     ),
     "flex": ((FIRST, '<flex flex="cloth"/>' + FIRST), ["<flex>", "no joint for it"]),
 }
+
+
 ALSO = {
     "all aligned": (BASE, "<body><freejoint/></body>" + BASE),
     "tendon over more": (FIRST, '<tendon tendon1="rope"/>' + FIRST),
@@ -283,91 +253,3 @@ def test_too_large(tmp_path):
     file = tmp_path / "model.xml"
     file.write_text(" " * 4_000_001)
     complains(file, DRIVEN, "larger than 4000000 bytes")
-
-
-DRIVES = {
-    "nothing said": (
-        Supplied(),
-        [
-            "3 degrees of freedom",
-            "nothing said of what drives it",
-            "--drive JOINT:START:STOP",
-            "2 more",
-        ],
-    ),
-    "a template": (Supplied("mcpherson", drive=DRIVEN.drive), ["--template"]),
-    "one short": (
-        Supplied(drive=DRIVEN.drive, hold=SPRINGS[:1]),
-        ["3 degrees of freedom, and 2 driven or held", "--hold JOINT for 1 more"],
-    ),
-    "one too many": (
-        Supplied(drive=DRIVEN.drive, hold=(*SPRINGS, "left_coupler_joint")),
-        ["4 driven or held", "fewer --hold, by 1"],
-    ),
-    "only held": (Supplied(hold=SPRINGS), ["2 driven or held", "--drive JOINT:START:STOP"]),
-    "misspelt": (Supplied(drive=("right_drive_joint:0:1",)), ["--drive", "'right_driver_joint'"]),
-    "no range": (
-        Supplied(drive=("right_driver_joint",)),
-        ["--drive", "JOINT:START:STOP", "[rad, m]", "right_driver_joint:START:STOP"],
-    ),
-    "no end": (
-        Supplied(drive=("right_driver_joint:0",)),
-        ["say from where to where: right_driver_joint:START:STOP"],
-    ),
-    "misspelt, no range": (
-        Supplied(drive=("right_drive_joint",)),
-        ["did you mean 'right_driver_joint'?"],
-    ),
-    "too many samples": (
-        Supplied(drive=("right_driver_joint:0:1:2000000",)),
-        ["2 to 1000000 samples; correct the numbers"],
-    ),
-    "no numbers": (
-        Supplied(drive=("right_driver_joint:0:wide",)),
-        ["--drive", "correct the numbers"],
-    ),
-    "no samples": (
-        Supplied(drive=("right_driver_joint:0:1:0",)),
-        ["--drive", "correct the numbers"],
-    ),
-    "nowhere": (Supplied(drive=("right_driver_joint:1:1",)), ["--drive", "correct the numbers"]),
-    "two": (
-        Supplied(drive=("right_driver_joint:0:1", "left_driver_joint:0:1")),
-        ["2 driven or held", "--hold JOINT for 2 more", "others for 1 that depend on each other"],
-    ),
-    "hold misspelt": (
-        Supplied(drive=DRIVEN.drive, hold=("right_spring_link",)),
-        ["--hold", "'right_spring_link_joint'"],
-    ),
-    "hold driven": (
-        Supplied(drive=DRIVEN.drive, hold=("right_driver_joint",)),
-        ["--hold", "which is driven"],
-    ),
-    "units": (Supplied(units="mm"), ["--units", "a model", "--drive, --hold"]),
-}
-
-
-@pytest.mark.parametrize(
-    ("supplied", "found"),
-    [
-        (
-            DRIVEN,
-            (
-                "--drive: found 'right_driver_joint', which an equality of the file locks, expected"
-                " a joint that moves; name another"
-            ),
-        ),
-        (
-            Supplied(drive=("left_driver_joint:0:0.8",), hold=("right_driver_joint",)),
-            "joint that moves; leave it out",
-        ),
-    ],
-)
-def test_a_joint_that_the_file_locks_is_not_driven(tmp_path, supplied, found):
-    complains(edited(tmp_path, (COUPLING, '<joint joint1="right_driver_joint"')), supplied, found)
-
-
-@pytest.mark.parametrize("kind", DRIVES)
-def test_driving(kind):
-    supplied, fragments = DRIVES[kind]
-    complains(GRIPPER, supplied, *fragments)

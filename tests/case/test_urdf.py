@@ -1,6 +1,5 @@
 """URDF with loops: links stand and move as Pinocchio, which reads the file itself, says they do."""
 
-import json
 import math
 from pathlib import Path
 
@@ -14,7 +13,6 @@ from kincheck.core.case.io.reader_options import LEFT_OUT, Supplied
 from kincheck.core.case.models.files import load
 from kincheck.core.case.models.mjcf.elements import parse_xml
 from kincheck.core.case.models.robots.urdf import read_urdf
-from kincheck.core.errors import CaseError
 from kincheck.core.joints import Polynomial, Revolute
 from kincheck.core.mechanism.drivers import JointAngle
 from kincheck.core.mechanism.mechanism import Body, Mechanism
@@ -22,24 +20,12 @@ from kincheck.core.mechanism.mechanism import Body, Mechanism
 from ..fuzz import urdf as seeds
 from ..support.exported_again import same_motion
 from ..support.model_poses import coordinate, solution
+from ..support.urdf_texts import DRIVE, FOUR_BAR, TREE, robot
 
 # Rounding of metre-sized coordinates, some operations deep.
 EXACT = 1e-13
-DRIVE = Supplied(drive=("A:0:0.5:5",))
-FOUR_BAR = seeds.FOUR_BAR.decode()
-LOOP = FOUR_BAR[FOUR_BAR.index("<constraint") : FOUR_BAR.index("</robot>")]
-TREE = FOUR_BAR.replace(LOOP, "")
 ENDS = '<parent link="b"/><parent_origin xyz="4 0 0"/><child link="c"/>'
 THERE = 'xyz="-0.958851077208406 0 1.7551651237807455"'
-
-
-def robot(folder: Path, text: str, **beside: str) -> Path:
-    """Return the file of a robot, and write the files beside it."""
-    file = folder / "robot.urdf"
-    file.write_text(text)
-    for ending, content in beside.items():
-        file.with_suffix(f".{ending.replace('_', '.')}").write_text(content)
-    return file
 
 
 def random_tree(seed: int) -> str:
@@ -191,150 +177,6 @@ def test_a_polynomial_coupling_is_read_back(tmp_path: Path):
     again = load(file, Supplied(drive=("A:0:1:3",)))
     assert [each.type for each in again.mechanism.couplers] == ["polynomial"]
     assert same_motion(case, again) < EXACT
-
-
-def edited(folder: Path, old: str, new: str) -> Path:
-    assert old in FOUR_BAR
-    return robot(folder, FOUR_BAR.replace(old, new, 1))
-
-
-FAULTS = {
-    "two joints above": (
-        '<child link="c"/>',
-        '<child link="b"/>',
-        "'B' holds already.*<constraint>",
-    ),
-    "no link": ('<child link="c"/>', '<child link="cc"/>', "found 'cc', expected a link; did you"),
-    "ring": (
-        '<parent link="base"/><child link="a"/>',
-        '<parent link="tip"/><child link="a"/>',
-        "hangs on itself",
-    ),
-    "no child": ('<child link="a"/>', "", "<child>: missing, expected a link; add it"),
-    "two bases": (
-        '<link name="c"/>',
-        '<link name="c"/><link name="e"/>',
-        r"found 2 links .*\(base, e\)",
-    ),
-    "zero axis": ('xyz="0 1 0"', 'xyz="0 0 0"', "found zero, expected the direction of an axis"),
-    "mistyped attribute": (
-        'rpy="1 2 3"',
-        'rpq="1 2 3"',
-        "URDF does not have.*; did you mean 'rpy'",
-    ),
-    "mistyped element": ("<origin", "<orgin", "unknown in <joint>; did you mean 'origin'"),
-    "no type": (
-        'type="spherical"',
-        'type="rolling"',
-        "found 'rolling', expected one of fixed, link",
-    ),
-    "unknown joint": ('type="revolute"', 'type="hinge"', "found 'hinge', expected one of revolute"),
-    "macros": ("<constraint", "<xacro:leg/><constraint", "is a macro.*; expand the file"),
-    "twice": ('<link name="c"/>', '<link name="b"/>', "found 'b' again"),
-}
-
-
-@pytest.mark.parametrize(("old", "new", "said"), FAULTS.values(), ids=FAULTS)
-def test_a_fault_is_one_message(old: str, new: str, said: str, tmp_path: Path):
-    file = edited(tmp_path, old, new)
-    with pytest.raises(CaseError, match=said) as caught:
-        load(file, DRIVE)
-    assert str(caught.value).startswith(f"{file}: line ")
-
-
-COINCIDENT = {
-    "joint": "C",
-    "kind": "coincident",
-    "i": {"link": "b", "point": [4.0, 0.0, 0.0]},
-    "j": {"link": "c", "point": [-0.958851077208406, 0.0, 1.7551651237807455]},
-}
-BESIDE_FAULTS = {
-    "other schema": ({"schema": "mine"}, "found 'mine', expected 'kincheck-constraints/1'"),
-    "unknown link": (
-        {"i": {"link": "bb", "point": [4.0, 0.0, 0.0]}},
-        "found 'bb', expected a link",
-    ),
-    "open": ({"i": {"link": "b", "point": [4.1, 0.0, 0.0]}}, "is open by 0.1 in the zero pose"),
-    "no joint": ({"kind": "distance", "value": 1.0}, "is open by -1"),
-    "no point": ({"i": None}, "found no two links"),
-    "unknown kind": ({"kind": "weld"}, "weld"),
-}
-
-
-def beside(folder: Path, **changes: object) -> Path:
-    """The four-bar, closed by a file beside it."""
-    schema = changes.pop("schema", "kincheck-constraints/1")
-    table = {"schema": schema, "constraints": [COINCIDENT | changes]}
-    return robot(folder, TREE, constraints_json=json.dumps(table))
-
-
-def test_a_file_of_conditions_closes_the_loop_beside_it(tmp_path: Path):
-    (other := tmp_path / "other").mkdir()
-    found = solution(load(beside(tmp_path), DRIVE)).bodies["c"].r
-    same = solution(load(robot(other, FOUR_BAR), DRIVE)).bodies["c"].r
-    assert np.array_equal(found, same)
-
-
-@pytest.mark.parametrize(("changes", "said"), BESIDE_FAULTS.values(), ids=BESIDE_FAULTS)
-def test_a_fault_of_a_file_of_conditions_names_it(changes: dict, said: str, tmp_path: Path):
-    file = beside(tmp_path, **changes)
-    with pytest.raises(CaseError, match=said) as caught:
-        load(file, DRIVE)
-    assert str(caught.value).startswith(str(file.with_suffix(".constraints.json")))
-
-
-PAIRS = {
-    "a reference": ("closed_loop: [&x [a, b], *x]\ntype: [3d, 3d]", "found a reference"),
-    "fewer types": ("closed_loop: [[a, b]]\ntype: []", "type: found 0, expected 1"),
-    "unknown frame": ("closed_loop: [[a, bb]]\ntype: [3d]", "found 'bb', expected a link or joint"),
-    "unknown type": ("closed_loop: [[a, b]]\ntype: [4d]", "found '4d', expected 3d or 6d"),
-    "unknown joint": ("joint_name: [Q]\njoint_type: [FIXED]", "found 'Q', expected a joint"),
-    "no axes": (
-        "joint_name: [B]\njoint_type: [UJOINT_XW]",
-        "found 'UJOINT_XW', expected SPHERICAL",
-    ),
-    "no mapping": ("- 1", "expected closed_loop, type"),
-    "nested": ("[" * 400, "nested too deeply"),
-    "syntax": ("a: [", "not valid YAML"),
-}
-
-
-@pytest.mark.parametrize(("text", "said"), PAIRS.values(), ids=PAIRS)
-def test_a_fault_of_a_file_of_pairs_names_it(text: str, said: str, tmp_path: Path):
-    pytest.importorskip("yaml")
-    file = robot(tmp_path, TREE, yaml=text)
-    with pytest.raises(CaseError, match=said) as caught:
-        load(file, DRIVE)
-    assert str(caught.value).startswith(str(file.with_suffix(".yaml")))
-
-
-@pytest.mark.parametrize("name", ["robot.xacro", "robot.usd", "part.STL", "r.constraints.json"])
-def test_a_file_that_is_beside_models_is_told(name: str, tmp_path: Path):
-    (tmp_path / name).write_bytes(b"\x00\xff")
-    with pytest.raises(CaseError, match=r"found a \.[\w.]+ file, which .*; "):
-        load(tmp_path / name)
-
-
-@pytest.mark.parametrize(
-    ("text", "advice"),
-    [
-        ("<mujocoinclude/>", "give the file that includes it"),
-        ("<OpenSimDocument/>", "give MJCF or a case file"),
-        ("<launch/>", "give the URDF"),
-        (TREE.replace('xyz="0 0 2"', 'xyz="${l} 0 2"'), "xacro FILE"),
-    ],
-)
-def test_other_documents_are_told(text: str, advice: str, tmp_path: Path):
-    file = tmp_path / "model.xml"
-    file.write_text(text)
-    with pytest.raises(CaseError, match=advice):
-        load(file)
-
-
-def test_entities_are_refused(tmp_path: Path):
-    file = robot(tmp_path, '<!DOCTYPE r [<!ENTITY a "b">]>' + FOUR_BAR)
-    with pytest.raises(CaseError, match="found <!DOCTYPE>, expected none"):
-        load(file, DRIVE)
 
 
 AXES = ["3 4 0", "0.33 0 0.9439809320108114", "0 -0.6 0.8", "1e100 0 0", "2 3 6"]

@@ -10,6 +10,12 @@ from kincheck.core.harness.run import run
 from ..support.fakes import SAMPLES, Fake, crank, off, solution
 
 TOL = 1e-12
+WARM_SOLVES = execution.WARM_SOLVES
+
+
+@pytest.fixture(autouse=True)
+def as_users_solve(monkeypatch):
+    monkeypatch.setattr(execution, "WARM_SOLVES", WARM_SOLVES)
 
 
 def record_of(engine):

@@ -7,6 +7,7 @@ agree is what they forbid.
 """
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import pytest
@@ -107,7 +108,7 @@ class Example:
             )
             if np.abs(step).max() < 1e-14:
                 break
-        self.j, self.rng = j, rng
+        self.j = j
 
     def residual(self, i, j):
         return naive.joint_residuals(self.joint, self.i0, self.j0, i, j)
@@ -153,6 +154,10 @@ class Example:
         return np.array(self.each("gamma", *motions))
 
 
+moved_together = cache(Example)
+"""Examples that no test changes."""
+
+
 def threaded(example):
     """The last of the naive rows of a screw couples its coordinates, which is no primitive of the
     joint.
@@ -160,13 +165,13 @@ def threaded(example):
     return len(getattr(example.joint, "relations", ()))
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("name", TYPES)
 def test_joint_forbids_what_the_paper_forbids(name, seed):
     """On the manifold: native residuals vanish, the branch is the intended one, and the rows span
     the exact ones.
     """
-    example = Example(name, seed)
+    example = moved_together(name, seed)
     assert np.abs(example.residual(example.i, example.j)).max() < 1e-14
     assert np.abs(example.each("phi")).max() < 1e-14
     assert min(example.each("branch"), default=1.0) > 0.0
@@ -181,17 +186,17 @@ def test_joint_forbids_what_the_paper_forbids(name, seed):
     assert example.joint.rows == len(native) + threaded(example)
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("name", TYPES)
 def test_joint_accelerates_as_the_paper_says(name, seed):
     """Any admissible velocity, any acceleration with rows . acceleration = gamma: the exact second
     derivative vanishes.
     """
-    example = Example(name, seed)
-    rows = example.rows
+    example = moved_together(name, seed)
+    rows, rng = example.rows, np.random.default_rng(seed)
     free = np.eye(12) - np.linalg.pinv(rows) @ rows
-    v = free @ example.rng.normal(size=12)
-    a = np.linalg.pinv(rows) @ example.gamma(v) + free @ example.rng.normal(size=12)
+    v = free @ rng.normal(size=12)
+    a = np.linalg.pinv(rows) @ example.gamma(v) + free @ rng.normal(size=12)
     path = naive.along(
         {
             "i": (example.i.r, example.i.p, v[:6], a[:6]),

@@ -128,6 +128,8 @@ class Exact:
 def _value(b: Any) -> Any:
     if isinstance(b, Exact):
         return b.value
+    if isinstance(b, float) and math.isfinite(b):
+        return flint().fmpq(*b.as_integer_ratio())
     return Exact.of(Fraction(b)).value if math.isfinite(b) else flint().arb(b)
 
 

@@ -1,0 +1,93 @@
+"""How an MJCF model is said to be driven: what is wrong with it is one message."""
+
+import pytest
+from kincheck.core.case.io.reader_options import Supplied
+
+from ..support.mjcf_complaints import COUPLING, DRIVEN, GRIPPER, SPRINGS, complains, edited
+
+DRIVES = {
+    "nothing said": (
+        Supplied(),
+        [
+            "3 degrees of freedom",
+            "nothing said of what drives it",
+            "--drive JOINT:START:STOP",
+            "2 more",
+        ],
+    ),
+    "a template": (Supplied("mcpherson", drive=DRIVEN.drive), ["--template"]),
+    "one short": (
+        Supplied(drive=DRIVEN.drive, hold=SPRINGS[:1]),
+        ["3 degrees of freedom, and 2 driven or held", "--hold JOINT for 1 more"],
+    ),
+    "one too many": (
+        Supplied(drive=DRIVEN.drive, hold=(*SPRINGS, "left_coupler_joint")),
+        ["4 driven or held", "fewer --hold, by 1"],
+    ),
+    "only held": (Supplied(hold=SPRINGS), ["2 driven or held", "--drive JOINT:START:STOP"]),
+    "misspelt": (Supplied(drive=("right_drive_joint:0:1",)), ["--drive", "'right_driver_joint'"]),
+    "no range": (
+        Supplied(drive=("right_driver_joint",)),
+        ["--drive", "JOINT:START:STOP", "[rad, m]", "right_driver_joint:START:STOP"],
+    ),
+    "no end": (
+        Supplied(drive=("right_driver_joint:0",)),
+        ["say from where to where: right_driver_joint:START:STOP"],
+    ),
+    "misspelt, no range": (
+        Supplied(drive=("right_drive_joint",)),
+        ["did you mean 'right_driver_joint'?"],
+    ),
+    "too many samples": (
+        Supplied(drive=("right_driver_joint:0:1:2000000",)),
+        ["2 to 1000000 samples; correct the numbers"],
+    ),
+    "no numbers": (
+        Supplied(drive=("right_driver_joint:0:wide",)),
+        ["--drive", "correct the numbers"],
+    ),
+    "no samples": (
+        Supplied(drive=("right_driver_joint:0:1:0",)),
+        ["--drive", "correct the numbers"],
+    ),
+    "nowhere": (Supplied(drive=("right_driver_joint:1:1",)), ["--drive", "correct the numbers"]),
+    "two": (
+        Supplied(drive=("right_driver_joint:0:1", "left_driver_joint:0:1")),
+        ["2 driven or held", "--hold JOINT for 2 more", "others for 1 that depend on each other"],
+    ),
+    "hold misspelt": (
+        Supplied(drive=DRIVEN.drive, hold=("right_spring_link",)),
+        ["--hold", "'right_spring_link_joint'"],
+    ),
+    "hold driven": (
+        Supplied(drive=DRIVEN.drive, hold=("right_driver_joint",)),
+        ["--hold", "which is driven"],
+    ),
+    "units": (Supplied(units="mm"), ["--units", "a model", "--drive, --hold"]),
+}
+
+
+@pytest.mark.parametrize(
+    ("supplied", "found"),
+    [
+        (
+            DRIVEN,
+            (
+                "--drive: found 'right_driver_joint', which an equality of the file locks, expected"
+                " a joint that moves; name another"
+            ),
+        ),
+        (
+            Supplied(drive=("left_driver_joint:0:0.8",), hold=("right_driver_joint",)),
+            "joint that moves; leave it out",
+        ),
+    ],
+)
+def test_a_joint_that_the_file_locks_is_not_driven(tmp_path, supplied, found):
+    complains(edited(tmp_path, (COUPLING, '<joint joint1="right_driver_joint"')), supplied, found)
+
+
+@pytest.mark.parametrize("kind", DRIVES)
+def test_driving(kind):
+    supplied, fragments = DRIVES[kind]
+    complains(GRIPPER, supplied, *fragments)

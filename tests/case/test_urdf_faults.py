@@ -1,0 +1,142 @@
+"""URDF and the files beside it: one message for each fault."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from kincheck.core.case.models.files import load
+from kincheck.core.errors import CaseError
+
+from ..support.model_poses import solution
+from ..support.urdf_texts import DRIVE, FOUR_BAR, TREE, beside, robot
+
+
+def edited(folder: Path, old: str, new: str) -> Path:
+    assert old in FOUR_BAR
+    return robot(folder, FOUR_BAR.replace(old, new, 1))
+
+
+FAULTS = {
+    "two joints above": (
+        '<child link="c"/>',
+        '<child link="b"/>',
+        "'B' holds already.*<constraint>",
+    ),
+    "no link": ('<child link="c"/>', '<child link="cc"/>', "found 'cc', expected a link; did you"),
+    "ring": (
+        '<parent link="base"/><child link="a"/>',
+        '<parent link="tip"/><child link="a"/>',
+        "hangs on itself",
+    ),
+    "no child": ('<child link="a"/>', "", "<child>: missing, expected a link; add it"),
+    "two bases": (
+        '<link name="c"/>',
+        '<link name="c"/><link name="e"/>',
+        r"found 2 links .*\(base, e\)",
+    ),
+    "zero axis": ('xyz="0 1 0"', 'xyz="0 0 0"', "found zero, expected the direction of an axis"),
+    "mistyped attribute": (
+        'rpy="1 2 3"',
+        'rpq="1 2 3"',
+        "URDF does not have.*; did you mean 'rpy'",
+    ),
+    "mistyped element": ("<origin", "<orgin", "unknown in <joint>; did you mean 'origin'"),
+    "no type": (
+        'type="spherical"',
+        'type="rolling"',
+        "found 'rolling', expected one of fixed, link",
+    ),
+    "unknown joint": ('type="revolute"', 'type="hinge"', "found 'hinge', expected one of revolute"),
+    "macros": ("<constraint", "<xacro:leg/><constraint", "is a macro.*; expand the file"),
+    "twice": ('<link name="c"/>', '<link name="b"/>', "found 'b' again"),
+}
+
+
+@pytest.mark.parametrize(("old", "new", "said"), FAULTS.values(), ids=FAULTS)
+def test_a_fault_is_one_message(old: str, new: str, said: str, tmp_path: Path):
+    file = edited(tmp_path, old, new)
+    with pytest.raises(CaseError, match=said) as caught:
+        load(file, DRIVE)
+    assert str(caught.value).startswith(f"{file}: line ")
+
+
+BESIDE_FAULTS = {
+    "other schema": ({"schema": "mine"}, "found 'mine', expected 'kincheck-constraints/1'"),
+    "unknown link": (
+        {"i": {"link": "bb", "point": [4.0, 0.0, 0.0]}},
+        "found 'bb', expected a link",
+    ),
+    "open": ({"i": {"link": "b", "point": [4.1, 0.0, 0.0]}}, "is open by 0.1 in the zero pose"),
+    "no joint": ({"kind": "distance", "value": 1.0}, "is open by -1"),
+    "no point": ({"i": None}, "found no two links"),
+    "unknown kind": ({"kind": "weld"}, "weld"),
+}
+
+
+def test_a_file_of_conditions_closes_the_loop_beside_it(tmp_path: Path):
+    (other := tmp_path / "other").mkdir()
+    found = solution(load(beside(tmp_path), DRIVE)).bodies["c"].r
+    same = solution(load(robot(other, FOUR_BAR), DRIVE)).bodies["c"].r
+    assert np.array_equal(found, same)
+
+
+@pytest.mark.parametrize(("changes", "said"), BESIDE_FAULTS.values(), ids=BESIDE_FAULTS)
+def test_a_fault_of_a_file_of_conditions_names_it(changes: dict, said: str, tmp_path: Path):
+    file = beside(tmp_path, **changes)
+    with pytest.raises(CaseError, match=said) as caught:
+        load(file, DRIVE)
+    assert str(caught.value).startswith(str(file.with_suffix(".constraints.json")))
+
+
+PAIRS = {
+    "a reference": ("closed_loop: [&x [a, b], *x]\ntype: [3d, 3d]", "found a reference"),
+    "fewer types": ("closed_loop: [[a, b]]\ntype: []", "type: found 0, expected 1"),
+    "unknown frame": ("closed_loop: [[a, bb]]\ntype: [3d]", "found 'bb', expected a link or joint"),
+    "unknown type": ("closed_loop: [[a, b]]\ntype: [4d]", "found '4d', expected 3d or 6d"),
+    "unknown joint": ("joint_name: [Q]\njoint_type: [FIXED]", "found 'Q', expected a joint"),
+    "no axes": (
+        "joint_name: [B]\njoint_type: [UJOINT_XW]",
+        "found 'UJOINT_XW', expected SPHERICAL",
+    ),
+    "no mapping": ("- 1", "expected closed_loop, type"),
+    "nested": ("[" * 400, "nested too deeply"),
+    "syntax": ("a: [", "not valid YAML"),
+}
+
+
+@pytest.mark.parametrize(("text", "said"), PAIRS.values(), ids=PAIRS)
+def test_a_fault_of_a_file_of_pairs_names_it(text: str, said: str, tmp_path: Path):
+    pytest.importorskip("yaml")
+    file = robot(tmp_path, TREE, yaml=text)
+    with pytest.raises(CaseError, match=said) as caught:
+        load(file, DRIVE)
+    assert str(caught.value).startswith(str(file.with_suffix(".yaml")))
+
+
+@pytest.mark.parametrize("name", ["robot.xacro", "robot.usd", "part.STL", "r.constraints.json"])
+def test_a_file_that_is_beside_models_is_told(name: str, tmp_path: Path):
+    (tmp_path / name).write_bytes(b"\x00\xff")
+    with pytest.raises(CaseError, match=r"found a \.[\w.]+ file, which .*; "):
+        load(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("text", "advice"),
+    [
+        ("<mujocoinclude/>", "give the file that includes it"),
+        ("<OpenSimDocument/>", "give MJCF or a case file"),
+        ("<launch/>", "give the URDF"),
+        (TREE.replace('xyz="0 0 2"', 'xyz="${l} 0 2"'), "xacro FILE"),
+    ],
+)
+def test_other_documents_are_told(text: str, advice: str, tmp_path: Path):
+    file = tmp_path / "model.xml"
+    file.write_text(text)
+    with pytest.raises(CaseError, match=advice):
+        load(file)
+
+
+def test_entities_are_refused(tmp_path: Path):
+    file = robot(tmp_path, '<!DOCTYPE r [<!ENTITY a "b">]>' + FOUR_BAR)
+    with pytest.raises(CaseError, match="found <!DOCTYPE>, expected none"):
+        load(file, DRIVE)

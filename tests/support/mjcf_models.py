@@ -1,0 +1,64 @@
+"""MJCF models as files."""
+
+import numpy as np
+import pytest
+from kincheck.core.algebra import Quat, X, Y, Z, vec
+from kincheck.core.case.models.mjcf.classes import read_classes
+from kincheck.core.case.models.mjcf.elements import parse_xml
+from kincheck.core.case.models.mjcf.frames import read_compiler
+from kincheck.core.case.models.mjcf.tree import read_tree
+
+mujoco = pytest.importorskip("mujoco")
+
+
+# MuJoCo's residuals at kincheck's poses: rounding of metre-sized coordinates, some operations deep.
+EXACT = 1e-13
+# Without it MuJoCo refuses a moving body; masses move nothing here.
+MASS = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
+
+
+def model(tmp_path, text, name="model.xml"):
+    """The text as a file, with an inertia in every body."""
+    file = tmp_path / name
+    file.write_text(
+        "".join(
+            part + ">" + MASS * part.lstrip().startswith("<body")
+            for part in text.split(">")
+            if part.strip()
+        )
+    )
+    return file
+
+
+def agree(file):
+    """Compare what the tree holds at qpos0 with MuJoCo: places and turns of bodies, points and axes
+    of joints, sites.
+    """
+    root = parse_xml(file, file.read_text())
+    tree = read_tree(root, read_classes(root), read_compiler(root))
+    loaded = mujoco.MjModel.from_xml_path(str(file))
+    data = mujoco.MjData(loaded)
+    mujoco.mj_kinematics(loaded, data)
+    for name, place in tree.places.items():
+        body = data.body(name)
+        assert np.allclose([*place.at], body.xpos, rtol=0, atol=EXACT), name
+        between = place.turn.conjugate() * Quat(body.xquat[0], vec(body.xquat[1:]))
+        assert np.abs([*between.e]).max() < EXACT, name
+    for name, joint in tree.joints.items():
+        there = data.joint(name)
+        assert np.allclose([*joint.point], there.xanchor, rtol=0, atol=EXACT), name
+        if joint.type != "ball":
+            assert np.allclose([*joint.axis], there.xaxis, rtol=0, atol=EXACT), name
+            assert np.isclose(
+                joint.ref, loaded.qpos0[loaded.joint(name).qposadr[0]], rtol=0, atol=EXACT
+            ), name
+    for name, (_, place) in tree.sites.items():
+        assert np.allclose([*place.at], data.site(name).xpos, rtol=0, atol=EXACT), name
+        for column, axis in enumerate((X, Y, Z)):
+            assert np.allclose(
+                [*place.direction(axis)],
+                data.site(name).xmat.reshape(3, 3)[:, column],
+                rtol=0,
+                atol=EXACT,
+            ), name
+    return tree
