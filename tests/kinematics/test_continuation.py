@@ -4,6 +4,7 @@ lies beyond them.
 
 import json
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -38,15 +39,23 @@ def distance(a, b):
 # Limit points
 
 
-@pytest.mark.parametrize("style", ["native", "relative"])
-@pytest.mark.parametrize("direction", [1, -1])
+@cache
+def strut_curve(direction, style="native"):
+    return trace(
+        mcpherson(),
+        "stroke",
+        direction=direction,
+        length=5.0 if direction == 1 else 3.0,
+        style=style,
+    )
+
+
+@pytest.mark.parametrize(("direction", "style"), [(1, "native"), (-1, "native"), (1, "relative")])
 def test_limits_of_the_strut(direction, style):
     """To 1e-9 m and much better; the dip of the condition at +0.26 m on the way is no branch
     point.
     """
-    length = 5.0 if direction == 1 else 3.0
-    curve = trace(mcpherson(), "stroke", direction=direction, length=length, style=style)
-    (event,) = curve.events
+    (event,) = strut_curve(direction, style).events
     assert event.kind == "limit point"
     assert event.value == pytest.approx(LIMITS[direction], abs=1e-14)
     assert event.singularity.sigma < 1e-10
@@ -56,15 +65,12 @@ def test_limits_of_the_strut(direction, style):
 
 
 def test_the_limit_does_not_depend_on_the_steps():
-    values = [
-        trace(mcpherson(), "stroke", direction=-1, length=2.5, longest=longest).events[0].value
-        for longest in (0.02, 0.1)
-    ]
-    assert values[0] == pytest.approx(values[1], abs=1e-14)
+    curve = trace(mcpherson(), "stroke", direction=-1, length=2.5, longest=0.11)
+    assert curve.events[0].value == pytest.approx(strut_curve(-1).events[0].value, abs=1e-14)
 
 
 def test_the_strut_goes_on_beyond():
-    curve = trace(mcpherson(), "stroke", direction=-1, length=3.0)
+    curve = strut_curve(-1)
     beyond = np.abs(curve.arc) > abs(curve.events[0].arc)
     assert (np.diff(curve.values[~beyond]) < 0.0).all()
     assert (np.diff(curve.values[beyond]) > 0.0).all()
@@ -80,7 +86,7 @@ def test_a_rod_that_is_shorter_than_its_crank():
     leaves it.
     """
     rod = 0.1
-    curve = trace(slider_crank(rod), "turn", length=4.0)
+    curve = trace(slider_crank(rod), "turn", length=4.0, longest=0.1)
     limit = np.arcsin(rod / CRANK)
     assert [event.value for event in curve.events] == pytest.approx([limit, -limit], abs=1e-12)
     assert curve.closed
@@ -96,7 +102,7 @@ def test_a_rod_that_is_shorter_than_its_crank():
 def test_a_rocker_that_drives_its_crank():
     """Limits where crank and coupler are in line; the crank goes round, and the curve is closed."""
     rocked = replace(four_bar(), drivers=[replace(four_bar().drivers[0], name="rock", joint="D")])
-    curve = trace(rocked, "rock", length=12.0)
+    curve = trace(rocked, "rock", length=12.0, longest=0.1)
     crank, coupler, rocker, base = (
         distance(A0, B0),
         distance(B0, C0),
@@ -133,7 +139,7 @@ def test_change_points(loops, direction):
     """All links in line: the determinant changes its sign with an odd number of loops, and not with
     an even one.
     """
-    curve = trace(chain(loops), "turn", length=4.5, direction=direction)
+    curve = trace(chain(loops), "turn", length=4.5, direction=direction, longest=0.1)
     (event,) = curve.events
     assert event.kind == "branch point"
     assert event.value == pytest.approx(LEAN + direction * np.pi / 2.0, abs=1e-11)
@@ -145,7 +151,7 @@ def test_change_points(loops, direction):
 
 def test_a_motion_without_singular_poses():
     """A whole turn of a crank, and back at the design."""
-    curve = trace(four_bar(), "turn", length=12.0)
+    curve = trace(four_bar(), "turn", length=12.0, longest=0.1)
     assert curve.closed
     assert curve.events == ()
     assert curve.values[-1] == pytest.approx(2.0 * np.pi, abs=0.1)
@@ -154,7 +160,7 @@ def test_a_motion_without_singular_poses():
 
 # The closing step and the first one
 
-PAST = [0.0, 1e-5, 0.002, 0.04, 0.2]
+PAST = [0.0, 1e-5, 0.002, 0.04]
 """How far the design is past a singular pose [rad]; zero stands for one that is nearer than a
 millionth.
 """
@@ -210,7 +216,8 @@ def test_the_length_of_a_closed_curve_is_that_of_one_turn(style):
     """
     lengths = []
     for begins in (-0.04, 0.002, 1.0):
-        curve = trace(driven_slider(np.pi + begins)[0], "push", length=25.0, style=style)
+        mechanism, _ = driven_slider(np.pi + begins)
+        curve = trace(mechanism, "push", length=25.0, longest=0.1, style=style)
         assert curve.closed
         assert len(curve.events) == 2
         lengths.append(curve.arc[-1])
@@ -218,9 +225,7 @@ def test_the_length_of_a_closed_curve_is_that_of_one_turn(style):
     assert lengths[:2] == pytest.approx([lengths[2]] * 2, rel=1e-3)
 
 
-@pytest.mark.parametrize(
-    ("past", "direction"), [(-0.1, 1), (-0.02, -1), (-1e-5, 1), (1e-5, -1), (0.02, 1), (0.1, -1)]
-)
+@pytest.mark.parametrize(("past", "direction"), [(-0.1, 1), (-1e-5, -1), (1e-5, 1), (0.02, -1)])
 def test_both_dead_centres_of_a_rocker(past, direction):
     """The four-bar that its rocker drives, with its crank beside the pose in which it stretches the
     coupler.
@@ -312,7 +317,7 @@ def test_what_makes_no_sense(arguments, message):
 
 def test_the_command_line(tmp_path, capsys):
     file = tmp_path / "curve.json"
-    assert main(["trace", "mcpherson_strut", "--length", "3", "--json", str(file)]) == 0
+    assert main(["trace", "mcpherson_strut", "--length", "2.5", "--json", str(file)]) == 0
     assert "limit point at stroke = -0.316737084 m" in capsys.readouterr().out
     found = json.loads(file.read_text())
     assert found["schema"] == "kincheck-trace/1"

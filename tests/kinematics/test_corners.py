@@ -59,13 +59,23 @@ def loop(start, beside, rod=ROD, rocker=ROD, loops=1):
     )
 
 
-@pytest.mark.parametrize(("loops", "order"), [(1, 0), (2, 2)])
-@pytest.mark.parametrize("count", [2, 3, 8, 400])
-@pytest.mark.parametrize("beside", [1e-2, 1e-3, -1e-4, 1e-5, -3e-6])
-def test_a_corner_is_turned_round(beside, count, order, loops):
+def latin(rows, columns, others):
+    """Every row with every column, and with each pair one of the others in turn."""
+    return [
+        (row, column, others[(i + j) % len(others)])
+        for i, row in enumerate(rows)
+        for j, column in enumerate(columns)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("beside", "count", "loops"),
+    latin([1e-2, 1e-3, -1e-4, 1e-5, -3e-6], [2, 3, 8, 400], [1, 2]),
+)
+def test_a_corner_is_turned_round(beside, count, loops):
     """The rocker makes half a turn while the crank's pin passes its pivot."""
     turn = np.linspace(0.0, 2.0, count)
-    found = solve(loop(-1.0, beside, loops=loops), "turn", turn, order=order)
+    found = solve(loop(-1.0, beside, loops=loops), "turn", turn, order=loops - 1)
     assert found.solved.all(), found.message
     # one over the distance of the two is the condition there, and all that follows goes through it
     assert np.abs(found.points["meet"].position - corner(turn - 1.0, beside)).max() <= 1e-13 / abs(
@@ -74,8 +84,7 @@ def test_a_corner_is_turned_round(beside, count, order, loops):
     assert "notes" not in found.details
 
 
-@pytest.mark.parametrize("loops", [1, 2])
-@pytest.mark.parametrize("beside", [1e-6, 1e-9, -1e-12])
+@pytest.mark.parametrize(("beside", "loops"), [(1e-6, 1), (1e-9, 2), (-1e-12, 1), (1e-6, 2)])
 def test_a_corner_that_is_too_narrow_is_no_straight_way(beside, loops):
     turn = np.linspace(0.0, 2.0, 9)
     found = solve(loop(-1.0, beside, loops=loops), "turn", turn)
@@ -88,9 +97,9 @@ def test_a_corner_that_is_too_narrow_is_no_straight_way(beside, loops):
 # Crank and pivots in line, the pin two metres from the rocker's pivot: rod and rocker are too short
 # to reach it by this. Of two loops alike the determinants change their signs together, and that of
 # the whole keeps it.
-@pytest.mark.parametrize("loops", [1, 2])
-@pytest.mark.parametrize("short", [1e-2, 1e-5, 1e-8, 1e-10])
-@pytest.mark.parametrize("count", [2, 5, 9, 300])
+@pytest.mark.parametrize(
+    ("short", "count", "loops"), latin([1e-2, 1e-5, 1e-8, 1e-10], [2, 5, 9, 300], [1, 2])
+)
 def test_a_gap_is_the_end(short, count, loops):
     turn = np.linspace(0.0, 2.0, count)
     mechanism = loop(np.pi - 1.0, 0.0, rod=1.2 - short, rocker=0.8, loops=loops)
@@ -108,8 +117,14 @@ KITES = [
 ]
 
 
-@pytest.mark.parametrize(("ground", "short", "start"), KITES)
-@pytest.mark.parametrize("count", [2, 3, 5, 9, 300])
+COUNTS = [2, 3, 5, 9, 300]
+
+
+# every kite with two or three of the counts
+@pytest.mark.parametrize(
+    ("ground", "short", "start", "count"),
+    [(*kite, count) for k, kite in enumerate(KITES) for count in COUNTS[k % 2 :: 2]],
+)
 def test_a_gap_behind_which_the_motion_seems_to_go_on_is_the_end(ground, short, start, count):
     """A kite that lies on its side: the rod is shorter than the crank, and cannot fold. Beyond,
     what crosses there is as near.
@@ -213,11 +228,15 @@ def side_of_the_line(pin, rest, turn, found):
     return across[:, 0] * d[:, 1] - across[:, 1] * d[:, 0]
 
 
-# Every style and every linkage with every kite, and every kite with both linkages in turn.
+STYLES = ["native", "paper", "conventional", "mixed", "relative"]
+
+
+# Each kite with both linkages, and with three of the styles, two of which are always the native and
+# the relative one.
 CHOSEN = [
     (name, (universal_loop, revolute_loop)[(row + column) % 2], style)
     for row, name in enumerate(NEARLY_KITES)
-    for column, style in enumerate(("native", "paper", "conventional", "mixed", "relative"))
+    for column, style in enumerate(("native", STYLES[1 + row % 3], "relative"))
 ]
 
 
@@ -237,9 +256,10 @@ def test_rows_that_were_chosen_do_not_hide_a_corner(name, made, style):
     assert found.solved.sum() >= 3
 
 
-@pytest.mark.parametrize("style", ["native", "relative"])
-@pytest.mark.parametrize("beside", [1e-2, -3e-3, 1e-3])
-@pytest.mark.parametrize("made", [universal_loop, revolute_loop])
+@pytest.mark.parametrize(
+    ("made", "beside", "style"),
+    latin([universal_loop, revolute_loop], [1e-2, -3e-3, 1e-3], ["native", "relative"]),
+)
 def test_other_rows_are_chosen_where_a_kite_is_nearly_singular(made, beside, style):
     """Those that were chosen at design depend on each other where it lies flat, or so nearly that
     it cannot be told from that.
@@ -257,8 +277,15 @@ def test_other_rows_are_chosen_where_a_kite_is_nearly_singular(made, beside, sty
     ).max() <= 1e-13 / abs(beside)
 
 
-@pytest.mark.parametrize("style", ["native", "paper", "conventional", "mixed", "relative"])
-@pytest.mark.parametrize("count", [4, 7, 8, 10, 12, 15])
+# every count with the native style and another one
+@pytest.mark.parametrize(
+    ("count", "style"),
+    [
+        (count, style)
+        for k, count in enumerate([4, 7, 8, 10, 12, 15])
+        for style in ("native", STYLES[1 + k % 4])
+    ],
+)
 def test_a_small_loop_does_not_hide_the_corner_of_a_large_one(count, style):
     """Its singular values are the smaller ones all the way round, but where the large one folds."""
     x, y, rest, end = (
