@@ -281,21 +281,20 @@ def test_beside_a_singular_pose_accelerations_keep_their_digits():
     assert np.abs(found.points["end"].acceleration - chain_end(1, turn)[2]).max() <= 1e-9
 
 
-@pytest.mark.parametrize("n", [2, 4, 6, 10, 20, 30])
-@pytest.mark.parametrize("sigma", [1.0, 1e-3, 1e-9])
-def test_sigma_is_about_the_smallest_singular_value(n, sigma):
+@pytest.mark.parametrize("n", [2, 4, 6, 10, 20, 26])
+def test_sigma_is_about_the_smallest_singular_value(n):
     """Whichever rows depend on each other. Of 10,000 such matrices of each n it was 0.021 to 2.04
     times as much. The smallest pivot, up to 35,000 times as much, is no measure."""
-    rng = np.random.default_rng(n)
-    left, right = (np.linalg.qr(rng.normal(size=(200, n, n)))[0] for _ in range(2))
-    sizes = np.linspace(1.0, 0.3, n)
-    sizes[-1] *= sigma
-    found, pivot = estimated(left * sizes @ right)
+    rng, sigma = np.random.default_rng(n), np.repeat([1.0, 1e-3, 1e-9], 200)
+    left, right = (np.linalg.qr(rng.normal(size=(len(sigma), n, n)))[0] for _ in range(2))
+    sizes = np.tile(np.linspace(1.0, 0.3, n), (len(sigma), 1))
+    sizes[:, -1] *= sigma
+    found, pivot = (each / sizes[:, -1] for each in estimated(left * sizes[:, None] @ right))
     # the more unknowns, the more the comparison matrix makes of them: where that is no longer
     # asked, sigma is known better
-    assert found.min() > (0.01 if n <= COMPARED else 0.1) * sizes[-1]
-    assert found.max() < 4.0 * sizes[-1]
-    assert sigma == 1.0 or pivot.max() > 20.0 * sizes[-1]
+    assert found.min() > (0.01 if n <= COMPARED else 0.1)
+    assert found.max() < 4.0
+    assert min(pivot[sigma == each].max() for each in (1e-3, 1e-9)) > 20.0
 
 
 def test_of_a_large_core_sigma_is_no_less_than_by_its_comparison_matrix(monkeypatch):

@@ -22,7 +22,7 @@ from kincheck.core import (
     solve_designs,
 )
 from kincheck.core.kinematics import design_batch, design_sweep
-from kincheck.core.kinematics.compiled.compiled_model import compile_model
+from kincheck.core.kinematics.compiled.compiled_model import compile_model, recent_model
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.compiled.samples import Route
 from kincheck.core.kinematics.continuation.sweep import follow
@@ -69,18 +69,23 @@ PATHS = {
 }
 
 
-@pytest.mark.parametrize("compiled", [True, False])
-@pytest.mark.parametrize("path", PATHS.values(), ids=PATHS)
+@pytest.mark.parametrize(
+    ("path", "compiled"),
+    [
+        *(pytest.param(path, True, id=name) for name, path in PATHS.items()),
+        pytest.param(PATHS["in no order"], False, id="in no order, by numpy"),
+    ],
+)
 def test_a_lane_is_what_a_model_of_its_own_gives(path, compiled):
     mechanism, varied = strut()
     request = Request(("stroke",), ("wheel_center",), varied=varied, compiled=compiled)
-    model = compile_model(mechanism, request)
+    model = recent_model(mechanism, request)
     numbers = drawn(mechanism, varied, 11, 2e-3)
     found = solve_variants(Route(model, path), numbers, TOL)
     assert found.solved.all()
     assert not found.messages
     for k in (0, 7, 10):
-        own = compile_model(variant(mechanism, varied, numbers[:, k]), replace(request, varied=()))
+        own = recent_model(variant(mechanism, varied, numbers[:, k]), replace(request, varied=()))
         alone = follow(Route(own, path), TOL).points["wheel_center"]
         for label in ("position", "velocity", "acceleration"):
             lanes = found.kept[model.rows[f"{label} wheel_center"], :, k].T
@@ -96,9 +101,14 @@ ROUGH = {
 }
 
 
-@pytest.mark.parametrize("order", [0, 2])
-@pytest.mark.parametrize("compiled", [True, False])
-@pytest.mark.parametrize("values", [FINE, *ROUGH.values()], ids=["fine", *ROUGH])
+@pytest.mark.parametrize(
+    ("values", "compiled", "order"),
+    [
+        pytest.param(values, compiled, order, id=f"{name}-{compiled}-{order}")
+        for k, (name, values) in enumerate({"fine": FINE, **ROUGH}.items())
+        for compiled, order in ((True, (0, 2)[k % 2]), (False, (2, 0)[k % 2]))
+    ],
+)
 def test_lanes_go_by_the_samples_before_and_where_that_fails_by_their_rates(
     values, compiled, order, monkeypatch
 ):

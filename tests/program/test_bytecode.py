@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import product
+from shutil import copytree
 from threading import Barrier, Thread
 from time import sleep
 
@@ -41,11 +42,24 @@ from .test_llvm import OPERATIONS
 pytest.importorskip("llvmlite", reason="llvmlite is not installed")
 
 
+@pytest.fixture(scope="module")
+def loops(tmp_path_factory):
+    """A cache with the loops that run any program, and nothing else."""
+    folder = tmp_path_factory.mktemp("loops")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(folder))
+        clear_caches()
+        for name in ("interpret", "follow"):
+            llvm._loop(name, compiler.vector_width())
+        clear_caches()
+    return folder / "kincheck"
+
+
 @pytest.fixture(autouse=True)
-def cache(tmp_path, monkeypatch):
-    """An empty one, so that nothing is compiled at first."""
+def cache(tmp_path, monkeypatch, loops):
+    """One without programs, so that none is compiled at first."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    return tmp_path / "kincheck"
+    return copytree(loops, tmp_path / "kincheck")
 
 
 def both(run: Callable[[LlvmCode], np.ndarray], plan: Plan) -> None:
@@ -68,11 +82,13 @@ def every_slot(made: LlvmCode, name: str, lanes: int = 19) -> np.ndarray:
     return executor.get(slots)
 
 
-@pytest.mark.parametrize("width", [2, 4, 8])
+DELTA = cases.load("delta_robot").mechanism
+
+
 @pytest.mark.parametrize(
-    "mechanism",
-    [mcpherson(), four_bar(), cases.load("delta_robot").mechanism],
-    ids=lambda each: each.name,
+    ("mechanism", "width"),
+    [*((mcpherson(), width) for width in (2, 4, 8)), (four_bar(), 4), (DELTA, 2)],
+    ids=lambda each: getattr(each, "name", each),
 )
 def test_programs_of_models(mechanism, width, monkeypatch):
     if width > compiler.vector_width():

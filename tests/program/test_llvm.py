@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from kincheck.core import Revolute, solve, solve_designs
+from kincheck.core import Body, JointAngle, Mechanism, Point, Revolute, solve, solve_designs
 from kincheck.core.algebra import root
 from kincheck.core.caches import clear_caches
 from kincheck.core.kinematics import Style
@@ -160,13 +160,22 @@ def test_code_in_use_stays_after_clearing_the_caches(tmp_path, monkeypatch):
     np.testing.assert_array_equal(positions(), expected)
 
 
+CRANK = Mechanism(
+    "crank",
+    [Body("crank")],
+    [Revolute("axle", "ground", "crank", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))],
+    [Point("tip", "crank", (1.0, 0.0, 0.0))],
+    [JointAngle("turn", "axle")],
+)
+
+
 def test_cached_code_is_used_and_a_damaged_entry_is_rebuilt(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     wanted = np.linspace(0.0, 1.0, 5)
 
     def positions(*, often: bool = False):
         clear_caches()  # as another process
-        mechanism = four_bar()
+        mechanism = CRANK
         driver, point = mechanism.drivers[0].name, mechanism.points[0].name
         model = compile_model(mechanism, Request((driver,), (point,)))
         if often and model._code.interpreted:

@@ -146,7 +146,7 @@ def directly(expression, inputs):
 numbers = st.floats(-8.0, 8.0).map(lambda x: round(x, 3)) | CONSTANTS
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(
     st.lists(expressions(), min_size=1, max_size=INPUTS),
     st.lists(st.tuples(*[numbers] * INPUTS), min_size=1, max_size=5),
