@@ -376,7 +376,7 @@ def test_samples_do_not_depend_on_their_order_nor_on_others(mechanism, values, e
 
 
 @given(data=st.data())
-@settings(derandomize=True, max_examples=6, deadline=None)
+@settings(derandomize=True, max_examples=8, deadline=None)
 def test_order_and_names_do_not_matter(data):
     base, values = data.draw(
         st.sampled_from(
