@@ -193,7 +193,7 @@ def test_relative_drivers_and_a_phase_of_whole_half_turns(solved, turns):
     """The sine of pi is 1e-16 and that of 3.14159 is 3e-6, and both are none to who types them."""
     mechanism = replace(arm(30.0), drivers=[JointAngle("u", "h"), JointAngle("v", "k")])
     for phase in (turns * math.pi, six(turns * math.pi)):
-        motions = {"u": Sine(-4.0, 0.5, phase), "v": Ramp(0.3)}
+        motions = {"u": Sine(-9.0, 0.5, phase), "v": Ramp(0.3)}
         found = solved(case_of(mechanism, motions))
         assert found.solved.all(), found.message
         assert found.points["r"].position[:, 0] == pytest.approx(
