@@ -34,12 +34,11 @@ def test_a_large_mechanism_that_is_not_driven_is_told_what_can_move(cranks):
         solve(replace(ring(cranks), drivers=()), "turn", [0.0])
 
 
-@pytest.mark.parametrize("order", [0, 2])
-def test_designs_of_many_bodies_tied_together_are_solved_each_by_itself(order):
+def test_designs_of_many_bodies_tied_together_are_solved_each_by_itself():
     """What is known of sigma of many variants at once leaves all samples of such a ring in doubt.
     Designs that end early say why.
     """
-    whole, turn = ring(21), np.array([0.1, -0.2, 0.0])
+    whole, turn, order = ring(21), np.array([0.1, -0.2, 0.0]), 1
     (hinge,) = (joint.point for joint in whole.joints if joint.name == "pivot0")
     hinges = np.array(hinge) + [[0.0, 0.0, 0.0], [0.0, 0.0, 0.1]]
     found = solve_designs(whole, "turn", turn, {"joints.pivot0.point": hinges}, order=order)
@@ -51,9 +50,8 @@ def test_designs_of_many_bodies_tied_together_are_solved_each_by_itself(order):
         ]
         motion = found.points["tip12"]
         assert np.abs(motion.position[k] - alone.position).max() <= 1e-13
-        assert (motion.acceleration is None) == (order < 2)
-        if alone.acceleration is not None:
-            assert np.abs(motion.acceleration[k] - alone.acceleration).max() <= 1e-13
+        assert np.abs(motion.velocity[k] - alone.velocity).max() <= 1e-13
+        assert motion.acceleration is None
     # the same programs
     found = solve_designs(whole, "turn", [0.1, 3.0], {"joints.pivot0.point": [hinge]}, order=order)
     assert found.solved.tolist() == [[True, False]]
@@ -104,7 +102,7 @@ def test_redundant_rows_of_a_sparse_system_do_not_hide_a_corner_or_a_gap(rod, en
         Revolute("pin", "crank0", "rod", (*pin[0].tolist(), 0.0), Z),
         Revolute("end", "rod", "rocker", at, Z),
     ]
-    whole = ring(25)
+    whole = ring(20)
     made = replace(
         whole, bodies=[*whole.bodies, Body("rod"), Body("rocker")], joints=[*whole.joints, *hinges]
     )
@@ -117,7 +115,7 @@ def test_redundant_rows_of_a_sparse_system_do_not_hide_a_corner_or_a_gap(rod, en
 
 
 @pytest.mark.parametrize(
-    ("cranks", "turns", "count"), [(9, 1, 2), (9, -4, 11), (20, -4, 2), (20, 2, 11)]
+    ("cranks", "turns", "count"), [(9, 1, 2), (9, -4, 11), (20, -2, 2), (20, 1, 11)]
 )
 def test_turns_between_two_samples_are_not_lost(cranks, turns, count):
     """A nut stands at both: where it stands says nothing of the turns, which its driver makes

@@ -2,14 +2,11 @@
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from gc import collect
-from threading import Thread
-from weakref import WeakSet
 
 import numpy as np
 import pytest
 from kincheck.core import Revolute, Spherical, solve, solve_designs
-from kincheck.core.caches import KEYS, ThreadCache, clear_caches, keep_last
+from kincheck.core.caches import clear_caches
 from kincheck.core.kinematics.by_components import block_solver
 from kincheck.core.kinematics.by_components import sweep as cascade_sweep
 from kincheck.core.kinematics.compiled import compiled_model, samples
@@ -255,82 +252,6 @@ def test_of_large_mechanisms_the_last_is_kept(large, kind, monkeypatch):
     with ThreadPoolExecutor(1) as threads:
         threads.submit(solve, large, driver, values).result()
     assert len(made) == 2
-
-
-def test_what_was_made_for_a_thread_goes_with_it():
-    bound = ThreadCache()
-    made = WeakSet()
-
-    class Made:
-        pass
-
-    def ask():
-        one, other = (bound("key", Made) for _ in range(2))
-        assert one is other
-        made.add(one)
-
-    ask()
-    thread = Thread(target=ask)
-    thread.start()
-    thread.join()
-    collect()
-    assert len(made) == 1
-
-
-def test_a_thread_keeps_what_it_used_last():
-    bound, made = ThreadCache(), list[int]()
-
-    def ask(key):
-        return bound(key, lambda: made.append(key) or key)
-
-    assert [ask(key) for key in range(KEYS)] == made == [*range(KEYS)]
-    ask(0)  # used most recently, so the next key replaces 1
-    ask(KEYS)
-    ask(0)
-    assert made == [*range(KEYS + 1)]
-    ask(1)
-    assert made == [*range(KEYS + 1), 1]
-
-
-@pytest.mark.parametrize("per_thread", [False, True])
-def test_a_function_keeps_its_last_results(per_thread):
-    made = list[int]()
-
-    @keep_last(2, per_thread=per_thread)
-    def ask(key):
-        made.append(key)
-        return [key]
-
-    assert ask(1) is ask(1)
-    for key in (2, 1, 3, 1, 2):  # 3 replaces 2
-        ask(key)
-    assert made == [1, 2, 3, 2]
-    with ThreadPoolExecutor(1) as threads:
-        other = threads.submit(ask, 1).result()
-    assert (other is ask(1)) is not per_thread
-
-
-@pytest.mark.parametrize("per_thread", [False, True])
-def test_clearing_reaches_every_thread(per_thread):
-    class Large:
-        pass
-
-    made = WeakSet()
-
-    @keep_last(2, per_thread=per_thread)
-    def ask(key):
-        found = Large()
-        made.add(found)
-        return found
-
-    with ThreadPoolExecutor(1) as threads:  # the other thread lives on
-        threads.submit(ask, 1).result()
-        ask(2)
-        collect()
-        assert len(made) == 2
-        clear_caches()
-        collect()
-        assert len(made) == 0
 
 
 def test_after_clearing_models_are_made_anew(made):

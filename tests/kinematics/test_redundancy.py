@@ -150,12 +150,12 @@ def test_where_only_the_chosen_rows_depend_on_each_other_there_is_no_singular_po
     assert np.abs(found.points["rim"].position - expected).max() <= 1e-13
     assert "notes" not in found.details
     assert "singular_poses" not in found.details
-    assert trace(locomotive(np.pi / 2.0), "turn", length=7.0).events == ()
+    assert trace(locomotive(np.pi / 2.0), "turn", length=7.0, longest=0.1).events == ()
 
 
 def test_where_both_rods_are_at_their_dead_points_there_is_one():
     found = solve(locomotive(np.pi), "turn", np.linspace(0.0, 4.0 * np.pi, 49))
     assert all("(bifurcation)" in note for note in found.details["notes"])
-    assert [event.kind for event in trace(locomotive(np.pi), "turn", length=7.0).events][:1] == [
-        "branch point"
-    ]
+    assert [
+        event.kind for event in trace(locomotive(np.pi), "turn", length=3.5, longest=0.1).events
+    ][:1] == ["branch point"]

@@ -22,12 +22,9 @@ from kincheck.core.kinematics.continuation.sweep import follow
 from kincheck.core.kinematics.continuation.walk import march
 from kincheck.core.kinematics.formulation.acceptance_criteria import doubtful
 from kincheck.core.kinematics.one_design import solve
-from kincheck.core.program import Elimination, Tape, program
-from kincheck.core.program.dense_core import COMPARED
 from mpmath import mp, mpf
 
 from ..support.mechanisms import CRANK, mcpherson, slider_crank, slider_crank_motion
-from ..support.running import run_on
 from .test_chain import LEAN, chain
 from .test_continuation import LIMITS
 
@@ -222,91 +219,12 @@ def test_lock_up_of_the_strut_is_reported_to_its_digits(direction):
     assert {"lca", "knuckle"} <= set(pose["direction"])
 
 
-# The signs of determinants
-
-
-@pytest.mark.parametrize("sizes", [[1], [2], [5], [11], [1, 3], [2, 2, 4]])
-def test_orientation_tells_the_sign_of_every_block(sizes):
-    """Of blocks solved one after the other, rows and columns mixed: of each that of its
-    determinant, or always the other.
-    """
-    n, lanes = sum(sizes), 64
-    rng = np.random.default_rng(sizes)
-    block = np.repeat(np.arange(len(sizes)), sizes)
-    matrices = np.where(block[:, None] >= block, rng.normal(size=(lanes, n, n)), 0.0)
-    rows, columns = rng.permutation(n), rng.permutation(n)
-    mixed = matrices[:, rows][:, :, columns]
-    tape = Tape()
-    used = (mixed != 0.0).any(axis=0)
-    elimination = Elimination(
-        [{j: tape.input(n * i + j) for j in range(n) if used[i, j]} for i in range(n)]
-    )
-    memory = np.vstack([mixed.reshape(lanes, -1).T, np.zeros((1, lanes))])
-    run_on([program("p", tape, {n * n: elimination.orientation})], memory)
-    expected = np.stack(
-        [np.linalg.slogdet(matrices[:, block == k][:, :, block == k])[0] for k in range(len(sizes))]
-    )
-    _, known = np.unique(expected, axis=1, return_inverse=True)
-    _, found = np.unique(memory[n * n], return_inverse=True)
-    # one number for each combination of signs
-    assert (
-        len(set(zip(known.tolist(), found.tolist(), strict=True)))
-        == known.max() + 1
-        == found.max() + 1
-    )
-    assert known.max() > 0
-
-
-def estimated(matrices):
-    """The estimate of sigma, and the smallest pivot, of matrices of shape (lanes, n, n)."""
-    lanes, n, _ = matrices.shape
-    tape = Tape()
-    slots = np.arange(n * n).reshape(n, n)
-    elimination = Elimination(
-        [{j: tape.input(int(slots[i, j])) for j in range(n)} for i in range(n)]
-    )
-    block = np.vstack([matrices.reshape(lanes, -1).T, np.zeros((n + 1, lanes))])
-    run_on(
-        [program("p", tape, dict(enumerate([elimination.sigma, *elimination.pivots], n * n)))],
-        block,
-    )
-    return block[n * n], np.abs(block[n * n + 1 :]).min(axis=0)
-
-
 def test_beside_a_singular_pose_accelerations_keep_their_digits():
     """There sigma is 6e-4: solved only as any other sample they are off by 1e-8."""
     turn = BRANCH + np.array([-0.2, -0.1, -0.05, -0.002])
     found = solve(chain(1), "turn", turn)
     assert found.details["retried_samples"] == 1
     assert np.abs(found.points["end"].acceleration - chain_end(1, turn)[2]).max() <= 1e-9
-
-
-@pytest.mark.parametrize("n", [2, 4, 6, 10, 20, 30])
-@pytest.mark.parametrize("sigma", [1.0, 1e-3, 1e-9])
-def test_sigma_is_about_the_smallest_singular_value(n, sigma):
-    """Whichever rows depend on each other. Of 10,000 such matrices of each n it was 0.021 to 2.04
-    times as much. The smallest pivot, up to 35,000 times as much, is no measure."""
-    rng = np.random.default_rng(n)
-    left, right = (np.linalg.qr(rng.normal(size=(200, n, n)))[0] for _ in range(2))
-    sizes = np.linspace(1.0, 0.3, n)
-    sizes[-1] *= sigma
-    found, pivot = estimated(left * sizes @ right)
-    # the more unknowns, the more the comparison matrix makes of them: where that is no longer
-    # asked, sigma is known better
-    assert found.min() > (0.01 if n <= COMPARED else 0.1) * sizes[-1]
-    assert found.max() < 4.0 * sizes[-1]
-    assert sigma == 1.0 or pivot.max() > 20.0 * sizes[-1]
-
-
-def test_of_a_large_core_sigma_is_no_less_than_by_its_comparison_matrix(monkeypatch):
-    """And not by a little: of 24 random rows it would be a hundredth."""
-    matrices = np.random.default_rng(5).normal(size=(50, 24, 24))
-    exact, _ = estimated(matrices)
-    monkeypatch.setattr("kincheck.core.program.dense_core.COMPARED", 24)
-    compared, _ = estimated(matrices)
-    assert (compared <= exact * (1.0 + 1e-12)).all()
-    assert np.median(exact / compared) > 10.0
-    assert (exact <= 4.0 * np.linalg.svd(matrices, compute_uv=False)[:, -1]).all()
 
 
 @pytest.mark.parametrize(

@@ -9,39 +9,32 @@ import pytest
 from kincheck import cases
 from kincheck.core import (
     Body,
-    Distance,
     Gear,
     JointAngle,
     Mechanism,
     Point,
-    PointCoordinate,
     RackPinion,
     Revolute,
     Screw,
-    SolveError,
-    Spherical,
     Translational,
     solve,
 )
-from kincheck.core.kinematics.compiled.compiled_model import compile_model
+from kincheck.core.kinematics.compiled.compiled_model import recent_model
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.compiled.samples import Route
 from kincheck.core.kinematics.continuation.sweep import follow
 from kincheck.core.kinematics.formulation.constraints import frames
 from kincheck.core.kinematics.solver_selection import IRREDUCIBLE
-from kincheck.core.kinematics.sparse.determinant_signs import Blocks
 from kincheck.core.kinematics.sparse.sparse_equations import PoseError
 from kincheck.core.kinematics.sparse.sparse_model import SparseModel
 from kincheck.core.kinematics.sparse.sweep import solve_sparse
 from kincheck.core.kinematics.structure.components import components
-from kincheck.core.kinematics.structure.sparse_lu import Factors
 from kincheck.core.mechanism.motions import Path, Ramp, Sine
 from kincheck.core.studies.bench import scaling
 from kincheck.core.studies.bench.ring import LEAN, pivot, ring
 
 from ..support.mechanisms import four_bar, mcpherson, slider_crank
 from .test_cascade import assert_alike
-from .test_chain import chain
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
@@ -55,9 +48,8 @@ def turning(*values, rate=1.0):
 
 def both(mechanism, path, points, compiled=False):
     bodies = tuple(body.name for body in mechanism.moving)
-    expected = follow(
-        Route(compile_model(mechanism, Request(tuple(path.motions), points, bodies)), path), 1e-12
-    )
+    model = recent_model(mechanism, Request(tuple(path.motions), points, bodies))
+    expected = follow(Route(model, path), 1e-12)
     return solve_sparse(SparseModel(mechanism, compiled=compiled), path, points, bodies), expected
 
 
@@ -77,7 +69,10 @@ def both(mechanism, path, points, compiled=False):
 )
 def test_it_gives_what_one_program_gives(name, compiled):
     case = cases.load(name)
-    assert_alike(*both(case.mechanism, case.sweep.path, case.points, compiled))
+    path = case.sweep.path
+    # one by one a sample takes ten times as long as together
+    path = path if compiled else replace(path, times=path.times[::4])
+    assert_alike(*both(case.mechanism, path, case.points, compiled))
 
 
 @WAYS
@@ -135,12 +130,15 @@ def test_any_samples(times, compiled):
 
 @WAYS
 def test_a_motion_that_is_elsewhere_at_time_zero_is_led_to_its_first_sample(compiled):
-    for times in (np.linspace(0.0, 3.0, 31), np.linspace(2.0, 1.0, 7)):
+    for times in (np.linspace(0.0, 2.0, 15), np.linspace(2.0, 1.0, 4)):
         assert_alike(
             *both(four_bar(), Path({"turn": Sine(1.2, 0.3, 0.7)}, times), ("C",), compiled)
         )
-    steep = Path({"stroke": Sine(0.5, 0.01, 1.0)}, np.zeros(1))  # begins beyond the travel
-    assert solve_sparse(SparseModel(mcpherson(), compiled=compiled), steep).message.startswith(
+
+
+def test_a_motion_that_begins_beyond_the_travel_ends_on_the_way_to_its_first_sample():
+    steep = Path({"stroke": Sine(0.5, 0.01, 1.0)}, np.zeros(1))
+    assert solve_sparse(SparseModel(mcpherson()), steep).message.startswith(
         "on the way to the first sample: cannot be followed beyond"
     )
 
@@ -177,20 +175,9 @@ def test_turns_are_counted_and_no_step_is_longer_than_can_be_told_from_another()
         )
 
 
-def test_a_wrong_branch_is_no_solution():
-    model = SparseModel(CRANK, compiled=False)
-    here = model.moving(model.design, 0.0, model.drives(turning(0.0), np.zeros(1))[:, 0])
-    # half a turn about x: the axes are parallel, but opposite
-    over = np.array([0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0])
-    with pytest.raises(PoseError, match="wrong branch"):
-        model.reach(
-            replace(here, state=over), 0.0, model.drives(turning(0.0), np.zeros(1))[:, 0], 1e-12
-        )
-
-
-@pytest.mark.parametrize("cranks", [16, 120])
+@pytest.mark.parametrize("cranks", [9, 120])
 def test_every_crank_of_a_ring_turns_as_the_first(cranks):
-    """Of a ring of 31 bodies as one program, whose samples are beyond doubt, and of a large one as
+    """Of a ring of 17 bodies as one program, whose samples are beyond doubt, and of a large one as
     a sparse system.
     """
     turn = np.linspace(-0.8, 0.8, 17)
@@ -255,154 +242,12 @@ def test_redundant_rows_of_many_loops_are_found_where_they_are():
     assert np.abs(found.points["end"].position - expected).max() <= 1e-15 * loops
 
 
-def test_redundant_rows_that_contradict_are_told():
-    mechanism = four_bar()
-    joints = [
-        joint.changed(axis=(0.0, 1.0, 1e-3)) if joint.name == "D" else joint
-        for joint in mechanism.joints
-    ]
-    found = solve_sparse(
-        Mechanism("askew", mechanism.bodies, joints, mechanism.points, mechanism.drivers),
-        turning(0.5),
-    )
-    assert not found.solved.any()
-    assert "the redundant rows (" in found.message
-    assert "contradict" in found.message
-
-
-def test_an_end_of_the_travel_is_told_and_the_other_side_goes_on():
-    values = np.linspace(-0.05, 0.4, 46)
-    model = SparseModel(mcpherson())
-    found = solve_sparse(
-        model, Path({"stroke": Ramp(1.0)}, values), ["wheel"], ["knuckle"], order=1
-    )
-    assert (found.solved == (values < 0.29337)).all()  # formulation section 10
-    assert np.isnan(found.points["wheel"].position[~found.solved]).all()
-    assert "cannot be followed beyond stroke = 0.293" in found.message
-    assert "last reachable sample at stroke = 0.29;" in found.message
-    assert 0.0 < found.details["smallest_pivot"] < 1e-2
-    assert found.points["wheel"].acceleration is None
-    assert found.bodies["knuckle"].a is None
-    far = solve_sparse(model, Path({"stroke": Ramp(1.0)}, np.array([0.4, 0.5])))
-    assert "no sample reached on this side" in far.message
-    assert not far.solved.any()
-    assert np.isnan([far.residual, far.details["redundant_residual"]]).all()
-
-
-def without_driver(mechanism):
-    return Mechanism(mechanism.name, mechanism.bodies, mechanism.joints, mechanism.points)
-
-
-def test_what_cannot_be_solved_is_refused_by_name():
-    whole = chain(40)
-    with pytest.raises(
-        SolveError,
-        match=(
-            r"1 degree of freedom .* but 0 drivers; what can still move is most of all 'crank0', "
-        ),
-    ):
-        SparseModel(without_driver(whole), compiled=False)
-    second = JointAngle("second", "pivot20")
-    with pytest.raises(
-        SolveError, match=r"1 degree of freedom .* but 2 drivers; not independent are .*'second'"
-    ):
-        SparseModel(
-            Mechanism("two", whole.bodies, whole.joints, (), [*whole.drivers, second]),
-            compiled=False,
-        )
-    stretched = slider_crank()
-    push = [PointCoordinate("push", "end", X)]
-    with pytest.raises(SolveError, match=r"driven by 'push' it does not move .*dead centre"):
-        SparseModel(
-            Mechanism("stuck", stretched.bodies, stretched.joints, stretched.points, push),
-            compiled=False,
-        )
-    m = mcpherson()
-    joints = [
-        joint.changed(length=3.0) if isinstance(joint, Distance) else joint for joint in m.joints
-    ]
-    with pytest.raises(SolveError, match="does not close at the design position: residual"):
-        SparseModel(Mechanism("apart", m.bodies, joints, m.points, m.drivers), compiled=False)
-    with pytest.raises(SolveError, match="no body can move"):
-        SparseModel(Mechanism("still", [Body("wall", fixed=True)], []), compiled=False)
-
-
-def test_a_rod_that_spins_freely_is_named():
-    mechanism = mcpherson()
-    rod = [
-        Spherical("inner", "chassis", "rod", (1.14, 0.355, 0.1455)),
-        Spherical("outer", "knuckle", "rod", (1.115, 0.665, 0.118)),
-    ]
-    joints = [*(joint for joint in mechanism.joints if not isinstance(joint, Distance)), *rod]
-    with pytest.raises(SolveError, match=r"but 1 driver; 'rod' can turn; .*use distance"):
-        SparseModel(
-            Mechanism(
-                "spinning",
-                [*mechanism.bodies, Body("rod")],
-                joints,
-                mechanism.points,
-                mechanism.drivers,
-            )
-        )
-
-
 def test_costs_are_measured_with_residuals_and_errors():
-    rows = scaling.measure([3], [5], rounds=1)
+    rows = scaling.measure([2], [3], rounds=1)
     assert [(row.mechanism, row.size, row.bodies, row.unknowns) for row in rows] == [
-        ("chain", 3, 7, 42),
-        ("ring", 5, 9, 54),
+        ("chain", 2, 5, 30),
+        ("ring", 3, 5, 30),
     ]
     assert all(row.residual <= 1e-15 for row in rows)
     assert all(row.error <= 1e-14 for row in rows)
     assert all(row.us_per_value.median > 0.0 for row in rows)
-
-
-@pytest.mark.parametrize("n", [6, 40])
-def test_the_sign_of_the_determinant(n):
-    """Of matrices of one pattern it is that of the signed pivot, or always the other."""
-    rng = np.random.default_rng(n)
-    rows, columns = np.nonzero(
-        (rng.random((n, n)) < 3.0 / n) | np.eye(n, k=1, dtype=bool) | np.eye(n, k=1 - n, dtype=bool)
-    )
-    factors = Factors(rows, columns, rng.normal(size=len(rows)), n)
-    products: set[float] = set()
-    signs: set[float] = set()
-    for _ in range(50):
-        values = rng.normal(size=len(rows))
-        factors.update(values)
-        factors.factor()
-        dense = np.zeros((n, n))
-        dense[rows, columns] = values
-        sign = np.linalg.slogdet(dense)[0]
-        signs.add(float(sign))
-        products.add(float(np.sign(factors.signed_pivot) * sign))
-    assert len(products) == 1
-    assert len(signs) == 2
-
-
-def test_orientation_tells_the_sign_of_every_block():
-    """Of blocks solved one after the other, rows and columns mixed: of each that of its
-    determinant, or always the other.
-    """
-    sizes = [1, 2, 5, 1, 2, 3]
-    rng, n = np.random.default_rng(4), sum(sizes)
-    block = np.repeat(np.arange(len(sizes)), sizes)
-    i, j = np.nonzero(block[:, None] >= block)
-    rows, columns = rng.permutation(n), rng.permutation(n)
-    blocks = Blocks(rows[i], columns[j], n)
-    known: list[tuple[float, ...]] = []
-    found: list[bytes] = []
-    for _ in range(64):
-        matrix, mixed = rng.normal(size=(n, n)), np.zeros((n, n))
-        mixed[rows[i], columns[j]] = matrix[i, j]
-        known.append(
-            tuple(
-                float(np.linalg.slogdet(matrix[np.ix_(at, at)])[0])
-                for at in (np.flatnonzero(block == k) for k in range(6))
-            )
-        )
-        found.append(
-            blocks.orientation(matrix[i, j, None], np.array([np.linalg.slogdet(mixed)[0]]))[0]
-        )
-    # one answer for each combination of signs
-    assert len(set(known)) == len(set(found)) == len(set(zip(known, found, strict=True))) > 20

@@ -27,7 +27,7 @@ from kincheck.core.mechanism.motions import Path, Ramp
 from kincheck.core.studies.bench.ring import LEAN, pivot, ring
 
 X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
-CRANKS = 9
+CRANKS = 5
 """A small ring is solved as one sparse system on request; the front door does so from 40 bodies."""
 
 
@@ -82,8 +82,6 @@ PLAIN, KITE, ASIDE = (0.5, 1.5, 1.3, 1.2), (1.25, 1.2, 0.7, 0.7), (1.0, 1.2, 1.0
         (9, PLAIN, "hinges"),
         (9, PLAIN, "universals"),
         (9, KITE, "hinges"),
-        (9, KITE, "universals"),
-        (9, ASIDE, "hinges"),
         (9, ASIDE, "universals"),
         (65, KITE, "universals"),
         (65, ASIDE, "hinges"),
@@ -107,7 +105,7 @@ def test_rows_chosen_anew_are_counted():
 @pytest.mark.parametrize("compiled", [False, True])
 def test_several_samples_at_once_give_what_one_after_the_other_gives(compiled):
     mechanism = four_bar(KITE, -1.1, "hinges")
-    path = Path({"turn": Ramp(1.0)}, np.linspace(0.0, 1.6, 81))
+    path = Path({"turn": Ramp(1.0)}, np.linspace(0.0, 1.6, 41))
     found = solve_sparse(SparseModel(mechanism, compiled=compiled), path, ["meet"])
     assert found.solved.all(), found.message
     pin, meet = pin_meeting(*KITE, path.times - 1.1)
@@ -160,7 +158,7 @@ def inside(off, ends, crank=3, cranks=CRANKS, phase=0.7):
 
 
 COARSE, MIDDLE = np.linspace(0.0, -1.1, 3), np.linspace(0.0, -1.1, 9)
-FINE = np.concatenate([np.linspace(0.0, -0.5, 9), np.arange(-0.501, -0.601, -5e-4)])
+FINE = np.concatenate([np.linspace(0.0, -0.5, 9), np.arange(-0.5014, -0.601, -5e-4)])
 """Samples close to each other only where the motion ends."""
 
 
@@ -190,9 +188,9 @@ def test_the_largest_block_is_followed_where_it_is_regular(ends):
     turn = np.linspace(0.0, 0.8, 9)
     found = swept(inside(0.0, ends), turn)
     assert found.solved.all(), found.message
-    at = pivot(6, CRANKS)
+    at = pivot(2, CRANKS)
     tip = np.column_stack([at + np.sin(LEAN - turn), np.cos(LEAN - turn), 0.0 * turn])
-    assert np.abs(found.points["tip6"].position - tip).max() <= 1e-13
+    assert np.abs(found.points["tip2"].position - tip).max() <= 1e-13
 
 
 def test_sigmas_of_blocks():

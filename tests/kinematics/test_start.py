@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from kincheck.adapters.exudyn.exudyn import Exudyn
-from kincheck.adapters.exudyn.solvers import static
 from kincheck.adapters.mujoco.mujoco import MuJoCo
 from kincheck.adapters.pinocchio.pinocchio import Pinocchio
 from kincheck.core import (
@@ -22,19 +21,12 @@ from kincheck.core import (
     Translational,
     solve,
 )
-from kincheck.core import solve_designs as designs
 from kincheck.core.case.case import Case, Output, Sweep, Truth
-from kincheck.core.case.io.model_writer import way_to
-from kincheck.core.kinematics.by_components.block_solver import Cascade
-from kincheck.core.kinematics.by_components.sweep import CascadeSweep
 from kincheck.core.kinematics.compiled.motion_start import start_of
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.solver_selection import prepare
 from kincheck.core.kinematics.sparse.sweep import solve_sparse
 from kincheck.core.mechanism.motions import Absolute, Path, Ramp, Sine, Table
-from kincheck.core.studies.tolerance.sweep import sweep_designs
-from kincheck.core.studies.variation.variation_file import read_variation
-from kincheck.core.studies.verified_reference import prove_case
 
 from ..support.mechanisms import slider_crank
 from .test_chain import chain
@@ -149,10 +141,16 @@ WAYS = [
 ]
 
 
-@pytest.mark.parametrize("solved", WAYS)
-def test_the_pinion_rolls_with_the_arm_whatever_its_angle_at_design(solved):
+@pytest.mark.parametrize(
+    ("solved", "angles"),
+    [
+        pytest.param(by_style("native"), ANGLES[2:], id="native at other angles"),
+        *(pytest.param(*way.values, ANGLES[:2], id=way.id, marks=way.marks) for way in WAYS),
+    ],
+)
+def test_the_pinion_rolls_with_the_arm_whatever_its_angle_at_design(solved, angles):
     """At 60 degrees the sine of the phase is not the design value to the last bit, at 45 it is."""
-    for degrees in ANGLES:
+    for degrees in angles:
         mechanism = arm(degrees)
         found = solved(case_of(mechanism, circling(mechanism, phases_of(degrees))))
         assert found.solved.all(), found.message
@@ -166,22 +164,22 @@ def test_the_pinion_rolls_with_the_arm_whatever_its_angle_at_design(solved):
 @pytest.mark.parametrize("solved", WAYS)
 @pytest.mark.parametrize("kind", ["sine", "typed table"])
 def test_six_typed_digits_are_as_good_as_all(solved, kind):
-    for degrees in ANGLES[2:4]:
-        phases = phases_of(degrees)
-        mechanism = arm(degrees)
-        motions = circling(mechanism, map(six, phases) if kind == "sine" else phases, kind)
-        found = solved(case_of(mechanism, motions))
-        assert found.solved.all(), found.message
-        assert found.points["r"].position[:, 0] == pytest.approx(
-            2.0 * math.pi * RADIUS * TIMES, abs=1e-4
-        ), degrees
-        assert "notes" not in found.details
-        # what is between the design and the path is travelled: at time zero the tip is where its
-        # drivers are
-        middle = found.points["tip"].position[6, :2]
-        assert middle == pytest.approx(
-            [motion.motion.at(np.zeros(1))[0][0] for motion in motions.values()], abs=1e-14
-        )
+    degrees = ANGLES[2 if kind == "sine" else 3]
+    phases = phases_of(degrees)
+    mechanism = arm(degrees)
+    motions = circling(mechanism, map(six, phases) if kind == "sine" else phases, kind)
+    found = solved(case_of(mechanism, motions))
+    assert found.solved.all(), found.message
+    assert found.points["r"].position[:, 0] == pytest.approx(
+        2.0 * math.pi * RADIUS * TIMES, abs=1e-4
+    )
+    assert "notes" not in found.details
+    # what is between the design and the path is travelled: at time zero the tip is where its
+    # drivers are
+    middle = found.points["tip"].position[6, :2]
+    assert middle == pytest.approx(
+        [motion.motion.at(np.zeros(1))[0][0] for motion in motions.values()], abs=1e-14
+    )
 
 
 @pytest.mark.parametrize(
@@ -252,59 +250,6 @@ def test_a_sample_at_which_the_design_stands_is_a_start(solved):
     assert found.details["start"]["time"] == 0.75
 
 
-FAR = 1.0
-"""By what the arm at time zero is ahead of its design [rad]."""
-
-
-@pytest.mark.parametrize("solved", WAYS)
-def test_two_ways_to_different_turns_are_never_chosen_in_silence(solved):
-    mechanism = arm(60.0)
-    motions = circling(mechanism, [phase + FAR for phase in phases_of(60.0)])
-    found = solved(case_of(mechanism, motions))
-    assert found.solved.all(), found.message
-    said = "; ".join(found.details["notes"])
-    assert "AMBIGUOUS: by way of the first sample the results differ by up to 0.62" in said
-    assert "all drivers go straight from it to time zero" in said
-    # what is found at a time does not depend on where the sweep begins
-    shorter = solved(case_of(mechanism, motions, TIMES[4:]))
-    assert shorter.points["r"].position == pytest.approx(found.points["r"].position[4:], abs=1e-12)
-
-
-def test_two_ways_to_one_motion_are_one():
-    mechanism = replace(arm(30.0), drivers=[JointAngle("u", "h"), JointAngle("v", "k")])
-    found = by_style("native")(case_of(mechanism, {"u": Sine(2.0, 1.0, 1.0), "v": Ramp(0.3)}))
-    (note,) = found.details["notes"]
-    assert note.startswith(
-        "the design position is not on the path: all drivers go straight from it to time zero (u ="
-        " 1.68"
-    )
-
-
-@pytest.mark.parametrize("solved", WAYS)
-def test_where_one_way_is_closed_the_other_is_taken(solved):
-    """Straight to time zero, the tip would go through the hinge, where links of different lengths
-    cannot bring it.
-    """
-    mechanism = arm(0.0)
-    short = replace(mechanism.joints[1], point=(0.55, math.sqrt(0.6**2 - 0.55**2), 0.0))
-    mechanism = replace(mechanism, joints=[mechanism.joints[0], short, mechanism.joints[2]])
-    motions = circling(mechanism, [1.5 * math.pi, math.pi])
-    found = solved(case_of(mechanism, motions, np.linspace(-0.3, 0.1, 9)))
-    assert found.solved.all(), found.message
-    assert "no sample can be reached by way of time zero" in "; ".join(found.details["notes"])
-    assert found.details["start"]["time"] == -0.3
-
-
-def test_components_start_alike():
-    for phase in (math.pi, six(math.pi)):
-        path = Path({"turn": Sine(-1.2, 0.2, phase)}, TIMES)
-        found = CascadeSweep(Cascade(chain(3), Request(("turn",), ("end",))), path).solve(1e-12)
-        expected = 3.0 + np.sin(0.3 - path.motions["turn"].at(TIMES)[0])
-        assert found.solved.all(), found.message
-        assert found.points["end"].position[:, 0] == pytest.approx(expected, abs=1e-12)
-        assert found.details["start"]["time"] == 0.0
-
-
 @pytest.mark.parametrize("phase", [3.0 * math.pi, six(3.0 * math.pi)])
 def test_a_singular_pose_between_the_start_and_the_first_sample_is_passed(phase):
     """The cranks of a parallelogram pass their base line, 1.87 rad from design, before any
@@ -326,78 +271,3 @@ def test_a_start_nearer_than_rounding_may_be_a_dead_centre():
     assert other.points["end"].position == pytest.approx(
         found.points["end"].position[::2], abs=1e-15
     )
-
-
-def test_many_designs_start_alike():
-    mechanism = replace(arm(30.0), drivers=[JointAngle("u", "h"), JointAngle("v", "k")])
-    values, tips = np.linspace(-1.0, 1.0, 5), np.array([(1.0, 0.1, 0.0), (0.9, 0.2, 0.0)])
-    for phase in (math.pi, six(math.pi), 1.0):
-        motions = {"v": Sine(0.5, 0.3, phase)}
-        found = designs(mechanism, "u", values, {"points.tip.position": tips}, motions=motions)
-        for k, tip in enumerate(tips.tolist()):
-            one = replace(mechanism, points=[Point("tip", "b", tuple(tip)), mechanism.points[1]])
-            alone = solve(one, "u", values, motions=motions)
-            assert found.points["tip"].position[k] == pytest.approx(
-                alone.points["tip"].position, abs=1e-12
-            )
-
-
-def test_what_is_assumed_of_many_designs_is_said():
-    mechanism = replace(arm(30.0), drivers=[JointAngle("u", "h"), JointAngle("v", "k")])
-    tips = {"points.tip.position": np.array([(1.0, 0.1, 0.0)])}
-    near, far = (
-        designs(mechanism, "u", TIMES, tips, motions={"v": Sine(0.5, 0.3, phase)}).notes
-        for phase in (six(math.pi), 1.0)
-    )
-    assert [*near] == []
-    assert "the design position is not on the path: all drivers go straight" in "; ".join(far)
-
-
-@pytest.mark.parametrize(("phase", "said"), [(six(math.pi), False), (1.0, True)])
-def test_what_is_assumed_of_a_study_is_said(phase, said, tmp_path):
-    mechanism = replace(arm(30.0), drivers=[JointAngle("u", "h"), JointAngle("v", "k")])
-    file = tmp_path / "vary.toml"
-    what = '[units]\nlength = "m"\n[hardpoints.tip]\nat = "points.tip.position"\nsigma = 0.001\n'
-    file.write_text(f'schema = "kincheck-vary/1"\nmode = "monte_carlo"\n{what}')
-    case = case_of(mechanism, {"u": Sine(0.5, 0.3, phase), "v": Ramp(0.1)})
-    found = sweep_designs(case, read_variation(file, case), samples=8)
-    assert any("go straight" in note for note in found.run["cases"]["case"]["notes"]) == said
-
-
-def test_a_simulator_starts_there_too():
-    """Turns of a coupled joint are counted from the design, where a typed phase begins as well as
-    an exact one.
-    """
-    if static().version() is None:
-        pytest.skip("not installed")
-    mechanism = arm(60.0)
-    mechanism = replace(mechanism, drivers=[JointAngle("u", "h"), JointAngle("v", "k")])
-    near, far = (
-        case_of(mechanism, {"u": Sine(1.0, 0.3, phase), "v": Ramp(0.1)})
-        for phase in (six(math.pi), 1.0)
-    )
-    assert static().unsupported(near) is None
-    assert "counted from the design" in str(static().unsupported(far))
-    found = static().solve(static().build(near), near, 1e-12)
-    assert found.points["r"].position[:, 0] == pytest.approx(
-        RADIUS * near.sweep.motions["u"].at(TIMES)[0], abs=1e-9
-    )
-
-
-def test_a_written_start_is_reached_from_the_design():
-    """The way begins at the design, also where the motion does not, so that turns are counted."""
-    mechanism = replace(arm(60.0), drivers=[JointAngle("u", "h"), JointAngle("v", "k")])
-    case = case_of(mechanism, {"u": Sine(9.0, 0.1, 1.5), "v": Ramp(0.1)})
-    way = way_to(case, 0.5)
-    assert way["rack"].r[0] == pytest.approx((0.0, 0.0, 0.0), abs=1e-15)
-    assert way["a"].p[0] == pytest.approx((1.0, 0.0, 0.0, 0.0), abs=1e-15)
-    assert way["rack"].r[-1, 0] == pytest.approx(
-        RADIUS * case.sweep.motions["u"].at(np.array([0.5]))[0][0], abs=1e-12
-    )
-
-
-def test_typed_digits_are_proved():
-    mechanism = arm(60.0)
-    case = case_of(mechanism, circling(mechanism, map(six, phases_of(60.0))))
-    made, _ = prove_case(case, digits=20, numbers="double", tol=1e-12)
-    assert all(each.proved for each in made.samples)

@@ -5,18 +5,15 @@ vector, and the cache on disk.
 from __future__ import annotations
 
 import math
-from dataclasses import fields, replace
-from gc import collect
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
-from kincheck.core import Revolute, solve, solve_designs
+from kincheck.core import solve, solve_designs
 from kincheck.core.algebra import root
 from kincheck.core.caches import clear_caches
 from kincheck.core.kinematics import Style
-from kincheck.core.kinematics.compiled import program_cache
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.continuation.sweep import sweep
@@ -35,7 +32,7 @@ from kincheck.core.program import (
     sin,
     where_larger,
 )
-from kincheck.core.program.llvm import compiler, jit
+from kincheck.core.program.llvm import compiler
 from kincheck.core.program.llvm.executor import LlvmExecutor
 from kincheck.core.program.llvm.jit import LlvmCode
 
@@ -144,105 +141,6 @@ def test_a_lane_that_cannot_be_reached_is_reported_alike():
     assert messages[0] == messages[1]
 
 
-def test_code_in_use_stays_after_clearing_the_caches(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))  # no machine code of another test's
-    mechanism, path = four_bar(), np.linspace(0.0, 1.0, 5)
-    driver, point = mechanism.drivers[0].name, mechanism.points[0].name
-    model = compile_model(mechanism, Request((driver,), (point,)))
-    assert model._code.interpreted
-
-    def positions():
-        return sweep(model, Path({driver: Ramp(1.0)}, path), 1e-12).points[point].position
-
-    expected = positions()
-    clear_caches()
-    collect()
-    np.testing.assert_array_equal(positions(), expected)
-
-
-def test_cached_code_is_used_and_a_damaged_entry_is_rebuilt(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    wanted = np.linspace(0.0, 1.0, 5)
-
-    def positions(*, often: bool = False):
-        clear_caches()  # as another process
-        mechanism = four_bar()
-        driver, point = mechanism.drivers[0].name, mechanism.points[0].name
-        model = compile_model(mechanism, Request((driver,), (point,)))
-        if often and model._code.interpreted:
-            model._code.count(10**9)
-        return sweep(model, Path({driver: Ramp(1.0)}, wanted), 1e-12).points[point].position
-
-    fresh = positions()
-    interpreted = {*(tmp_path / "kincheck").iterdir()}
-    # what was traced, its tables, what goes through them and the loops
-    assert len(interpreted) == 4
-    np.testing.assert_array_equal(positions(often=True), fresh)
-    entries = [*(tmp_path / "kincheck").iterdir()]
-    assert len(entries) == 5  # and its machine code
-    for name in ("_trace", "bytecode", "_text"):
-        owner = {"_trace": program_cache, "bytecode": jit.bytecode, "_text": LlvmCode}[name]
-        monkeypatch.setattr(owner, name, None)
-    np.testing.assert_array_equal(positions(), fresh)
-    monkeypatch.undo()
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    (code,) = {*entries} - interpreted
-    for entry, other in zip(entries, [*entries[1:], entries[0]], strict=True):
-        kept = entry.read_bytes()
-        flipped = kept[:-1] + bytes([kept[-1] ^ 1])
-        every = (b"", kept[:100], flipped, b"\0" * len(kept), other.read_bytes())
-        # all are read by one function: one of them is damaged in all ways
-        for damage in every if entry == code else (flipped, other.read_bytes()):
-            entry.write_bytes(damage)
-            if entry != code:
-                # where there is code, neither tables nor what goes through them is looked for
-                code.unlink()
-            np.testing.assert_array_equal(positions(often=True), fresh)
-            assert entry.read_bytes() == kept
-
-
-def test_what_was_traced_is_not_taken_for_anything_else(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    times: list[str] = []
-    trace = program_cache._trace
-    monkeypatch.setattr(
-        program_cache, "_trace", lambda *given: times.append("traced") or trace(*given)
-    )
-    mechanism = four_bar()
-    request = Request((mechanism.drivers[0].name,), ())
-    moved = replace(mechanism.bodies[0], origin=(1e-16, 0.0, 0.0))
-    for different in (
-        lambda: (mechanism, request),
-        lambda: (mechanism, replace(request, order=1)),
-        lambda: (replace(mechanism, bodies=[moved, *mechanism.bodies[1:]]), request),
-        lambda: (
-            monkeypatch.setattr(program_cache, "_source", lambda: b"changed")
-            or (mechanism, request)
-        ),
-    ):
-        times.clear()
-        for _ in range(2):
-            program_cache.traced(*different())
-        assert times == ["traced"]
-
-
-def test_joints_of_the_users_own_are_traced_every_time(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    known = four_bar()
-    hinge = next(joint for joint in known.joints if isinstance(joint, Revolute))
-
-    class Mine(Revolute):
-        type = "mine_traced"
-
-    monkeypatch.setattr(
-        Revolute, "registry", {k: v for k, v in Revolute.registry.items() if k != "mine_traced"}
-    )
-    mine = Mine(**{each.name: getattr(hinge, each.name) for each in fields(hinge)})
-    mechanism = replace(known, joints=[mine if joint is hinge else joint for joint in known.joints])
-    program_cache.traced(mechanism, Request((known.drivers[0].name,), ()))
-    assert not (tmp_path / "kincheck").exists()
-
-
 def test_a_program_may_need_more_values_at_once_than_there_are_registers_and_exchange_its_inputs():
     tape, rng, n = Tape(), np.random.default_rng(0), 80
     x = [tape.input(k) for k in range(n)]
@@ -269,13 +167,6 @@ def test_a_program_may_need_more_values_at_once_than_there_are_registers_and_exc
         found.append(executor.get(range(n + 2)))
     # a product and a sum may be rounded once
     np.testing.assert_allclose(found[1], found[0], rtol=1e-13)
-
-
-def test_a_cache_that_cannot_be_written_costs_nothing_but_time(tmp_path, monkeypatch):
-    (tmp_path / "kincheck").write_text("a file where the folder should be")
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    mechanism = four_bar()
-    assert solve(mechanism, mechanism.drivers[0].name, [0.0, 0.5]).solved.all()
 
 
 def test_without_llvmlite_numpy_takes_over(monkeypatch):

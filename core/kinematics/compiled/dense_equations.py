@@ -42,7 +42,8 @@ class Equations:
     @property
     def closure(self) -> Array:
         """Return the largest residual of each pose, shape (m,); infinite instead of NaN."""
-        return np.nan_to_num(np.abs(self.phi).max(axis=1), nan=np.inf)
+        largest = np.abs(self.phi).max(axis=1)
+        return np.where(np.isnan(largest), np.inf, largest)
 
 
 def system_of(model: Model) -> System:

@@ -23,7 +23,7 @@ import numpy as np
 
 from ...mechanism.motions import Path
 from ...trajectory import Array
-from ..compiled.dense_equations import System
+from ..compiled.dense_equations import Equations, System
 from ..compiled.request import CONSISTENT
 from ..formulation.acceptance_criteria import LARGEST_DEVIATION
 
@@ -103,7 +103,7 @@ class ArclengthWalk:
         """
         found = self.system.equations(state, self.sample(time))
         dq = direction * _solution(found.jacobian[0], found.nu[0])
-        return self._spot(state, time, dq / np.linalg.norm(dq), 0.0)
+        return _spot(found, state, time, dq / np.linalg.norm(dq), 0.0)
 
     def advance(self, spot: Spot, h: float) -> Spot | None:
         """Return the pose at about the length h from a spot; None if corrections do not converge
@@ -113,8 +113,8 @@ class ArclengthWalk:
         """
         state = self.system.stepped(spot.state, h * spot.dq[None])
         time, moved, closure = spot.time + h * spot.dt, 0.0, np.inf
+        found = self.system.equations(state, self.sample(time))
         for _ in range(CORRECTIONS):
-            found = self.system.equations(state, self.sample(time))
             if not found.closure[0] < 0.5 * closure:
                 break  # the last step gained nothing: rounding
             closure = float(found.closure[0])
@@ -127,20 +127,12 @@ class ArclengthWalk:
             if moved > LARGEST_DEVIATION * abs(h) + self.tol:
                 return None
             state, time = self.system.stepped(state, step[None, :-1]), time + float(step[-1])
+            found = self.system.equations(state, self.sample(time))
         try:
-            after = self._spot(state, time, spot.dq, spot.arc + h)
+            after = _spot(found, state, time, spot.dq, spot.arc + h)
         except np.linalg.LinAlgError:
             return None
         return after if self._solved(after) else None
-
-    def _spot(self, state: Array, time: float, along: Array, arc: float) -> Spot:
-        found = self.system.equations(state, self.sample(time))
-        bordered = _bordered(found.jacobian[0], found.nu[0], along)
-        tangent = _solution(bordered, np.append(np.zeros(len(along)), 1.0))
-        tangent /= np.linalg.norm(tangent[:-1])
-        sigma = float(np.linalg.svd(bordered[:-1], compute_uv=False)[-1])
-        sign = float(np.linalg.slogdet(_bordered(found.jacobian[0], found.nu[0], tangent[:-1]))[0])
-        return Spot(state, time, tangent[:-1], float(tangent[-1]), arc, sigma, sign)
 
     def _solved(self, spot: Spot) -> bool:
         zero = np.zeros((1, self.system.unknowns))
@@ -270,8 +262,29 @@ class ArclengthWalk:
         return 0.5 * (a + b)
 
 
+def _spot(found: Equations, state: Array, time: float, along: Array, arc: float) -> Spot:
+    """Return a pose with its tangent.
+
+    Args:
+        found: equations at the pose.
+        along: the tangent has a positive component along this, shape (n,).
+
+    Raises:
+        np.linalg.LinAlgError: the curve has no single tangent there.
+    """
+    bordered = _bordered(found.jacobian[0], found.nu[0], along)
+    tangent = _solution(bordered, np.append(np.zeros(len(along)), 1.0))
+    tangent /= np.linalg.norm(tangent[:-1])
+    sigma = float(np.linalg.svd(bordered[:-1], compute_uv=False)[-1])
+    sign = float(np.linalg.slogdet(_bordered(found.jacobian[0], found.nu[0], tangent[:-1]))[0])
+    return Spot(state, time, tangent[:-1], float(tangent[-1]), arc, sigma, sign)
+
+
 def _bordered(jacobian: Array, nu: Array, dq: Array) -> Array:
-    return np.block([[jacobian, -nu[:, None]], [dq[None], np.zeros((1, 1))]])
+    n = len(dq)
+    found = np.zeros((n + 1, n + 1))
+    found[:n, :n], found[:n, n], found[n, :n] = jacobian, -nu, dq
+    return found
 
 
 def _solution(matrix: Array, b: Array) -> Array:

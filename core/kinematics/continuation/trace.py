@@ -13,8 +13,8 @@ from ...input_checks import names_of, no_such, require_kind, require_positive
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path, Ramp
 from ...trajectory import Array
-from ..compiled.compiled_model import compile_model
-from ..compiled.dense_equations import System
+from ..compiled.compiled_model import recent_model
+from ..compiled.dense_equations import System, system_of
 from ..compiled.request import Request
 from ..formulation.constraints import Style
 from ..structure.driver_count import require_driven
@@ -91,8 +91,8 @@ def trace(
         if name not in there:
             raise no_such("trace", "point", name, there)
     request = Request((driver,), wanted, order=0, style=Style(style), compiled=False)
-    model = compile_model(mechanism, request)
-    system = System(model)
+    model = recent_model(mechanism, request)
+    system = system_of(model)
     walk = ArclengthWalk(system, Path({driver: Ramp(1.0)}, np.zeros(1)), tol)
     trail = _walked(
         walk,
@@ -114,9 +114,7 @@ def trace(
         driver=driver,
         arc=direction * np.array([spot.arc for spot in spots]),
         values=np.array([spot.time for spot in spots]),
-        sigma=np.array(
-            [examine(system, spot.state, walk.sample(spot.time)).sigma for spot in spots]
-        ),
+        sigma=_sigma(walk, spots),
         points=_points(walk, spots),
         events=tuple(trail.events),
         closed=trail.closed,
@@ -242,9 +240,19 @@ def _at(walk: ArclengthWalk, spot: Spot) -> dict[str, Array]:
     return {name: found[0] for name, found in _points(walk, [spot]).items()}
 
 
-def _points(walk: ArclengthWalk, spots: Sequence[Spot]) -> dict[str, Array]:
+def _sigma(walk: ArclengthWalk, spots: Sequence[Spot]) -> Array:
+    """Return the smallest singular value of the kept rows at spots, shape (spots,)."""
+    sigma = np.linalg.svd(walk.system.equations(*_stacked(walk, spots)).jacobian)[1]
+    return np.asarray(sigma[:, -1], dtype=np.float64)
+
+
+def _stacked(walk: ArclengthWalk, spots: Sequence[Spot]) -> tuple[Array, Array]:
+    """Return states and samples of spots, shapes (numbers, spots) and (sampled, spots)."""
     state = np.concatenate([spot.state for spot in spots], axis=1)
-    sample = np.concatenate([walk.sample(spot.time) for spot in spots], axis=1)
+    return state, np.concatenate([walk.sample(spot.time) for spot in spots], axis=1)
+
+
+def _points(walk: ArclengthWalk, spots: Sequence[Spot]) -> dict[str, Array]:
     zero = np.zeros((len(spots), walk.system.unknowns))
-    found = walk.system.outputs(state, sample, zero, zero)
+    found = walk.system.outputs(*_stacked(walk, spots), zero, zero)
     return {name: found[f"position {name}"].T for name in walk.system.model.request.points}

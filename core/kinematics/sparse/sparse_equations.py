@@ -182,7 +182,8 @@ class SparseEquations:
             rates=rates,
             accelerations=accelerations,
         )
-        (pivot, orientation), sigmas = self._pivots(), self._sigmas()
+        pivot, orientation = self._pivots()
+        sigmas = self._sigmas(pivot)
         slopes, high = (
             each if len(each) else np.zeros(len(sigmas)) for each in (at.slopes, at.high)
         )
@@ -202,12 +203,12 @@ class SparseEquations:
         pivot, entries = self.factors.signed_pivot, self.elements.entries[self.solved]
         return abs(pivot), self.blocks.orientation(entries[:, None], np.array([pivot]))[0]
 
-    def _sigmas(self) -> Array:
-        """Return the sigmas of the blocks by the last factors; the smallest pivot instead if all
+    def _sigmas(self, pivot: float) -> Array:
+        """Return the sigmas of the blocks by the last factors; their smallest pivot instead if all
         rows are solved.
         """
         if not len(self.dropped):
-            return np.array([abs(self.factors.signed_pivot)])
+            return np.array([pivot])
         factors, entries = self.factors, self.elements.entries[self.solved]
         return self.blocks.sigmas(entries[:, None], factors.solve, factors.solve_transposed)[0]
 

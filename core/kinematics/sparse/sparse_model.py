@@ -128,7 +128,7 @@ class SparseModel(SparseEquations):
             pivot=np.array([pivot]),
             chosen=True,
             turned=np.array([orientation != here.orientation]),
-            sigmas=self._sigmas()[None],
+            sigmas=self._sigmas(pivot)[None],
         )
         failed = [name for name, passed in poses.passed(here, tol).items() if not passed.all()]
         if failed:

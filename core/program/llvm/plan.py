@@ -180,6 +180,7 @@ class PlanInMemory:
         names = list(plan.programs)
         self.calls: Mapping[str, int] = {name: k for k, name in enumerate(names)}
         self.entries = np.zeros((len(names), 2), np.int64)
+        self._entries_at: int = self.entries.ctypes.data
         extrapolates = plan.extrapolates(width)
         pairs: dict[str, Sequence[tuple[int, ...]]] = {
             "carried": plan.carried,
@@ -232,7 +233,7 @@ class PlanInMemory:
 
     def entry(self, name: str) -> int:
         """Return the address of the call of a program."""
-        return self.entries.ctypes.data + 16 * self.calls[name]
+        return self._entries_at + 16 * self.calls[name]
 
 
 def in_order(pairs: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:

@@ -1,0 +1,57 @@
+"""Two ways from the design to the path: which one is taken, and what is said of the other."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from kincheck.core import (
+    JointAngle,
+)
+from kincheck.core.mechanism.motions import Ramp, Sine
+
+from .test_start import TIMES, WAYS, arm, by_style, case_of, circling, phases_of
+
+FAR = 1.0
+"""By what the arm at time zero is ahead of its design [rad]."""
+
+
+@pytest.mark.parametrize("solved", WAYS)
+def test_two_ways_to_different_turns_are_never_chosen_in_silence(solved):
+    mechanism = arm(60.0)
+    motions = circling(mechanism, [phase + FAR for phase in phases_of(60.0)])
+    found = solved(case_of(mechanism, motions))
+    assert found.solved.all(), found.message
+    said = "; ".join(found.details["notes"])
+    assert "AMBIGUOUS: by way of the first sample the results differ by up to 0.62" in said
+    assert "all drivers go straight from it to time zero" in said
+    # what is found at a time does not depend on where the sweep begins
+    shorter = solved(case_of(mechanism, motions, TIMES[4::4]))
+    assert shorter.points["r"].position == pytest.approx(
+        found.points["r"].position[4::4], abs=1e-12
+    )
+
+
+def test_two_ways_to_one_motion_are_one():
+    mechanism = replace(arm(30.0), drivers=[JointAngle("u", "h"), JointAngle("v", "k")])
+    found = by_style("native")(case_of(mechanism, {"u": Sine(2.0, 1.0, 1.0), "v": Ramp(0.3)}))
+    (note,) = found.details["notes"]
+    assert note.startswith(
+        "the design position is not on the path: all drivers go straight from it to time zero (u ="
+        " 1.68"
+    )
+
+
+@pytest.mark.parametrize("solved", WAYS)
+def test_where_one_way_is_closed_the_other_is_taken(solved):
+    """Straight to time zero, the tip would go through the hinge, where links of different lengths
+    cannot bring it.
+    """
+    mechanism = arm(0.0)
+    short = replace(mechanism.joints[1], point=(0.55, math.sqrt(0.6**2 - 0.55**2), 0.0))
+    mechanism = replace(mechanism, joints=[mechanism.joints[0], short, mechanism.joints[2]])
+    motions = circling(mechanism, [1.5 * math.pi, math.pi])
+    found = solved(case_of(mechanism, motions, np.linspace(-0.3, 0.1, 9)))
+    assert found.solved.all(), found.message
+    assert "no sample can be reached by way of time zero" in "; ".join(found.details["notes"])
+    assert found.details["start"]["time"] == -0.3

@@ -1,0 +1,157 @@
+"""When other rows are looked for, how often, and which are taken."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from kincheck import cases
+from kincheck.core.kinematics.compiled.compiled_model import recent_model
+from kincheck.core.kinematics.compiled.request import SIGMA, Request
+from kincheck.core.kinematics.compiled.samples import Route
+from kincheck.core.kinematics.continuation import row_exchange, segments, singular_samples, sweep
+from kincheck.core.kinematics.continuation.row_exchange import Choice, chosen
+from kincheck.core.kinematics.continuation.segments import Followed
+from kincheck.core.kinematics.continuation.side_follower import SideWalk
+from kincheck.core.kinematics.continuation.sweep import follow
+from kincheck.core.kinematics.continuation.walk import march
+from kincheck.core.kinematics.one_design import solve
+from kincheck.core.mechanism.motions import Path, Ramp
+
+from .test_choice import ALONG, DEAD, loop
+from .test_redundancy import locomotive
+
+
+def test_no_more_often_than_so(monkeypatch):
+    """Then the motion ends, or is refused, and says that it was the choice of rows."""
+    turn = np.linspace(0.0, 3.0, 31)
+    monkeypatch.setattr(segments, "MOST", 0)
+    found = solve(loop(), "turn", turn)
+    assert not found.solved.all()
+    assert "the mechanism is regular there" in found.message
+
+
+def test_few_samples_are_tried_in_vain(monkeypatch):
+    tried, found, renew = list[float](), list[int](), Followed.renew
+    monkeypatch.setattr(
+        Choice, "anew", lambda self, route, lane: tried.append(lane[route.model.slots["from time"]])
+    )
+    monkeypatch.setattr(
+        Followed,
+        "renew",
+        lambda self, lanes: tried.clear() or renew(self, lanes) or found.append(len(tried)),
+    )
+    monkeypatch.setattr(segments, "WITHOUT", 3)
+    solve(locomotive(np.pi / 2.0), "turn", DEAD - np.linspace(1e-3, 1e-4, 9))
+    assert found == [3]
+
+
+def test_a_sample_in_question_only_that_is_not_reached_again_stays(monkeypatch):
+    monkeypatch.setattr(Followed, "visit", lambda self, samples: {})
+    turn, question = np.append(0.0, DEAD - np.geomspace(1.0, 1e-2, 12)), segments.in_question
+    found = list[int]()
+    monkeypatch.setattr(
+        segments,
+        "in_question",
+        lambda *a, **k: found.append(question(*a, **k).sum()) or question(*a, **k),
+    )
+    assert solve(locomotive(np.pi / 2.0), "turn", turn).solved.all()
+    assert found[0] >= 1
+
+
+def test_what_cannot_be_better_is_asked_once(monkeypatch):
+    """The Bricard linkage comes near its dead centre, which no choice of rows changes."""
+    asked, values = list[int](), singular_samples.smallest_singular_values
+    monkeypatch.setattr(
+        singular_samples,
+        "smallest_singular_values",
+        lambda *given: asked.append(1) or values(*given),
+    )
+    case = cases.load("bricard")
+    route = Route(recent_model(case.mechanism, Request(("hinge",), ("P3",))), case.sweep.path)
+    first, second = (follow(route, 1e-12) for _ in range(2))
+    assert len(asked) == 1
+    assert first.details == second.details
+    assert "rows_chosen_anew" not in first.details
+    follow(route, 1e-13)
+    assert len(asked) == 2
+
+
+def test_the_best_rows_known_are_taken_again_where_they_are_good_enough():
+    matrix = np.array([[1.0, 0.0], [0.0, 1e-3], [0.0, 1.0], [0.0, 0.2]])
+    drivers, none = 0, ()
+    assert chosen(matrix, [(0, 1), (0, 3)], drivers, none) == (0, 2)
+    assert chosen(matrix, [(0, 1), (0, 2)], drivers, none) == (0, 2)
+    matrix[3, 1] = 0.5
+    assert chosen(matrix, [(0, 1), (0, 3)], drivers, none) == (0, 3)
+    # there are not two
+    assert chosen(np.array([[1.0, 0.0], [1.0, 0.0], [1.0, 1e-17]]), [(0, 1)], drivers, none) == (
+        0,
+        1,
+    )
+
+
+def test_a_pose_that_other_rows_lead_away_from_is_not_taken():
+    """What rows chosen anew make of a pose is near it, or it is another."""
+    model = recent_model(loop(), Request(("turn",), ("tracer",)))
+    route = Route(model, Path({"turn": Ramp(1.0)}, np.array([0.0, 1.5])))
+    lane = march(route, 1e-12, visit={1}).visited[1]
+    standing = Choice(model).anew(route, lane)
+    assert standing is None  # none are better there
+    beside = replace(route, path=Path({"turn": Ramp(1.0)}, np.array([0.0, ALONG - 1e-3])))
+    lane = march(beside, 1e-12, visit={1}).visited[1]
+    standing = Choice(model).anew(beside, lane)
+    assert standing is not None
+    before = {name: lane[model.vectors[f"from {name}"]] for name in model.state}
+    sample = beside.sampled(np.array([ALONG - 1e-3]))
+    assert row_exchange._standing(standing.model, before, sample, 1e-6) is not None
+    off = {name: value + 1e-3 * (name == "u coupler") for name, value in before.items()}
+    assert row_exchange._standing(standing.model, off, sample, 1e-6) is None
+
+
+def test_a_pose_that_contradicts_other_rows_is_not_taken(monkeypatch):
+    """Rows chosen anew leave out others than before: those must hold as well. A hinge is askew by a
+    part of what is allowed.
+    """
+    skew = replace(loop().joint("C"), axis=(4.0 + 1e-9, -3.0, 12.0))
+    mechanism = replace(
+        loop(), joints=[skew if joint.name == "C" else joint for joint in loop().joints]
+    )
+    model = recent_model(mechanism, Request(("turn",), ()))
+    state = {name: np.array(value) for name, value in model.state.items()}
+    sample = Route(model, Path({"turn": Ramp(1.0)}, np.array([0.3]))).sampled(np.array([0.3]))
+    assert row_exchange._standing(model, state, sample, 1.0) is not None
+    monkeypatch.setattr(row_exchange, "CONSISTENT", 1e-12)
+    assert row_exchange._standing(model, state, sample, 1.0) is None
+
+
+@pytest.mark.parametrize("part", [2.0, 4.0])
+def test_a_sample_is_taken_again_only_where_it_is_much_farther_from_singular(part, monkeypatch):
+    model = recent_model(loop(), Request(("turn",), ("tracer",)))
+    route = Route(model, Path({"turn": Ramp(1.0)}, np.array([0.1, 0.2, 0.3])))
+    found = march(route, 1e-12)
+    sigma, other = model.rows[SIGMA].start, np.full_like(found.kept, 7.0)
+    other[sigma] = part * found.kept[sigma]
+    monkeypatch.setattr(segments, "march", lambda *_, **__: found._replace(kept=other))
+    whole = Followed(route, found._replace(kept=found.kept.copy()), 1e-12)
+    whole._follow(route, np.arange(3))
+    assert (whole.found.kept[0] == 7.0).tolist() == [part > 3.0] * 3
+    assert whole.part_of.tolist() == [int(part > 3.0)] * 3
+
+
+def test_other_rows_are_looked_for_before_a_step_is_divided_down_to_the_pose(monkeypatch):
+    """Down to where nothing is seen through rounding takes thirty parts each time."""
+    divided, divide = list[float](), SideWalk._divided
+    monkeypatch.setattr(
+        SideWalk, "_divided", lambda self, *where: divided.append(1.0) or divide(self, *where)
+    )
+    turn = np.linspace(0.0, 2.0 * np.pi, 73)
+
+    def parts():
+        divided.clear()
+        assert solve(loop(), "turn", turn).details["rows_chosen_anew"] >= 3
+        return len(divided)
+
+    soon = parts()
+    for module in (sweep, segments):
+        monkeypatch.setattr(module, "LOW", 0.0)
+    assert 2 * soon < parts()

@@ -1,0 +1,185 @@
+"""Memory of executors: windows, tables, heads, and slots that are read, written and carried."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from kincheck.core.kinematics.compiled.compiled_model import compile_model
+from kincheck.core.kinematics.compiled.request import Request
+from kincheck.core.program import NODES, NumpyExecutor, Plan, Tape, absolute, before, program
+from kincheck.core.program.llvm.compiler import available
+from kincheck.core.program.llvm.executor import LlvmExecutor
+from kincheck.core.program.llvm.jit import LlvmCode
+from kincheck.core.program.llvm.plan import TOGETHER, PlanInMemory, in_order
+
+from ..support.mechanisms import mcpherson
+from .test_tracks import COMPILED
+
+
+@pytest.mark.parametrize("lanes", [1, 7, 8, 19])
+@pytest.mark.parametrize("compiled", COMPILED)
+def test_of_all_runs_of_a_program_the_largest_counts(compiled, lanes):
+    """Blocks of five slots: x from 0 on, y from 5 on."""
+    times, tape = 5, Tape()
+    x, y = tape.input(0), tape.input(times)
+    traced = program(
+        "f", tape, {10: absolute(x - y), 11: absolute(before(x, y) * 2.0)}, times=times
+    )
+    plan = Plan({"f": traced}, {str(k): k for k in range(12)})
+    executor = LlvmExecutor(LlvmCode(plan), lanes) if compiled else NumpyExecutor(plan, lanes)
+    values = np.random.default_rng(3).normal(size=(10, lanes))
+    values[7, -1] = math.nan
+    executor.put(range(10), values)
+    executor.run("f")
+    xs, ys = values[:times], values[times:]
+    shifted = np.roll(xs, 1, axis=1)
+    group = executor.margin if compiled else lanes  # lanes are neighbours within a vector
+    shifted[:, ::group] = ys[:, ::group]
+    wanted = np.abs(xs - ys).max(axis=0), np.abs(2.0 * shifted).max(axis=0)
+    assert np.isnan(wanted[0]).tolist() == [False] * (lanes - 1) + [True]
+    np.testing.assert_array_equal(executor.get([10, 11]), wanted)
+
+
+def test_flops_of_a_program_are_those_of_all_its_runs():
+    tape = Tape()
+    x, y = tape.input(0), tape.input(5)
+    once, five = (program("f", tape, {10: absolute(x - y)}, times=times) for times in (1, 5))
+    assert (once.flops, five.flops) == (2, 14)  # and four times the larger of two
+
+
+def test_what_is_carried_is_moved_so_that_no_slot_is_read_after_it_was_written():
+    """Whatever the order: the same as taking all over one after the other."""
+    pairs = [
+        (5, 6),
+        (4, 5),
+        (9, 9),
+        *((k, k - 57) for k in range(182, 200)),
+        *((k, k + 40) for k in range(20, 30)),
+    ]
+    moved = in_order(pairs)
+    assert {*moved} == {*pairs} - {(9, 9)}
+    assert moved != [pair for pair in pairs if pair != (9, 9)]
+    one, other = list(range(300)), list(range(300))
+    for slots, moves in ((one, pairs), (other, moved)):
+        for source, target in moves:
+            slots[target] = slots[source]
+    assert one == other
+
+
+@pytest.mark.parametrize("count", range(1, 10))
+def test_rows_that_fill_up_a_table_of_pairs_change_nothing(count):
+    pairs, width = [(k, k + 1) for k in reversed(range(count))], 8
+    table = PlanInMemory(Plan({}, {}, carried=pairs), width, 20)._tables["carried"]
+    assert len(table) % TOGETHER == 0
+    one, other = list(range(20)), list(range(20))
+    for slots, moves in ((one, pairs), (other, table // (8 * width))):
+        for source, target in moves:
+            slots[target] = slots[source]
+    assert one == other
+
+
+def test_a_lane_that_is_a_head_has_none_before_it():
+    tape = Tape()
+    plan = Plan(
+        {"f": program("f", tape, {2: before(tape.input(0), tape.input(1))})},
+        {str(k): k for k in range(3)},
+    )
+    executor = NumpyExecutor(plan, 6)
+    executor.put([0, 1], np.arange(12.0).reshape(2, 6))
+    executor.heads[:] = [0, 4]
+    executor.run("f")
+    assert executor.get([2]).tolist() == [[6.0, 0.0, 1.0, 2.0, 10.0, 4.0]]
+
+
+@pytest.mark.skipif(not available(), reason="llvmlite is not installed")
+def test_tables_begin_with_a_cache_line():
+    mechanism = mcpherson()
+    model = compile_model(
+        mechanism, Request(("stroke",), ("wheel",), varied=("points.wheel.position",))
+    )
+    for lanes in (1, 9, 300):
+        executor = model.executor(lanes)
+        for columns in (1, 3):
+            table = executor.table(columns)
+            assert table.shape == (model.kept, columns, executor.room)
+            assert table.ctypes.data % 64 == 0
+            assert table.flags.c_contiguous
+
+
+@pytest.mark.parametrize("lanes", [1, 7, 8, 19])
+@pytest.mark.parametrize("compiled", COMPILED)
+def test_a_window_is_memory_and_takes_what_is_arranged(compiled, lanes):
+    tape = Tape()
+    plan = Plan(
+        {"f": program("f", tape, {3: tape.input(1) - tape.input(2)})}, {str(k): k for k in range(4)}
+    )
+    executor = LlvmExecutor(LlvmCode(plan), lanes) if compiled else NumpyExecutor(plan, lanes)
+    values = np.random.default_rng(1).normal(size=(2, lanes))
+    executor.window(range(1, 3))[:] = executor.arranged(values)
+    np.testing.assert_array_equal(executor.get(range(1, 3)), values)
+    executor.run("f")
+    found = np.full(lanes, np.nan)
+    found[executor.arranged(np.arange(lanes)[None])] = executor.window(range(3, 4))
+    np.testing.assert_array_equal(found, values[0] - values[1])
+    copy = executor.get(range(1, 3))
+    executor.clear()
+    np.testing.assert_array_equal(copy, values)
+
+
+@pytest.mark.parametrize("compiled", COMPILED)
+def test_what_stood_in_slots_is_put_out_whatever_is_written_before(compiled, monkeypatch):
+    """Lanes of a group: to slots that are read, that are put out elsewhere, and that nobody reads;
+    and values used on the way.
+    """
+    monkeypatch.setattr("kincheck.core.program.llvm.jit.OFTEN", 0)
+    tape = Tape()
+    x, last, first, other = (
+        tape.input(0),
+        tape.at(NODES - 1, 0),
+        tape.at(0, 0),
+        tape.at(NODES - 1, 1),
+    )
+    head = tape.at(0, 3)
+    total = x
+    for k in range(40):  # more than there are registers for
+        total = total * (last + first * float(k)) * head
+    late = tape.input(7) + total
+    out = {
+        0: total,
+        1: last,
+        2: first,
+        3: other,
+        4: tape.input(2),
+        5: other + first,
+        6: tape.input(1),
+        7: head,
+        8: late,
+    }
+    plan = Plan({"f": program("f", tape, out)}, {str(k): k for k in range(9)})
+    executor = LlvmExecutor(LlvmCode(plan), 8) if compiled else NumpyExecutor(plan, 8)
+    group = executor.margin if compiled else 8
+    values = np.random.default_rng(5).uniform(0.2, 0.4, size=(9, 8))
+    heads = np.arange(8) // group * group
+    for _ in range(2):  # interpreted, and compiled
+        executor.put(range(9), values)
+        executor.run("f")
+        lasts, firsts = values[:, heads + group - 1], values[:, heads]
+        expected = values[0]
+        for k in range(40):
+            expected = expected * (lasts[0] + firsts[0] * float(k)) * firsts[3]
+        found = executor.get(range(9))
+        for each, wanted in ((found[0], expected), (found[8], values[7] + expected)):
+            # 160 operations, some of them fused, each rounded
+            assert np.abs(each / wanted - 1.0).max() <= 4e-14
+        stood = [
+            lasts[0],
+            firsts[0],
+            lasts[1],
+            values[2],
+            lasts[1] + firsts[0],
+            values[1],
+            firsts[3],
+        ]
+        np.testing.assert_array_equal(found[1:8], stood)
