@@ -9,9 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 from kincheck import cases
-from kincheck.core import (
-    SolveError,
-)
+from kincheck.core import Body, JointAngle, Mechanism, Revolute, SolveError
 from kincheck.core.cli.main import main
 from kincheck.core.kinematics.continuation.trace import trace
 
