@@ -3,6 +3,7 @@
 import gc
 import os
 import sys
+from functools import cache
 from pathlib import Path
 
 import kincheck.adapters
@@ -51,12 +52,13 @@ def no_recent_models(request):
 
 
 @pytest.fixture(autouse=True, scope="session")
-def no_calibration():
-    """A run in a history takes the speed of the machine, longer than most tests take; its own test
-    has the function itself.
+def known_circumstances():
+    """A run in a history takes the speed of the machine and the state of the repository, longer
+    than most tests take; the tests of these functions have the functions themselves.
     """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(provenance, "calibration", lambda: 0.02)
+        patch.setattr(provenance, "git_state", cache(provenance.git_state))
         yield
 
 

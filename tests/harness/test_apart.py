@@ -5,8 +5,6 @@ does not do to ours.
 import os
 import subprocess
 import sys
-import time
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -15,25 +13,7 @@ from kincheck.core.cli.registry import Status
 from kincheck.core.harness.engine_versions import versions
 from kincheck.core.harness.unloadable import Unloadable
 
-from ..support.fakes import Fake
-
-DEEDS = {
-    "tells": lambda: "1.2",
-    "prints": lambda: print("loading\nhello") or "3",
-    "is_missing": lambda: None,
-    "exits": lambda: sys.exit(0),
-    "aborts": os.abort,
-    "hangs": lambda: time.sleep(1000.0),
-    "raises": lambda: 1 / 0,
-}
-
-
-@dataclass
-class Loading(Fake):
-    """Its name says what asking for its version does."""
-
-    def version(self):
-        return DEEDS[self.name]()
+from ..support.engines_asked import DEEDS, Foreign, Loading, Ours
 
 
 def test_versions_are_told_in_the_order_of_the_engines(monkeypatch):
@@ -43,20 +23,6 @@ def test_versions_are_told_in_the_order_of_the_engines(monkeypatch):
         [*map(Loading, DEEDS), Unloadable("gone", "no module", "projection")], patience=10.0
     )
     assert found == ["1.2", "3", *[None] * 6]
-
-
-@dataclass
-class Foreign:
-    """Tell by its version in which process it is asked."""
-
-    name: str
-
-    def version(self):
-        return str(os.getpid())
-
-
-class Ours(Foreign):
-    in_process = True
 
 
 def test_only_an_engine_that_says_so_is_asked_in_this_process(monkeypatch):

@@ -115,7 +115,7 @@ def test_a_run_killed_at_any_moment_is_resumed_to_the_same_records(tmp_path):
     lasted = time.monotonic() - begin
     with Store(tmp_path / "undisturbed.sqlite") as store:
         expected = store.results(1)
-    assert len(expected.records) == 12
+    assert len(expected.records) == 8
     moments = random.Random(943745)
     for number in range(MOMENTS):
         path = tmp_path / f"{number}.sqlite"
