@@ -7,7 +7,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
 from kincheck.core.cli import main
 from kincheck.core.cli.registry import Status
 from kincheck.core.harness.engine_versions import versions
@@ -32,31 +31,24 @@ def test_only_an_engine_that_says_so_is_asked_in_this_process(monkeypatch):
     assert foreign not in (ours, None)
 
 
-@pytest.mark.parametrize("deed", ["import sys; sys.exit(0)", "import os; os.abort()"])
-def test_a_run_with_a_history_outlives_a_simulator_that_cannot_be_loaded(deed, tmp_path):
-    (tmp_path / "exudyn.py").write_text(deed)
-    command = [
-        "run",
-        "rssr",
-        "--engine",
-        "native",
-        "exudyn",
-        "--history",
-        "h.sqlite",
-        "--json",
-        "r.json",
-    ]
+def test_a_run_with_a_history_outlives_simulators_that_cannot_be_loaded(tmp_path):
+    (tmp_path / "exudyn.py").write_text("import sys; sys.exit(0)")
+    (tmp_path / "mujoco.py").write_text("import os; os.abort()")
+    command = ["run", "rssr", "--engine", "native", "exudyn", "mujoco"]
+    files = ["--history", "h.sqlite", "--json", "r.json"]
     code = "import sys; from kincheck.core.cli import main as cli; sys.exit(cli.main(sys.argv[1:]))"
     env = {**os.environ, "PYTHONPATH": str(tmp_path)}
     found = subprocess.run(
-        [sys.executable, "-c", code, *command],
+        [sys.executable, "-c", code, *command, *files],
         cwd=tmp_path,
         env=env,
         capture_output=True,
         text=True,
         timeout=120.0,
     )
-    assert "[1/2] rssr native: pass" in found.stderr
+    assert "/3] rssr native: pass" in found.stderr
+    assert "/3] rssr exudyn: unavailable" in found.stderr
+    assert "/3] rssr mujoco: crashed" in found.stderr
     assert (tmp_path / "r.json").exists()
     assert (tmp_path / "h.sqlite").exists()
 
