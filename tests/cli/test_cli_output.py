@@ -311,8 +311,10 @@ RUN = ["run", "first", "--engine", "native", "--jobs", "0"]
 def kincheck(*arguments, out=subprocess.PIPE, **env):
     """The command line in a process of its own, with a case and an engine that need no time."""
     arguments = [sys.executable, "-c", KINCHECK, *arguments]
+    env = os.environ | env
+    env.pop("PYTHONUNBUFFERED", None)  # or nothing would be left to be written in the end
     return subprocess.run(
-        arguments, cwd=ROOT, stdout=out, stderr=subprocess.PIPE, env=os.environ | env, check=False
+        arguments, cwd=ROOT, stdout=out, stderr=subprocess.PIPE, env=env, check=False
     )
 
 
