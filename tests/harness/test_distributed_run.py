@@ -7,6 +7,7 @@ import os
 import signal
 import socket
 from collections import Counter
+from importlib.util import find_spec
 
 import pytest
 from kincheck.core.harness.record import Outcome
@@ -23,11 +24,13 @@ from .test_workers import timeless
 
 TOL = 1e-12
 LIMITS = Limits(timeout=60.0, memory=1.0)
-pytest.importorskip("distributed")
 # its own, of sockets and loops it leaves to the collector when a worker is killed
-pytestmark = pytest.mark.filterwarnings(
-    "ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning"
-)
+pytestmark = [
+    pytest.mark.filterwarnings(
+        "ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning"
+    ),
+    pytest.mark.skipif(find_spec("distributed") is None, reason="distributed is not installed"),
+]
 
 
 def test_pairs_are_solved_on_a_cluster_as_here_though_a_worker_is_lost_until_it_goes(cluster):

@@ -5,6 +5,7 @@ is lost on the way.
 import importlib
 import os
 import signal
+from importlib.util import find_spec
 
 import msgspec
 import pytest
@@ -24,11 +25,13 @@ POINTS = {
     "ball": {"at": "ball", "sigma": 1.0},
     "axis": {"at": "joints.lca_pivot.axis", "sigma": 0.1},
 }
-pytest.importorskip("distributed")
 # its own, of sockets and loops it leaves to the collector when a worker is killed
-pytestmark = pytest.mark.filterwarnings(
-    "ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning"
-)
+pytestmark = [
+    pytest.mark.filterwarnings(
+        "ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning"
+    ),
+    pytest.mark.skipif(find_spec("distributed") is None, reason="distributed is not installed"),
+]
 
 
 def timeless(results):
