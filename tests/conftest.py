@@ -1,7 +1,9 @@
 """What several rooms are tested with."""
 
+import gc
 import os
 import sys
+from functools import cache
 from pathlib import Path
 
 import kincheck.adapters
@@ -22,7 +24,17 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 os.environ.pop("COLUMNS", None)  # pytest-xdist sets it for its workers; logs have their own width
 
+# Each young collection of garbage by default follows 700 new objects: with the syntax trees of two
+# hundred files of tests in memory that is a third of reading them.
+gc.set_threshold(50_000, 20, 20)
+
 NATIVE = Fake("native")
+
+
+def pytest_collection_finish():
+    """The tests themselves, a million objects, are searched for garbage no more."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(autouse=True)
@@ -40,12 +52,13 @@ def no_recent_models(request):
 
 
 @pytest.fixture(autouse=True, scope="session")
-def no_calibration():
-    """A run in a history takes the speed of the machine, longer than most tests take; its own test
-    has the function itself.
+def known_circumstances():
+    """A run in a history takes the speed of the machine and the state of the repository, longer
+    than most tests take; the tests of these functions have the functions themselves.
     """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(provenance, "calibration", lambda: 0.02)
+        patch.setattr(provenance, "git_state", cache(provenance.git_state))
         yield
 
 

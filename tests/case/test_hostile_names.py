@@ -24,7 +24,7 @@ from kincheck.core.report.table import print_table
 from kincheck.core.studies.tolerance.csv_tables import _csv
 from markdown_it import MarkdownIt
 
-from ..report.test_report import Page
+from ..report.page import Page
 from ..support.fakes import crank
 from ..support.made_up import results
 

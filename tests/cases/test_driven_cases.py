@@ -18,7 +18,7 @@ from kincheck.core.mechanism.motions import Absolute, Ramp, Sine, Table
 from kincheck.core.report.junit import to_junit
 from kincheck.core.report.report import write_report
 
-from ..report.test_report import Page
+from ..report.page import Page
 from ..support.case_texts import edited, write
 
 STRUT = (cases.FOLDER / "mcpherson_strut.toml").read_text()

@@ -82,9 +82,8 @@ def test_all_cases_and_engines_are_the_default(kincheck_main, capsys):
         ([RIGHT], [], True),
         ([RIGHT], ["--timeout", "60"], False),
         ([RIGHT, Fake()], [], False),
-        ([Fake()], [], False),
     ],
-    ids=["native", "native, limited", "both", "other"],
+    ids=["native", "native, limited", "both"],
 )
 def test_what_is_not_ours_alone_is_solved_in_worker_processes(
     kincheck_main, capsys, monkeypatch, engines, options, inside

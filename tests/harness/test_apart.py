@@ -5,35 +5,14 @@ does not do to ours.
 import os
 import subprocess
 import sys
-import time
-from dataclasses import dataclass
 from pathlib import Path
 
-import pytest
 from kincheck.core.cli import main
 from kincheck.core.cli.registry import Status
 from kincheck.core.harness.engine_versions import versions
 from kincheck.core.harness.unloadable import Unloadable
 
-from ..support.fakes import Fake
-
-DEEDS = {
-    "tells": lambda: "1.2",
-    "prints": lambda: print("loading\nhello") or "3",
-    "is_missing": lambda: None,
-    "exits": lambda: sys.exit(0),
-    "aborts": os.abort,
-    "hangs": lambda: time.sleep(1000.0),
-    "raises": lambda: 1 / 0,
-}
-
-
-@dataclass
-class Loading(Fake):
-    """Its name says what asking for its version does."""
-
-    def version(self):
-        return DEEDS[self.name]()
+from ..support.engines_asked import DEEDS, Foreign, Loading, Ours
 
 
 def test_versions_are_told_in_the_order_of_the_engines(monkeypatch):
@@ -45,20 +24,6 @@ def test_versions_are_told_in_the_order_of_the_engines(monkeypatch):
     assert found == ["1.2", "3", *[None] * 6]
 
 
-@dataclass
-class Foreign:
-    """Tell by its version in which process it is asked."""
-
-    name: str
-
-    def version(self):
-        return str(os.getpid())
-
-
-class Ours(Foreign):
-    in_process = True
-
-
 def test_only_an_engine_that_says_so_is_asked_in_this_process(monkeypatch):
     monkeypatch.syspath_prepend(str(Path(__file__).parents[2]))
     ours, foreign = versions([Ours("any"), Foreign("native")])
@@ -66,31 +31,24 @@ def test_only_an_engine_that_says_so_is_asked_in_this_process(monkeypatch):
     assert foreign not in (ours, None)
 
 
-@pytest.mark.parametrize("deed", ["import sys; sys.exit(0)", "import os; os.abort()"])
-def test_a_run_with_a_history_outlives_a_simulator_that_cannot_be_loaded(deed, tmp_path):
-    (tmp_path / "exudyn.py").write_text(deed)
-    command = [
-        "run",
-        "rssr",
-        "--engine",
-        "native",
-        "exudyn",
-        "--history",
-        "h.sqlite",
-        "--json",
-        "r.json",
-    ]
+def test_a_run_with_a_history_outlives_simulators_that_cannot_be_loaded(tmp_path):
+    (tmp_path / "exudyn.py").write_text("import sys; sys.exit(0)")
+    (tmp_path / "mujoco.py").write_text("import os; os.abort()")
+    command = ["run", "rssr", "--engine", "native", "exudyn", "mujoco"]
+    files = ["--history", "h.sqlite", "--json", "r.json"]
     code = "import sys; from kincheck.core.cli import main as cli; sys.exit(cli.main(sys.argv[1:]))"
     env = {**os.environ, "PYTHONPATH": str(tmp_path)}
     found = subprocess.run(
-        [sys.executable, "-c", code, *command],
+        [sys.executable, "-c", code, *command, *files],
         cwd=tmp_path,
         env=env,
         capture_output=True,
         text=True,
         timeout=120.0,
     )
-    assert "[1/2] rssr native: pass" in found.stderr
+    assert "/3] rssr native: pass" in found.stderr
+    assert "/3] rssr exudyn: unavailable" in found.stderr
+    assert "/3] rssr mujoco: crashed" in found.stderr
     assert (tmp_path / "r.json").exists()
     assert (tmp_path / "h.sqlite").exists()
 

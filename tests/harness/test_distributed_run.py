@@ -7,6 +7,7 @@ import os
 import signal
 import socket
 from collections import Counter
+from importlib.util import find_spec
 
 import pytest
 from kincheck.core.harness.record import Outcome
@@ -15,7 +16,6 @@ from kincheck.core.harness.run import run
 from kincheck.core.harness.workers import distributed as ours
 from kincheck.core.harness.workers.distributed import ClusterError, on_cluster
 from kincheck.core.harness.workers.messages import pack
-from kincheck.core.harness.workers.pool import in_workers
 
 from ..support.bad_engine import Bad
 from ..support.drill import Slow
@@ -24,19 +24,21 @@ from .test_workers import timeless
 
 TOL = 1e-12
 LIMITS = Limits(timeout=60.0, memory=1.0)
-pytest.importorskip("distributed")
 # its own, of sockets and loops it leaves to the collector when a worker is killed
-pytestmark = pytest.mark.filterwarnings(
-    "ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning"
-)
+pytestmark = [
+    pytest.mark.filterwarnings(
+        "ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning"
+    ),
+    pytest.mark.skipif(find_spec("distributed") is None, reason="distributed is not installed"),
+]
 
 
-def test_pairs_are_solved_on_a_cluster_as_here_though_a_worker_is_lost(cluster):
-    """Killed in the middle, with a pair on it: another has it, nothing is lost and nothing comes
-    twice.
+def test_pairs_are_solved_on_a_cluster_as_here_though_a_worker_is_lost_until_it_goes(cluster):
+    """A worker is killed in the middle, with a pair on it: another has it, nothing is lost and
+    nothing comes twice. A cluster that goes is a message.
     """
     cases = [crank(f"c{k}", reference=k % 2 == 0) for k in range(6)]
-    cases[3] = crank("segfault")
+    crashing = cases[3] = crank("segfault")
     engines = [
         Slow("native", seconds=0.03),
         Fake(),
@@ -59,8 +61,11 @@ def test_pairs_are_solved_on_a_cluster_as_here_though_a_worker_is_lost(cluster):
         progress=hear,
     )
     assert victims[0] not in [nanny.pid for nanny in cluster.workers.values()]
-    here = run(cases, engines[:3], tol=TOL, solver=in_workers(2, LIMITS))
-    assert timeless(there.records) == timeless(here.records)
+    crash = next(k for k, each in enumerate(there.records) if each.outcome is Outcome.CRASHED)
+    assert there.records[crash].message.startswith("the process died of SIGSEGV in ")
+    cases.remove(crashing)
+    here = run(cases, engines[:3], tol=TOL).records
+    assert [each for each in timeless(there.records) if each.case != "segfault"] == timeless(here)
     assert set(heard.values()) == {1}
     assert len(heard) == 18
     assert {each.outcome for each in there.records if each.case == "segfault"} == {
@@ -73,9 +78,7 @@ def test_pairs_are_solved_on_a_cluster_as_here_though_a_worker_is_lost(cluster):
     ).records
     assert record.message.startswith("cannot be sent to a cluster: ")
 
-
-def test_a_cluster_that_goes_is_a_message(cluster):
-    def hear(record, done, total):
+    def close(record, done, total):
         if done == 1:
             cluster.close()
 
@@ -86,7 +89,7 @@ def test_a_cluster_that_goes_is_a_message(cluster):
             [Slow("slow", seconds=0.05)],
             tol=TOL,
             solver=on_cluster(cluster.scheduler_address, LIMITS),
-            progress=hear,
+            progress=close,
         )
 
 

@@ -5,6 +5,7 @@ hardpoint, a stroke out of reach.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +31,12 @@ STRUT = dict.fromkeys(adapters.ENGINES, (1e-14, 1e-13, 1e-12)) | {
 CLOSED_FORM = 1e-11
 
 
+@cache
+def built_in(name):
+    """The case, read once: its frozen arrays are shared."""
+    return cases.load(name)
+
+
 def engine(name):
     found = adapters.engine(name)
     if found.version() is None:
@@ -44,7 +51,7 @@ def record(case, name):
 
 @pytest.mark.parametrize("name", adapters.ENGINES)
 def test_the_strut_is_solved_to_round_off(name):
-    found = record(cases.load("mcpherson_strut"), name)
+    found = record(built_in("mcpherson_strut"), name)
     assert found.outcome is Outcome.PASS
     assert found.truth == "in_house_oracle"
     for deviations in found.errors.values():
@@ -56,20 +63,20 @@ def test_the_strut_is_solved_to_round_off(name):
 @pytest.mark.parametrize("name", adapters.ENGINES)
 @pytest.mark.parametrize("case", ["four_bar", "rssr", "spatial_slider_crank"])
 def test_closed_forms_hold_over_a_full_turn(case, name):
-    found = record(cases.load(case), name)
+    found = record(built_in(case), name)
     assert found.outcome is Outcome.PASS
     assert np.ptp(next(iter(found.driver.values()))) == pytest.approx(2.0 * np.pi)
-    for output in cases.load(case).outputs:
+    for output in built_in(case).outputs:
         limit = CLOSED_FORM
         if output.forces:  # relative, see tests/adapters/test_engine_forces.py
-            largest = np.abs(cases.load(case).reference[output.name].position).max()
+            largest = np.abs(built_in(case).reference[output.name].position).max()
             limit = (1e-9 if name == "exudyn" else 1e-12) * largest
         assert found.errors[output.name].position.max_abs <= limit
 
 
 @pytest.mark.parametrize("name", adapters.ENGINES)
 def test_a_hardpoint_moved_by_a_micrometre_fails_and_is_named(name):
-    case = cases.load("mcpherson_strut")
+    case = built_in("mcpherson_strut")
     joints = list(case.mechanism.joints)
     k = [joint.name for joint in joints].index("tie_rod")
     (x, y, z), rack = joints[k].points
@@ -82,7 +89,7 @@ def test_a_hardpoint_moved_by_a_micrometre_fails_and_is_named(name):
 
 @pytest.mark.parametrize("name", adapters.ENGINES)
 def test_a_stroke_out_of_reach_gives_the_last_sample_and_no_numbers_beyond(name):
-    case = cases.load("mcpherson_strut")
+    case = built_in("mcpherson_strut")
     sweep = replace(case.sweep, values=np.linspace(0.0, 0.6, 61))
     found = record(replace(case, sweep=sweep, reference={}), name)
     assert found.outcome is Outcome.FAIL
@@ -99,7 +106,7 @@ def test_a_world_turned_and_a_hundred_metres_away_keeps_its_digits(name):
     """Bodies without an origin of their own, as case files leave them: no engine may hang them on
     arms of a hundred metres.
     """
-    case = cases.load("mcpherson_strut")
+    case = built_in("mcpherson_strut")
     turn = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
     far = np.array([100.0, -50.0, 20.0])
     moved = placed(

@@ -10,6 +10,7 @@ from kincheck.core.cli.main import main
 from kincheck.core.history.schema import MIGRATIONS
 from kincheck.core.history.store import Store
 
+from ..support.fakes import crank
 from ..support.nights import nights
 
 NO_TRENDS = "The history cannot be read, so this page shows no earlier runs."
@@ -73,22 +74,13 @@ WHOLE_FILE = [directory, no_database, of_another_program, of_a_later_version, cu
 
 
 @pytest.mark.parametrize("fault", WHOLE_FILE)
-def test_a_history_that_cannot_be_used_costs_no_result(path, tmp_path, capsys, monkeypatch, fault):
+def test_a_history_that_cannot_be_used_costs_no_result(
+    kincheck_main, path, tmp_path, capsys, monkeypatch, fault
+):
     fault(path, monkeypatch)
     out, junit = tmp_path / "out", tmp_path / "junit.xml"
-    command = [
-        "run",
-        "rssr",
-        "--engine",
-        "native",
-        "--history",
-        str(path),
-        "--out",
-        str(out),
-        "--junit",
-        str(junit),
-    ]
-    assert main(command) == 2
+    files = ["--history", path, "--out", out, "--junit", junit]
+    assert kincheck_main("run", "crank", *files) == 2
     while HELD:
         HELD.pop().close()
     told, said = capsys.readouterr()
@@ -97,7 +89,7 @@ def test_a_history_that_cannot_be_used_costs_no_result(path, tmp_path, capsys, m
     assert problem.endswith("; the run is not in the history")
     assert "1 pass" in told
     assert len(json.loads((out / "results.json").read_text())["records"]) == 1
-    assert "rssr" in junit.read_text()
+    assert "crank" in junit.read_text()
     assert NO_TRENDS in (out / "report.html").read_text()
 
 
@@ -134,12 +126,9 @@ def passed_over(capsys, path):
     return told
 
 
-def test_the_other_runs_are_drawn_and_the_new_one_is_kept(damaged, tmp_path, capsys):
+def test_the_other_runs_are_drawn_and_the_new_one_is_kept(kincheck_main, damaged, tmp_path, capsys):
     out = tmp_path / "out"
-    assert (
-        main(["run", "rssr", "--engine", "native", "--history", str(damaged), "--out", str(out)])
-        == 2
-    )
+    assert kincheck_main("run", "crank", "--history", damaged, "--out", out) == 2
     assert "1 pass" in passed_over(capsys, damaged)
     assert NO_TRENDS not in (out / "report.html").read_text()
     with Store(damaged, writable=False) as store:
@@ -199,47 +188,32 @@ def test_many_damaged_runs_are_not_told_one_by_one(path, capsys):
 
 
 def test_damage_that_comes_while_records_are_added_costs_no_result(
-    path, tmp_path, capsys, monkeypatch
+    kincheck_main, path, tmp_path, capsys, monkeypatch
 ):
     add = Store.add_record
 
     def damage_then_add(self, run, record):
-        if record.case == "bennett":
+        if record.case == "b":
             self.connection.execute("DROP TABLE records")
         add(self, run, record)
 
     monkeypatch.setattr(Store, "add_record", damage_then_add)
     out = tmp_path / "out"
-    assert (
-        main(
-            [
-                "run",
-                "rssr",
-                "bennett",
-                "four_bar",
-                "--engine",
-                "native",
-                "--history",
-                str(path),
-                "--out",
-                str(out),
-            ]
-        )
-        == 2
-    )
+    cases = {name: crank(name) for name in "abc"}
+    assert kincheck_main("run", *cases, "--history", path, "--out", out, cases=cases) == 2
     said = [line for line in capsys.readouterr().err.splitlines() if not line.startswith("[")]
     assert len(said) == 1
-    assert "the records before bennett native are stored as run 1" in said[0]
+    assert "the records before b native are stored as run 1" in said[0]
     assert len(json.loads((out / "results.json").read_text())["records"]) == 3
     assert NO_TRENDS in (out / "report.html").read_text()
 
 
-def test_a_run_to_be_resumed_that_is_damaged_is_made_anew(path, capsys):
-    command = ["run", "rssr", "--engine", "native", "--history", str(path)]
-    assert main(command) == 0
+def test_a_run_to_be_resumed_that_is_damaged_is_made_anew(kincheck_main, path, capsys):
+    command = ["run", "crank", "--history", path]
+    assert kincheck_main(*command) == 0
     change(path, "UPDATE runs SET status = 'interrupted', plan = '('")
     capsys.readouterr()
-    assert main([*command, "--resume"]) == 2
+    assert kincheck_main(*command, "--resume") == 2
     said = capsys.readouterr().err
     assert "run 2 is new" in said
     assert "run 1 cannot be read" in said

@@ -5,6 +5,7 @@ is lost on the way.
 import importlib
 import os
 import signal
+from importlib.util import find_spec
 
 import msgspec
 import pytest
@@ -19,11 +20,13 @@ from kincheck.core.studies.tolerance.sweep import sweep_designs
 from ..support.fakes import crank
 from .test_vary import vary
 
-distributed = pytest.importorskip("distributed")
 # its own, of sockets and loops it leaves to the collector when a worker is killed
-pytestmark = pytest.mark.filterwarnings(
-    "ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning"
-)
+pytestmark = [
+    pytest.mark.filterwarnings(
+        "ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning"
+    ),
+    pytest.mark.skipif(find_spec("distributed") is None, reason="distributed is not installed"),
+]
 
 
 def timeless(results):
@@ -59,10 +62,12 @@ def test_a_sweep_is_the_same_on_a_cluster_as_here_though_a_worker_is_lost(cluste
 
 def test_a_cluster_that_goes_is_a_message(tmp_path, monkeypatch):
     """Its scheduler and worker are threads: processes that go are in the test above."""
+    from distributed import LocalCluster  # takes most of a second, which reading the tests saves
+
     # the time that a client waits for it to come back, too
     monkeypatch.setattr(ours, "CONNECT", 1.0)
     case = crank()
-    cluster = distributed.LocalCluster(
+    cluster = LocalCluster(
         n_workers=1, processes=False, protocol="tcp://", dashboard_address=None, silence_logs=50
     )
 

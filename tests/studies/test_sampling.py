@@ -1,6 +1,7 @@
 """Distributions, samplings and correlations of drawn variants, held against scipy's."""
 
 import json
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -10,7 +11,6 @@ from kincheck.core.studies.variation.distributions import Law
 from kincheck.core.studies.variation.modes import Sampling
 from kincheck.core.studies.variation.sampling import DRAWN
 from kincheck.core.studies.variation.variation_file import read_variation
-from scipy import stats
 
 from ..support.fakes import crank
 from .test_vary import HEAD
@@ -26,12 +26,23 @@ TIP = {
     "uniform": {"at": "tip", "half_width": [0.0, 2.0, 0.0]},
     "triangular": {"at": "tip", "half_width": [0.0, 2.0, 0.0], "distribution": "triangular"},
 }
-OF_SCIPY = {  # in mm
-    "normal": stats.norm(scale=2.0),
-    "truncated_normal": stats.truncnorm(-1.5, 1.5, scale=2.0),
-    "uniform": stats.uniform(-2.0, 4.0),
-    "triangular": stats.triang(0.5, -2.0, 4.0),
-}
+
+
+@pytest.fixture(scope="module")
+def stats():
+    """It takes a second to import, and others collect these tests too."""
+    return import_module("scipy.stats")
+
+
+@pytest.fixture
+def of_scipy(stats, law):
+    """The law in mm."""
+    return {
+        "normal": stats.norm(scale=2.0),
+        "truncated_normal": stats.truncnorm(-1.5, 1.5, scale=2.0),
+        "uniform": stats.uniform(-2.0, 4.0),
+        "triangular": stats.triang(0.5, -2.0, 4.0),
+    }[law]
 
 
 def variation(tmp_path, tables=None, **hardpoints):
@@ -43,19 +54,21 @@ def variation(tmp_path, tables=None, **hardpoints):
 
 @pytest.mark.parametrize("law", TIP)
 @pytest.mark.parametrize("sampling", [Sampling.LATIN, Sampling.SOBOL])
-def test_there_is_one_variant_in_every_interval_of_equal_probability(tmp_path, law, sampling):
+def test_there_is_one_variant_in_every_interval_of_equal_probability(
+    tmp_path, law, sampling, of_scipy
+):
     """A Latin hypercube has that for any number, a Sobol sequence for powers of two."""
     count = 1000 if sampling is Sampling.LATIN else 1024
     found = variation(tmp_path, tip=TIP[law]).sampled(sampling, count)
     assert found.coordinates[0].law == Law(law)
-    shares = np.sort(OF_SCIPY[law].cdf(1e3 * found.offsets(3, 0, count)[0]))
+    shares = np.sort(of_scipy.cdf(1e3 * found.offsets(3, 0, count)[0]))
     np.testing.assert_array_equal(np.floor(shares * count + 1e-9), np.arange(count))
 
 
 @pytest.mark.parametrize("law", ["truncated_normal", "triangular"])
-def test_random_draws_have_the_distribution(tmp_path, law):
+def test_random_draws_have_the_distribution(tmp_path, law, stats, of_scipy):
     drawn = 1e3 * variation(tmp_path, tip=TIP[law]).offsets(1, 0, 4 * DRAWN)[0]
-    assert stats.kstest(drawn, OF_SCIPY[law].cdf).pvalue > 0.01  # of a fixed seed
+    assert stats.kstest(drawn, of_scipy.cdf).pvalue > 0.01  # of a fixed seed
     assert np.abs(drawn).max() <= {"truncated_normal": 3.0, "triangular": 2.0}[law]
 
 

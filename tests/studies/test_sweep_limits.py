@@ -3,6 +3,7 @@
 import csv
 import json
 from dataclasses import replace
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -14,7 +15,6 @@ from kincheck.core.studies.tolerance.page import page
 from kincheck.core.studies.tolerance.sweep import sweep_designs
 from kincheck.core.studies.variation.limits import Limit
 from kincheck.core.studies.variation.modes import Sampling
-from scipy import stats
 
 from ..support.fakes import crank
 from .test_vary import HEAD, vary
@@ -35,7 +35,13 @@ def found(tmp_path_factory):
     )
 
 
-def test_yield_and_capability_of_a_normal_output(found):
+@pytest.fixture(scope="module")
+def stats():
+    """It takes a second to import, and others collect these tests too."""
+    return import_module("scipy.stats")
+
+
+def test_yield_and_capability_of_a_normal_output(found, stats):
     y, x, whole = found.limits
     expected = stats.norm.cdf(3.0) - stats.norm.cdf(-2.0)
     assert y.share == pytest.approx(expected, abs=2.0 / 4096)
@@ -51,7 +57,7 @@ def test_yield_and_capability_of_a_normal_output(found):
     assert (whole.output, whole.outside, whole.share) == ("", y.outside, y.share)
 
 
-def test_the_interval_is_that_of_clopper_and_pearson(found):
+def test_the_interval_is_that_of_clopper_and_pearson(found, stats):
     y = found.limits[0]
     inside = y.known - y.outside
     low = stats.beta.ppf(0.025, inside, y.outside + 1)
@@ -60,7 +66,7 @@ def test_the_interval_is_that_of_clopper_and_pearson(found):
     assert found.limits[1].interval == pytest.approx((0.025 ** (1.0 / 4096), 1.0), rel=1e-9)
 
 
-def test_the_histogram_counts_every_variant(found):
+def test_the_histogram_counts_every_variant(found, stats):
     each = found.outputs["y"].histogram
     assert sum(each.counts) == 4096
     assert len(each.edges) == len(each.counts) + 1 == 31

@@ -34,11 +34,6 @@ def deaf(case):
         time.sleep(0.01)
 
 
-def spinning(case):
-    while True:
-        pass
-
-
 def flooding(case):
     for _ in range(1600):
         os.write(1, b"x" * 65535 + b"\n")  # 105 MB in all, by the file descriptor
@@ -60,7 +55,6 @@ KINDS = {
     "abort": lambda case: os.abort(),
     "system_exit": lambda case: sys.exit(0),
     "exit": lambda case: os._exit(3),
-    "spinning": spinning,
     "deaf": deaf,
     "memory": lambda case: np.ones(10**9),
     "flood": flooding,
@@ -81,6 +75,19 @@ class Bad(Fake):
     def solve(self, model, case, tol):
         print(f"solving {case.name}")
         return KINDS.get(case.name, solution)(case)
+
+
+@dataclass
+class Elsewhere(Fake):
+    """Says which process it is in; crashes there in the case of that name."""
+
+    name: str = "elsewhere"
+
+    def solve(self, model, case, tol):
+        if case.name == "segfault":
+            os.kill(os.getpid(), signal.SIGSEGV)
+        answer = solution(case)
+        return type(answer)(**{**vars(answer), "details": {"process": os.getpid()}})
 
 
 @dataclass

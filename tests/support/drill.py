@@ -26,17 +26,18 @@ class Slow(Fake):
         return solution(case)
 
 
-CASES = {
-    name: crank(name, reference=name != "free") for name in ("first", "segfault", "free", "last")
-}
-ENGINES = {"native": Slow("native"), "slow": Slow("slow", seconds=0.01), "bad": Bad()}
+# the crash comes last: a worker after it would be one more to start
+CASES = {name: crank(name, reference=name != "free") for name in ("first", "free", "segfault")}
+ENGINES = {"native": Slow("native"), "bad": Bad()}
 
 
 def main():
     """`kincheck` with these, on the arguments of the process."""
     kincheck.adapters.ENGINES = dict.fromkeys(ENGINES, "")
-    kincheck.adapters.engine = ENGINES.__getitem__
+    kincheck.adapters.SIMULATIONS = {}
+    kincheck.adapters.engine = lambda name, mode="projection": ENGINES[name]
     kincheck.cases.names = lambda: tuple(CASES)
     kincheck.cases.load = CASES.__getitem__
+    kincheck.cases.summary = lambda name: ("closed form", "made up")
     provenance.calibration = lambda: 0.02  # its own work takes longer than a run
     return cli.main(sys.argv[1:])

@@ -1,0 +1,61 @@
+"""Read a page of the report as the tests need it."""
+
+from __future__ import annotations
+
+import base64
+import json
+import zlib
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import pytest
+from kincheck.core.harness.record import Results
+from kincheck.core.report.report import write_report
+
+
+class Page(HTMLParser):
+    """What the tests read off a page: its text outside scripts and styles, its scripts, its
+    tags.
+    """
+
+    def __init__(self, text: str) -> None:
+        super().__init__(convert_charrefs=True)
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.scripts: dict[str, str] = {}
+        self.names: list[str] = []
+        self.text = ""
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+        self.text += " "
+        if tag == "script":
+            self.names.append(dict(attrs).get("id") or f"script {len(self.names)}")
+            self.scripts[self.names[-1]] = ""
+
+    def handle_data(self, data: str) -> None:
+        if self.cdata_elem == "script":
+            self.scripts[self.names[-1]] += data
+        elif self.cdata_elem is None:
+            self.text += data
+
+    @property
+    def data(self) -> Any:
+        text = zlib.decompress(base64.b64decode(self.scripts["report-data"], validate=True))
+        return json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
+
+
+def report(run: Results, folder: Path) -> Page:
+    path = folder / "report.html"
+    write_report(run, path)
+    assert path.stat().st_size < 8_000_000
+    return Page(path.read_text(encoding="utf-8"))
+
+
+def traces(page: Page, figure: str, name: str, mode: str) -> list[Any]:
+    return [
+        trace
+        for trace in page.data["figures"][figure]["data"]
+        if trace["meta"] == name and trace["mode"] == mode
+    ]

@@ -1,0 +1,209 @@
+"""The figures of the report hold the numbers of its records."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+
+import msgspec
+import pytest
+from kincheck.core.harness.record import Deviation, Deviations, Outcome, Results
+from kincheck.core.report.axis import SAMPLES
+from kincheck.core.report.figure_data import Past
+from kincheck.core.report.figures import SYMBOLS
+from kincheck.core.report.report import write_report
+
+from ..support.made_up import CRANK, GRID, distances, judged, record, results, series
+from .page import report, traces
+
+
+def test_figures_hold_the_outputs_in_millimetres_with_the_travel_upwards(tmp_path: Path) -> None:
+    run = results()
+    page = report(run, tmp_path)
+    assert page.data["drivers"]["case-0"] == [1000 * d for d in GRID]
+    for each in run.records[:2]:
+        [curve] = traces(page, "case-0-0", each.engine, "lines")
+        assert curve["y"] == "driver"
+        expected = [1000 * v for v in each.outputs["half_track_change"].position if v is not None]
+        assert curve["x"] == pytest.approx(expected, rel=1e-9)  # ten digits are kept
+    [reference] = traces(page, "case-0-0", "reference", "lines")
+    assert reference["x"] == pytest.approx(
+        [1000 * v for v in series(GRID).position if v is not None], rel=1e-9
+    )
+    layout = page.data["figures"]["case-0-0"]["layout"]
+    assert layout["xaxis"]["title"]["text"] == "half-track change [mm]"
+    assert "wheel travel [mm]" in layout["yaxis"]["title"]["text"]
+
+
+def test_an_angle_lies_on_the_horizontal_axis_in_degrees(tmp_path: Path) -> None:
+    page = report(results(driver=CRANK | {"name": "stroke"}), tmp_path)
+    [curve] = traces(page, "case-0-0", "one", "lines")
+    assert curve["x"] == "driver"
+    assert page.data["drivers"]["case-0"] == pytest.approx(
+        [math.degrees(d) for d in GRID], rel=1e-15
+    )
+
+
+@pytest.mark.parametrize("motion", ["position", "velocity"])
+def test_error_figures_hold_the_distances_from_the_reference(tmp_path: Path, motion: str) -> None:
+    run = results()
+    page = report(run, tmp_path)
+    for each in run.records[:2]:
+        [curve] = traces(page, f"case-0-0-{motion}", each.engine, "lines+markers")
+        deviation: Deviation = getattr(each.errors["half_track_change"], motion)
+        expected = distances(
+            getattr(each.outputs["half_track_change"], motion), getattr(series(GRID), motion)
+        )
+        assert curve["y"] == pytest.approx(expected, rel=5e-3)  # three digits are kept
+        assert curve["y"][deviation.worst_step] == pytest.approx(deviation.max_abs, rel=5e-3)
+        assert max(curve["y"]) == pytest.approx(deviation.max_abs, rel=5e-3)
+    [ring] = traces(page, f"case-0-0-{motion}", "worst", "markers")
+    top = getattr(run.records[1].errors["half_track_change"], motion)
+    assert (ring["x"], ring["y"]) == ([1000 * GRID[top.worst_step]], [top.max_abs])
+    assert "case-0-0-acceleration" not in page.data["figures"]
+
+
+def test_a_case_without_reference_is_drawn_against_the_engine_it_was_compared_with(
+    tmp_path: Path,
+) -> None:
+    run = results("consensus_only")
+    native, one, _ = run.records
+    nothing = Deviations(
+        position=None, velocity=None, acceleration=None, reason="the case has no reference"
+    )
+    native = msgspec.structs.replace(
+        native, errors=dict.fromkeys(native.errors, nothing), outcome=Outcome.UNJUDGED
+    )
+    output = {
+        name: judged(one.outputs[name], native.outputs[name], 1e-9, "native")
+        for name in one.outputs
+    }
+    page = report(
+        Results(run=run.run, records=[native, msgspec.structs.replace(one, errors=output)]),
+        tmp_path,
+    )
+    assert traces(page, "case-0-0", "reference", "lines") == []
+    assert traces(page, "case-0-0-position", "native", "lines+markers") == []
+    [curve] = traces(page, "case-0-0-position", "one", "lines+markers")
+    assert max(curve["y"]) == pytest.approx(output["half_track_change"].position.max_abs, rel=5e-3)  # type: ignore[union-attr]
+    words = re.sub(r"\s+", " ", page.text)
+    assert "1 of 1 comparisons is outside tolerance, 1 not judged" in words
+    assert "✗ fail 1 ? not judged 1" in words
+    assert "Not judged: native on strut the case has no reference" in words
+
+
+def test_samples_that_are_missing_are_not_called_out_of_tolerance(tmp_path: Path) -> None:
+    run = results()
+    fine = {
+        name: msgspec.structs.replace(
+            each,
+            **{
+                motion: msgspec.structs.replace(found, within=True)
+                for motion, found in each.items()
+            },
+        )
+        for name, each in run.records[1].errors.items()
+    }
+    short = msgspec.structs.replace(run.records[1], errors=fine)
+    page = report(Results(run=run.run, records=[run.records[0], short, run.records[2]]), tmp_path)
+    assert "1 of 2 comparisons lacks samples" in page.text
+
+
+def test_what_was_not_computed_leaves_a_gap_and_no_number(tmp_path: Path) -> None:
+    run = results()
+    whole = run.records[1]
+    holed = [
+        None if k == 4 else math.nan if k == 5 else v
+        for k, v in enumerate(series(GRID, 3e-9).position)
+    ]
+    output = msgspec.structs.replace(whole.outputs["half_track_change"], position=holed)
+    broken = msgspec.structs.replace(
+        whole, outputs={"half_track_change": output}, solved=19, us_per_step=None, rank=None
+    )
+    page = report(Results(run=run.run, records=[broken], references=run.references), tmp_path)
+    [curve] = traces(page, "case-0-0", "one", "lines")
+    assert [k for k, value in enumerate(curve["x"]) if value is None] == [4, 5]
+    [errors] = traces(page, "case-0-0-position", "one", "lines+markers")
+    assert [k for k, value in enumerate(errors["y"]) if value is None] == [4, 5]
+    assert "19 of 21 samples were solved" in page.text
+    overview = page.text[page.text.index("Overview") : page.text.index("Engines")]
+    assert "µs" not in overview
+
+
+def test_zero_errors_stay_zero_and_the_floor_is_below_all_others(tmp_path: Path) -> None:
+    figure = report(results(), tmp_path).data["figures"]["case-0-0-position"]
+    errors = [e for trace in figure["data"] if trace["mode"] == "lines+markers" for e in trace["y"]]
+    assert 0 in errors
+    assert 0 < figure["layout"]["meta"]["floor"] < min(e for e in errors if e)
+    assert figure["layout"]["yaxis"]["ticktext"][0] == "exactly 0"
+
+
+def test_long_series_are_thinned_and_said_to_be(tmp_path: Path) -> None:
+    driver = [1e-4 * k for k in range(3 * SAMPLES)]
+    spike = 1234
+    found = series(driver)
+    position = [
+        v + (1e-7 if k == spike else 0.0) for k, v in enumerate(found.position) if v is not None
+    ]
+    output = msgspec.structs.replace(found, position=position)
+    errors = {"half_track_change": judged(output, series(driver), 1e-9, "closed_form")}
+    long = record(
+        "strut",
+        "closed_form",
+        "one",
+        0,
+        driver,
+        outputs={"half_track_change": output},
+        errors=errors,
+    )
+    run = Results(
+        run=results().run,
+        records=[long],
+        references={"strut": {"half_track_change": series(driver)}},
+    )
+    page = report(run, tmp_path)
+    [curve] = traces(page, "case-0-0", "one", "lines")
+    assert SAMPLES <= len(curve["x"]) <= SAMPLES + 2
+    assert len(page.data["drivers"]["case-0"]) == len(curve["x"])
+    [drawn] = traces(page, "case-0-0-position", "one", "lines+markers")
+    assert max(drawn["y"]) == pytest.approx(1e-7, rel=5e-3)
+    assert "Thinned figures: strut" in page.text
+
+
+def test_earlier_runs_are_drawn_where_there_are_any(tmp_path: Path) -> None:
+    runs = [Past(run=str(k), engine="one", max_error=1e-9, us_per_step=2.0) for k in range(2)]
+    for past, drawn in ((runs[1:], False), (runs, True)):
+        write_report(results(), tmp_path / "report.html", history={"strut": past})
+        text = (tmp_path / "report.html").read_text("utf-8")
+        assert ("<h3>Earlier runs</h3>" in text, "case-0-trend-error" in text) == (drawn, drawn)
+
+
+def test_every_symbol_has_a_swatch_of_its_own(tmp_path: Path) -> None:
+    """What the legend shows is what is drawn: symbols without one would all be told by the same
+    cross.
+    """
+    records = [
+        record("strut", "closed_form", f"engine {k}", 1e-12, GRID) for k in range(len(SYMBOLS))
+    ]
+    write_report(Results(run={}, records=records), tmp_path / "report.html")
+    legend = (
+        (tmp_path / "report.html").read_text("utf-8").split("Curves shown")[1].split("</div>")[0]
+    )
+    shapes = [each.partition("/>")[2] for each in re.findall(r"<svg(.*?)</svg>", legend, re.DOTALL)]
+    assert len(shapes) == len(set(shapes)) == len(SYMBOLS)
+
+
+def test_differences_of_round_off_are_drawn_within_the_tolerance(tmp_path: Path) -> None:
+    """Else the round-off of an output that stays where it is looks like a motion."""
+    still = msgspec.structs.replace(series(GRID), position=[1e-17 * (k % 3) for k in range(21)])
+    errors = {
+        "x": judged(still, msgspec.structs.replace(still, position=[0.0] * 21), 1e-9, "native")
+    }
+    run = results("consensus_only")
+    one = msgspec.structs.replace(run.records[1], outputs={"x": still}, errors=errors)
+    native = msgspec.structs.replace(run.records[0], outputs={"x": still}, errors={})
+    figures = report(Results(run=run.run, records=[native, one]), tmp_path).data["figures"]
+    assert figures["case-0-0"]["layout"]["xaxis"]["range"] == pytest.approx([-2e-6, 2e-6])
+    moving = report(results(), tmp_path).data["figures"]["case-0-0"]["layout"]
+    assert "range" not in moving["xaxis"]
