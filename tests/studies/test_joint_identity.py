@@ -28,25 +28,14 @@ def folder(tmp_path):
     return tmp_path
 
 
-def run(folder, *arguments):
+SLOTTED = ["slot.toml", "--joint-type", "pin_in_slot:PinInSlot", "--engine", "native"]
+
+
+def run(folder, *arguments, status=2):
     """Run as a user does, in the folder of the module."""
-    command = [
-        sys.executable,
-        "-m",
-        "kincheck",
-        "run",
-        "slot.toml",
-        "--joint-type",
-        "pin_in_slot:PinInSlot",
-        "--engine",
-        "native",
-    ]
-    done = subprocess.run(
-        [*command, *arguments], cwd=folder, capture_output=True, text=True, check=False
-    )
-    # only native knows the joint, so nothing is compared
-    assert done.returncode == 2, done.stderr
-    assert "nothing was compared" in done.stderr
+    command = [sys.executable, "-m", "kincheck", "run", *arguments]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == status, done.stderr
     return done.stderr
 
 
@@ -69,16 +58,38 @@ EDITS = {
 
 
 def test_an_edit_of_the_joints_code_makes_another_run(folder):
-    run(folder, "--history", "h.sqlite")
+    # only native knows the joint, so nothing is compared
+    assert "nothing was compared" in run(folder, *SLOTTED, "--history", "h.sqlite")
     for edited, expected in EDITS.items():
         killed(folder)
         if edited is not None:
             (folder / edited).write_text((folder / edited).read_text() + "\n# edited\n")
-        assert expected in run(folder, "--history", "h.sqlite", "--resume"), edited
+        assert expected in run(folder, *SLOTTED, "--history", "h.sqlite", "--resume"), edited
+
+
+ENGINE = """import kincheck.adapters
+native = kincheck.adapters.engine("native")
+
+class Mine:
+    name, mode, loop, settings = "mine", "projection", "compiled", {}
+    version, unsupported = native.version, native.unsupported
+    build, solve, in_process = native.build, native.solve, True
+"""
+
+
+def test_an_edit_of_an_engines_code_makes_another_run(tmp_path):
+    """Whatever version it gives."""
+    (tmp_path / "mine.py").write_text(ENGINE)
+    command = ["four_bar", "--engine", "mine:Mine", "--history", "h.sqlite"]
+    run(tmp_path, *command, status=0)
+    killed(tmp_path)
+    (tmp_path / "mine.py").write_text(ENGINE + "\n# edited\n")
+    assert "run 2 is new" in run(tmp_path, *command, "--resume", status=0)
 
 
 def test_installed_modules_and_kinchecks_own_are_not_among_the_sources():
     assert sources([]) == {}
-    found = sources([f"{__name__}:Nothing"])
+    found = sources([f"{__name__}:Nothing", "numpy", "kincheck.adapters.native"])
     assert __name__ in found
-    assert not any(name.split(".")[0] in ("kincheck", "numpy", "pytest") for name in found)
+    assert not any(name.split(".")[0] in ("kincheck", "scipy", "pytest") for name in found)
+    assert "numpy.linalg" not in found
