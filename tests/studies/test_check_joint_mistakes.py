@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import pytest
 from kincheck.core import (
     ConstantVelocity,
+    Cylindrical,
     InPlane,
     Revolute,
     Spherical,
@@ -152,6 +153,13 @@ def unscaled(self, i, j):
     return tuple(p.Distance(*arms, 0.05 * a, 0.05, 0.05) for a in (f, g))
 
 
+def measured_backwards(self, freedom, i, j):
+    P, h = vec(self.point), unit(self.axis)
+    if freedom == "rotation":
+        return p.DrivenAngle(h)
+    return p.Dot20(-h, i.arm(P), j.arm(P), ZERO)
+
+
 def no_rows(self, i, j):
     return ()
 
@@ -197,6 +205,14 @@ MISTAKES = {
     "other coordinates": (
         "mixed style",
         lambda: mistaken(Revolute, freedoms=("rotation", "translation")),
+    ),
+    "a driver that pulls backwards": (
+        "mixed style",
+        lambda: mistaken(Cylindrical, measured=measured_backwards),
+    ),
+    "a driver about the opposite axis": (
+        "mixed style",
+        lambda: mistaken(Revolute, measured=lambda self, *_: p.DrivenAngle(-unit(self.axis))),
     ),
     "loop": ("loop: acceleration", lambda: mistaken(Revolute, p.Dot11, gamma=negative_gamma)),
 }
