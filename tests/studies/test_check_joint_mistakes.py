@@ -263,3 +263,15 @@ def test_a_wrong_equivalent_is_caught(few, in_folder):
     report = check_joint(mistaken(right, equivalent=equivalent), samples=8)
     assert report.failures == ("loop: native, equivalent",), report
     assert "2 degrees of freedom" in report["loop: native, equivalent"].message
+
+
+def test_an_equivalent_with_fixed_names_is_caught(few):
+    """The second joint of a mechanism would have parts of the same names."""
+
+    def equivalent(self):
+        return [], [Revolute("pin", self.i, self.j, self.point, self.axis)]
+
+    report = check_joint(mistaken(Revolute, equivalent=equivalent), samples=8)
+    assert report.failures == ("loop: native, equivalent",), report
+    message = report["loop: native, equivalent"].message
+    assert "calls a part 'pin' whatever the joint's name is" in message
