@@ -32,7 +32,8 @@ def keeping(
     from .joint_loading import sources
 
     about: dict[str, Any] = {"tol": options.tol, "command": options.command, "settings": settings}
-    about |= {"unread": unread, "resume": options.resume, "joints": sources(options.joint_type)}
+    code = [*options.joint_type, *(type(each).__module__ for each in engines)]
+    about |= {"unread": unread, "resume": options.resume, "sources": sources(code)}
     try:
         found = keep(Path(options.history), cases, engines, **about)
     except HistoryError as error:

@@ -1,4 +1,4 @@
-"""Joint types of users: a class given by module and name, and the sources behind it."""
+"""Joint types and engines of users: a class given by module and name, and the sources behind it."""
 
 from __future__ import annotations
 
@@ -68,18 +68,23 @@ def load_joint(where: str) -> type[Joint]:
 
 
 def sources(names: Iterable[str]) -> dict[str, str]:
-    """Return the SHA-256 of the source of every module behind joint types at MODULE:CLASS,
-    by module name.
+    """Return the SHA-256 of the source of every module behind joint types or engines, by module
+    name.
 
     Included are the modules themselves and those loaded from their folders or below, but neither
     installed modules nor kincheck's. Modules imported only later, and files read by a module,
     are not included.
+
+    Args:
+        names: of them, MODULE:CLASS or MODULE.
     """
     named = [sys.modules.get(name.partition(":")[0]) for name in names]
     folders = {
         file.parent
         for module in named
-        if module is not None and (file := _file(module)) is not None
+        if module is not None
+        and (file := _file(module)) is not None
+        and INSTALLED not in file.parts
     }
     found: dict[str, str] = {}
     for name, module in sorted(sys.modules.items()):

@@ -72,7 +72,7 @@ def keep(
     settings: Mapping[str, Any],
     resume: bool,
     unread: Sequence[str] = (),
-    joints: Mapping[str, str] | None = None,
+    sources: Mapping[str, str] | None = None,
 ) -> Keeping:
     """Begin a run in a history, or continue the last one with the same cases, engines, tolerance,
     limits, versions, machine and files.
@@ -81,7 +81,8 @@ def keep(
         settings: further circumstances.
         resume: continue an unfinished run; begin a new one if there is none.
         unread: names of requested cases that cannot be read.
-        joints: digests of the modules of joint types, by name: other code is another run.
+        sources: digests of the modules of joint types and engines of users, by name: other code
+            makes another run.
 
     Raises:
         HistoryError: the file cannot be read or written.
@@ -97,7 +98,7 @@ def keep(
     state = [facts[name] for name in ("kincheck", "python", "numpy")] + [
         git.get(name) for name in ("commit", "changed", "edits")
     ]
-    code = [*state, *(joints or {}).items()]
+    code = [*state, *(sources or {}).items()]
     found = versions(engines, min(settings.get("timeout", PATIENCE), PATIENCE))
     versioned = [
         (each.name, each.mode, version) for each, version in zip(engines, found, strict=True)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import pytest
 from kincheck.core import (
     ConstantVelocity,
+    Cylindrical,
     InPlane,
     Revolute,
     Spherical,
@@ -152,6 +153,13 @@ def unscaled(self, i, j):
     return tuple(p.Distance(*arms, 0.05 * a, 0.05, 0.05) for a in (f, g))
 
 
+def measured_backwards(self, freedom, i, j):
+    P, h = vec(self.point), unit(self.axis)
+    if freedom == "rotation":
+        return p.DrivenAngle(h)
+    return p.Dot20(-h, i.arm(P), j.arm(P), ZERO)
+
+
 def no_rows(self, i, j):
     return ()
 
@@ -198,6 +206,14 @@ MISTAKES = {
         "mixed style",
         lambda: mistaken(Revolute, freedoms=("rotation", "translation")),
     ),
+    "a driver that pulls backwards": (
+        "mixed style",
+        lambda: mistaken(Cylindrical, measured=measured_backwards),
+    ),
+    "a driver about the opposite axis": (
+        "mixed style",
+        lambda: mistaken(Revolute, measured=lambda self, *_: p.DrivenAngle(-unit(self.axis))),
+    ),
     "loop": ("loop: acceleration", lambda: mistaken(Revolute, p.Dot11, gamma=negative_gamma)),
 }
 
@@ -239,3 +255,15 @@ def test_a_wrong_equivalent_is_caught(few, in_folder):
     report = check_joint(mistaken(right, equivalent=equivalent), samples=8)
     assert report.failures == ("loop: native, equivalent",), report
     assert "2 degrees of freedom" in report["loop: native, equivalent"].message
+
+
+def test_an_equivalent_with_fixed_names_is_caught(few):
+    """The second joint of a mechanism would have parts of the same names."""
+
+    def equivalent(self):
+        return [], [Revolute("pin", self.i, self.j, self.point, self.axis)]
+
+    report = check_joint(mistaken(Revolute, equivalent=equivalent), samples=8)
+    assert report.failures == ("loop: native, equivalent",), report
+    message = report["loop: native, equivalent"].message
+    assert "calls a part 'pin' whatever the joint's name is" in message

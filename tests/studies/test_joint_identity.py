@@ -32,22 +32,19 @@ def folder(tmp_path):
 
 
 @pytest.fixture
-def run(folder, monkeypatch, own_joint_types, capsys):
-    """Returns what a run says, in the folder of the module, which each run imports anew."""
-    monkeypatch.chdir(folder)
+def run(tmp_path, monkeypatch, own_joint_types, capsys):
+    """Returns what a run says, in the folder of the modules, which each run imports anew."""
+    monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("sys.path", ["", *sys.path])
 
-    def run(*arguments):
-        for module in ("pin_in_slot", "beside"):
+    def run(*arguments, status=2):
+        for module in ("pin_in_slot", "beside", "mine"):
             monkeypatch.delitem(sys.modules, module, raising=False)
         importlib.invalidate_caches()
         clear_caches()
-        joint = ("--joint-type", "pin_in_slot:PinInSlot")
-        status = main(["run", "slot.toml", *joint, "--engine", "native", "--jobs", "0", *arguments])
+        found = main(["run", *arguments, "--jobs", "0", "--history", "h.sqlite"])
         said = capsys.readouterr().err
-        # only native knows the joint, so nothing is compared
-        assert status == 2, said
-        assert "nothing was compared" in said
+        assert found == status, said
         return said
 
     return run
@@ -68,16 +65,41 @@ EDITS = {
 }
 
 
+SLOTTED = ["slot.toml", "--joint-type", "pin_in_slot:PinInSlot", "--engine", "native"]
+
+
 def test_an_edit_of_the_joints_code_makes_another_run(folder, run):
-    run("--history", "h.sqlite")
+    # only native knows the joint, so nothing is compared
+    assert "nothing was compared" in run(*SLOTTED)
     for edited, expected in EDITS.items():
         killed(folder)
         (folder / edited).write_text((folder / edited).read_text() + "\n# edited\n")
-        assert expected in run("--history", "h.sqlite", "--resume"), edited
+        assert expected in run(*SLOTTED, "--resume"), edited
+
+
+ENGINE = """import kincheck.adapters
+native = kincheck.adapters.engine("native")
+
+class Mine:
+    name, mode, loop, settings = "mine", "projection", "compiled", {}
+    version, unsupported = native.version, native.unsupported
+    build, solve, in_process = native.build, native.solve, True
+"""
+
+
+def test_an_edit_of_an_engines_code_makes_another_run(tmp_path, run):
+    """Whatever version it gives."""
+    (tmp_path / "mine.py").write_text(ENGINE)
+    command = ["four_bar", "--engine", "mine:Mine"]
+    run(*command, status=0)
+    killed(tmp_path)
+    (tmp_path / "mine.py").write_text(ENGINE + "\n# edited\n")
+    assert "run 2 is new" in run(*command, "--resume", status=0)
 
 
 def test_installed_modules_and_kinchecks_own_are_not_among_the_sources():
     assert sources([]) == {}
-    found = sources([f"{__name__}:Nothing"])
+    found = sources([f"{__name__}:Nothing", "numpy", "kincheck.adapters.native"])
     assert __name__ in found
-    assert not any(name.split(".")[0] in ("kincheck", "numpy", "pytest") for name in found)
+    assert not any(name.split(".")[0] in ("kincheck", "scipy", "pytest") for name in found)
+    assert "numpy.linalg" not in found

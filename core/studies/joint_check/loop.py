@@ -11,6 +11,7 @@ import numpy as np
 
 from ...case.case import Case, Series
 from ...case.joint_probe import alternatives
+from ...errors import MechanismError
 from ...harness.compare import describe, deviations, output_series
 from ...harness.engine import Engine
 from ...harness.execution import check
@@ -178,8 +179,16 @@ def _equivalent(case: Case) -> Case | None:
     if it has none.
     """
     tested = next(joint for joint in case.mechanism.joints if joint.type == case.name)
-    if declared_equivalent(tested) is None:
+    offered = declared_equivalent(tested)
+    if offered is None:
         return None
+    another = declared_equivalent(replace(tested, name=f"{tested.name} again")) or ((), ())
+    names = {part.name for parts in offered for part in parts}
+    if taken := sorted(names & {part.name for parts in another for part in parts}):
+        raise MechanismError(
+            f"{tested}: equivalent() calls a part {taken[0]!r} whatever the joint's name is, and"
+            " two joints of a mechanism would share it; make the names of its parts of self.name"
+        )
     known = {*Joint.registry.values()} - {type(tested)}
     mechanism = with_equivalents(case.mechanism, known)
     return replace(case, name=f"{case.name}_equivalent", mechanism=mechanism)
