@@ -84,7 +84,7 @@ def test_a_simulator_starts_there_too():
         for phase in (six(math.pi), 1.0)
     )
     assert static().unsupported(near) is None
-    assert "counted from the design" in str(static().unsupported(far))
+    assert "count from the design" in str(static().unsupported(far))
     found = static().solve(static().build(near), near, 1e-12)
     assert found.points["r"].position[:, 0] == pytest.approx(
         RADIUS * near.sweep.motions["u"].at(TIMES)[0], abs=1e-9

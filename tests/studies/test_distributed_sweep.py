@@ -75,7 +75,7 @@ def test_a_cluster_that_goes_is_a_message(tmp_path, monkeypatch):
         if progress.done == 4096:
             cluster.close()
 
-    gone = r"scheduler tcp://.+: (has gone|every worker that had)"
+    gone = r"scheduler tcp://.+: (was lost|every worker that had)"
     with cluster, pytest.raises(ClusterError, match=gone):
         sweep_designs(
             case,

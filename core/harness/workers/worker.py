@@ -1,4 +1,4 @@
-"""The parent's side of a worker process, and a slot that replaces its worker after a failure."""
+"""The parent's side of a worker process, and slots: they replace a worker after a failure."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ GOING = 5.0
 
 
 class _Tail(Thread):
-    """Thread that reads a stream to its end and keeps the last part."""
+    """Thread for a stream: it reads to the end and keeps the last part."""
 
     def __init__(self, stream: IO[bytes]) -> None:
         super().__init__(daemon=True)
@@ -50,7 +50,7 @@ class _Tail(Thread):
 
 
 class Worker:
-    """A process that solves one pair at a time. It ends with the thread that started it."""
+    """A process for one pair at a time. It ends with its parent thread."""
 
     def __init__(self, limits: Limits) -> None:
         self.limits = limits

@@ -207,10 +207,8 @@ class ArclengthWalk:
                 (a, weight * f_a, h, spot.dt) if is_b else (h, spot.dt, b, weight * f_b)
             )
             last_b = is_b
-        if (
-            abs(best.dt) > STATIONARY
-            and (nodes := self._nodes(before, after, best.arc - before.arc)) is not None
-        ):
+        far = abs(best.dt) > STATIONARY
+        if far and (nodes := self._nodes(before, after, best.arc - before.arc)) is not None:
             offsets, spots = nodes
             root = _root(offsets, np.array([spot.dt for spot in spots]))
             if np.isfinite(root):
@@ -241,17 +239,14 @@ class ArclengthWalk:
         """Return spots on both sides of a length from the first, and their lengths; None if any is
         not reached.
         """
-        offsets = min(NODE, 0.125 * (after.arc - before.arc)) * np.array(
-            [-4.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0]
-        )
+        steps = np.array([-4.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0])
+        offsets = min(NODE, 0.125 * (after.arc - before.arc)) * steps
         found = [self.advance(before, centre + offset) for offset in offsets.tolist()]
         spots = [spot for spot in found if spot is not None]
         return (offsets, spots) if len(spots) == len(found) else None
 
     def _least(self, before: Spot, length: float) -> float:
-        """Return the length from a spot to the minimum of sigma, by golden section; sigma counts as
-        zero if no correction converges.
-        """
+        """Return the length to the least sigma, by golden section; 0 stands for unreached poses."""
         part = 0.5 * (np.sqrt(5.0) - 1.0)
         a, b = 0.0, length
         while b - a > 0.01 * length:
@@ -293,9 +288,8 @@ def _solution(matrix: Array, b: Array) -> Array:
 
 def _between(offsets: Array, spots: Sequence[Spot], at: float) -> float:
     """The time at an offset among spots, interpolated."""
-    return float(
-        np.polynomial.Polynomial.fit(offsets, [spot.time for spot in spots], len(spots) - 1)(at)
-    )
+    times = [spot.time for spot in spots]
+    return float(np.polynomial.Polynomial.fit(offsets, times, len(times) - 1)(at))
 
 
 def _root(x: Array, y: Array) -> float:

@@ -172,7 +172,7 @@ def _unknown(record: Record) -> Finding:
 def _same(
     name: str, pairs: Sequence[Pair], first: Mapping[str, Attempt], solver: Solver
 ) -> Finding:
-    """Check that repeated solves give the same answers."""
+    """Check repeated solves: all give the same answers."""
     worst, where = 0.0, ""
     for index, attempt in solver(pairs):
         case = pairs[index].case.name

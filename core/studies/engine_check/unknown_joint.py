@@ -1,4 +1,4 @@
-"""A joint that no engine knows, and that no chain of known joints replaces."""
+"""A joint unknown to every engine, without a chain of known joints in its place."""
 
 from __future__ import annotations
 
