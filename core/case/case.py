@@ -204,8 +204,9 @@ def size(case: Case) -> float:
     points = [case.mechanism.point(name).position for name in compared]
     points += [position for joint in case.mechanism.joints for position in joint.points_on()]
     shift = float(np.ptp(values[~turning(case)], axis=1).max(initial=0.0))
-    extent = max(float(np.ptp(np.array(points), axis=0).max()), shift)
-    return extent if extent > _COINCIDE * float(np.abs(points).max()) else NO_SIZE
+    places = np.array(points, dtype=np.float64)
+    extent = max(float((places.max(axis=0) - places.min(axis=0)).max()), shift)
+    return extent if extent > _COINCIDE * float(np.abs(places).max()) else NO_SIZE
 
 
 def turning(case: Case) -> NDArray[np.bool_]:

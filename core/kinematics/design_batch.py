@@ -130,7 +130,7 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
         kept[:, doubted, k], solved[doubted, k] = np.nan, False
         near = route.path.where(float(route.path.times[route.by_time][doubted.argmax()]))
         refused = (
-            f"refused at {number_of(doubted.sum(), 'sample')} so near a singular pose that"
+            f"refused at {number_of(int(doubted.sum()), 'sample')} so near a singular pose that"
             f" residuals leave them uncertain, as at {near}; "
         )
         messages[k] = "; ".join(

@@ -7,6 +7,7 @@ continuous, so that rotations beyond half a turn differ from those the other way
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 
@@ -80,7 +81,7 @@ class _OfBody:
         rate = np.array([*Pose.of(ZERO, pose).turn(spin)])
         change = quat(e[:, 1:]) * quat(e[:, :-1]).conjugate()
         agrees = agreement(change, 0.5 * (rate[:, 1:] + rate[:, :-1]), np.diff(t))
-        smallest: Array = np.asarray(change.e0)
+        smallest = cast("Array", np.asarray(change.e0))
         doubtful = np.abs(agrees) < DOUBTFUL
         # rates have no bound towards a fold, but short steps change little
         kept = np.sign(np.where(doubtful, smallest, agrees))

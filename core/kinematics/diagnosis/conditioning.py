@@ -18,6 +18,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path
@@ -196,7 +197,7 @@ def _orientations(matrices: Sequence[Array], design: Array, nearest: int) -> lis
     return found.tolist()
 
 
-def _is_length(formulation: Cartesian, rows: Array) -> Array:
+def _is_length(formulation: Cartesian, rows: Array) -> NDArray[np.bool_]:
     """Return the mask of the rows of lengths: a shift changes them."""
     first = formulation.columns.values()
     slides = [k for name, k in formulation.coordinates.items() if name.endswith(".translation")]

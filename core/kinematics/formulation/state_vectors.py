@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -64,7 +64,7 @@ def state_of(
             h, relative = unit(joint.axis), i.q.conjugate() * j.q
             s_i, s_j = (frame.arm(body, joint.point) for body in joint.bodies)
             apart = (j.u - i.u) + (j.swing(s_j) - i.swing(s_i))
-            angle: Array = np.asarray(angle_about(h, relative))
+            angle = cast("Array", np.asarray(angle_about(h, relative)))
             angle = angle + 4.0 * np.pi * np.round(
                 (driven.get(joint.name, 0.0) - angle) / (4.0 * np.pi)
             )

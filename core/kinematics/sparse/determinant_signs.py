@@ -100,10 +100,10 @@ class Blocks:
         """
         found = [np.zeros((values.shape[1], 0))]
         if self._well_chosen:
-            left = self.rows * solve_transposed(
+            left: Array = self.rows * solve_transposed(
                 np.repeat(self.columns * self.start, values.shape[1], axis=1)
             )
-            right = self.columns * solve(left)
+            right: Array = self.columns * solve(left)
             found.append((np.linalg.norm(left, axis=0) / np.linalg.norm(right, axis=0))[:, None])
         for each in self._dense(values):
             # what is no number is singular

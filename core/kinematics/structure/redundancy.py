@@ -38,10 +38,10 @@ def independent_rows(matrix: Array, last: int, conditions: Sequence[Condition] =
         conditions: geometric conditions of the rows. Without them the choice is good at the pose of
             the matrix only, not along a sweep.
     """
-    left, taken = np.array(matrix), list[int]()
+    left, taken = matrix.copy(), list[int]()
     enough = RANK_TOLERANCE * (float(np.abs(left).max(initial=0.0)) or 1.0)
     for row in range(len(matrix) - last, len(matrix)):
-        if (size := float(np.linalg.norm(left[row]))) > enough:
+        if (size := float(np.linalg.norm(left[row : row + 1]))) > enough:
             taken.append(row)
             left = _without(left, left[row : row + 1] / size)
     all_rows = sorted(conditions, key=lambda each: each.remote) or [

@@ -93,7 +93,8 @@ def _pushes(probe: Probe, case: Case, name: str) -> Iterator[tuple[Array, Array,
     hinge: Any = mechanism.joint(driver.joint)
     sign = {hinge.j: 1.0, hinge.i: -1.0}.get(name)
     if sign is not None:  # its first body is the ground
-        axis = np.array(hinge.axis) / np.linalg.norm(hinge.axis)
+        axis = np.array(hinge.axis, dtype=np.float64)
+        axis /= np.linalg.norm(axis)
         still = np.zeros((len(probe.motion.solved), 3))
         yield still, still, sign * forces.drivers[driver.name][:, None] * axis
     (spring,) = (each for each in mechanism.forces if isinstance(each, SpringDamper))

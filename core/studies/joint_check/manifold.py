@@ -160,7 +160,7 @@ def _smallest(matrix: Array) -> Array:
 
 def rank(matrix: Array) -> NDArray[np.int64]:
     """Return the numerical rank of each lane's rows, shape (lanes,)."""
-    return np.asarray(np.linalg.matrix_rank(_even(matrix)[0], tol=DEPENDENT))
+    return np.asarray(np.linalg.matrix_rank(_even(matrix)[0], tol=DEPENDENT), dtype=np.int64)
 
 
 def _even(matrix: Array) -> tuple[Array, Array]:

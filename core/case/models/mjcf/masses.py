@@ -232,8 +232,11 @@ def _sizes(element: Element, kind: str) -> Sequence[float]:
     """Return the sizes of a shape: radius and half length, or three half lengths [m]."""
     sizes = [*element.numbers("size", (1, 2, 3), (0.0,))]
     if "fromto" in element.attributes and kind != "sphere":  # two radii alike, then the half length
-        ends = np.reshape(element.numbers("fromto", (6,)), (2, 3))
-        return [*[sizes[0]] * (SHAPES[kind] - 1), 0.5 * float(np.linalg.norm(ends[1] - ends[0]))]
+        ends = np.array(element.numbers("fromto", (6,)), dtype=np.float64).reshape(2, 3)
+        return [
+            *[sizes[0]] * (SHAPES[kind] - 1),
+            0.5 * float(np.linalg.norm(np.diff(ends, axis=0))),
+        ]
     if len(sizes) < SHAPES[kind]:
         raise element.fault(f"size: found {len(sizes)} numbers, expected {SHAPES[kind]}; add them")
     return sizes[: SHAPES[kind]]

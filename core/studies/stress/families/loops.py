@@ -140,7 +140,7 @@ class Builder:
     def _rows(self, mechanism: Mechanism, drop: int = 0) -> Array:
         """Return rows of unit length, translations in metres, without the first `drop` rows."""
         rows = Evaluator(conditions(mechanism))
-        found = rows.jacobian(Poses.design(len(self.bodies), 1))[0][drop:]
+        found: Array = rows.jacobian(Poses.design(len(self.bodies), 1))[0][drop:]
         found[:, np.arange(found.shape[1]) % 6 < 3] /= rows.stated.unit
         return found / np.linalg.norm(found, axis=1, keepdims=True)
 
