@@ -203,10 +203,10 @@ def size(case: Case) -> float:
     compared = [name for name in case.points if not name.startswith(MARKER)] or named
     points = [case.mechanism.point(name).position for name in compared]
     points += [position for joint in case.mechanism.joints for position in joint.points_on()]
-    shift = float(np.ptp(values[~turning(case)], axis=1).max(initial=0.0))
-    places = np.array(points, dtype=np.float64)
-    extent = max(float((places.max(axis=0) - places.min(axis=0)).max()), shift)
-    return extent if extent > _COINCIDE * float(np.abs(places).max()) else NO_SIZE
+    shifts = values[~turning(case)]
+    shift = float((shifts.max(axis=1) - shifts.min(axis=1)).max(initial=0.0))
+    extent = max(*(max(each) - min(each) for each in zip(*points, strict=True)), shift)
+    return extent if extent > _COINCIDE * float(np.abs(points).max()) else NO_SIZE
 
 
 def turning(case: Case) -> NDArray[np.bool_]:
