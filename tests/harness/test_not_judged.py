@@ -6,6 +6,7 @@ import json
 import re
 import sqlite3
 import zlib
+from contextlib import closing
 from xml.etree import ElementTree as ET
 
 import msgspec
@@ -215,7 +216,7 @@ def test_a_history_of_before_is_read_as_what_it_is(path, capsys):
             if (each.case, each.engine) == ("first", "mujoco")
         ],
     )
-    with sqlite3.connect(path) as raw:  # it is as the older version left it
+    with closing(sqlite3.connect(path)) as raw:  # it is as the older version left it
         ((outcome, record),) = raw.execute("SELECT outcome, record FROM records")
     assert (outcome, json.loads(zlib.decompress(record))["outcome"]) == ("pass", "pass")
     with Store(path) as store:
