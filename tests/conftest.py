@@ -85,6 +85,12 @@ def cluster(monkeypatch):
 
 
 @pytest.fixture
+def path(tmp_path):
+    """The file of a history."""
+    return tmp_path / "history.sqlite"
+
+
+@pytest.fixture
 def own_joint_types(monkeypatch):
     """Joint types that a test makes are forgotten after it."""
     monkeypatch.setattr(Joint, "registry", dict(Joint.registry))

@@ -192,11 +192,6 @@ def test_results_of_before_are_read_as_what_they_are(tmp_path):
     assert [each.outcome for each in from_json(file.read_bytes()).records] == ["unjudged", "pass"]
 
 
-@pytest.fixture
-def path(tmp_path):
-    return tmp_path / "history.sqlite"
-
-
 def bare(all_records, engine="mujoco", *, outcome=Outcome.UNJUDGED):
     """The records with a pair that nothing is compared with."""
     nothing = {"position": None, "velocity": None, "acceleration": None, "reason": WHY}

@@ -32,11 +32,6 @@ GONE = {"outcome": Outcome.UNAVAILABLE, "message": "not installed", "seconds": N
 UNMADE = "not run: the run ended before this pair"
 
 
-@pytest.fixture
-def path(tmp_path):
-    return tmp_path / "history.sqlite"
-
-
 def killed(path, made, *, owner="a-host-that-is-no-more|1|1"):
     """A run of all pairs that ended by force after so many; with an owner of None, one that goes
     on.

@@ -27,11 +27,6 @@ FIRST_SCHEMA = Path(__file__).parents[1] / "data" / "history_1.sqlite"
 """Two runs of a crank in three and four engines, made by schema 1."""
 
 
-@pytest.fixture
-def path(tmp_path):
-    return tmp_path / "history.sqlite"
-
-
 def history(path, *argv):
     return main.main(["history", "--history", str(path), *map(str, argv)])
 

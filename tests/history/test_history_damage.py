@@ -16,11 +16,6 @@ from ..support.nights import nights
 NO_TRENDS = "The history cannot be read, so this page shows no earlier runs."
 
 
-@pytest.fixture
-def path(tmp_path):
-    return tmp_path / "history.sqlite"
-
-
 def change(path, statement):
     connection = sqlite3.connect(path)
     connection.execute(statement)

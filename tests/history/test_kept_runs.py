@@ -25,11 +25,6 @@ MOMENTS = int(os.environ.get("KINCHECK_DRILL", "1"))
 """At which a run is killed: KINCHECK_DRILL=50 for the full drill."""
 
 
-@pytest.fixture
-def path(tmp_path):
-    return tmp_path / "history.sqlite"
-
-
 def kincheck(*arguments, limit=None, **environment):
     """The command line with made-up cases and engines: see drill.py. limit: on the size of files
     [bytes].

@@ -23,11 +23,6 @@ from .test_regression import reported
 FIRST = ("first", "mujoco")
 
 
-@pytest.fixture
-def path(tmp_path):
-    return tmp_path / "history.sqlite"
-
-
 def held_to(factor):
     """A change of errors: all tolerances grow."""
 

@@ -13,11 +13,6 @@ from kincheck.core.report.regression_summary import to_markdown
 from ..support.nights import FACTS, RESULTS, changed, keep, nights, records, reported, times, worse
 
 
-@pytest.fixture
-def path(tmp_path):
-    return tmp_path / "history.sqlite"
-
-
 def kinds(found):
     return [(each.kind, each.case, each.engine) for each in found.findings]
 

@@ -3,7 +3,6 @@
 import xml.etree.ElementTree as ET
 
 import msgspec
-import pytest
 from kincheck.core.cli import main
 from kincheck.core.harness.record import Outcome
 from kincheck.core.history.regression.findings import Regressions
@@ -13,11 +12,6 @@ from kincheck.core.report.regression_labels import headline, rows
 from kincheck.core.report.regression_summary import to_markdown
 
 from ..support.nights import changed, keep, nights, records, reported, times, worse
-
-
-@pytest.fixture
-def path(tmp_path):
-    return tmp_path / "history.sqlite"
 
 
 def test_the_command_writes_every_format(path, tmp_path, capsys):

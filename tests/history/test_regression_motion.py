@@ -25,11 +25,6 @@ def night(path, unjudged=True, driver=DRIVER, **values):
     keep(path, changed(records(), driver=driver, outputs=outputs, **errors))
 
 
-@pytest.fixture
-def path(tmp_path):
-    return tmp_path / "history.sqlite"
-
-
 def found_after(path, **now):
     night(path, unjudged=now.get("unjudged", True))
     night(path, **now)

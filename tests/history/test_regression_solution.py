@@ -15,11 +15,6 @@ from ..support.nights import changed, keep, nights, records, reported
 FIRST = ("first", "mujoco")
 
 
-@pytest.fixture
-def path(tmp_path):
-    return tmp_path / "history.sqlite"
-
-
 def of_output(output="x", **changes):
     """A change of outputs: of one of them."""
 

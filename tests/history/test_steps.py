@@ -17,11 +17,6 @@ from kincheck.core.history.store import Store
 from ..support.nights import changed, keep, nights, records, times, worse
 
 
-@pytest.fixture
-def path(tmp_path):
-    return tmp_path / "history.sqlite"
-
-
 def found(path, **options):
     with Store(path) as store:
         return steps(read(store), **options)

@@ -31,11 +31,6 @@ ENGINES = [
 ]
 
 
-@pytest.fixture
-def path(tmp_path):
-    return tmp_path / "history.sqlite"
-
-
 def kept(path, cases, engines, *, resume=False, stop=None):
     """A run in a history, which ends by force after so many records; the run's number and what it
     gave.
