@@ -1,12 +1,10 @@
 """Comparing: projections, tolerances, and deviations that must not be missed."""
 
 from dataclasses import replace
-from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from kincheck import cases
-from kincheck.core.case.case import NO_SIZE, ORDERS, Output, Series, size
+from kincheck.core.case.case import NO_SIZE, Output, Series, size
 from kincheck.core.errors import CaseError
 from kincheck.core.harness.compare import (
     as_numbers,
@@ -16,15 +14,10 @@ from kincheck.core.harness.compare import (
     output_series,
     pace,
 )
-from kincheck.core.harness.record import Outcome
-from kincheck.core.harness.run import run
 from kincheck.core.mechanism.drivers import PointCoordinate
 from kincheck.core.mechanism.mechanism import Mechanism
-from kincheck.core.report.junit import to_junit
-from kincheck.core.report.report import headline, write_report
-from msgspec import UNSET
 
-from ..support.fakes import RADIUS, SAMPLES, Fake, crank, exact, partial, solution
+from ..support.fakes import RADIUS, SAMPLES, crank, exact, partial, solution
 
 REFERENCE = np.array([0.0, 1.0, 3.0, 2.0])
 
@@ -219,99 +212,3 @@ def test_a_deviation_is_described_by_output_quantity_sample_driver_and_tolerance
         == "half_track_change: velocity is off by 0.004 m/s at sample 2 (stroke = 0.1), tolerance"
         " 0.001 m/s, against closed form"
     )
-
-
-class Undefined(Output):
-    """An output without a value, whose derivatives are known."""
-
-    def of(self, at, design):
-        return replace(super().of(at, design), x=np.full(SAMPLES, np.nan))
-
-
-class Rate(Output):
-    """The derivative of an output, made of velocities."""
-
-    orders = 2
-
-    def of(self, at, design):
-        return super().of(at, design).dot
-
-
-class UndefinedRate(Rate):
-    """Nor has it a value."""
-
-    def of(self, at, design):
-        return replace(super().of(at, design), x=np.full(SAMPLES, np.nan))
-
-
-@pytest.mark.parametrize("complete", [True, False])
-def test_an_output_without_any_value_fails_where_all_samples_were_solved(complete):
-    x, y = crank().outputs
-    case = replace(crank(), outputs=(Undefined(**vars(x)), y))
-    results = run([case], [Fake(answer=solution if complete else partial)], tol=1e-12)
-    (record,) = results.records
-    assert record.outcome is Outcome.FAIL
-    assert record.errors["x"].position is None
-    assert record.errors["x"].lost == (SAMPLES if complete else UNSET)
-    assert (
-        headline(results)
-        == f"1 of 1 comparisons {'has outputs without a value' if complete else 'lacks samples'}"
-    )
-    assert (
-        f"x: position: {SAMPLES} samples without a value where closed form has one"
-        in record.message
-    ) is complete
-    failed = ElementTree.fromstring(to_junit(results)).findall(".//testcase[failure]")
-    assert [test.get("name") for test in failed] == (["x"] if complete else ["x", "y"])
-
-
-def test_an_engine_that_solves_no_sample_is_in_the_headline_and_in_the_overview(tmp_path):
-    def nothing(case):
-        return solution(
-            case, solved=np.zeros(SAMPLES, dtype=bool), position=np.full((SAMPLES, 3), np.nan)
-        )
-
-    results = run([crank()], [Fake("native"), Fake("none", answer=nothing)], tol=1e-12)
-    assert headline(results) == "1 of 2 comparisons lacks samples"
-    write_report(results, tmp_path / "report.html")
-    text = (tmp_path / "report.html").read_text("utf-8")
-    assert "<small>no sample solved</small>" in text
-    assert "<small>nothing to compare with</small>" not in text
-
-
-@pytest.mark.parametrize(
-    "rates",
-    [(), ("velocity",), ("velocity", "acceleration")],
-    ids=["positions", "velocities", "all"],
-)
-def test_a_derivative_has_one_less_of_what_the_engine_gives(rates):
-    case = crank()
-    right, missing = (
-        case.reference["x"],
-        {name: None for name in ("velocity", "acceleration") if name not in rates},
-    )
-    standards = [("closed_form", Series(right.velocity, right.acceleration))]
-    known, lost = (
-        deviations(
-            case,
-            output,
-            output_series(case, output, solution(case, **missing)),
-            standards,
-            complete=True,
-        )
-        for output in (kind(**vars(case.outputs[0])) for kind in (Rate, UndefinedRate))
-    )
-    assert [quantity for quantity, _ in known.items()] == ["position", "velocity"][: len(rates)]
-    assert not known.lost
-    assert lost.lost == (SAMPLES if rates else UNSET)
-    assert (
-        "position: the engine gives no velocities, on which it depends" in (lost.reason or "")
-    ) is not bool(rates)
-
-
-def test_a_reference_of_all_there_is_needs_no_native_engine():
-    """Of outputs that are derivatives there is no acceleration."""
-    case, native = cases.load("mcpherson_suspension"), Fake("native")
-    assert any(output.orders < ORDERS for output in case.outputs)
-    run([case], [Fake("mujoco", refusal="no")], tol=1e-12, baseline=native)
-    assert native.solves == 0

@@ -15,14 +15,13 @@ from kincheck import cases
 from kincheck.core import Body, Distance, JointAngle, Mechanism, Point, Revolute, solve
 from kincheck.core.case.case import MARKER, Case, Sweep, Truth
 from kincheck.core.harness.record import Outcome, Results, from_json, to_json
-from kincheck.core.harness.scene import FRAMES, LARGEST, POSES, scene, with_scenes
+from kincheck.core.harness.scene import FRAMES, scene, with_scenes
 from kincheck.core.harness.scene_record import Scene, SceneBody
-from kincheck.core.report.axis import Axis, driver_axis
+from kincheck.core.report.axis import driver_axis
 from kincheck.core.report.drawing import Drawing, drawing
 
-from ..kinematics.test_chain import chain
 from ..oracles.naive import A
-from ..support.made_up import GRID, STROKE, record, series
+from ..support.made_up import GRID, STROKE, record
 
 STRUT = cases.load("mcpherson_strut")
 AXIS = driver_axis(
@@ -234,94 +233,3 @@ def test_results_without_scenes_are_read():
 
 
 UP: Any = {"name": "lift", "type": "point_coordinate", "point": "wheel_center", "relative": True}
-
-
-@pytest.mark.parametrize(
-    ("driver", "up", "name"),
-    [
-        (UP | {"direction": [0, 0, 2]}, 1, "wheel travel"),
-        (UP | {"direction": [0, 0, -1]}, -1, "wheel travel"),
-        (UP | {"direction": [0, 0, 1], "point": "tip"}, 1, "lift"),
-        (UP | {"direction": [0, 0, 1], "relative": False}, 1, "lift"),
-        (UP | {"direction": [0, 1, 1]}, 0, "lift"),
-        (UP | {"direction": [1, 0, 0]}, 0, "lift"),
-        ({"name": "lift", "type": "joint_displacement"}, 0, "lift"),
-        ({"name": "lift", "type": "joint_angle"}, 0, "lift"),
-    ],
-)
-def test_travel_is_upwards_where_a_point_is_driven_along_z(
-    driver: dict[str, Any], up: int, name: str
-):
-    made = record(
-        "strut", "closed_form", "one", 0.0, GRID, driver={"lift": GRID}, outputs={"x": series(GRID)}
-    )
-    axis: Axis = driver_axis({"driver": driver}, [made], [])
-    assert (axis.up, axis.name) == (up, name)
-
-
-def test_large_mechanisms_have_fewer_frames_and_the_largest_no_scene():
-    def case(loops: int) -> Case:
-        made = chain(loops)
-        return Case(
-            made.name, "", Truth.CONSENSUS_ONLY, made, Sweep("turn", np.linspace(0.0, 0.1, 101)), ()
-        )
-
-    assert len(scene(case(30)).frames) == POSES // 61
-    # one crank more than loops
-    assert with_scenes(Results(run={}, records=[]), [case(LARGEST // 2)]).scenes == {}
-
-
-def test_a_suspension_has_its_wheel_about_the_axis_of_rotation():
-    shown = scene(cases.load("mcpherson_suspension"), poses=False)
-    [wheel] = shown.wheels
-    # a right wheel in axes x rearward, y outboard and z up, without static angles
-    assert wheel.spin == pytest.approx((0.0, 1.0, 0.0), abs=1e-12)
-    aslant = msgspec.structs.replace(wheel, spin=[0.6, 0.8, 0.0])
-    drawn = drawing(msgspec.structs.replace(shown, wheels=[aslant]), AXIS)
-    [(body, center, spin, up, radius)] = drawn.wheels
-    assert drawn.bodies[body]["name"] == "knuckle"
-    turn = A(np.array(drawn.bodies[body]["p"][0]))
-    assert np.array(drawn.bodies[body]["r"][0]) + turn @ center == pytest.approx(
-        (0.975, 0.715, 0.101)
-    )
-    assert turn @ spin == pytest.approx((0.6, 0.8, 0.0), abs=1e-12)
-    assert (up, radius) == ([0.0, 0.0, 1.0], 0.3)
-    assert drawn.layers == ["names", "frames", "paths", "wheels"]
-    assert drawing(scene(STRUT, poses=False), AXIS).wheels == []
-
-
-def test_arrows_are_the_forces_of_outputs_at_the_samples_of_the_frames():
-    shown = msgspec.structs.replace(
-        scene(cases.load("mcpherson_strut_loaded"), poses=False), frames=[0, 2]
-    )
-    components = [(force.name, force.output, force.direction) for force in shown.forces]
-    assert components == [
-        ("stroke", "wheel_load", [0.0, 0.0, 1.0]),
-        ("tie_rod", "tie_rod_force_y", [0.0, 1.0, 0.0]),
-        ("ball", "ball_force_y", [0.0, 1.0, 0.0]),
-        ("strut_top", "strut_top_force_z", [0.0, 0.0, 1.0]),
-    ]
-    further = [
-        msgspec.structs.replace(shown.forces[2], output="ball_force_x", direction=[1.0, 0.0, 0.0]),
-        msgspec.structs.replace(shown.forces[2], output="aslant", direction=[0.6, 0.8, 0.0]),
-    ]
-    shown = msgspec.structs.replace(shown, forces=[*shown.forces[:3], *further])
-    values = {
-        "wheel_load": [5.0, 6.0, None],
-        "ball_force_x": [1.0, 2.0, 3.0],
-        "ball_force_y": [-4.0, 0.0, -6.0],
-        "aslant": [10.0, 0.0, 5.0],
-    }
-    drawn = drawing(shown, AXIS, values)
-    # components along axes are one vector; what is unknown has no arrow
-    assert {name: forces for _, _, name, forces in drawn.arrows} == {
-        "stroke": [[0.0, 0.0, 5.0], None],
-        "ball": [[1.0, -4.0, 0.0], [3.0, -6.0, 0.0]],
-        "aslant": [[6.0, 8.0, 0.0], [3.0, 4.0, 0.0]],
-    }
-    body, place, *_ = next(each for each in drawn.arrows if each[2] == "ball")
-    assert drawn.bodies[body]["name"] == "knuckle"
-    turn = A(np.array(drawn.bodies[body]["p"][0]))
-    assert np.array(drawn.bodies[body]["r"][0]) + turn @ place == pytest.approx(
-        (0.9676, 0.66, -0.01)
-    )

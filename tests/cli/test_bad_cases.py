@@ -1,0 +1,141 @@
+"""Cases that cannot be read, in a run of others: named first, recorded; the others are solved."""
+
+import re
+from pathlib import Path
+from xml.etree import ElementTree
+
+import kincheck.adapters
+import kincheck.cases
+import kincheck.core
+import pytest
+from kincheck.core.cli import main
+from kincheck.core.errors import CaseError
+from kincheck.core.harness.results_file import read_results
+from kincheck.core.report.caveats import caveats
+from kincheck.core.report.report import headline
+
+from ..support.fakes import Fake, crank
+from .test_cli import RIGHT
+
+
+def test_all_bad_case_files_are_named_before_anything_is_computed(kincheck_main, capsys, tmp_path):
+    first, second = tmp_path / "first.toml", tmp_path / "second.json"
+    first.write_text('schema = "kincheck-case/9"\n')
+    second.write_text("{")
+    RIGHT.solves = 0
+    assert kincheck_main("run", first, second, tmp_path / "third.toml") == 2
+    captured = capsys.readouterr()
+    said = captured.err.splitlines()
+    assert [
+        sum(name in line for line in said) for name in ("first.toml", "second.json", "third.toml")
+    ] == [1, 1, 1]
+    assert "Traceback" not in captured.err
+    assert captured.out == ""
+    assert RIGHT.solves == 0
+
+
+@pytest.mark.parametrize("bad", ["bad.toml", "nosuch"])
+def test_the_other_cases_of_a_bad_one_are_run_and_recorded(
+    kincheck_main, capsys, tmp_path, monkeypatch, bad
+):
+    monkeypatch.chdir(tmp_path)
+    Path("bad.toml").write_text('schema = "kincheck-case/9"\n')
+    files = ["--out", "out", "--junit", "junit.xml", "--history", "history"]
+    for _ in range(2):
+        assert kincheck_main("run", "crank", bad, "crank_two", *files) == 2
+    captured = capsys.readouterr()
+    message = f"{bad}: schema: found" if bad == "bad.toml" else f"there is no case {bad!r}"
+    assert captured.err.count(message) == 2  # once each run
+    assert captured.err.index(message) < captured.err.index("[1/2] crank native: pass")
+    found = read_results(Path("out/results.json"))
+    assert [record.case for record in found.records] == ["crank", "crank_two"]
+    assert found.missing == [(bad, "native", "projection")]
+    assert [*found.unread] == [bad]
+    assert message in found.unread[bad]
+    assert headline(found).endswith("within tolerance; 1 case could not be read")
+    assert dict(caveats(found))[f"Not read: {bad}"].startswith(message)
+    (error,) = (
+        test.find("error")
+        for test in ElementTree.parse("junit.xml").iter("testcase")
+        if test.find("error") is not None
+    )
+    assert error.get("message") == found.unread[bad]
+    # what is broken tonight is told, and tomorrow too
+    assert kincheck_main("report", "--history", "history") == 1
+    told = capsys.readouterr().out
+    assert message.partition(":")[0].replace("_", r"\_") in told
+    assert told.startswith(
+        "## run 2: all 2 right, 1 case could not be read; nothing to compare with: no earlier"
+        " green run"
+    )
+    # and is one fault, however many engines were to solve it
+    engines = [RIGHT, Fake("other")]
+    assert kincheck_main("run", "crank", "--history", "history", engines=engines) == 0
+    assert kincheck_main("run", "crank", bad, "--history", "history", engines=engines) == 2
+    capsys.readouterr()
+    assert kincheck_main("report", "--history", "history") == 1
+    told = capsys.readouterr().out.splitlines()[0]
+    told = re.sub(r": \d slower, ", ": ", told)  # of sweeps of 0.05 ms, on a busy machine
+    assert told == "## run 4 against run 3 (last green): 1 case could not be read"
+
+
+def test_a_night_in_which_no_case_can_be_read_is_recorded(
+    kincheck_main, capsys, tmp_path, monkeypatch
+):
+    """Else the report would judge the night before, and its files would stand there as those of
+    this one.
+    """
+    monkeypatch.chdir(tmp_path)
+    files = [
+        "--out",
+        "out",
+        "--junit",
+        "junit.xml",
+        "--markdown",
+        "cases.md",
+        "--history",
+        "history",
+    ]
+    for _ in range(2):
+        assert kincheck_main("run", "crank", *files) == 0
+    assert kincheck_main("run", "nosuch", *files) == 2
+    captured = capsys.readouterr()
+    assert captured.err.count("there is no case 'nosuch'") == 1
+    assert captured.out.endswith("nothing was run\n1 case could not be read: nosuch\n")
+    found = read_results(Path("out/results.json"))
+    assert (found.records, found.missing) == ([], [("nosuch", "native", "projection")])
+    assert [test.get("name") for test in ElementTree.parse("junit.xml").iter("testcase")] == [
+        "not run"
+    ]
+    assert "1 case could not be read: nosuch" in Path("cases.md").read_text()
+    assert kincheck_main("report", "--history", "history") == 1
+    assert capsys.readouterr().out.startswith(
+        "## run 3: all 0 right, 1 case could not be read; nothing to compare with"
+    )
+
+
+def test_an_option_that_is_wrong_ends_a_run_and_the_bad_cases_are_told_too(kincheck_main, capsys):
+    RIGHT.solves = 0
+    assert kincheck_main("run", "crank", "nosuch", "--engine", "nativ", engines=[RIGHT]) == 2
+    assert [line[:29] for line in capsys.readouterr().err.splitlines()] == [
+        "kincheck: there is no case 'n",
+        "kincheck: there is no engine ",
+    ]
+    assert RIGHT.solves == 0
+
+
+def test_a_bad_built_in_case_is_a_message(kincheck_main, capsys, monkeypatch):
+    def load(name):
+        raise CaseError("crank.toml: sweep.steps = 0: expected at least 1")
+
+    status = kincheck_main("run", "crank", cases={"crank": crank()})
+    assert status == 0
+    monkeypatch.setattr(kincheck.cases, "load", load)
+    capsys.readouterr()
+    assert main.main(["run", "crank"]) == 2
+    assert capsys.readouterr().err == "kincheck: crank.toml: sweep.steps = 0: expected at least 1\n"
+
+
+def test_two_cases_of_one_name_are_refused(kincheck_main, capsys):
+    assert kincheck_main("run", cases={"a": crank("same"), "b": crank("same")}) == 2
+    assert "two cases named 'same'" in capsys.readouterr().err

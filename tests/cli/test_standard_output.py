@@ -1,0 +1,91 @@
+"""Standard output that lacks letters, is full, closed or no longer read."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from kincheck.core.harness.record import from_json
+
+ROOT = Path(__file__).parents[2]
+KINCHECK = "import sys; from tests.support.drill import main; sys.exit(main())"
+RUN = ["run", "first", "--engine", "native", "--jobs", "0"]
+
+
+def kincheck(*arguments, out=subprocess.PIPE, **env):
+    """The command line in a process of its own, with a case and an engine that need no time."""
+    arguments = [sys.executable, "-c", KINCHECK, *arguments]
+    env = os.environ | env
+    env.pop("PYTHONUNBUFFERED", None)  # or nothing would be left to be written in the end
+    return subprocess.run(
+        arguments, cwd=ROOT, stdout=out, stderr=subprocess.PIPE, env=env, check=False
+    )
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "utf-16"])
+def test_an_encoding_that_lacks_letters_ends_no_finished_run(encoding):
+    done = kincheck(*RUN, PYTHONIOENCODING=encoding)
+    assert done.returncode == 0, done.stderr
+    assert "1 pass" in done.stdout.decode(encoding)
+    done = kincheck(*RUN, "--json", "-", PYTHONIOENCODING=encoding)
+    assert done.returncode == 0, done.stderr
+    assert len(from_json(done.stdout).records) == 1
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device of Linux")
+@pytest.mark.parametrize("asked", [["list"], RUN, [*RUN, "--json", "-"]])
+def test_a_full_standard_output_is_one_message(asked):
+    with open("/dev/full", "wb") as full:
+        done = kincheck(*asked, out=full)
+    assert done.returncode == 2
+    assert (
+        done.stderr.decode()
+        .splitlines()[-1]
+        .startswith("kincheck: standard output cannot be written (No space left")
+    )
+    assert b"Traceback" not in done.stderr
+
+
+@pytest.mark.skipif(os.name != "posix", reason="closes a stream as a POSIX shell does")
+def test_a_closed_standard_output_has_nobody_to_read_it(tmp_path):
+    code = (
+        "import os, sys; os.close(1); os.execv(sys.executable, [sys.executable, '-c',"
+        f" {KINCHECK!r}, *sys.argv[1:]])"
+    )
+    file = tmp_path / "r.json"
+    done = subprocess.run(
+        [sys.executable, "-c", code, *RUN, "--json", str(file)], cwd=ROOT, check=False
+    )
+    assert done.returncode == 0
+    assert len(from_json(file.read_bytes()).records) == 1
+
+
+@pytest.mark.skipif(os.name != "posix", reason="closes a pipe as a shell does")
+@pytest.mark.parametrize("command", [["list"], RUN, ["explain", "first"]])
+def test_a_reader_that_has_gone_is_no_failure(command):
+    """As for `kincheck list | head`, whose head has what it wanted."""
+    read, write = os.pipe()
+    os.close(read)
+    with os.fdopen(write, "wb") as gone:
+        done = kincheck(*command, out=gone)
+    assert done.returncode == 0
+    # progress, and no complaint
+    assert all(line.startswith(b"[") for line in done.stderr.splitlines()), done.stderr
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="has /dev/stdout")
+def test_a_file_that_standard_output_goes_to_is_not_written_over(tmp_path):
+    for name in ("/dev/stdout", str(tmp_path / "printed")):
+        with open(tmp_path / "printed", "w") as printed:
+            done = kincheck(*RUN, "--junit", name, out=printed)
+        assert done.returncode == 2
+        expected = (
+            f"kincheck: --junit {name}: found the file that standard output goes to, expected one"
+            " of its own; give another\n"
+        )
+        assert done.stderr.decode() == expected
+    # a pipe takes both
+    done = kincheck(*RUN, "--junit", "/dev/stdout")
+    assert b"</testsuites>" in done.stdout
+    assert b"1 pass" in done.stdout

@@ -1,0 +1,117 @@
+"""History files of another time or kind, and full disks."""
+
+import sqlite3
+
+import pytest
+from kincheck.core.harness.run import run
+from kincheck.core.history import schema
+from kincheck.core.history.run_recorder import keep
+from kincheck.core.history.store import HistoryError, Store
+
+from ..support.fakes import crank
+from .test_store import ENGINES, TOL, kept
+
+
+def test_an_older_file_is_migrated_and_keeps_its_data(path, monkeypatch):
+    keeping, results = kept(path, [crank()], ENGINES)
+    later = "ALTER TABLE runs ADD COLUMN note TEXT; UPDATE runs SET note = 'kept; too';"
+    monkeypatch.setattr(schema, "MIGRATIONS", (*schema.MIGRATIONS, later))
+    with Store(path) as store:
+        assert store.results(keeping.run) == results
+        assert store.connection.execute("SELECT note FROM runs").fetchall() == [("kept; too",)]
+        assert store.connection.execute("PRAGMA user_version").fetchone() == (
+            len(schema.MIGRATIONS),
+        )
+
+
+def test_a_migration_that_fails_changes_nothing(path, monkeypatch):
+    keeping, results = kept(path, [crank()], ENGINES)
+    with monkeypatch.context() as patch:
+        patch.setattr(
+            schema,
+            "MIGRATIONS",
+            (*schema.MIGRATIONS, "DROP TABLE records; CREATE TABLE runs (id INTEGER);"),
+        )
+        with pytest.raises(HistoryError, match="table runs already exists"):
+            Store(path)
+    with Store(path) as store:
+        assert store.results(keeping.run) == results
+
+
+def test_a_file_of_a_later_version_is_left_alone(path):
+    kept(path, [crank()], ENGINES)
+    with Store(path) as store:
+        store.connection.execute("PRAGMA user_version = 99")
+    for writable in (True, False):
+        with pytest.raises(
+            HistoryError, match=r"schema is version 99, this kincheck knows \d+; update kincheck"
+        ):
+            Store(path, writable=writable)
+
+
+def test_a_file_of_another_program_is_left_alone(path):
+    other = sqlite3.connect(path)
+    other.execute("CREATE TABLE bookmarks (url TEXT)")
+    other.close()
+    before = path.read_bytes()
+    with pytest.raises(HistoryError, match="a database of another program; give another file"):
+        Store(path)
+    assert path.read_bytes() == before
+    path.write_bytes(b"not a database at all" * 100)
+    with pytest.raises(HistoryError, match="file is not a database; give another file"):
+        Store(path)
+
+
+def test_places_that_cannot_be_are_messages(tmp_path):
+    with pytest.raises(
+        HistoryError, match="unable to open database file; give a file in a folder that exists"
+    ):
+        Store(tmp_path / "no" / "history.sqlite")
+    with pytest.raises(HistoryError, match="there is no such file"):
+        Store(tmp_path / "none.sqlite", writable=False)
+    with (
+        Store(tmp_path / "empty.sqlite") as store,
+        pytest.raises(HistoryError, match="there is no run 7"),
+    ):
+        store.results(7)
+
+
+def test_a_damaged_record_is_a_message(path):
+    keeping, _ = kept(path, [crank()], ENGINES)
+    with Store(path) as store:
+        store.connection.execute("UPDATE records SET record = x'00'")
+        with pytest.raises(HistoryError, match="cannot be read"):
+            store.records(keeping.run)
+
+
+# Disks
+
+
+def full_after(path, pages):
+    """A history file that can grow by so many pages: SQLite then says what it says of a full
+    disk.
+    """
+    store = Store(path)
+    (count,) = store.connection.execute("PRAGMA page_count").fetchone()
+    store.connection.execute(f"PRAGMA max_page_count = {count + pages}")
+    return store
+
+
+def test_a_full_disk_is_a_message_and_what_was_kept_stays(path):
+    cases = [crank(f"c{k}") for k in range(40)]
+    keeping = keep(path, cases, ENGINES[:1], tol=TOL, command="", settings={}, resume=False)
+    keeping.store.close()
+    keeping.store = full_after(path, pages=8)
+    results = run(cases, ENGINES[:1], tol=TOL, progress=lambda record, *_: keeping.add(record))
+    keeping.end(results, interrupted=False)
+    (problem,) = keeping.problems
+    assert problem.startswith(
+        f"history {path}: cannot be written: database or disk is full; make room; the records"
+        " before "
+    )
+    assert len(results.records) == 40  # the run went on
+    with Store(path) as store:
+        found = store.records(keeping.run)
+        assert 0 < len(found) < 40
+        assert found == results.records[: len(found)]
+        assert store.connection.execute("PRAGMA integrity_check").fetchone() == ("ok",)
