@@ -1,4 +1,4 @@
-"""What several rooms are tested with."""
+"""Settings and fixtures of all tests."""
 
 import gc
 import os
@@ -24,24 +24,25 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 os.environ.pop("COLUMNS", None)  # pytest-xdist sets it for its workers; logs have their own width
 
-# Each young collection of garbage by default follows 700 new objects: with the syntax trees of two
-# hundred files of tests in memory that is a third of reading them.
+# By default Python searches for garbage after 700 new objects. With the syntax trees of two hundred
+# test files in memory, that takes a third of the collection of tests.
 gc.set_threshold(50_000, 20, 20)
 
 NATIVE = Fake("native")
 
 
 def pytest_collection_finish():
-    """The tests themselves, a million objects, are searched for garbage no more."""
+    """Exclude the collected tests, a million objects, from garbage collection."""
     gc.collect()
     gc.freeze()
 
 
 @pytest.fixture(autouse=True)
 def no_recent_models(request):
-    """What a test has changed holds for the models it makes, and for no others.
+    """Empty the caches before and after a test that changes code, so that no other test sees its
+    models.
 
-    Other tests share models: making them anew for each takes a tenth of the suite.
+    Other tests share models: without that the suite takes a tenth more.
     """
     changes = "monkeypatch" in request.fixturenames
     if changes:
@@ -53,8 +54,9 @@ def no_recent_models(request):
 
 @pytest.fixture(autouse=True, scope="session")
 def known_circumstances():
-    """A run in a history takes the speed of the machine and the state of the repository, longer
-    than most tests take; the tests of these functions have the functions themselves.
+    """Replace the measured speed of the machine by a constant, and read the state of the repository
+    once: both take longer than most tests. The tests of these functions call the functions
+    themselves.
     """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(provenance, "calibration", lambda: 0.02)
@@ -64,8 +66,8 @@ def known_circumstances():
 
 @pytest.fixture(autouse=True, scope="session")
 def one_warm_solve():
-    """A timed solve is repeated once: most tests have no use for a more certain time. Those of the
-    times repeat it as often as a user's run does.
+    """Repeat a timed solve once, because most tests do not read the time. Tests of times restore
+    the number of a user's run.
     """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(execution, "WARM_SOLVES", 1)

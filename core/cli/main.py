@@ -66,9 +66,8 @@ def _done(argv: list[str]) -> int:
         return _printed(int(options.do(options, registry())))
     except KincheckError as error:
         complain(str(error).splitlines())
-    except (
-        SystemExit
-    ) as end:  # raised by an engine or a user's module, since the parser's own are handled above
+    except SystemExit as end:
+        # raised by an engine or a user's module: those of the parser are handled above
         where = traceback.extract_tb(end.__traceback__)[-1]
         complain(
             [

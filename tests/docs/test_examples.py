@@ -1,6 +1,7 @@
 """Every command and every Python example of the README and of the documentation runs as printed."""
 
 import os
+import re
 import subprocess
 import sys
 from contextlib import redirect_stdout
@@ -92,10 +93,18 @@ def test_examples_run_as_printed(path, tmp_path, commands_folder, monkeypatch, o
     try:
         for block in blocks(path.read_text("utf-8")):
             follow(reader, block, f"{path.relative_to(ROOT)}:{block.line}")
+        check_regressions(reader.folder)
     finally:
         for name in set(sys.modules) - modules:
             if str(reader.folder) in (getattr(sys.modules[name], "__file__", None) or ""):
                 del sys.modules[name]
+
+
+def check_regressions(folder):
+    """Equal runs regress by their times at most: only those depend on the load of the machine."""
+    for file in folder.glob("*.md"):
+        for headline in re.findall("^## run .*", file.read_text("utf-8"), re.MULTILINE):
+            assert re.search(r": (nothing regressed|\d+ slower)(;|$)", headline), headline
 
 
 def follow(reader, block, where):

@@ -266,4 +266,4 @@ def test_an_equivalent_with_fixed_names_is_caught(few):
     report = check_joint(mistaken(Revolute, equivalent=equivalent), samples=8)
     assert report.failures == ("loop: native, equivalent",), report
     message = report["loop: native, equivalent"].message
-    assert "calls a part 'pin' whatever the joint's name is" in message
+    assert "names a part 'pin', whatever the joint's name is" in message

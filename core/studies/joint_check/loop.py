@@ -186,8 +186,8 @@ def _equivalent(case: Case) -> Case | None:
     names = {part.name for parts in offered for part in parts}
     if taken := sorted(names & {part.name for parts in another for part in parts}):
         raise MechanismError(
-            f"{tested}: equivalent() calls a part {taken[0]!r} whatever the joint's name is, and"
-            " two joints of a mechanism would share it; make the names of its parts of self.name"
+            f"{tested}: equivalent() names a part {taken[0]!r}, whatever the joint's name is, so"
+            " two such joints collide in a mechanism; build the names of its parts from self.name"
         )
     known = {*Joint.registry.values()} - {type(tested)}
     mechanism = with_equivalents(case.mechanism, known)
