@@ -4,13 +4,7 @@ and keyboard.
 
 from __future__ import annotations
 
-import html
-import json
-import re
-import shutil
-import subprocess
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
@@ -19,76 +13,12 @@ import numpy as np
 import pytest
 from kincheck import cases
 from kincheck.core.harness.record import Outcome, Results
-from kincheck.core.harness.scene import FRAMES, scene
+from kincheck.core.harness.scene import scene
 from kincheck.core.report.figure_data import Effort, Past
-from kincheck.core.report.report import write_report
 
 from ..support.made_up import GRID, distances, record, results, series
 
-CHROMIUM = (
-    shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-)
-FLAGS = [
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-]
-FLAGS += [
-    "--disable-component-update",
-    "--disable-sync",
-    "--enable-logging=stderr",
-    "--v=0",
-    "--window-size=1200,4000",
-]
 HOSTILE = "</script><script>alert(1)</script><img src=x onerror=alert(2)>"
-
-# Waits for the page to be drawn, does what a test asks, and leaves what it returns in the document.
-ACT = """<script>
-addEventListener("load", async () => {
-  const pause = (ms = 100) => new Promise((done) => setTimeout(done, ms));
-  const all = (what) => [...document.querySelectorAll(what)], one = (what) => document.querySelector(what);
-  const keydown = (key) => new KeyboardEvent("keydown", { key, bubbles: true, cancelable: true });
-  const press = (key, on = document.body) => on.dispatchEvent(keydown(key));
-  while (!("ready" in document.documentElement.dataset)) await pause();
-  await pause(1000);
-  let told;
-  try { told = await (async () => { %s })(); } catch (error) { told = { error: String(error) }; }
-  document.body.dataset.told = JSON.stringify(told);
-});
-</script></body>"""  # noqa: E501
-
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
-
-
-@pytest.fixture
-def visit(tmp_path: Path) -> Any:
-    """Writes a report, opens it, and does something there; what that returned. Anything on the
-    console is a failure.
-    """
-
-    def opened(run: Results, act: str, **further: Any) -> Any:
-        path = tmp_path / "report.html"
-        write_report(run, path, **further)
-        path.write_text(path.read_text("utf-8").replace("</body>", ACT % act), "utf-8")
-        command = [
-            str(CHROMIUM),
-            *FLAGS,
-            "--virtual-time-budget=20000",
-            f"--user-data-dir={tmp_path / 'profile'}",
-            "--dump-dom",
-        ]
-        done = subprocess.run(
-            [*command, path.as_uri()], capture_output=True, text=True, timeout=120, check=True
-        )
-        assert [line for line in done.stderr.splitlines() if "CONSOLE" in line] == []
-        found = re.search(r'data-told="([^"]*)"', done.stdout)
-        assert found, "the page did not become ready"
-        return json.loads(html.unescape(found[1]))
-
-    return opened
 
 
 def strut(**changes: Any) -> Results:
@@ -248,51 +178,6 @@ def test_curves_are_switched_and_figures_zoomed_saved_and_unfolded(visit: Any) -
     root = ElementTree.fromstring(told["file"])
     assert root.tag == "{http://www.w3.org/2000/svg}svg"
     assert "var(--" not in told["file"]  # it stands by itself, in the colours of the screen
-
-
-def test_the_mechanism_is_drawn_turned_and_moved(visit: Any) -> None:
-    told = visit(
-        strut(),
-        """
-        const canvas = one("canvas"), slider = one("input[type=range]"), out = one("output"), looks = [];
-        const ink = () => canvas.toDataURL();
-        const note = (what) => looks.push([what, +slider.value, out.textContent, ink()]);
-        note("design");
-        press("ArrowLeft", canvas); note("turned");
-        canvas.dispatchEvent(new PointerEvent("pointermove", { buttons: 1, movementX: 40, movementY: 10 })); note("dragged");
-        press(".", canvas); note("step");
-        slider.value = 0; slider.dispatchEvent(new Event("input")); note("first");
-        one("[data-view='y z']").click(); note("front");
-        press(" ", canvas); await pause(500); const playing = one("[data-act=play]").textContent;
-        press(" ", canvas); note("played"); const still = +slider.value; await pause(500);
-        one("[data-layer=names]").click(); note("no names");
-        return { looks, playing, stopped: still === +slider.value, last: +slider.max };
-        """,  # noqa: E501
-    )
-    looks = {what: (frame, said) for what, frame, said, _ in told["looks"]}
-    assert told["last"] == FRAMES - 1
-    assert looks["design"][0] == looks["turned"][0] == 30
-    assert looks["step"][0] == 31
-    assert looks["first"][1].startswith("sample 0 · wheel travel −100 mm")  # the made-up grid's
-    assert looks["played"][0] > 2
-    assert (told["playing"], told["stopped"]) == ("pause", True)
-    pictures = [picture for *_, picture in told["looks"]]
-    assert len(set(pictures)) == len(pictures), [what for what, *_ in told["looks"]]
-
-
-def test_without_poses_the_design_is_drawn_and_nothing_moves(visit: Any) -> None:
-    shown = scene(cases.load("mcpherson_strut"), poses=False)
-    told = visit(
-        msgspec.structs.replace(results(), scenes={"strut": shown}),
-        """
-        const canvas = one("canvas"), seen = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
-        press(" ", canvas);
-        const controls = all("[data-act=play], input[type=range]").length;
-        return { said: one("output").textContent, controls, drawn: seen.some(Boolean), note: one(".scene .note").textContent };
-        """,  # noqa: E501
-    )
-    assert (told["said"], told["controls"], told["drawn"]) == ("design position", 0, True)
-    assert "no answer in this run: this is the design position" in told["note"]
 
 
 def test_earlier_runs_and_work_precision_are_drawn_where_there_are_any(visit: Any) -> None:
