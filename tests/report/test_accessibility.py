@@ -19,7 +19,8 @@ from kincheck.core.report.page_model import Plot
 from kincheck.core.report.report import write_report
 from kincheck.core.report.sections import Diagram, Report, Section, page
 
-from .test_report_browser import ACT, CHROMIUM, FLAGS, several, strut
+from ..support.browser import ACT, CHROMIUM, FLAGS
+from .test_report_browser import several, strut
 
 AXE = Path(os.environ.get("KINCHECK_AXE", "node_modules/axe-core/axe.min.js"))
 
