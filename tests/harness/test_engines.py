@@ -13,7 +13,6 @@ import pytest
 from kincheck import adapters, cases
 from kincheck.core import Distance
 from kincheck.core.case.io.case_file import load_case
-from kincheck.core.case.io.tolerance import DEFAULT_ATOL
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.run import run
 
@@ -134,17 +133,19 @@ def test_a_world_turned_and_a_hundred_metres_away_keeps_its_digits(name):
     assert found.outcome is Outcome.PASS
 
 
-# It is 8e-11 and 2e-10 in the mechanism's own frame, and was above the default in metres. How much
-# of it there is depends on the steps that lead to the pose.
+# How much round-off there is depends on the processor and on the steps that lead to the pose:
+# 2e-11 to 2e-10 m/s^2 were seen.
 @pytest.mark.parametrize("name", ["pinocchio", "exudyn"])
 def test_round_off_near_a_singular_pose_is_within_the_default_tolerance(name):
-    """It is a nanometre at the driver's pace, or nearly: there the end of the rod goes seven
-    thousand times as fast.
+    """The default is a nanometre at the driver's pace; the rod's end accelerates seven thousand
+    times as fast there, and so does the round-off.
     """
     case = load_case(Path(__file__).parents[1] / "data" / "fast_loop.toml")
-    _, found = run([case], [engine("native"), engine(name)], tol=1e-12).records
+    native, found = run([case], [engine("native"), engine(name)], tol=1e-12).records
+    fastest = max(np.max(np.abs(each.acceleration)) for each in native.outputs.values())
+    assert fastest > 5000 * case.sweep.rate**2
     worst = max(
         (each.acceleration for each in found.errors.values()), key=lambda each: each.max_abs
     )
-    assert 0.1 * DEFAULT_ATOL * case.sweep.rate**2 < worst.max_abs < 1e-12 * 1855.0
+    assert worst.max_abs < 1e-12 * 1855.0
     assert worst.within
