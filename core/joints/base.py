@@ -254,6 +254,9 @@ class AxialJoint(Joint):
     def measured(self, freedom: str, i: Attachment, j: Attachment) -> Primitive:
         """Return the primitive between one of its coordinates, "rotation" or "translation", and a
         drive.
+
+        Its rows are exact by themselves, because a driver's or coupler's force acts by them: about
+        the axis, or along it through the point.
         """
         P, h = vec(self.point), unit(self.axis)
         if freedom == "rotation":

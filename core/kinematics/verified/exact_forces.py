@@ -7,9 +7,9 @@ force 2 (t q), and the gradient g of a row by q is the torque vec(g q*) / 2. The
 the efforts of drivers are derivatives of the residuals: nothing relies on the rows and on nu of the
 solver.
 
-The residual of a driver or coupler gives its effort, but not its line of action: residuals that
-differ off the manifold alone have other gradients. What drivers and couplers do to the bodies is
-therefore written by hand, from axes and points, and the joints carry what is left.
+The residual of a driver or coupler gives its effort, but not its line of action: residuals may
+differ off the manifold alone, and then their gradients do. The wrenches of drivers and couplers are
+therefore written by hand, from axes and points, and the joints carry the rest.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from functools import cached_property
 from itertools import accumulate
 from typing import Any, cast
 
-from ...algebra import ZERO, Quat, Scalar, Vec3, cross, quat, vec
+from ...algebra import ZERO, Quat, Scalar, quat, vec
 from ...joints.base import Joint, unit
 from ...mechanism.drivers import JointDriver, PointCoordinate
 from ...mechanism.loads import TorsionSpringDamper
@@ -213,13 +213,13 @@ class _Equations(ForceEquations):
         return found
 
     def _parts(self, joint: Joint, multipliers: Sequence[Scalar]) -> Iterator[tuple[int, Scalar]]:
-        """Yield all rows of a joint: the multipliers are of joints without drivers and couplers."""
+        """Yield all rows of a joint: the multipliers are those of joints alone."""
         for k, c in self._of_joints[joint.name]:
             if isinstance(c, Constraint):
                 yield k, multipliers[k]
 
     def acting(self, efforts: Mapping[str, Scalar], multipliers: Sequence[Scalar]) -> list[Scalar]:
-        """Return what drivers and couplers do to the bodies by the unknowns [J]."""
+        """Return the generalised forces of drivers and couplers by the unknowns [J]."""
         total = dict.fromkeys(self.formulation.columns, NO_WRENCH)
         for body, wrench in self._wrenches(efforts, multipliers):
             if body in total:
@@ -234,7 +234,7 @@ class _Equations(ForceEquations):
             if isinstance(driver, PointCoordinate):
                 point = mechanism.point(driver.point)
                 push = efforts[driver.name] * vec([*unit(driver.direction)])
-                yield point.body, _at(states.arm(point.body, point.position), push)
+                yield point.body, Wrench.at(states.arm(point.body, point.position), push)
             elif isinstance(driver, JointDriver):
                 yield from self._along(driver.joint, driver.freedom, efforts[driver.name])
         first = len(multipliers) - len(mechanism.drivers) - len(mechanism.couplers)
@@ -246,22 +246,16 @@ class _Equations(ForceEquations):
                 yield from self._along(joint, freedom, (1.0 / unit_of) * slope * multipliers[k])
 
     def _along(self, name: str, freedom: str, load: Scalar) -> Iterator[tuple[str, Wrench]]:
-        """Yield what a load of a joint's coordinate does to its bodies: a couple about the axis, or
-        a force along it, at each body's own copy of the joint's point.
+        """Yield the wrenches of a coordinate's load on both bodies: couples about the axis, or
+        forces along it, at each body's own copy of the joint's point.
         """
         joint: Any = self.mechanism.joint(name)
         on_second = load * self.states.turned(joint.i, [*unit(joint.axis)])
         for body, push in ((joint.i, -on_second), (joint.j, on_second)):
-            turns = freedom == "rotation"
-            yield (
-                body,
-                Wrench(ZERO, push) if turns else _at(self.states.arm(body, joint.point), push),
-            )
-
-
-def _at(arm: Vec3, force: Vec3) -> Wrench:
-    """Return the wrench of a force at the end of an arm."""
-    return Wrench(force, cross(arm, force))
+            if freedom == "rotation":
+                yield body, Wrench(ZERO, push)
+            else:
+                yield body, Wrench.at(self.states.arm(body, joint.point), push)
 
 
 def _first(parts: Mapping[str, Sequence[Any]]) -> dict[str, int]:

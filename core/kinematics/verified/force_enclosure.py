@@ -1,10 +1,10 @@
 """Forces of a proved sample as balls.
 
 The multipliers solve F'^T mu = G with the inverse of F' that encloses the motion; see
-`exact_forces`. Those of drivers and couplers give their efforts. What these do to the bodies is
-then taken from G, and the same equations, solved again, give the joints what is left. Redundant
-rows are left out and carry nothing. To find undetermined forces, each of
-them is given a unit multiplier, and the solved rows balance it: what changes is undetermined.
+`exact_forces`. Those of drivers and couplers give their efforts. The generalised forces of these
+are then taken from G, and the same equations, solved again, give the reactions. Redundant rows are
+left out and carry nothing. To find undetermined forces, each of them is given a unit multiplier,
+and the solved rows balance it: what changes is undetermined.
 """
 
 from __future__ import annotations
@@ -103,8 +103,8 @@ def enclose_forces(
         return found
 
     def forces(right: Sequence[Ball], given: Collection[int] = ()) -> tuple[_Forces, list[Ball]]:
-        """Return the forces that balance generalised forces, and what the rows of drivers and
-        couplers carry beside the work of these: zero.
+        """Return the forces in balance with generalised forces, and the multipliers left to the
+        rows of drivers and couplers: zero.
         """
         every = further(balancing(right, given), angles)
         _, drivers, rest = _split(programs, run(programs.forces, every))
