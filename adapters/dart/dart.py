@@ -22,6 +22,10 @@ from ..shared.tree_model import TreeModel
 
 # DART puts rotational components above translational ones.
 ROWS = np.array([3, 4, 5, 0, 1, 2])
+BALL = 3
+# DART's rotations by less than a thousandth of a radian lack the third power of the angle, up to
+# 1.7e-10. The rotation vector of a ball joint therefore starts far from zero.
+START = np.array([1.0, 0.0, 0.0])
 
 
 class Dart(TreeEngine):
@@ -46,6 +50,7 @@ class DartModel(TreeModel):
 
     def __init__(self, dart: Any, case: Case) -> None:
         self.parts, self.transform = dart.dynamics, dart.math.Isometry3
+        self.from_start = dart.math.eulerXYZToMatrix(-START)
         self.skeleton = self.parts.Skeleton("mechanism")
         self.nodes: list[Any] = [None]
         self.joints: list[Any] = [None]
@@ -63,9 +68,12 @@ class DartModel(TreeModel):
             case "ball":
                 given = parts.BallJointProperties()
                 create = skeleton.createBallJointAndBodyNodePair
-        if link.move != "ball":
+        placed = self._at(offset)
+        if link.move == "ball":
+            placed.set_rotation(self.from_start)
+        else:
             given.mAxis = np.array(link.axis)
-        given.mName, given.mT_ParentBodyToJoint = f"joint {len(self.joints)}", self._at(offset)
+        given.mName, given.mT_ParentBodyToJoint = f"joint {len(self.joints)}", placed
         joint, node = create(self.nodes[parent], given)
         self.joints.append(joint)
         self.nodes.append(node)
@@ -92,7 +100,12 @@ class DartModel(TreeModel):
         return at, at
 
     def design(self) -> Array:
-        return np.zeros(self.unknowns)
+        found = np.zeros(self.unknowns)
+        for joint in self.joints[1:]:
+            if joint.getNumDofs() == BALL:
+                first = joint.getIndexInSkeleton(0)
+                found[first : first + BALL] = START
+        return found
 
     def moved(self, dx: Array) -> Array:
         self.skeleton.setPositions(self.q)

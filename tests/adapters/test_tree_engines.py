@@ -14,11 +14,12 @@ import pytest
 from kincheck import adapters, cases
 from kincheck.adapters.shared.joint_chains import Link
 from kincheck.core.case.case import Case
-from kincheck.core.case.joint_probe import probes
+from kincheck.core.case.joint_probe import probe, probes
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.resource_limits import Limits
 from kincheck.core.harness.run import run
 from kincheck.core.harness.workers.pool import in_workers
+from kincheck.core.joints import Spherical
 from kincheck.core.trajectory import Array, Trajectory
 
 from ..support.fakes import Fake, crank
@@ -74,6 +75,19 @@ def test_every_joint_is_as_in_the_native_solver(name: str) -> None:
             for quantity, limit in PROBES.items():
                 one, other = (getattr(each.points[point], quantity) for each in (found, expected))
                 assert np.abs(one - other).max() <= limit, (case.name, point, quantity)
+
+
+@pytest.mark.parametrize("name", TREES)
+def test_balls_turn_by_small_angles(name: str) -> None:
+    """By a ten-thousandth of a radian, where a simulator's rotations may be those of a series."""
+    case = probe(Spherical)
+    case = replace(case, sweep=replace(case.sweep, values=np.linspace(-2e-3, 2e-3, 9)))
+    engine, native = installed(name), adapters.engine("native")
+    found, expected = (each.solve(each.build(case), case, 1e-12) for each in (engine, native))
+    assert found.solved.all(), found.message
+    for point in case.points:
+        off = found.points[point].position - expected.points[point].position
+        assert np.abs(off).max() <= PROBES["position"]
 
 
 @pytest.mark.parametrize("name", TREES)

@@ -7,6 +7,10 @@ import numpy as np
 import pytest
 from kincheck import cases
 from kincheck.core import kinematics
+from kincheck.core import primitives as p
+from kincheck.core.algebra import ZERO, vec
+from kincheck.core.joints import Revolute, Translational
+from kincheck.core.joints.base import AxialJoint, unit
 from kincheck.core.kinematics.forces import equations
 from kincheck.core.kinematics.verified import exact_forces
 from kincheck.core.kinematics.verified.exact import as_decimal, as_double
@@ -16,6 +20,7 @@ from kincheck.core.mechanism.motions import Path, Ramp
 from kincheck.core.program.ball_executor import precision
 from kincheck.core.studies.verified_reference import prove_case
 
+from ..support.driven_chains import COUPLINGS, Link, chain
 from ..support.loaded import loaded, pushed
 
 flint = pytest.importorskip("flint")
@@ -156,6 +161,82 @@ def test_an_undetermined_component_is_refused_with_the_reason():
     assert "3 of 6 of both" in found.outputs["loose"].reason
     assert found.outputs["loose"].position == [None, None]
     assert {error.output: error.largest[0] for error in errors}["loose"] is None
+
+
+# Lines of action
+
+
+def in_balls(made):
+    """Forces at two samples, as balls."""
+    drivers = [driver.name for driver in made.mechanism.drivers]
+    members = (*made.mechanism.joints, *made.mechanism.drivers)
+    path = replace(made.path, times=made.path.times[1:3])
+    drives = {
+        name: [tuple(map(Fraction, row)) for row in table.T.tolist()]
+        for name, table in zip(drivers, path.drive(drivers, path.times).swapaxes(0, 1), strict=True)
+    }
+    names = [each.name for each in members]
+    found = prove(made.mechanism, path, [], drives, as_double, BITS, 1e-12, names)
+    for each in found.samples:
+        assert isinstance(each, kinematics.Enclosure), each
+    return zip(path.times, found.samples, strict=True)
+
+
+def off_by_hand(made):
+    """The largest difference of the proved forces from free-body diagrams, as a part of the
+    largest.
+    """
+    off, size = 0.0, 0.0
+    for t, sample in in_balls(made):
+        hand = made.by_hand(t)
+        pairs = [(sample.forces.joints[name], wrench) for name, wrench in hand.joints.items()]
+        pairs += [([sample.forces.drivers[name]], [x]) for name, x in hand.drivers.items()]
+        for balls, numbers in pairs:
+            found = np.array([float(each) for each in balls])
+            off, size = max(off, np.abs(found - numbers).max()), max(size, np.abs(found).max())
+    return off / size
+
+
+def at_origins(self, freedom, i, j):
+    """Slides between the internal origins of the bodies, not at the joint's point."""
+    P, h = vec(self.point), unit(self.axis)
+    between = p.Dot20(h, ZERO, ZERO, i.arm(P) - j.arm(P))
+    return between if freedom == "translation" else p.DrivenAngle(h)
+
+
+@pytest.mark.parametrize(
+    "coupled", [None, "rack", "rack that is a screw", "polynomial, translation by rotation"]
+)
+def test_proved_forces_are_those_by_hand(coupled):
+    if coupled is None:
+        made = chain([Link(Revolute), Link(Translational, flipped=True), Link(Revolute)])
+    else:
+        one, other, coupling = COUPLINGS[coupled]
+        made = chain([Link(Revolute), replace(one, flipped=True), other], coupling, size=0.5)
+    assert off_by_hand(made) < 1e-13
+
+
+@pytest.mark.parametrize("coupled", [False, True])
+def test_a_proof_does_not_share_the_row(coupled, monkeypatch):
+    """A slide driven beside its axis has the same motion: the proof keeps the line of action."""
+    monkeypatch.setattr(AxialJoint, "measured", at_origins)
+    slide = Link(Translational, flipped=True)
+    links = [Link(Revolute), slide, Link(Revolute)]
+    made = chain(links, COUPLINGS["rack"][2] if coupled else None, size=0.5)
+    assert off_by_hand(made) < 1e-13
+
+
+def test_another_coordinate_is_no_proof(monkeypatch):
+    """One of twice the displacement."""
+
+    def doubled(self, freedom, i, j):
+        P, h = vec(self.point), unit(self.axis)
+        return p.Dot20(2.0 * h, i.arm(P), j.arm(P), ZERO)
+
+    monkeypatch.setattr(AxialJoint, "measured", doubled)
+    made = chain([Link(Translational)])
+    with pytest.raises(AssertionError, match="a driver or coupler measures another coordinate"):
+        in_balls(made)
 
 
 # Planted mistakes

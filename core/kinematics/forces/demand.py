@@ -27,6 +27,11 @@ class Wrench:
     force: Vec3
     torque: Vec3
 
+    @staticmethod
+    def at(arm: Vec3, force: Vec3) -> Wrench:
+        """Return the wrench of a force at the end of an arm [m]."""
+        return Wrench(force, cross(arm, force))
+
     def __add__(self, b: Wrench) -> Wrench:
         return Wrench(self.force + b.force, self.torque + b.torque)
 
@@ -170,9 +175,8 @@ def spring(each: SpringDamper, at: BodyStates) -> Applied:
     elastic = each.stiffness * (length - (each.free_length or 0.0))
     tension = elastic + each.damping * rate
     pull = tension * along
-    on_i = Wrench(pull, cross(at.arm(i, P), pull))
-    on_j = Wrench(-pull, cross(at.arm(j, Q), -pull))
-    return Applied(tension, {i: on_i, j: on_j}, elastic * rate, each.damping * rate * rate)
+    wrenches = {i: Wrench.at(at.arm(i, P), pull), j: Wrench.at(at.arm(j, Q), -pull)}
+    return Applied(tension, wrenches, elastic * rate, each.damping * rate * rate)
 
 
 def torsion(
@@ -196,5 +200,5 @@ def constant(each: Force | Torque, at: BodyStates) -> Applied:
     amount = root(sum(x * x for x in each.vector))
     if isinstance(each, Torque):
         return Applied(amount, {body: Wrench(ZERO, vector)}, 0.0, -(vector @ at.spin(body)))
-    on_body = Wrench(vector, cross(at.arm(body, each.point), vector))
+    on_body = Wrench.at(at.arm(body, each.point), vector)
     return Applied(amount, {body: on_body}, 0.0, -(vector @ at.velocity(body, each.point)))
