@@ -4,6 +4,7 @@ schema kincheck-results/1.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from enum import StrEnum
@@ -12,6 +13,7 @@ from typing import Any, Literal
 import msgspec
 
 from ..case.case import Truth
+from ..forces import BALANCED
 from ..trajectory import QUANTITIES
 from .evidence import Evidence, Suspect
 from .record_tables import RecordTable, ResultsTable
@@ -218,7 +220,7 @@ class Results(ResultsTable, msgspec.Struct, frozen=True, kw_only=True):
         references: the reference values of each case with a reference, by case and output.
         scenes: the mechanism of each case, by case; empty in a run without scenes.
         suspects: by name, cases with engines in agreement with each other and not with the
-            reference.
+            reference or native.
     """
 
     schema: Literal["kincheck-results/1"] = "kincheck-results/1"
@@ -228,14 +230,28 @@ class Results(ResultsTable, msgspec.Struct, frozen=True, kw_only=True):
     scenes: dict[str, Scene] = {}
     suspects: dict[str, Suspect] = {}
 
-    def blames_reference(self, record: Record) -> bool:
-        """Return whether the suspected reference of the case explains a failure, so that the
-        record's own message is redundant.
+    def explains(self, record: Record) -> bool:
+        """Return whether the suspicion of the case explains all faults of a failed record, so that
+        the record's own message is redundant.
         """
-        whole = record.solved == record.samples and not any(
-            each.lost for each in record.errors.values()
+        found = self.suspects.get(record.case)
+        if found is None or record.outcome is not Outcome.FAIL:
+            return False
+        residual, power = record.residual_max, record.details.get("forces", {}).get("power_missing")
+        whole = (
+            record.solved == record.samples
+            and not any(each.lost or each.contradicted for each in record.errors.values())
+            and (residual or 0.0) <= self.run.get("tol", math.inf)
+            and (power or 0.0) <= BALANCED
         )
-        return record.case in self.suspects and record.outcome is Outcome.FAIL and whole
+        off = {
+            (name, quantity)
+            for name, errors in record.errors.items()
+            for quantity, each in errors.items()
+            if not each.within
+        }
+        accused = {(name, each) for name, every in found.outputs.items() for each in every}
+        return whole and record.engine in found.engines and (off <= accused or not accused)
 
     @property
     def missing(self) -> list[tuple[str, str, str]]:

@@ -123,8 +123,16 @@ def run(
             else:
                 judge(pair, attempt, case.standard)
     found, requested = [records[key] for key in wanted], planned(cases, engines, unread)
+    native = {name: each.standard.outputs for name, each in judging.items() if each.standard}
     return results(
-        cases, found, started=started, tol=tol, command=command, facts=facts, plan=requested
+        cases,
+        found,
+        started=started,
+        tol=tol,
+        command=command,
+        facts=facts,
+        plan=requested,
+        native=native,
     )
 
 

@@ -73,7 +73,7 @@ def judged(case: Case, answer: Answer, native: Standard, tol: float) -> Verdict:
     faults += [
         f"{name}: {each.reason}" for name, each in errors.items() if each.lost and each.within
     ]
-    faults += filter(None, (excess(case, answer.residual if solved else 0.0, tol),))
+    faults += filter(None, (excess(case, answer.residual if solved else 0.0, tol), *answer.faults))
     if faults:
         return Verdict(Outcome.FAIL, faults, errors, perf_counter() - begin)
     compared = any(each.items() for each in errors.values())
