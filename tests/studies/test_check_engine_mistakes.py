@@ -23,12 +23,12 @@ def here_alone(monkeypatch):
 
 @pytest.fixture
 def without_loads(monkeypatch):
-    monkeypatch.setattr(checking, "force_cases", lambda: [])
+    monkeypatch.setattr(checking, "force_cases", list)
 
 
 @pytest.fixture
 def with_loads(monkeypatch):
-    monkeypatch.setattr(checking, "probes", lambda: [])
+    monkeypatch.setattr(checking, "probes", list)
     monkeypatch.setattr("kincheck.core.cli.check_engine.TOPOLOGIES", {})
 
 

@@ -183,9 +183,7 @@ def each_element(kind, **changes):
 
 
 def other_gravity(factor):
-    return mechanism(
-        lambda given: replace(given, gravity=tuple(factor * x for x in given.gravity))
-    )
+    return mechanism(lambda given: replace(given, gravity=tuple(factor * x for x in given.gravity)))
 
 
 def diagonal(inertia):
@@ -237,7 +235,8 @@ def frozen_beyond(found, case):
         return found
     moved = points(
         **{
-            key: lambda x, case: np.nan_to_num(x) for key in ("position", "velocity", "acceleration")
+            key: lambda x, case: np.nan_to_num(x)
+            for key in ("position", "velocity", "acceleration")
         }
     )(found, case)
     return changed(moved, solved=np.ones_like(found.solved), message="")
@@ -480,7 +479,10 @@ HARMLESS = {
         "an engine may give positions alone; the rows of rates are skipped",
     ),
     "residual zero": (answer(part(residual=lambda x: 0.0)), "no outsider knows the residual"),
-    "more iterations": (answer(part(iterations=lambda x: 2 * x)), "nor how many iterations it took"),
+    "more iterations": (
+        answer(part(iterations=lambda x: 2 * x)),
+        "nor how many iterations it took",
+    ),
     "another rank": (
         answer(lambda x, case: changed(x, details={**x.details, "rank": 1})),
         "the rank is that of the engine's own rows, which differ",
