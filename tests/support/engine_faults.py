@@ -1,8 +1,8 @@
-"""Faults of engines, one each: of the model that is built, of the trajectory that is returned, and of
-the manners of an engine.
+"""Faults of engines, one each: of the model that is built, of the trajectory that is returned, and
+of the manners of an engine.
 
-`FAULTS` must be found by check-engine; `HARMLESS` cannot be told from a sound engine, for the reason
-given.
+`FAULTS` must be found by check-engine. `HARMLESS` cannot be told from a sound engine, for the
+reason that stands beside each.
 """
 
 import math
