@@ -4,7 +4,6 @@ schema kincheck-results/1.
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Mapping
 from enum import StrEnum
@@ -13,7 +12,6 @@ from typing import Any, Literal
 import msgspec
 
 from ..case.case import Truth
-from ..forces import BALANCED
 from ..trajectory import QUANTITIES
 from .evidence import Evidence, Suspect
 from .record_tables import RecordTable, ResultsTable
@@ -159,6 +157,9 @@ class Record(RecordTable, msgspec.Struct, frozen=True, kw_only=True):
         solved, samples: number of samples reached, and number of samples.
         us_per_step: time of the warm solve per sample [us], including the forces of outputs; null
             unless all samples were reached.
+        faults: what is wrong with an answer beside deviations: missing or contradicted samples,
+            residual, balance of power, bodies, degrees of freedom; `message` repeats them. Empty in
+            records of older versions.
         evidence: evidence on the reference used for the verdict; null without a reference, and in
             records of older versions.
         reasons: reasons for null numbers, by key: residual_max, rank, dof, iterations, us_per_step.
@@ -188,6 +189,7 @@ class Record(RecordTable, msgspec.Struct, frozen=True, kw_only=True):
     reasons: dict[str, str] = {}
     details: dict[str, Any] = {}
     evidence: Evidence | None = None
+    faults: list[str] = []
 
     @property
     def validated(self) -> bool:
@@ -237,12 +239,8 @@ class Results(ResultsTable, msgspec.Struct, frozen=True, kw_only=True):
         found = self.suspects.get(record.case)
         if found is None or record.outcome is not Outcome.FAIL:
             return False
-        residual, power = record.residual_max, record.details.get("forces", {}).get("power_missing")
-        whole = (
-            record.solved == record.samples
-            and not any(each.lost or each.contradicted for each in record.errors.values())
-            and (residual or 0.0) <= self.run.get("tol", math.inf)
-            and (power or 0.0) <= BALANCED
+        whole = record.solved == record.samples and not any(
+            each.lost for each in record.errors.values()
         )
         off = {
             (name, quantity)
@@ -251,7 +249,8 @@ class Results(ResultsTable, msgspec.Struct, frozen=True, kw_only=True):
             if not each.within
         }
         accused = {(name, each) for name, every in found.outputs.items() for each in every}
-        return whole and record.engine in found.engines and (off <= accused or not accused)
+        explained = record.engine in found.engines and (off <= accused or not accused)
+        return whole and not record.faults and explained
 
     @property
     def missing(self) -> list[tuple[str, str, str]]:

@@ -266,6 +266,7 @@ def _answered(
         facts,
         outcome=verdict.outcome,
         message="; ".join(messages),
+        faults=list(verdict.faults),
         driver={name: each.tolist() for name, each in case.sweep.moved.items()},
         outputs={
             output.name: as_numbers(answer.outputs[output.name], output) for output in case.outputs

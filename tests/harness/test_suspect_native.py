@@ -1,14 +1,18 @@
 """Where most engines agree with each other and not with native, it is native that is suspected."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 from kincheck.adapters import engine
+from kincheck.core import Body, JointDisplacement, Mechanism, Translational
+from kincheck.core import primitives as p
+from kincheck.core.algebra import ZERO, cross, vec
 from kincheck.core.case.case import Series
 from kincheck.core.harness.native_engine import NativeEngine
 from kincheck.core.harness.record import Outcome, from_json, to_json
 from kincheck.core.harness.run import run
+from kincheck.core.joints.base import unit
 from kincheck.core.report.junit import to_junit
 from kincheck.core.report.matrix import to_markdown
 from kincheck.core.report.report import headline, write_report
@@ -151,6 +155,48 @@ def test_beside_a_reference_of_positions_native_is_suspected_of_the_rest():
     results, found = suspected([WRONG, *OTHERS], case)
     assert found.subject == "native"
     assert results.records[0].outcome is Outcome.PASS
+
+
+class Beside(p.Dot20):
+    """A displacement whose force acts beside the axis."""
+
+    def rows(self, i, j):
+        aside = i.turn(vec((0.1, 0.2, -0.1)))
+        return tuple(
+            row._replace(pi=row.pi + cross(aside, row.ri), pj=row.pj + cross(aside, row.rj))
+            for row in super().rows(i, j)
+        )
+
+
+def test_a_joint_type_with_a_wrong_lever_makes_native_suspect(own_joint_types):
+    """Simulators solve its equivalent; native drives it beside its axis."""
+
+    @dataclass(frozen=True)
+    class LooseSlide(Translational):
+        type = "loose_slide"
+
+        def measured(self, freedom, i, j):
+            P = vec(self.point)
+            return Beside(unit(self.axis), i.arm(P), j.arm(P), ZERO)
+
+        def equivalent(self):
+            return [], [Translational(self.name, self.i, self.j, self.point, self.axis)]
+
+    mechanism = Mechanism(
+        "slide",
+        [Body("block", mass=1.0, center_of_mass=(0.0, 0.0, 0.0))],
+        [LooseSlide("guide", "ground", "block", (0.4, -0.2, 0.3), (0.3, 0.5, 1.0))],
+        drivers=[JointDisplacement("d", "guide")],
+        gravity=(0.0, 0.0, -10.0),
+    )
+    case = force_case(mechanism, [-0.5, 0.0, 0.5, 1.0])
+    case = replace(case, outputs=tuple(replace(each, atol=1e-8) for each in case.outputs))
+    simulators = [engine(name) for name in ("mujoco", "pinocchio", "exudyn")]
+    results = run([case], [NativeEngine(), *simulators], tol=1e-12)
+    assert results.suspects["slide"].engines == ["mujoco", "pinocchio", "exudyn"]
+    assert {*results.suspects["slide"].outputs} == {f"guide joint_moment {axis}" for axis in "xyz"}
+    # the effort itself is right
+    assert results.record("slide", "mujoco").errors["effort d"].within
 
 
 class OtherMoments(NativeEngine):

@@ -291,3 +291,15 @@ def test_an_engine_without_forces_or_bodies_is_judged_by_points():
     (record,) = run([crank()], [engine], tol=1e-12).records
     assert record.outcome is Outcome.PASS
     assert Reaction(*(np.zeros((2, 3)),) * 2, np.zeros((2, 6, 0))).determined() == (3, 3, 6)
+
+
+def test_another_number_of_freedoms_than_native_fails():
+    def two(case):
+        found = solution(case)
+        return changed(found, details={**found.details, "dof": 2})
+
+    native, other = run([crank()], [Fake("native"), Fake("other", two)], tol=1e-12).records
+    assert native.outcome is Outcome.PASS
+    assert other.outcome is Outcome.FAIL
+    assert other.message == "counts 2 degrees of freedom without drivers, native 1"
+    assert other.faults == [other.message]

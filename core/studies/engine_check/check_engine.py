@@ -16,7 +16,6 @@ import numpy as np
 
 from ...case.case import Case
 from ...case.joint_probe import probe, probes
-from ...errors import shortened
 from ...harness.engine import Engine, may_run_here
 from ...harness.engine_versions import versions
 from ...harness.execution import Answer, Attempt, Attempts, Pair, Solver, here
@@ -44,7 +43,6 @@ VERDICTS = {
     Outcome.UNJUDGED: Verdict.SKIP,
 }
 BEYOND, UNKNOWN = "refusal: beyond a fold", "refusal: unknown joint"
-FREEDOMS = "degrees of freedom"
 
 
 def check_engine(
@@ -89,7 +87,6 @@ def check_engine(
     for name, case in cases.items():
         faults = faults_of_forces(case, engine.mode, mine[case.name], standards[case.name])
         found.append(_compared(name, records[case.name], "; ".join(faults)))
-    found.append(_freedoms(mine, standards))
     found += rates([(case, records[case.name]) for case in cases.values()])
     beyond = refused[BEYOND].name
     found += [_folded(records[beyond], mine[beyond]), _unknown(records[refused[UNKNOWN].name])]
@@ -151,22 +148,6 @@ def _compared(name: str, record: Record, faults: str) -> Finding:
     limit = None if worst is None else 1.0
     why = "" if worst is None else AGREE_WHY
     return Finding(name, verdict, worst, limit, why, row=where, message=message)
-
-
-def _freedoms(answers: Mapping[str, Attempt], standards: Mapping[str, Attempt]) -> Finding:
-    """Check the degrees of freedom that an engine reports of a case against native's."""
-    found = {
-        case: (attempt.result.details.get("dof"), standard.result.details.get("dof"))
-        for case, attempt in answers.items()
-        if isinstance(attempt.result, Answer)
-        and isinstance((standard := standards[case]).result, Answer)
-    }
-    wrong = [
-        f"{case}: {mine}, native {native}"
-        for case, (mine, native) in found.items()
-        if mine is not None and native is not None and mine != native
-    ]
-    return Finding(FREEDOMS, Verdict.FAIL if wrong else Verdict.PASS, message=shortened(wrong, 3))
 
 
 def _folded(record: Record, attempt: Attempt) -> Finding:
