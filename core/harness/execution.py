@@ -10,10 +10,12 @@ from time import perf_counter
 from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..case.case import Case, Series
 from ..errors import KincheckError
 from ..failures import FailureKind
+from ..forces import Forces
 from ..trajectory import Array, Trajectory
 from .compare import output_series
 from .engine import Engine
@@ -67,7 +69,8 @@ class Answer:
         solved: number of solved samples.
         iterations: sum over the solved samples.
         residual, message, details, failures: see `Trajectory`.
-        power: missing to the balance at each sample [W], NaN if unknown; None without forces.
+        power: missing to the balance at each sample [W], NaN if unknown or no power flows; None
+            without forces.
         faults: what the answer gets wrong by itself, in sentences.
     """
 
@@ -98,9 +101,14 @@ class Answer:
             message=bounded("; ".join(filter(None, (found.message, why)))),
             details=plain(found.facts),
             failures=found.failures,
-            power=None if found.forces is None else np.where(solved, found.forces.power, np.nan),
+            power=None if found.forces is None else _power(found.forces, solved),
             faults=[*faults(case, found, rigid=rigid)],
         )
+
+
+def _power(forces: Forces, solved: NDArray[np.bool_]) -> Array:
+    flowing = solved & (np.asarray(forces.largest_power) > 0.0)
+    return np.where(flowing, forces.power, np.nan)
 
 
 @dataclass(frozen=True)

@@ -441,6 +441,9 @@ OF_FORCES = {
     "power off by 100 W": answer(forces(lambda x, case: replace(x, power=x.power + 100.0))),
     "power off at one sample": answer(forces(lambda x, case: replace(x, power=once(x.power)))),
     "power left out": answer(forces(lambda x, case: replace(x, power=x.power * math.nan))),
+    "power of nothing": answer(
+        forces(lambda x, case: replace(x, power=0.0 * x.power, largest_power=0.0 * x.power))
+    ),
     "power of drivers alone": answer(
         forces(lambda x, case: replace(x, power=x.power + sum(x.drivers.values(), 0.0)))
     ),

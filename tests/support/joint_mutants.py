@@ -26,8 +26,14 @@ CHANGED = ast.BinOp | ast.UnaryOp | ast.Name | ast.Attribute | ast.Constant | as
 
 def mutants(source: str) -> Iterator[tuple[str, str]]:
     """Yield the place with the change, and the source of every mutant."""
-    tree = ast.parse(source)
-    for function in (each for each in ast.walk(tree) if isinstance(each, ast.FunctionDef)):
+    methods = [
+        (f"{owner.name}.{each.name}", each)
+        for owner in ast.parse(source).body
+        if isinstance(owner, ast.ClassDef)
+        for each in owner.body
+        if isinstance(each, ast.FunctionDef)
+    ]
+    for name, function in methods:
         every = [
             node
             for statement in function.body
@@ -35,7 +41,9 @@ def mutants(source: str) -> Iterator[tuple[str, str]]:
             if isinstance(node, CHANGED)
         ]
         for number, node in enumerate(every):
-            for what in range(len([*_changes(node)])):
+            for what, change in enumerate(_changes(node)):
+                if ast.dump(change) == ast.dump(node):
+                    continue
                 other = copy.deepcopy(function)
                 twin = [
                     each
@@ -45,7 +53,7 @@ def mutants(source: str) -> Iterator[tuple[str, str]]:
                 ][number]
                 new = [*_changes(twin)][what]
                 text = ast.unparse(_Replacing(twin, new).visit(other))
-                where = f"line {node.lineno}: {ast.unparse(node)} -> {ast.unparse(new)}"
+                where = f"{name} {number}: {ast.unparse(node)} -> {ast.unparse(new)}"
                 yield where, _with_function(source, function, text)
 
 
