@@ -252,11 +252,11 @@ MISTAKES = {
         lambda: mistaken(Revolute, freedoms=("rotation", "translation")),
     ),
     "a driver that pulls backwards": (
-        "mixed style",
+        "driver",
         lambda: mistaken(Cylindrical, measured=measured_backwards),
     ),
     "a driver about the opposite axis": (
-        "mixed style",
+        "driver",
         lambda: mistaken(Revolute, measured=lambda self, *_: p.DrivenAngle(-unit(self.axis))),
     ),
     "a drive without its acceleration": (

@@ -78,15 +78,26 @@ def _turned(q: Array, a: Array) -> Array:
     return a + q[:, :1] * twice + np.cross(q[:, 1:], twice)
 
 
+def coordinate(s: Specimen, joint: AxialJoint, freedom: str) -> tuple[list[Array], Array]:
+    """Return a coordinate of the joint with its rate and acceleration, by their definition, and the
+    wrench of a unit effort on both bodies, lengths in the unit of the place.
+
+    Returns:
+        Three arrays of shape (lanes,), and one of shape (12, lanes): force and torque about the
+        origin, of the first body, then of the second.
+    """
+    axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
+    point = np.array(joint.point) / s.place.unit
+    i, j = (_moving(s, k, point - s.traced.origins[k]) for k in range(2))
+    h = _turned(s.state[3:7].T, axis)
+    return _rotation(s, i, j, h, axis) if freedom == "rotation" else _slide(i, j, h)
+
+
 def _defects(s: Specimen, joint: AxialJoint, freedom: str) -> Array:
     """Return the defects of one coordinate's driver as named by `WHATS`, shape (4, lanes)."""
-    scaled = joint.scaled(1.0 / s.place.unit)
-    axis = np.array(scaled.axis) / np.linalg.norm(scaled.axis)
-    i, j = (_moving(s, k, np.array(scaled.point) - s.traced.origins[k]) for k in range(2))
-    h = _turned(s.state[3:7].T, axis)
-    values, wrench = _rotation(s, i, j, h, axis) if freedom == "rotation" else _slide(i, j, h)
-    c, c_t, c_tt = values
+    (c, c_t, c_tt), wrench = coordinate(s, joint, freedom)
     drive = Drive(c, c_t, c_tt, np.cos(0.5 * c), np.sin(0.5 * c))
+    scaled = joint.scaled(1.0 / s.place.unit)
     attached = (Attachment(vec(tuple(origin))) for origin in s.traced.origins)
     primitive: Any = replace(scaled.measured(freedom, *attached), drive=drive)
     per_rate = replace(primitive, drive=replace(drive, c_t=1.0))
