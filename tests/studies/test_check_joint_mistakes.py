@@ -201,6 +201,11 @@ def beside_the_axis(self, i, j):
     )
 
 
+def near_design(self, i, j):
+    """What does not know the drive's value."""
+    return ((i.q.conjugate() * j.q).e0,)
+
+
 def on_one_body(self, i, j):
     return tuple(row._replace(ri=ZERO, pi=ZERO) for row in super(type(self), self).rows(i, j))
 
@@ -273,6 +278,9 @@ MISTAKES = {
         "driver",
         lambda: driving(rows=doubled_rows),
     ),
+    "a drive that loses a turn": ("driver", lambda: driving(branch=no_branch)),
+    "a drive refused": ("driver", lambda: driving(branch=negative_branch)),
+    "a drive refused half a turn away": ("driver", lambda: driving(branch=near_design)),
     "a drive about another axis": (
         "driver",
         lambda: mistaken(Revolute, measured=lambda self, *_: p.DrivenAngle(triad(self.axis)[0])),

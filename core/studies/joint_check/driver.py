@@ -1,5 +1,5 @@
 """Check of the drivers of a joint: what `measured` drives is the joint's own coordinate, with its
-rate and acceleration, and its force acts along the joint's axis.
+turns, rate and acceleration, and its force acts along the joint's axis.
 
 Coordinates and wrenches are computed here from the poses alone, by their definition; no equation of
 the joint takes part.
@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ...algebra import quat, vec
+from ...algebra import Quat, quat, vec
 from ...joints import Attachment, AxialJoint
 from ...primitives.base import Drive, Pose, Twist
 from ...trajectory import Array
@@ -22,7 +22,9 @@ from .checks import AMPLIFIED, AMPLIFIED_WHY, Specimen
 from .traced import COLUMNS, POSES
 
 FREEDOMS = ("rotation", "translation")
-WHATS = ("value", "rate", "acceleration", "force")
+WHATS = ("value", "rate", "acceleration", "force", "turns")
+WAY = 6.0
+"""Largest further angle at which an angle's driver is examined [rad], almost a turn."""
 
 
 def driver(s: Specimen) -> Iterator[Finding]:
@@ -37,7 +39,7 @@ def driver(s: Specimen) -> Iterator[Finding]:
     remedy = (
         "measured() is to drive the joint's own coordinate: phi = 0 at the drive's c, nu of its"
         " c_t, gamma of its c_tt; its rows are a force along the axis through the joint's point, or"
-        " a couple about the axis"
+        " a couple about the axis; its branch tests are positive at c, and not a turn further"
     )
     yield judged("driver", figures, AMPLIFIED, AMPLIFIED_WHY, names, remedy=remedy)
 
@@ -94,13 +96,12 @@ def coordinate(s: Specimen, joint: AxialJoint, freedom: str) -> tuple[list[Array
 
 
 def _defects(s: Specimen, joint: AxialJoint, freedom: str) -> Array:
-    """Return the defects of one coordinate's driver as named by `WHATS`, shape (4, lanes)."""
+    """Return the defects of one coordinate's driver as named by `WHATS`, shape (5, lanes)."""
     (c, c_t, c_tt), wrench = coordinate(s, joint, freedom)
-    drive = Drive(c, c_t, c_tt, np.cos(0.5 * c), np.sin(0.5 * c))
     scaled = joint.scaled(1.0 / s.place.unit)
     attached = (Attachment(vec(tuple(origin))) for origin in s.traced.origins)
-    primitive: Any = replace(scaled.measured(freedom, *attached), drive=drive)
-    per_rate = replace(primitive, drive=replace(drive, c_t=1.0))
+    measured: Any = scaled.measured(freedom, *attached)
+    primitive, per_rate = (_driving(measured, c, rate, c_tt) for rate in (c_t, 1.0))
     poses = [Pose.of(vec(tuple(x[:3])), quat(x[3:])) for x in (s.state[:7], s.state[7:POSES])]
     twists = [Twist(vec(tuple(x[:3])), vec(tuple(x[3:]))) for x in (s.rate[:6], s.rate[6:12])]
     (row,), (phi,) = primitive.rows(*poses), primitive.phi(*poses)
@@ -112,14 +113,52 @@ def _defects(s: Specimen, joint: AxialJoint, freedom: str) -> Array:
     entries = np.array([x + np.zeros(s.lanes) for part in row for x in part])
     rates, accelerations = s.rate[: 2 * COLUMNS], s.acceleration[: 2 * COLUMNS]
     speed, pull = np.linalg.norm(rates, axis=0), np.linalg.norm(accelerations, axis=0)
+    there, turned = s.state, 0.0
+    if freedom == "rotation":
+        turned = np.linspace(-WAY, WAY, s.lanes)
+        there = _turned_on(s, joint, turned)
+    lost, far = _turns(measured, there, c + turned, turning=freedom == "rotation")
     figures = (
-        phi + np.zeros(s.lanes),
+        np.maximum(np.abs(phi), np.abs(far)),
         ((entries * rates).sum(axis=0) - nu) / (1.0 + speed),
         ((entries * accelerations).sum(axis=0) - gamma) / (1.0 + speed**2 + pull),
         np.abs(entries - one * wrench).max(axis=0),
+        lost,
     )
     size = np.linalg.norm(entries, axis=0)
     return np.abs(figures) / np.where(size > 0.0, size, 1.0)
+
+
+def _driving(measured: Any, c: Any, c_t: Any = 0.0, c_tt: Any = 0.0) -> Any:
+    return replace(measured, drive=Drive(c, c_t, c_tt, np.cos(0.5 * c), np.sin(0.5 * c)))
+
+
+def _turned_on(s: Specimen, joint: AxialJoint, angle: Array) -> Array:
+    """Return the state with body j turned further about the axis."""
+    h, state = _turned(s.state[3:7].T, np.array(joint.axis)), s.state.copy()
+    h /= np.linalg.norm(h, axis=1)[:, None]
+    arm = np.array(joint.point) / s.place.unit - s.traced.origins[1]
+    turn = Quat(np.cos(0.5 * angle), vec([*(np.sin(0.5 * angle) * h.T)]))
+    state[10:14] = np.array([*(turn * quat(s.state[10:14]))])
+    state[7:10] += (_turned(s.state[10:14].T, arm) - _turned(state[10:14].T, arm)).T
+    return state
+
+
+def _turns(measured: Any, state: Array, c: Array, *, turning: bool) -> tuple[Array, Array]:
+    """Return one where a branch test refuses the drive's value, or accepts a zero of phi a turn
+    further; and phi.
+    """
+    pair = [Pose.of(vec(tuple(x[:3])), quat(x[3:])) for x in (state[:7], state[7:POSES])]
+    wrong = np.zeros(state.shape[1], np.bool_)
+    at_turns: list[Array] = []
+    for turns in (0, 1) if turning else (0,):
+        primitive = _driving(measured, c + 2.0 * np.pi * turns)
+        (phi,) = primitive.phi(*pair)
+        tests = [np.ones_like(c), *primitive.branch(*pair)]
+        accepted = np.min(np.broadcast_arrays(*tests), axis=0) > 0.0
+        wrong |= accepted & (np.abs(phi) < AMPLIFIED) if turns else ~accepted
+        at_turns.append(phi + 0.0 * c)
+    return wrong.astype(np.float64), at_turns[0]
 
 
 def _slide(i: _Moving, j: _Moving, h: Array) -> tuple[list[Array], Array]:
