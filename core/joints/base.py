@@ -22,7 +22,6 @@ from ..primitives import (
     Dot12,
     Dot20,
     DrivenAngle,
-    LockedDisplacement,
     NamedSlide,
     NamedTurn,
     Primitive,
@@ -259,9 +258,7 @@ class AxialJoint(Joint):
         P, h = vec(self.point), unit(self.axis)
         if freedom == "rotation":
             return DrivenAngle(h)
-        if "rotation" in self.freedoms:
-            return Dot20(h, i.arm(P), j.arm(P), ZERO)
-        return LockedDisplacement(h, i.arm(P) - j.arm(P))
+        return Dot20(h, i.arm(P), j.arm(P), ZERO)
 
     def mixed(self, i: Attachment, j: Attachment) -> Sequence[tuple[Primitive, str]]:
         """Return the joint with its coordinates named: TraX and RotX of formulation section 4, and

@@ -25,7 +25,7 @@ from .dot10 import Dot10
 from .dot11 import Dot11
 from .dot12 import Dot12
 from .dot20 import Dot20
-from .dot21 import Dot21, LockedDisplacement
+from .dot21 import Dot21
 from .driven import DrivenAngle, DrivenCoordinate
 from .ground import Ground
 from .named import NamedSlide, NamedTurn
@@ -44,7 +44,6 @@ __all__ = [
     "DrivenAngle",
     "DrivenCoordinate",
     "Ground",
-    "LockedDisplacement",
     "NamedSlide",
     "NamedTurn",
     "Pose",

@@ -26,10 +26,10 @@ was rejected. Table 2 prints a spurious block and drops a dot (formulation secti
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from ..algebra import ZERO, Scalar, Vec3, cross
-from .base import Drive, Pose, Primitive, Row, Twist
+from .base import Pose, Primitive, Row, Twist
 from .dot20 import ConventionalDot20
 
 
@@ -45,13 +45,17 @@ class Dot21(Primitive):
     e0: Vec3
 
     def phi(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
-        return tuple(along(a, self.e0, i, j) for a in (self.f, self.g))
+        du = j.u - i.u
+        return tuple(i.swing(a) @ (self.e0 + du) + a @ du for a in (self.f, self.g))
 
     def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
-        return tuple(along_row(a, self.e0, i, j) for a in (self.f, self.g))
+        e, axes = self.e0 + (j.u - i.u), (i.turn(self.f), i.turn(self.g))
+        return tuple(Row(-a, cross(a, e), a, ZERO) for a in axes)
 
     def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
-        return tuple(along_gamma(a, self.e0, i, j, vi, vj) for a in (self.f, self.g))
+        e, e_t = self.e0 + (j.u - i.u), vj.v - vi.v
+        turning = (cross(vi.w, i.turn(a)) for a in (self.f, self.g))
+        return tuple(-(cross(vi.w, a_t) @ e + 2.0 * (a_t @ e_t)) for a_t in turning)
 
     def paper_form(self) -> tuple[Primitive, ...]:
         return (PaperDot21(self.f, self.g, self.e0),)
@@ -60,93 +64,20 @@ class Dot21(Primitive):
         return tuple(ConventionalDot20(a, ZERO, ZERO, self.e0) for a in (self.f, self.g))
 
 
-@dataclass(frozen=True)
-class LockedDisplacement(Primitive):
-    """The displacement of body j along h of body i is c, for bodies that turn alike (1 row): (23)
-    with a = h, driven.
-    """
-
-    n = 1
-    h: Vec3
-    e0: Vec3
-    drive: Drive = field(default_factory=Drive)
-
-    def phi(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
-        return (along(self.h, self.e0, i, j) - self.drive.c,)
-
-    def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
-        return (along_row(self.h, self.e0, i, j),)
-
-    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
-        return (self.drive.c_tt + along_gamma(self.h, self.e0, i, j, vi, vj),)
-
-    def nu(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
-        return (self.drive.c_t,)
-
-    def paper_form(self) -> tuple[Primitive, ...]:
-        return (PaperLockedDisplacement(self.h, self.e0, self.drive),)
-
-    def conventional_form(self) -> tuple[Primitive, ...]:
-        return (ConventionalDot20(self.h, ZERO, ZERO, self.e0, self.drive),)
-
-
-def along(a: Vec3, e0: Vec3, i: Pose, j: Pose) -> Scalar:
-    """Return the change of a . e since design [m]."""
-    du = j.u - i.u
-    return i.swing(a) @ (e0 + du) + a @ du
-
-
-def along_row(a: Vec3, e0: Vec3, i: Pose, j: Pose) -> Row:
-    """Return the row of a . e."""
-    a_now = i.turn(a)
-    return Row(-a_now, cross(a_now, e0 + (j.u - i.u)), a_now, ZERO)
-
-
-def along_gamma(a: Vec3, e0: Vec3, i: Pose, j: Pose, vi: Twist, vj: Twist) -> Scalar:
-    """Return the right-hand side of a . e in the acceleration equation [m/s^2]."""
-    a_dot = cross(vi.w, i.turn(a))
-    return -(cross(vi.w, a_dot) @ (e0 + (j.u - i.u)) + 2.0 * (a_dot @ (vj.v - vi.v)))
-
-
 class PaperDot21(Dot21):
     """Eq. (23) in body axes."""
 
     body_axes = True
 
     def phi(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
-        return tuple(_paper_along(a, self.e0, i, j) for a in (self.f, self.g))
+        y = i.A.T @ (self.e0 + (j.u - i.u))
+        return tuple(a @ y - a @ self.e0 for a in (self.f, self.g))
 
     def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
-        return tuple(_paper_along_row(a, self.e0, i, j) for a in (self.f, self.g))
+        y = i.A.T @ (self.e0 + (j.u - i.u))
+        return tuple(Row(-(i.A @ a), cross(a, y), i.A @ a, ZERO) for a in (self.f, self.g))
 
     def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
-        return tuple(_paper_along_gamma(a, self.e0, i, j, vi, vj) for a in (self.f, self.g))
-
-
-class PaperLockedDisplacement(LockedDisplacement):
-    """(23) in body axes with a = h, driven."""
-
-    body_axes = True
-
-    def phi(self, i: Pose, j: Pose) -> tuple[Scalar, ...]:
-        return (_paper_along(self.h, self.e0, i, j) - self.drive.c,)
-
-    def rows(self, i: Pose, j: Pose) -> tuple[Row, ...]:
-        return (_paper_along_row(self.h, self.e0, i, j),)
-
-    def gamma(self, i: Pose, j: Pose, vi: Twist, vj: Twist) -> tuple[Scalar, ...]:
-        return (self.drive.c_tt + _paper_along_gamma(self.h, self.e0, i, j, vi, vj),)
-
-
-def _paper_along(a: Vec3, e0: Vec3, i: Pose, j: Pose) -> Scalar:
-    return a @ (i.A.T @ (e0 + (j.u - i.u))) - a @ e0
-
-
-def _paper_along_row(a: Vec3, e0: Vec3, i: Pose, j: Pose) -> Row:
-    a_G = i.A @ a
-    return Row(-a_G, cross(a, i.A.T @ (e0 + (j.u - i.u))), a_G, ZERO)
-
-
-def _paper_along_gamma(a: Vec3, e0: Vec3, i: Pose, j: Pose, vi: Twist, vj: Twist) -> Scalar:
-    y, y_t = i.A.T @ (e0 + (j.u - i.u)), i.A.T @ (vj.v - vi.v)
-    return a @ (2.0 * cross(vi.w, y_t) - cross(vi.w, cross(vi.w, y)))
+        y, y_t = i.A.T @ (self.e0 + (j.u - i.u)), i.A.T @ (vj.v - vi.v)
+        turning = 2.0 * cross(vi.w, y_t) - cross(vi.w, cross(vi.w, y))
+        return tuple(a @ turning for a in (self.f, self.g))

@@ -4,15 +4,16 @@ import importlib
 from dataclasses import replace
 
 import pytest
-from kincheck.core import Revolute, Spherical, check_joint
+from kincheck.core import Revolute, Screw, Spherical, Translational, check_joint
 from kincheck.core import primitives as p
+from kincheck.core.algebra import ZERO, vec
 from kincheck.core.case.joint_probe import AXIS, probe
 from kincheck.core.harness.native_engine import NativeEngine
 from kincheck.core.joints import Joint
 from kincheck.core.joints.base import unit
 from kincheck.core.studies.findings import Verdict
 from kincheck.core.studies.joint_check import reactions as checks
-from kincheck.core.studies.joint_check.loaded_probe import loaded, solved
+from kincheck.core.studies.joint_check.loaded_probe import driven, loaded, solved
 from kincheck.core.studies.joint_check.loop import loops
 from kincheck.core.studies.stress.solving import interpreted
 
@@ -28,6 +29,32 @@ def found(joint_type):
     case = loaded(probe(joint_type))
     every = checks.reactions(solved(case, case.mechanism), case)
     return {each.check.removeprefix("reaction: "): each.verdict for each in every}
+
+
+def driven_checks(joint_type):
+    """The same with drivers of the joint's own coordinates."""
+    case = driven(probe(joint_type))
+    return {
+        each.check: each.verdict for each in checks.reactions(solved(case, case.mechanism), case)
+    }
+
+
+@pytest.mark.parametrize("name", ["revolute", "translational", "cylindrical", "screw", "planar"])
+def test_sound_driven_joints_pass(name):
+    assert {*driven_checks(Joint.registry[name]).values()} == {Verdict.PASS}
+
+
+def at_origins(self, freedom, i, j):
+    """Slides between the internal origins of the bodies, not at the joint's point."""
+    P, h = vec(self.point), unit(self.axis)
+    between = p.Dot20(h, ZERO, ZERO, i.arm(P) - j.arm(P))
+    return between if freedom == "translation" else p.DrivenAngle(h)
+
+
+@pytest.mark.parametrize("base", [Translational, Screw])
+def test_a_slide_driven_beside_its_axis_is_found(base):
+    found = driven_checks(mistaken(base, measured=at_origins))
+    assert found["reaction: acts and reacts"] is Verdict.FAIL
 
 
 def failing(joint_type):

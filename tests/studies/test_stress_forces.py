@@ -5,9 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from kincheck.core import primitives as p
+from kincheck.core.algebra import ZERO, vec
 from kincheck.core.forces import Forces
 from kincheck.core.harness.execution import Pair
 from kincheck.core.harness.native_engine import NativeEngine
+from kincheck.core.joints.base import AxialJoint, unit
 from kincheck.core.studies.stress.families import Family
 from kincheck.core.studies.stress.reproducers import judge
 from kincheck.core.studies.stress.run import specimen
@@ -18,8 +21,8 @@ from kincheck.core.studies.stress.verdicts import Verdict, judged
 
 demand = importlib.import_module("kincheck.core.kinematics.forces.demand")
 FORCES = Family.registry["forces"]
-# Numbers of specimens: a hinge twice, a four-bar of four hinges, a fast loop.
-TWICE, FOUR_BAR, SPINNING = 0, 4, 5
+# Numbers of specimens: a hinge twice, a four-bar of four hinges, a fast arm, a driven slide.
+TWICE, FOUR_BAR, SPINNING, SLIDING = 21, 4, 5, 12
 NATIVE = interpreted(NativeEngine())
 
 
@@ -115,6 +118,22 @@ def test_a_term_left_out_of_the_equations_is_found(monkeypatch):
     one = specimen(FORCES, 0, SPINNING, 3)
     found = judged(one.specimen, one.case, one.truth, once(Pair(one.case, NATIVE, 1e-12)))
     assert found.counts[Verdict.WRONG_FORCE] > 0
+
+
+def test_a_slide_driven_beside_its_axis_is_found(monkeypatch):
+    """Its force acts at the internal origin of the second body."""
+    right = AxialJoint.measured
+
+    def wrong(self, freedom, i, j):
+        P, h = vec(self.point), unit(self.axis)
+        if freedom == "rotation":
+            return right(self, freedom, i, j)
+        return p.Dot20(h, ZERO, ZERO, i.arm(P) - j.arm(P))
+
+    monkeypatch.setattr(AxialJoint, "measured", wrong)
+    one = specimen(FORCES, 0, SLIDING, 3)
+    found = judged(one.specimen, one.case, one.truth, once(Pair(one.case, NATIVE, 1e-12)))
+    assert found.counts[Verdict.WRONG_FORCE] == 3
 
 
 def test_an_engine_without_forces_is_not_judged(made):

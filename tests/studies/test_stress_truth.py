@@ -9,9 +9,11 @@ import pytest
 from kincheck import cases
 from kincheck.core import solve
 from kincheck.core.case.case import Output, without_forces
+from kincheck.core.case.io.coordinates import with_all_coordinates
 from kincheck.core.case.joint_probe import probes
 from kincheck.core.errors import KincheckError
 from kincheck.core.joints import Spherical
+from kincheck.core.mechanism.mechanism import Point
 from kincheck.core.studies.stress.families.base import as_case
 from kincheck.core.studies.stress.families.degenerate import WRONG
 from kincheck.core.studies.stress.families.dimensions import crank_rocker
@@ -269,6 +271,16 @@ def test_a_proof_is_about_rows_that_are_good_at_the_sample():
     case = cases.load("bennett")
     truth = followed(replace(case, sweep=replace(case.sweep, values=np.radians([0.0, 45.0, 90.0]))))
     assert distance_from_proof(truth, 2) < 1e-2
+
+
+def test_a_point_of_the_ground_needs_no_proof():
+    """At the global origin it has no round-off either."""
+    case = cases.load("four_bar")
+    points = [*case.mechanism.points, Point("here", "ground", (0.0, 0.0, 0.0))]
+    case = replace(case, mechanism=replace(case.mechanism, points=points))
+    few = with_all_coordinates(replace(case, sweep=replace(case.sweep, values=np.array([0.25]))))
+    assert "here" in few.points
+    assert distance_from_proof(followed(few), 0) < 1e-2
 
 
 def failures(make):

@@ -180,11 +180,6 @@ def dot21(rng):
     return Specimen(p.Dot21(f, g, vector(rng)))
 
 
-def locked_displacement(rng):
-    drive = driver_motion(rng)
-    return Specimen(p.LockedDisplacement(direction(rng), vector(rng), drive.numbers), drive)
-
-
 def distance(rng):
     d0 = vector(rng)
     return Specimen(
@@ -244,7 +239,6 @@ MAKERS = {
     p.DrivenAngle: driven_angle,
     p.DrivenCoordinate: driven_coordinate,
     p.Ground: ground,
-    p.LockedDisplacement: locked_displacement,
     p.NamedSlide: named_slide,
     p.NamedTurn: named_turn,
     p.Spherical: spherical,

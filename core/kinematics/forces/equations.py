@@ -20,7 +20,7 @@ from ...primitives.base import GROUND_POSE
 from ..formulation.cartesian import COLUMNS, Cartesian
 from ..formulation.constraints import Constraint, Relation
 from ..formulation.formulation import Configuration, Rows
-from .demand import NO_WRENCH, Applied, BodyStates, inertial
+from .demand import NO_WRENCH, Applied, BodyStates, Wrench, inertial
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,18 +48,23 @@ class ForceEquations:
     @cached_property
     def demand(self) -> list[Scalar]:
         """Return M a + h - Q by the unknowns [J]; zero for the coordinates of joints."""
-        found: list[Scalar] = [0.0] * self.formulation.unknowns
-        gravity = vec(self.mechanism.gravity)
-        for name, first in self.formulation.columns.items():
+        gravity, wrenches = vec(self.mechanism.gravity), dict[str, Wrench]()
+        for name in self.formulation.columns:
             body = self.mechanism.body(name)
-            total = (
+            wrenches[name] = (
                 NO_WRENCH if is_literal_zero(body.mass) else inertial(body, self.states, gravity)
             )
             for each in self.applied.values():
                 if name in each.wrenches:
-                    total += -each.wrenches[name]
-            force = self.states.frame.unit * total.force
-            found[first : first + COLUMNS] = [*force, *total.torque]
+                    wrenches[name] += -each.wrenches[name]
+        return self.by_unknowns(wrenches)
+
+    def by_unknowns(self, wrenches: Mapping[str, Wrench]) -> list[Scalar]:
+        """Return wrenches on the moving bodies by the unknowns [J]; zero for coordinates."""
+        found: list[Scalar] = [0.0] * self.formulation.unknowns
+        for name, first in self.formulation.columns.items():
+            force = self.states.frame.unit * wrenches[name].force
+            found[first : first + COLUMNS] = [*force, *wrenches[name].torque]
         return found
 
     @cached_property

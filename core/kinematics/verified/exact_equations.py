@@ -181,6 +181,8 @@ def _lifted(mechanism: Mechanism, inputs: _Inputs) -> Mechanism:
         mechanism,
         joints=inputs.members(mechanism.joints),
         grounded=(),
+        points=inputs.members(mechanism.points),
+        drivers=inputs.members(mechanism.drivers),
         bodies=inputs.members(mechanism.bodies),
         gravity=inputs.lift(mechanism.gravity),
         forces=inputs.members(mechanism.forces),

@@ -6,29 +6,34 @@ q' of Euler parameters is an angular velocity w = 2 vec(q' q*), so a torque t ha
 force 2 (t q), and the gradient g of a row by q is the torque vec(g q*) / 2. The rows of joints and
 the efforts of drivers are derivatives of the residuals: nothing relies on the rows and on nu of the
 solver.
+
+The residual of a driver or coupler gives its effort, but not its line of action: residuals that
+differ off the manifold alone have other gradients. What drivers and couplers do to the bodies is
+therefore written by hand, from axes and points, and the joints carry what is left.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from itertools import accumulate
 from typing import Any, cast
 
-from ...algebra import Quat, Scalar, quat, vec
-from ...joints.base import unit
+from ...algebra import ZERO, Quat, Scalar, Vec3, cross, quat, vec
+from ...joints.base import Joint, unit
+from ...mechanism.drivers import JointDriver, PointCoordinate
 from ...mechanism.loads import TorsionSpringDamper
 from ...mechanism.mechanism import Mechanism
 from ...primitives.base import GROUND_POSE, Drive, Twist
 from ...program import Program, Tape, Traced, program
 from ...program.derivative import Gradient
-from ..forces.demand import BodyStates, at_work
+from ..forces.demand import NO_WRENCH, BodyStates, Wrench, at_work
 from ..forces.equations import ForceEquations
 from ..forces.power import powers
 from ..forces.wanted import WantedForces
 from ..formulation.cartesian import COLUMNS, Cartesian
-from ..formulation.constraints import Frames
+from ..formulation.constraints import Constraint, Frames
 from ..formulation.formulation import Acceleration, Configuration, Rows
 
 
@@ -86,19 +91,23 @@ class ForcePrograms:
         wanted: the forces of the outputs, in their order: of joints six numbers each, of drivers
             and force elements one each.
         rows: number of all rows; the multipliers are theirs.
+        of_joints: number of the rows of joints, which come first.
         angles: joints whose angles are inputs.
         half_angles: of each of these joints sine and cosine of half the angle, or of half the angle
             and half a turn.
         demand: generalised forces by the state [J].
+        acting: those of drivers and couplers.
         left_out: derivatives of the rows left out by the state, row by row.
         forces: the forces wanted [N or N m], then the sum of the powers [W], which is zero.
     """
 
     wanted: WantedForces
     rows: int
+    of_joints: int
     angles: Sequence[str]
     half_angles: Program
     demand: Program
+    acting: Program
     left_out: Program
     forces: Program
 
@@ -144,10 +153,6 @@ def force_programs(
     states = _states(frame, traced, given)
     applied = at_work(mechanism, states, given.angles.__getitem__)
     equations = _Equations(mechanism, traced.formulation, traced.at, states, applied, traced)
-    found: list[Scalar] = []
-    for name in wanted.joints:
-        force, moment = equations.reaction(mechanism.joint(name), given.multipliers)
-        found += [*((1.0 / frame.unit) * force), *moment]
     efforts = {
         driver.name: _effort(traced, driver.name, given.multipliers)
         * (1.0 if driver.turns else 1.0 / frame.unit)
@@ -157,6 +162,10 @@ def force_programs(
         driver.name: given.speeds[driver.name] * (1.0 if driver.turns else frame.unit)
         for driver in mechanism.drivers
     }
+    found: list[Scalar] = []
+    for name in wanted.joints:
+        force, moment = equations.reaction(mechanism.joint(name), given.multipliers)
+        found += [*((1.0 / frame.unit) * force), *moment]
     found += [efforts[name] for name in wanted.drivers]
     found += [applied[name].amount for name in wanted.elements]
     found.append(sum(powers(mechanism, states, applied, efforts, speeds), 0.0))
@@ -166,9 +175,11 @@ def force_programs(
     return ForcePrograms(
         wanted,
         len(traced.gradients),
+        len(traced.gradients) - len(mechanism.couplers) - len(mechanism.drivers),
         [*given.angles],
         _program("half angles", tape, _half_angles(mechanism, traced.at, given.angles)),
         _program("demand", tape, _by_state(traced, equations.demand)),
+        _program("acting", tape, _by_state(traced, equations.acting(efforts, given.multipliers))),
         _program("rows left out", tape, left_out),
         _program("forces", tape, found),
     )
@@ -200,6 +211,57 @@ class _Equations(ForceEquations):
                 row[column] = gradient.get(first[f"x {name}"], 0.0)
             found.append(row)
         return found
+
+    def _parts(self, joint: Joint, multipliers: Sequence[Scalar]) -> Iterator[tuple[int, Scalar]]:
+        """Yield all rows of a joint: the multipliers are of joints without drivers and couplers."""
+        for k, c in self._of_joints[joint.name]:
+            if isinstance(c, Constraint):
+                yield k, multipliers[k]
+
+    def acting(self, efforts: Mapping[str, Scalar], multipliers: Sequence[Scalar]) -> list[Scalar]:
+        """Return what drivers and couplers do to the bodies by the unknowns [J]."""
+        total = dict.fromkeys(self.formulation.columns, NO_WRENCH)
+        for body, wrench in self._wrenches(efforts, multipliers):
+            if body in total:
+                total[body] += wrench
+        return self.by_unknowns(total)
+
+    def _wrenches(
+        self, efforts: Mapping[str, Scalar], multipliers: Sequence[Scalar]
+    ) -> Iterator[tuple[str, Wrench]]:
+        mechanism, traced, states = self.mechanism, self.traced, self.states
+        for driver in mechanism.drivers:
+            if isinstance(driver, PointCoordinate):
+                point = mechanism.point(driver.point)
+                push = efforts[driver.name] * vec([*unit(driver.direction)])
+                yield point.body, _at(states.arm(point.body, point.position), push)
+            elif isinstance(driver, JointDriver):
+                yield from self._along(driver.joint, driver.freedom, efforts[driver.name])
+        first = len(multipliers) - len(mechanism.drivers) - len(mechanism.couplers)
+        slots = _first(traced.parts)
+        for k, coupler in enumerate(mechanism.couplers, first):
+            for joint, freedom, _ in coupler.terms:
+                slope = traced.gradients[k].get(slots[f"x {joint}.{freedom}"], 0.0)
+                unit_of = states.frame.unit if freedom == "translation" else 1.0
+                yield from self._along(joint, freedom, (1.0 / unit_of) * slope * multipliers[k])
+
+    def _along(self, name: str, freedom: str, load: Scalar) -> Iterator[tuple[str, Wrench]]:
+        """Yield what a load of a joint's coordinate does to its bodies: a couple about the axis, or
+        a force along it, at each body's own copy of the joint's point.
+        """
+        joint: Any = self.mechanism.joint(name)
+        on_second = load * self.states.turned(joint.i, [*unit(joint.axis)])
+        for body, push in ((joint.i, -on_second), (joint.j, on_second)):
+            turns = freedom == "rotation"
+            yield (
+                body,
+                Wrench(ZERO, push) if turns else _at(self.states.arm(body, joint.point), push),
+            )
+
+
+def _at(arm: Vec3, force: Vec3) -> Wrench:
+    """Return the wrench of a force at the end of an arm."""
+    return Wrench(force, cross(arm, force))
 
 
 def _first(parts: Mapping[str, Sequence[Any]]) -> dict[str, int]:

@@ -1,15 +1,18 @@
 """Forces of a proved sample as balls.
 
 The multipliers solve F'^T mu = G with the inverse of F' that encloses the motion; see
-`exact_forces`. Redundant rows are left out and carry nothing. To find undetermined forces, each of
+`exact_forces`. Those of drivers and couplers give their efforts. What these do to the bodies is
+then taken from G, and the same equations, solved again, give the joints what is left. Redundant
+rows are left out and carry nothing. To find undetermined forces, each of
 them is given a unit multiplier, and the solved rows balance it: what changes is undetermined.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 from ...errors import KincheckError
 from ...program import Program
@@ -25,6 +28,9 @@ Run = Callable[[Program, Sequence[Ball]], Sequence[Ball]]
 
 class UnprovedError(KincheckError, ArithmeticError):
     """There is no proof for a sample; the message gives the reason."""
+
+
+_Forces: TypeAlias = tuple[Mapping[str, Sequence[Ball]], Mapping[str, Ball], Sequence[Ball]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,36 +88,50 @@ def enclose_forces(
         for k, about in enumerate(near)
     ]
 
-    def carried(right: Sequence[Ball]) -> list[Ball]:
-        """Return the multipliers of all rows; zero of those left out."""
-        solved = (inverse.transpose() * matrix(size, 1, list(right))).entries()
+    rows = run(programs.left_out, further(nothing, angles))
+    off = {row: rows[k * size : (k + 1) * size] for k, row in enumerate(left_out)}
+
+    def balancing(right: Sequence[Ball], given: Collection[int]) -> list[Ball]:
+        """Return the multipliers of all rows: one of the given rows, zero of others left out."""
+        column = [x - sum((off[row][k] for row in given), arb(0)) for k, x in enumerate(right)]
+        solved = (inverse.transpose() * matrix(size, 1, column)).entries()
         found = list(nothing)
         for row, value in zip(kept, solved, strict=False):  # those of lengths come last
             found[row] = value
+        for row in given:
+            found[row] = arb(1)
         return found
 
-    demand = run(programs.demand, further(nothing, angles))
-    joints, drivers, rest = _split(programs, run(programs.forces, further(carried(demand), angles)))
+    def forces(right: Sequence[Ball], given: Collection[int] = ()) -> tuple[_Forces, list[Ball]]:
+        """Return the forces that balance generalised forces, and what the rows of drivers and
+        couplers carry beside the work of these: zero.
+        """
+        every = further(balancing(right, given), angles)
+        _, drivers, rest = _split(programs, run(programs.forces, every))
+        left = [x - y for x, y in zip(right, run(programs.acting, every), strict=True)]
+        own = balancing(left, [row for row in given if row < programs.of_joints])
+        joints, *_ = _split(programs, run(programs.forces, further(own, angles)))
+        return (joints, drivers, rest), own[programs.of_joints :]
+
+    (joints, drivers, rest), beside = forces(run(programs.demand, further(nothing, angles)))
     *amounts, power = rest
     if not power.contains(0):
         raise UnprovedError(
             f"the powers of drivers, masses and force elements sum up to {power.str(5)} W, expected"
             " zero: an equation of the forces is wrong, please report it"
         )
-    free: list[tuple[Mapping[str, Sequence[Ball]], Mapping[str, Ball]]] = []
-    rows = run(programs.left_out, further(nothing, angles))
-    for k, row in enumerate(left_out):
-        multipliers = carried([-x for x in rows[k * size : (k + 1) * size]])
-        multipliers[row] = arb(1)
-        free.append(_split(programs, run(programs.forces, further(multipliers, angles)))[:2])
+    if not all(each.contains(0) for each in beside):
+        raise UnprovedError(
+            "a driver or coupler measures another coordinate than the turn about its joint's axis"
+            " or the displacement along it: see measured() of the joint's type"
+        )
+    free = [forces([arb(0)] * size, [row])[0][:2] for row in left_out]
     return EnclosedForces(
         joints, drivers, dict(zip(programs.wanted.elements, amounts, strict=True)), free, power
     )
 
 
-def _split(
-    programs: ForcePrograms, values: Sequence[Ball]
-) -> tuple[dict[str, Sequence[Ball]], dict[str, Ball], Sequence[Ball]]:
+def _split(programs: ForcePrograms, values: Sequence[Ball]) -> _Forces:
     """Return values by joint and driver, and the others."""
     wanted = programs.wanted
     last = WRENCH * len(wanted.joints)

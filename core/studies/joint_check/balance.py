@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from ...algebra import quat, rotation_less_identity
-from ...case.case import Case
 from ...mechanism.body import inertia_matrix
 from ...mechanism.loads import SpringDamper
 from ...trajectory import Array, BodyMotion
@@ -60,7 +59,7 @@ def speed(probe: Probe) -> float:
     return max(float(np.abs(each).max()) for each in motions)
 
 
-def unbalanced(probe: Probe, case: Case, name: str) -> Array:
+def unbalanced(probe: Probe, name: str) -> Array:
     """Return what is missing to a body's balance by Newton and Euler, shape (n, 6)."""
     n = len(probe.motion.solved)
     if probe.mechanism.is_fixed(name):
@@ -74,13 +73,13 @@ def unbalanced(probe: Probe, case: Case, name: str) -> Array:
     inertia, w, w_t = inertia_matrix(body.inertia), motion.v[:, 3:], motion.a[:, 3:]
     change = w_t @ inertia + np.cross(w, w @ inertia)
     torque = -np.einsum("nab,nb->na", _turn(motion), change)
-    for push, at, moment in _pushes(probe, case, name):
+    for push, at, moment in _pushes(probe, name):
         force, torque = force + push, torque + moment + np.cross(at - centre, push)
     return np.hstack([force, torque])
 
 
-def _pushes(probe: Probe, case: Case, name: str) -> Iterator[tuple[Array, Array, Array]]:
-    """Yield what joints, the driver and the spring do to a body: force, its place, moment."""
+def _pushes(probe: Probe, name: str) -> Iterator[tuple[Array, Array, Array]]:
+    """Yield what joints, drivers and the spring do to a body: force, its place, moment."""
     mechanism, forces = probe.mechanism, probe.motion.forces
     assert forces is not None
     for joint in mechanism.joints:
@@ -89,14 +88,9 @@ def _pushes(probe: Probe, case: Case, name: str) -> Iterator[tuple[Array, Array,
             found = forces.joints[joint.name]
             place = _moving(probe, joint.j, mechanism.reaction_point(joint))[0]
             yield sign * found.force, place, sign * found.moment
-    driver: Any = mechanism.driver(case.sweep.driver)
-    hinge: Any = mechanism.joint(driver.joint)
-    sign = {hinge.j: 1.0, hinge.i: -1.0}.get(name)
-    if sign is not None:  # its first body is the ground
-        axis = np.array(hinge.axis, dtype=np.float64)
-        axis /= np.linalg.norm(axis)
-        still = np.zeros((len(probe.motion.solved), 3))
-        yield still, still, sign * forces.drivers[driver.name][:, None] * axis
+    for driver in mechanism.drivers:
+        effort = forces.drivers[driver.name][:, None]
+        yield from _by_driver(probe, driver, effort, name)
     (spring,) = (each for each in mechanism.forces if isinstance(each, SpringDamper))
     if name == spring.j:
         start, v_i, *_ = _moving(probe, spring.i, spring.points[0])
@@ -106,3 +100,17 @@ def _pushes(probe: Probe, case: Case, name: str) -> Iterator[tuple[Array, Array,
         rate = (along * (v_j - v_i)).sum(axis=1)
         tension = spring.stiffness * (length - (spring.free_length or 0.0)) + spring.damping * rate
         yield -tension[:, None] * along, end, 0.0 * end
+
+
+def _by_driver(
+    probe: Probe, driver: Any, effort: Array, name: str
+) -> Iterator[tuple[Array, Array, Array]]:
+    """Yield what a driver does: a couple about its joint's axis, or a force along it."""
+    joint: Any = probe.mechanism.joint(driver.joint)
+    if name not in joint.bodies:
+        return
+    tip, start = (_moving(probe, joint.i, at)[0] for at in (joint.axis, (0.0, 0.0, 0.0)))
+    push = (1.0 if name == joint.j else -1.0) * effort * (tip - start)
+    push /= np.linalg.norm(joint.axis)
+    place = _moving(probe, joint.j, joint.point)[0]
+    yield (0.0 * push, place, push) if driver.turns else (push, place, 0.0 * push)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,12 +13,13 @@ from ...case.measures import DriverEffort, ForceMeasure, JointForce, JointMoment
 from ...case.quantity import with_markers
 from ...errors import SolveError
 from ...forces import Reaction
-from ...joints import Joint
+from ...joints import AxialJoint, Joint
 from ...kinematics import NativeSolver
 from ...mechanism.body import Body
+from ...mechanism.drivers import JointAngle, JointDisplacement, JointDriver
 from ...mechanism.loads import SpringDamper
 from ...mechanism.mechanism import GROUND, Mechanism
-from ...mechanism.motions import Path
+from ...mechanism.motions import Path, Sine
 from ...trajectory import Trajectory
 
 # Samples of the probe: forces follow from each pose alone.
@@ -26,6 +28,11 @@ TOL = 1e-12
 GRAVITY = (0.5, -1.0, -9.75)
 INERTIA = (0.04, 0.05, 0.06, 0.004, -0.003, 0.002)
 CENTRE = np.array([0.05, -0.03, 0.04])
+DRIVEN: Mapping[type[JointDriver], Sine] = {
+    JointDisplacement: Sine(0.05, 0.5),
+    JointAngle: Sine(0.5, 0.25),
+}
+"""Drivers of a joint's own coordinates, slides first, and their motions [m, rad]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,9 +78,41 @@ def loaded(case: Case) -> Case:
     return replace(case, mechanism=with_markers(heavy, bound), sweep=sweep, outputs=bound)
 
 
+def driven(case: Case) -> Case | None:
+    """Return the loaded probe with drivers of the joint's own coordinates in place of rods, and the
+    joint seen from its second body, whose frame is then off the axis; None without coordinates.
+    """
+    heavy = loaded(case)
+    mechanism, tested = heavy.mechanism, _tested(heavy)
+    if not isinstance(tested, AxialJoint):
+        return None
+    rods = [joint for joint in mechanism.joints if joint.name.startswith("rod_")]
+    # a screw has two coordinates and one freedom
+    found = [each for each in DRIVEN if each.freedom in tested.freedoms][: len(rods)]
+    left = rods[len(found) :]
+    joints = [tested.reversed() if each is tested else each for each in mechanism.joints]
+    drivers = [each(f"own {each.freedom}", tested.name) for each in found]
+    mechanism = replace(
+        mechanism,
+        joints=[joint for joint in joints if joint not in rods or joint in left],
+        drivers=[*mechanism.drivers, *drivers],
+    )
+    motions = {driver.name: DRIVEN[type(driver)] for driver in drivers}
+    efforts = [
+        DriverEffort(f"{name} effort", *default(10.0, "N m"), driver=name).bound(mechanism)
+        for name in motions
+    ]
+    return replace(
+        heavy,
+        mechanism=with_markers(mechanism, efforts),
+        sweep=replace(heavy.sweep, motions=motions),
+        outputs=(*heavy.outputs, *efforts),
+    )
+
+
 def _tested(case: Case) -> Joint:
     # the probe's hinge or rods may be of the same type
-    return next(joint for joint in case.mechanism.joints if joint.bodies == ("a", "b"))
+    return next(joint for joint in case.mechanism.joints if {*joint.bodies} == {"a", "b"})
 
 
 def _with_mass(body: Body, number: int, mechanism: Mechanism) -> Body:
@@ -91,7 +130,7 @@ def solved(case: Case, mechanism: Mechanism) -> Probe:
     """
     path: Path = case.sweep.path
     names = tuple(body.name for body in mechanism.moving)
-    forces = [joint.name for joint in mechanism.joints] + [case.sweep.driver]
+    forces = [each.name for each in (*mechanism.joints, *mechanism.drivers)]
     solver = NativeSolver().prepare(mechanism, path, bodies=names, forces=forces)
     found = solver(TOL)
     if not found.solved.all() or found.forces is None:

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...case.case import Case, Series
+from ...case.case import Case, Quantity, Series
 from ...case.joint_probe import alternatives
 from ...errors import MechanismError
 from ...harness.compare import describe, deviations, output_series
@@ -24,7 +24,7 @@ from ...mechanism.equivalents import declared_equivalent, with_equivalents
 from ...trajectory import Array, Trajectory
 from ..findings import Finding, Verdict, judged
 from .checks import ROUND_OFF
-from .loaded_probe import loaded, solved
+from .loaded_probe import driven, loaded, solved
 from .reactions import reactions
 
 # Largest accepted constraint residual of an engine [m or -]: round-off of metre-sized coordinates,
@@ -101,20 +101,36 @@ def _broken(name: str, error: Exception) -> Finding:
 
 
 def _forces(case: Case, other: Case | str, engines: Sequence[Engine]) -> Iterator[Finding]:
-    """Check the reaction in the loaded probe, and compare it with that of the engines."""
-    heavy = loaded(case)
+    """Check the reaction in the loaded probe and with driven coordinates, and compare it with that
+    of the engines.
+    """
+    yield from _reactions(loaded(case), other, engines, "reaction")
+    if (own := driven(case)) is None:
+        why = "no AxialJoint: nothing drives it"
+        yield Finding("driven reaction", Verdict.SKIP, message=why)
+    else:
+        yield from _reactions(own, other, engines, "driven reaction")
+
+
+def _reactions(
+    heavy: Case, other: Case | str, engines: Sequence[Engine], what: str
+) -> Iterator[Finding]:
     probe = solved(heavy, heavy.mechanism)
-    yield from reactions(probe, heavy)
+    yield from reactions(probe, heavy, what)
     reference = {each.name: output_series(heavy, each, probe.motion) for each in heavy.outputs}
     if not isinstance(other, str):
-        equivalent = _equivalent(heavy)
-        assert equivalent is not None
-        there = {joint.name for joint in equivalent.mechanism.joints} | {heavy.sweep.driver}
-        outputs = tuple(each for each in heavy.outputs if there.issuperset(each.forces))
-        other = replace(equivalent, outputs=outputs)
+        try:
+            equivalent = _equivalent(heavy)
+            assert equivalent is not None
+            drivers = {driver.name for driver in heavy.mechanism.drivers}
+            there = drivers | {joint.name for joint in equivalent.mechanism.joints}
+            outputs = tuple(each for each in heavy.outputs if there.issuperset(each.forces))
+            other = replace(equivalent, outputs=outputs)
+        except MechanismError as error:  # a driver or coupler names a joint that is replaced
+            other = f"its equivalent cannot be driven: {error}"
     for engine in engines:
         if engine.name != STANDARD:
-            yield _simulated(engine, heavy, other, reference, "reaction")
+            yield _simulated(engine, heavy, other, reference, what)
 
 
 def _unlocked(tested: Joint | type[Joint]) -> tuple[Case, Trajectory]:
@@ -242,7 +258,7 @@ def _compared(name: str, case: Case, found: Trajectory, reference: dict[str, Ser
             Verdict.FAIL,
             message=f"{found.solved.sum()} of {len(found.solved)} samples solved: {found.message}",
         )
-    worst: tuple[float, str, str, Deviation] | None = None
+    worst: tuple[float, Quantity, str, Deviation] | None = None
     lacking = ""
     for output in case.outputs:
         standards = [(STANDARD, reference[output.name])]
@@ -252,16 +268,21 @@ def _compared(name: str, case: Case, found: Trajectory, reference: dict[str, Ser
         for quantity, deviation in result.items():
             figure = deviation.max_abs / deviation.tolerance
             if worst is None or figure > worst[0]:
-                worst = figure, output.name, quantity, deviation
+                worst = figure, output, quantity, deviation
     assert worst is not None
     if above := excess(case, found.residual, TOL):
         return Finding(name, Verdict.FAIL, message=above)
-    figure, output_name, quantity, deviation = worst
+    figure, output, quantity, deviation = worst
     message = (
         lacking
         if figure <= 1.0
         else describe(
-            output_name, quantity, deviation, case.sweep.driver, case.sweep.values.tolist()
+            output.name,
+            quantity,
+            deviation,
+            case.sweep.driver,
+            case.sweep.values.tolist(),
+            output.unit,
         )
     )
     verdict = Verdict.PASS if figure <= 1.0 else Verdict.FAIL
@@ -273,6 +294,6 @@ def _compared(name: str, case: Case, found: Trajectory, reference: dict[str, Ser
         AGREE_WHY,
         None,
         deviation.worst_step,
-        f"{output_name} {quantity}",
+        f"{output.name} {quantity}",
         message,
     )

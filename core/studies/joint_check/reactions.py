@@ -17,6 +17,7 @@ from ...case.case import Case
 from ...errors import KincheckError
 from ...joints import Kind
 from ...mechanism.mechanism import Mechanism
+from ...mechanism.motions import Sine
 from ..findings import Finding, Verdict, judged
 from .balance import speed, unbalanced, work
 from .loaded_probe import Probe, solved
@@ -30,17 +31,18 @@ SMALLER, SHIFT = 2.0**-10, 128.0
 PLACE_LIMIT = 1e3 * LIMIT
 
 
-def reactions(probe: Probe, case: Case) -> Iterator[Finding]:
+def reactions(probe: Probe, case: Case, what: str = "reaction") -> Iterator[Finding]:
     """Yield the findings on the reaction of the joint under test.
 
     Args:
-        case: from `loaded`, solved as `probe`.
+        case: from `loaded` or `driven`, solved as `probe`.
+        what: first part of the names of the findings.
     """
     forces = probe.motion.forces
     assert forces is not None
     largest = float(np.nanmax(forces.largest_power))
     yield judged(
-        "reaction: power",
+        f"{what}: power",
         np.abs(forces.power)[None] / largest,
         LIMIT,
         WHY,
@@ -48,26 +50,27 @@ def reactions(probe: Probe, case: Case) -> Iterator[Finding]:
         remedy="drivers, masses and springs do not balance: a joint has nu = 0",
     )
     yield judged(
-        "reaction: no work",
+        f"{what}: no work",
         np.abs(work(probe))[None] / (probe.size * speed(probe)),
         LIMIT,
         WHY,
         ["work"],
         remedy="the reaction works on the joint's freedoms: see rows and nu",
     )
-    off = np.array([unbalanced(probe, case, body) for body in probe.joint.bodies])
+    off = np.array([unbalanced(probe, body) for body in probe.joint.bodies])
     yield judged(
-        "reaction: acts and reacts",
+        f"{what}: acts and reacts",
         np.abs(off).max(axis=2) / probe.size,
         LIMIT,
         WHY,
         [f"body {body}" for body in probe.joint.bodies],
-        remedy="what one body gets is not the opposite of what the other gets: see rows",
+        remedy="what one body gets is not the opposite of what the other gets: see rows; a driver's"
+        " force acts along the axis through the point: see measured()",
     )
-    yield from _variants(probe, case)
+    yield from _variants(probe, case, what)
 
 
-def _variants(probe: Probe, case: Case) -> Iterator[Finding]:
+def _variants(probe: Probe, case: Case, what: str) -> Iterator[Finding]:
     """Check that forces do not depend on what is arbitrary."""
     mechanism = case.mechanism
     others: Sequence[tuple[str, Mechanism, float, float]] = (
@@ -81,9 +84,9 @@ def _variants(probe: Probe, case: Case) -> Iterator[Finding]:
             " and no internal origins in primitives()"
         )
         try:
-            found = solved(case, other).reaction
+            found = solved(_paced(case, scale), other).reaction
         except KincheckError as error:
-            yield Finding(f"reaction: {name}", Verdict.FAIL, message=f"{error}; {remedy}")
+            yield Finding(f"{what}: {name}", Verdict.FAIL, message=f"{error}; {remedy}")
             continue
         off = np.concatenate(
             [
@@ -93,13 +96,24 @@ def _variants(probe: Probe, case: Case) -> Iterator[Finding]:
             axis=1,
         )
         yield judged(
-            f"reaction: {name}",
+            f"{what}: {name}",
             np.abs(off).T / probe.size,
             limit,
             WHY,
             ["force x", "force y", "force z", "moment x", "moment y", "moment z"],
             remedy=remedy,
         )
+
+
+def _paced(case: Case, factor: float) -> Case:
+    """Return the case with lengths in the motions of its drivers by a factor."""
+    motions = {
+        name: replace(motion, amplitude=factor * motion.amplitude)
+        if isinstance(motion, Sine) and not case.mechanism.driver(name).turns
+        else motion
+        for name, motion in case.sweep.motions.items()
+    }
+    return replace(case, sweep=replace(case.sweep, motions=motions))
 
 
 def _turned_round(mechanism: Mechanism) -> Mechanism:

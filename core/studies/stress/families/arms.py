@@ -36,43 +36,50 @@ class Arms(Family):
     def specimen(self, rng: Rng, samples: int) -> Specimen:
         """Return a random tree or chain with joints 0.1 to 0.3 m apart."""
         count = bodies(rng, LARGEST)
-        chain = rng.random() < 0.3
-        parts, joints, drivers = list[Body](), list[Joint](), list[Driver]()
-        motions = dict[str, Motion]()
-        ends: dict[str, Any] = {GROUND: np.zeros(3)}
-        for k in range(count):
-            parent = list(ends)[-1 if chain else int(rng.integers(len(ends)))]
-            name, place = f"b{k + 1}", ends[parent] + rng.uniform(0.1, 0.3) * direction(rng)
-            kind = KINDS[0] if not drivers else KINDS[int(rng.integers(len(KINDS)))]
-            joint = _joint(kind, rng, f"j{k + 1}", parent, name, triple(place))
-            parts.append(Body(name))
-            joints.append(joint)
-            ends[name] = place
-            # the rotation of a screw determines its translation
-            for freedom in joint.freedoms[:1] if kind is Screw else joint.freedoms:
-                of = JointAngle if freedom == "rotation" else JointDisplacement
-                drivers.append(of(f"{joint.name}_{freedom}", joint.name))
-                size = 1.0 if freedom == "rotation" else 0.1
-                swings = rng.random() < 0.5
-                motions[drivers[-1].name] = (
-                    Sine(float(size * rng.uniform(0.2, 1.0)), float(rng.uniform(0.1, 0.5)))
-                    if swings
-                    else Ramp(float(size * rng.uniform(-1.0, 1.0)))
-                )
-        swept = drivers[0].name
-        del motions[swept]
-        ends.pop(GROUND)
-        last = list(ends)[-3:]
-        points = [
-            Point(f"tip_{name}", name, triple(ends[name] + 0.1 * direction(rng))) for name in last
-        ]
-        mechanism = Mechanism("arm", parts, joints, points, drivers)
+        mechanism, motions = random_arm(rng, count)
+        swept = mechanism.drivers[0].name
         return Specimen(
-            f"arm of {count} bodies and {len(drivers)} drivers",
+            f"arm of {count} bodies and {len(mechanism.drivers)} drivers",
             partial(as_case, mechanism, swept, np.linspace(-2.0, 2.0, samples), motions=motions),
             partial(closed, motion=forward(mechanism)),
             facts=(("bodies", count),),
         )
+
+
+def random_arm(
+    rng: Rng, count: int, kinds: Sequence[type[Joint]] = KINDS
+) -> tuple[Mechanism, dict[str, Motion]]:
+    """Return a tree or chain, and the motions of all drivers but the first, which turns."""
+    chain = rng.random() < 0.3
+    parts, joints, drivers = list[Body](), list[Joint](), list[Driver]()
+    motions = dict[str, Motion]()
+    ends: dict[str, Any] = {GROUND: np.zeros(3)}
+    for k in range(count):
+        parent = list(ends)[-1 if chain else int(rng.integers(len(ends)))]
+        name, place = f"b{k + 1}", ends[parent] + rng.uniform(0.1, 0.3) * direction(rng)
+        kind = Revolute if not drivers else kinds[int(rng.integers(len(kinds)))]
+        joint = _joint(kind, rng, f"j{k + 1}", parent, name, triple(place))
+        parts.append(Body(name))
+        joints.append(joint)
+        ends[name] = place
+        # the rotation of a screw determines its translation
+        for freedom in joint.freedoms[:1] if kind is Screw else joint.freedoms:
+            of = JointAngle if freedom == "rotation" else JointDisplacement
+            drivers.append(of(f"{joint.name}_{freedom}", joint.name))
+            size = 1.0 if freedom == "rotation" else 0.1
+            swings = rng.random() < 0.5
+            motions[drivers[-1].name] = (
+                Sine(float(size * rng.uniform(0.2, 1.0)), float(rng.uniform(0.1, 0.5)))
+                if swings
+                else Ramp(float(size * rng.uniform(-1.0, 1.0)))
+            )
+    del motions[drivers[0].name]
+    ends.pop(GROUND)
+    points = [
+        Point(f"tip_{name}", name, triple(ends[name] + 0.1 * direction(rng)))
+        for name in list(ends)[-3:]
+    ]
+    return Mechanism("arm", parts, joints, points, drivers), motions
 
 
 def _joint(

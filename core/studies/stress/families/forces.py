@@ -12,9 +12,9 @@ from ....algebra import triple
 from ....case.case import Case, Quantity
 from ....case.measures import DriverEffort, ElementForce, ForceMeasure, JointForce, JointMoment
 from ....case.quantity import with_markers
-from ....joints import Joint, Revolute
+from ....joints import Cylindrical, Joint, RackPinion, Revolute, Screw, Translational
 from ....mechanism.body import Body, Inertia
-from ....mechanism.drivers import JointAngle
+from ....mechanism.drivers import JointAngle, JointDisplacement
 from ....mechanism.loads import (
     Axes,
     Force,
@@ -25,6 +25,7 @@ from ....mechanism.loads import (
 )
 from ....mechanism.mechanism import GROUND, Mechanism
 from ....mechanism.motions import Motion, Sine
+from .arms import random_arm
 from .base import Family, Rng, Specimen, as_case, bodies, direction, power
 from .dimensions import crank_rocker
 from .loops import random_mechanism
@@ -36,6 +37,8 @@ SHORTEST = 0.1
 # Fraction of the reach of loops: most specimens meet no singular pose there, near which forces grow
 # without limit.
 NEAR = 0.1
+# Slides are frequent: their drives have a line of action.
+OF_ARMS = (Revolute, Translational, Translational, Cylindrical, Screw)
 # Tolerance of force outputs, which a case requires. The truth has its own bounds for forces.
 TOLERANCE = (1e-6, 1e-9, "the stress truth has bounds of its own")
 
@@ -45,19 +48,28 @@ class Forces(Family):
 
     name = "forces"
     about = (
-        f"loops of 3 to {LARGEST} bodies and planar four-bars with random masses, gravity, springs,"
-        " dampers and constant loads; some hinges twice, which leaves forces undetermined"
+        f"loops of 3 to {LARGEST} bodies, arms driven at every slide and hinge, and planar"
+        " four-bars with random masses, gravity, springs, dampers and constant loads; some hinges"
+        " twice, which leaves forces undetermined"
     )
     samples = 11
 
     def specimen(self, rng: Rng, samples: int) -> Specimen:
-        """Return a loaded mechanism: one third are four-bars with four hinges; half of the others
-        have one hinge twice.
+        """Return a loaded mechanism: a four-bar with four hinges, an arm, or a loop, which has one
+        hinge twice in every second specimen.
         """
-        if rng.random() < 1.0 / 3.0:
+        draw, motions = rng.random(), dict[str, Motion]()
+        along: Sequence[np.ndarray] = ()
+        if draw < 1.0 / 3.0:
             plane = any_plane(rng)
             mechanism, reach, what = four_bar(plane, *crank_rocker(rng)), 1.0, "four_bar"
-            along: Sequence[np.ndarray] = (plane.e1, plane.e2, np.array(plane.normal))
+            along = (plane.e1, plane.e2, np.array(plane.normal))
+        elif draw < 2.0 / 3.0:
+            arm, motions = random_arm(rng, int(rng.integers(2, LARGEST)), OF_ARMS)
+            # a joint may have the body that it carries first
+            joints = [joint.reversed() if rng.random() < 0.5 else joint for joint in arm.joints]
+            mechanism, reach = replace(arm, joints=joints), 1.0
+            what = f"arm of {len(joints)} bodies"
         else:
             mechanism, reach = random_mechanism(rng, lambda: bodies(rng, LARGEST))
             reach *= NEAR
@@ -65,7 +77,7 @@ class Forces(Family):
             if rng.random() < 0.5 and (doubled := _doubled(rng, mechanism)) is not None:
                 mechanism, what = doubled, f"{what}, a hinge twice"
         mechanism = _loaded(rng, mechanism)
-        motions: dict[str, Motion] = {d.name: Sine(0.1 * reach, 0.7) for d in mechanism.drivers[1:]}
+        motions = motions or {d.name: Sine(0.1 * reach, 0.7) for d in mechanism.drivers[1:]}
         values = np.linspace(-reach, reach, samples)
         rate = power(rng, -1.0, 1.0)
         outputs = _outputs(rng, mechanism, along)
@@ -162,12 +174,15 @@ def _elements(rng: Rng, mechanism: Mechanism) -> list[ForceElement]:
 
 
 def _outputs(rng: Rng, mechanism: Mechanism, along: Sequence[np.ndarray]) -> tuple[Quantity, ...]:
-    """Return force outputs: two joints, a hinge and its twin if there is one, all drivers and all
-    force elements.
+    """Return force outputs: two joints, driven or coupled slides before others, a hinge and its
+    twin if there is one, all drivers and all force elements.
     """
     twins = [joint for joint in mechanism.joints if joint.name.endswith("_twin")]
     others = [joint for joint in mechanism.joints if joint not in twins]
-    chosen: list[Joint] = [others[k] for k in rng.choice(len(others), 2, replace=False)]
+    slides = {each.joint for each in mechanism.drivers if isinstance(each, JointDisplacement)}
+    slides |= {each.joints[1] for each in mechanism.couplers if isinstance(each, RackPinion)}
+    mixed: list[Joint] = [others[int(k)] for k in rng.permutation(len(others))]
+    chosen = sorted(mixed, key=lambda joint: joint.name not in slides)[:2]
     axes = [*np.eye(3), *along]
     found: list[ForceMeasure] = [
         cls(f"{joint.name}.{what}{k}", *TOLERANCE, joint=joint.name, direction=triple(axis))

@@ -30,7 +30,8 @@ def distance_from_proof(truth: Truth, sample: int) -> float:
         (p, int(np.flatnonzero(at == sample)[0])) for at, p in truth.parts if sample in at
     )
     at, system = part.at(k), truth.system
-    mechanism, points = system.mechanism, system.case.points
+    mechanism = system.mechanism
+    points = [p for p in system.case.points if not mechanism.is_fixed(mechanism.point(p).body)]
     path = system.path
     drives = system.sampled(np.array([sample]))[:, :, 0]
     pose = _state(truth, at, PoseState.of(mechanism))
