@@ -14,7 +14,7 @@ from ...case.joint_probe import ATOL, WHY, probe, probes
 from ...case.measures import DriverEffort, ElementForce, ForceMeasure, JointForce, JointMoment
 from ...case.measures.force import Axis
 from ...case.quantity import with_markers
-from ...joints import Revolute, Translational
+from ...joints import Fixed, Revolute, Translational
 from ...mechanism.body import Body
 from ...mechanism.drivers import JointAngle, JointDisplacement, PointCoordinate
 from ...mechanism.loads import Axes, Force, SpringDamper, Torque, TorsionSpringDamper
@@ -123,11 +123,16 @@ def uneven_drives() -> Case:
 
 
 def _turns() -> Case:
-    """Return a wheel on a torsional spring over two turns, from the last value to the first."""
+    """Return a wheel with a rider on a torsional spring over two turns, from the last value to the
+    first.
+    """
     mechanism = Mechanism(
         "turns",
-        [_body("wheel", 0)],
-        [Revolute("hub", GROUND, "wheel", (0.1, 0.2, 0.3), (0.2, -1.0, 0.4))],
+        [_body("wheel", 0), _body("rider", 1)],
+        [
+            Revolute("hub", GROUND, "wheel", (0.1, 0.2, 0.3), (0.2, -1.0, 0.4)),
+            Fixed("weld", "wheel", "rider", (0.3, 0.1, 0.4)),
+        ],
         drivers=[JointAngle("turn", "hub")],
         gravity=GRAVITY,
         forces=[TorsionSpringDamper("clock", "hub", 4.0, damping=0.5, free_angle=0.25)],
