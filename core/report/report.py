@@ -188,7 +188,7 @@ def _fault(record: Record, tol: float) -> str:
         any(each.contradicted for each in errors),
         any(each.lost for each in errors),
         record.solved == record.samples and (record.residual_max or 0.0) > tol,
-        record.solved == record.samples,
+        record.solved == record.samples and bool(record.faults),
         True,
     )
     return next(what for (_, _, what), true in zip(FAULTS, holds, strict=True) if true)
