@@ -14,7 +14,6 @@ from ..case.case import Case, pace, size
 from ..case.measures import ForceMeasure
 from ..errors import KincheckError
 from ..forces import BALANCED, Forces
-from ..kinematics import motion_defects
 from ..trajectory import QUANTITIES, Array, BodyMotion, Trajectory
 from ..unit_text import value_text
 
@@ -23,7 +22,7 @@ CONSTRAINED = 1e-9
 """Largest defect of a motion of bodies in the constraints, relative to the mechanism's size and its
 constraints' rates: the default tolerance of outputs, and ten thousand times the round-off.
 """
-KINDS = {"f": "floats", "b": "booleans", "iu": "whole numbers"}
+KINDS = {"f": "floats", "b": "booleans", "iu": "whole numbers", "fiu": "a real number"}
 """Words for the expected numbers, by kinds of numpy."""
 
 
@@ -55,7 +54,7 @@ def _check_form(case: Case, trajectory: Trajectory) -> None:
     iterations = _numbers("iterations", trajectory.iterations, (n,), "iu")
     if (iterations < 0).any():
         raise BadTrajectoryError(f"iterations has {iterations.min()}, expected no negative number")
-    residual = _numbers("residual", trajectory.residual, (), "f")
+    residual = _numbers("residual", trajectory.residual, (), "fiu")
     if solved.any() and not (np.isfinite(residual) and residual >= 0.0):
         raise BadTrajectoryError(
             f"residual is {residual} although {solved.sum()} samples are called solved, expected"
@@ -174,6 +173,8 @@ def faults(case: Case, trajectory: Trajectory, *, rigid: bool) -> Iterator[str]:
                 " drivers' power must be stored or dissipated, so a force or a rate is wrong"
             )
     if trajectory.bodies and solved.any() and rigid:
+        from ..kinematics import motion_defects  # few engines give motions of bodies
+
         found = motion_defects(case.mechanism, case.sweep.path, trajectory)
         where, off = max(found.items(), key=lambda each: each[1].max())
         if off.max() > CONSTRAINED:
