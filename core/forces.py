@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
@@ -16,6 +16,10 @@ Array: TypeAlias = NDArray[np.float64]
 # The null space of redundant rows is orthonormal to round-off over the smallest singular value,
 # which is above 1e-6 in sound linkages. A larger component is real.
 DETERMINED = 1e-8
+BALANCED = 1e-9
+"""Largest accepted part of the powers that is missing to their balance: the default tolerance of
+outputs, and a hundred thousand times the round-off of the engines.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,16 +87,23 @@ class Forces:
     largest_power: Array
     message: str = ""
 
+    def has(self, names: Collection[str]) -> bool:
+        """Return whether all named joints, drivers and force elements have their forces here."""
+        return all(
+            name in self.joints or name in self.drivers or name in self.elements for name in names
+        )
+
     def account(self) -> dict[str, Any]:
-        """Return facts for the record: the power missing, as a part of the largest, and the joints
-        whose reaction is not wholly determined, with the determined directions.
+        """Return facts for the record: the power missing, as a part of the largest (None if it is
+        not known at any sample), and the joints whose reaction is not wholly determined, with the
+        determined directions.
         """
         known = np.isfinite(self.power)
         largest = float(self.largest_power[known].max(initial=0.0))
         missing = float(np.abs(self.power[known]).max(initial=0.0))
         counts = {name: each.determined() for name, each in self.joints.items()}
         return {
-            "power_missing": missing / largest if largest else 0.0,
+            "power_missing": (missing / largest if largest else missing) if known.any() else None,
             "determined_directions": {
                 name: {"force": force, "moment": moment, "wrench": wrench}
                 for name, (force, moment, wrench) in counts.items()

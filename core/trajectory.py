@@ -109,7 +109,7 @@ class Trajectory(Tabular):
             if there are none.
         message: empty, or why samples are missing: the finding, the place and the remedy.
         details: further facts worth a place in the record (rank, rows, degrees of freedom, ...).
-        bodies: motion by body name, if requested and given by the engine.
+        bodies: motion by body name, of all moving bodies or of none; it must keep the constraints.
         forces: reactions and efforts, if requested and given by the engine.
         driven_by: gives `drive`; None if the engine does not tell it.
         failures: kinds of the failures in the message, each once.

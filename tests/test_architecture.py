@@ -101,7 +101,8 @@ IMPORTS = {
         "harness studies"
     ),
     "studies/engine_check": (
-        ". primitives joints case harness harness/workers studies studies/joint_check"
+        ". primitives joints mechanism case case/measures case/io harness harness/workers "
+        "studies studies/joint_check"
     ),
     "studies/tolerance": (
         ". program program/llvm mechanism kinematics case case/measures case/io harness "

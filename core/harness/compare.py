@@ -89,9 +89,7 @@ def _force_series(output: ForceMeasure, trajectory: Trajectory) -> Series:
     """Return a force over the samples, NaN if it is missing or undetermined."""
     given = trajectory.forces
     # a simulator may replace a joint by an equivalent, which gives no reaction of the joint
-    if given is None or not {*given.joints, *given.drivers, *given.elements}.issuperset(
-        output.forces
-    ):
+    if given is None or not given.has(output.forces):
         return Series(np.full(len(trajectory.solved), np.nan), possible=False)
     values = np.where(trajectory.solved, output.values(given), np.nan)
     return Series(values, reason=output.undetermined(given))

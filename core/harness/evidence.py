@@ -137,20 +137,29 @@ class Explanation(msgspec.Struct, frozen=True, kw_only=True):
     unit: str
 
 
+REFERENCE = "reference"
+"""The subject of a suspicion, beside the native engine."""
+
+
 class Suspect(msgspec.Struct, frozen=True, kw_only=True):
-    """A case whose engines agree with each other, but not with the reference.
+    """A case whose engines agree with each other, but not with the reference or not with native.
 
     Attributes:
+        subject: "reference" or "native".
+        engines: those that agree.
         agreement: largest difference between engines in `output` and `quantity` [unit].
-        output, quantity, sample: place of the reference's largest deviation, in tolerances.
+        outputs: quantities out of tolerance, by output; empty in results of older versions.
+        output, quantity, sample: place of the subject's largest deviation, in tolerances.
         difference, tolerance: the deviation at this place, and its tolerance [unit].
-        explanations: simple changes that make the reference fit.
+        explanations: simple changes that make the subject fit.
         unexplained: outputs and quantities that no such change explains.
         message: the whole suspicion in one sentence.
     """
 
+    subject: str = REFERENCE
     engines: list[str]
     agreement: float
+    outputs: dict[str, list[str]] = {}
     output: str
     quantity: str
     sample: int

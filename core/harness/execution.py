@@ -10,11 +10,13 @@ from time import perf_counter
 from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..case.case import Case, Series
 from ..errors import KincheckError
 from ..failures import FailureKind
-from ..trajectory import QUANTITIES, Array, Trajectory
+from ..forces import Forces
+from ..trajectory import Array, Trajectory
 from .compare import output_series
 from .engine import Engine
 from .held_trajectory import held_trajectory
@@ -22,6 +24,7 @@ from .provenance import plain, readable
 from .record import Outcome, Seconds
 from .resource_limits import memory_limit
 from .scheduler_delay import waited
+from .trajectory_check import check, faults
 
 # Number of solves: one interruption does not move their median. Slow engines stop after the budget
 # [s], unless two solves differ in time by the factor UNLIKE: the slow one included a compilation.
@@ -31,10 +34,6 @@ UNLIKE = 2.0
 
 # Longest message [characters]: a page. An engine may put all its data into one.
 LONGEST_MESSAGE = 2000
-
-
-class BadTrajectoryError(KincheckError):
-    """An engine's answer violates the engine protocol."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +69,9 @@ class Answer:
         solved: number of solved samples.
         iterations: sum over the solved samples.
         residual, message, details, failures: see `Trajectory`.
+        power: missing to the balance at each sample [W], NaN if unknown or no power flows; None
+            without forces.
+        faults: what the answer gets wrong by itself, in sentences.
     """
 
     outputs: Mapping[str, Series]
@@ -79,6 +81,34 @@ class Answer:
     message: str
     details: dict[str, Any]
     failures: Sequence[FailureKind] = ()
+    power: Array | None = None
+    faults: Sequence[str] = ()
+
+    @staticmethod
+    def of(pair: Pair, found: Trajectory, held: Trajectory | None = None, why: str = "") -> Answer:
+        """Return the answer that a checked trajectory gives to a pair.
+
+        Args:
+            held, why: from `held_trajectory`.
+        """
+        case, solved = pair.case, np.asarray(found.solved, dtype=np.bool_)
+        rigid = pair.engine.mode == "projection"
+        return Answer(
+            outputs={each.name: output_series(case, each, found, held) for each in case.outputs},
+            solved=int(solved.sum()),
+            iterations=int(np.asarray(found.iterations)[solved].sum()),
+            residual=float(found.residual),
+            message=bounded("; ".join(filter(None, (found.message, why)))),
+            details=plain(found.facts),
+            failures=found.failures,
+            power=None if found.forces is None else _power(found.forces, solved),
+            faults=[*faults(case, found, rigid=rigid)],
+        )
+
+
+def _power(forces: Forces, solved: NDArray[np.bool_]) -> Array:
+    flowing = solved & (np.asarray(forces.largest_power) > 0.0)
+    return np.where(flowing, forces.power, np.nan)
 
 
 @dataclass(frozen=True)
@@ -196,7 +226,6 @@ def _solve(pair: Pair, seconds: dict[str, float]) -> Answer:
             undisturbed.append(own)
         seconds["warm"] = float(np.median(warm))
         seconds["waited"] = seconds["warm"] - float(np.median(undisturbed))
-    solved = np.asarray(trajectory.solved, dtype=np.bool_)
 
     def solve_anew(case: Case) -> Trajectory:
         found = engine.solve(engine.build(case), case, pair.tol)
@@ -204,67 +233,13 @@ def _solve(pair: Pair, seconds: dict[str, float]) -> Answer:
         return found
 
     held, why = held_trajectory(case, engine.mode, trajectory, solve_anew)
-    return Answer(
-        outputs={
-            output.name: output_series(case, output, trajectory, held) for output in case.outputs
-        },
-        solved=int(solved.sum()),
-        iterations=int(np.asarray(trajectory.iterations)[solved].sum()),
-        residual=float(trajectory.residual),
-        message=bounded("; ".join(filter(None, (trajectory.message, why)))),
-        details=plain(trajectory.facts),
-        failures=trajectory.failures,
-    )
+    return Answer.of(pair, trajectory, held, why)
 
 
 def _more(first: float, warm: Sequence[float]) -> bool:
     """Return whether to solve again for the time."""
     unlike = len(warm) < 3 and max(warm) > UNLIKE * min(first, *warm)
     return len(warm) < WARM_SOLVES and (unlike or sum(warm) + min(warm) <= WARM_BUDGET)
-
-
-def check(case: Case, engine: str, trajectory: Trajectory) -> None:
-    """Check an answer against the engine protocol.
-
-    Raises:
-        BadTrajectoryError: a point is missing, a shape is wrong, or a solved sample is not finite.
-    """
-    n = len(case.sweep.values)
-    for name in ("solved", "iterations"):
-        _check_shape(f"{engine}: {name}", getattr(trajectory, name), (n,))
-    solved = np.asarray(trajectory.solved, dtype=np.bool_)
-    if solved.any() and not np.isfinite(trajectory.residual):
-        raise BadTrajectoryError(
-            f"{engine}: residual is {trajectory.residual} although {solved.sum()} samples are"
-            " called solved"
-        )
-    for point in case.points:
-        if point not in trajectory.points:
-            raise BadTrajectoryError(
-                f"{engine}: no motion of point {point!r}; found:"
-                f" {', '.join(trajectory.points) or 'none'}"
-            )
-        motion = trajectory.points[point]
-        for quantity in QUANTITIES:
-            values: Array | None = getattr(motion, quantity)
-            if values is None and quantity != "position":
-                continue
-            _check_shape(f"{engine}: {quantity} of point {point!r}", values, (n, 3))
-            finite = np.isfinite(np.asarray(values, dtype=np.float64)).all(axis=1)
-            bad = np.flatnonzero(solved & ~finite)
-            if bad.size:
-                raise BadTrajectoryError(
-                    f"{engine}: {quantity} of point {point!r} is"
-                    f" {np.asarray(values)[bad[0]].tolist()} at sample {bad[0]}"
-                    f" ({case.sweep.driver} = {case.sweep.values[bad[0]]:.9g}), which is called"
-                    f" solved; {bad.size} of {n} samples are so: mark them unsolved and explain, or"
-                    " give finite numbers"
-                )
-
-
-def _check_shape(what: str, values: Any, expected: tuple[int, ...]) -> None:
-    if np.shape(values) != expected:
-        raise BadTrajectoryError(f"{what} has shape {np.shape(values)}, expected {expected}")
 
 
 def error_text(error: BaseException) -> str:

@@ -62,7 +62,7 @@ def notes(run: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 
 def suspects(results: Results) -> list[tuple[str, str]]:
-    """Return the cases with a suspected reference, and the reason."""
+    """Return the cases with a suspected reference or native engine, and the reason."""
     return [(case, each.message) for case, each in results.suspects.items()]
 
 

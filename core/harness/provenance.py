@@ -15,7 +15,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from ..case.case import TIME, Case, Truth
+from ..case.case import TIME, Case, Series, Truth
 from ..case.notes import notes
 from ..mechanism.motions import Absolute, Motion
 from ..version import VERSION
@@ -38,13 +38,15 @@ def results(
     command: str,
     facts: Mapping[str, Any] | None = None,
     plan: Sequence[tuple[str, str, str]] = (),
+    native: Mapping[str, Mapping[str, Series]] | None = None,
 ) -> Results:
-    """Return the results of a run: its records, circumstances and references.
+    """Return the results of a run: its records, circumstances, references and suspicions.
 
     Args:
         facts: further circumstances, recorded at the start of the run. They replace those found
             here.
         plan: the planned pairs of an incomplete run.
+        native: outputs of the native engine by case, as far as they are known.
     """
     known = {**circumstances(cases, started=started, tol=tol, command=command), **(facts or {})}
     known["cases"] = _with_identical(
@@ -52,7 +54,11 @@ def results(
         records,
         [case.name for case in cases if not (case.origin and case.origin.own)],
     )
-    suspects = {case.name: found for case in cases if (found := suspect(case, records))}
+    suspects = {
+        case.name: found
+        for case in cases
+        if (found := suspect(case, records, (native or {}).get(case.name)))
+    }
     return Results(
         run=known | {"engines": versions(records), **missing(plan, records)},
         records=list(records),

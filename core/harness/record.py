@@ -157,6 +157,9 @@ class Record(RecordTable, msgspec.Struct, frozen=True, kw_only=True):
         solved, samples: number of samples reached, and number of samples.
         us_per_step: time of the warm solve per sample [us], including the forces of outputs; null
             unless all samples were reached.
+        faults: what is wrong with an answer beside deviations: missing or contradicted samples,
+            residual, balance of power, bodies, degrees of freedom; `message` repeats them. Empty in
+            records of older versions.
         evidence: evidence on the reference used for the verdict; null without a reference, and in
             records of older versions.
         reasons: reasons for null numbers, by key: residual_max, rank, dof, iterations, us_per_step.
@@ -186,6 +189,7 @@ class Record(RecordTable, msgspec.Struct, frozen=True, kw_only=True):
     reasons: dict[str, str] = {}
     details: dict[str, Any] = {}
     evidence: Evidence | None = None
+    faults: list[str] = []
 
     @property
     def validated(self) -> bool:
@@ -218,7 +222,7 @@ class Results(ResultsTable, msgspec.Struct, frozen=True, kw_only=True):
         references: the reference values of each case with a reference, by case and output.
         scenes: the mechanism of each case, by case; empty in a run without scenes.
         suspects: by name, cases with engines in agreement with each other and not with the
-            reference.
+            reference or native.
     """
 
     schema: Literal["kincheck-results/1"] = "kincheck-results/1"
@@ -228,14 +232,25 @@ class Results(ResultsTable, msgspec.Struct, frozen=True, kw_only=True):
     scenes: dict[str, Scene] = {}
     suspects: dict[str, Suspect] = {}
 
-    def blames_reference(self, record: Record) -> bool:
-        """Return whether the suspected reference of the case explains a failure, so that the
-        record's own message is redundant.
+    def explains(self, record: Record) -> bool:
+        """Return whether the suspicion of the case explains all faults of a failed record, so that
+        the record's own message is redundant.
         """
+        found = self.suspects.get(record.case)
+        if found is None or record.outcome is not Outcome.FAIL:
+            return False
         whole = record.solved == record.samples and not any(
             each.lost for each in record.errors.values()
         )
-        return record.case in self.suspects and record.outcome is Outcome.FAIL and whole
+        off = {
+            (name, quantity)
+            for name, errors in record.errors.items()
+            for quantity, each in errors.items()
+            if not each.within
+        }
+        accused = {(name, each) for name, every in found.outputs.items() for each in every}
+        explained = record.engine in found.engines and (off <= accused or not accused)
+        return whole and not record.faults and explained
 
     @property
     def missing(self) -> list[tuple[str, str, str]]:

@@ -123,8 +123,16 @@ def run(
             else:
                 judge(pair, attempt, case.standard)
     found, requested = [records[key] for key in wanted], planned(cases, engines, unread)
+    native = {name: each.standard.outputs for name, each in judging.items() if each.standard}
     return results(
-        cases, found, started=started, tol=tol, command=command, facts=facts, plan=requested
+        cases,
+        found,
+        started=started,
+        tol=tol,
+        command=command,
+        facts=facts,
+        plan=requested,
+        native=native,
     )
 
 
@@ -258,6 +266,7 @@ def _answered(
         facts,
         outcome=verdict.outcome,
         message="; ".join(messages),
+        faults=list(verdict.faults),
         driver={name: each.tolist() for name, each in case.sweep.moved.items()},
         outputs={
             output.name: as_numbers(answer.outputs[output.name], output) for output in case.outputs

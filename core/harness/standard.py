@@ -30,12 +30,14 @@ class Standard:
             Samples near a singular pose that it refuses for an uncertain pose or rate are not
             included: they contradict no other engine.
         why: the native engine's own message.
+        dof: its number of degrees of freedom without drivers; None if it is not known.
     """
 
     outputs: Mapping[str, Series]
     absent: str = ""
     refused: NDArray[np.bool_] | None = None
     why: str = ""
+    dof: int | None = None
 
     def refuses(self, case: Case) -> NDArray[np.bool_] | None:
         """Return the samples that neither native nor the reference reaches, shape (n,)."""
@@ -51,10 +53,10 @@ def standard_of(native: Record) -> Standard:
         return Standard({}, why)
     outputs = {name: _series(output) for name, output in native.outputs.items()}
     if native.solved == native.samples:
-        return Standard(outputs)
+        return Standard(outputs, dof=native.dof)
     refused = ~known(outputs.values(), native.samples or 0)
     refused[native.details.get(UNCERTAIN, [])] = False
-    return Standard(outputs, refused=refused, why=native.message)
+    return Standard(outputs, refused=refused, why=native.message, dof=native.dof)
 
 
 def has_everything(case: Case) -> bool:

@@ -1,29 +1,35 @@
-"""Suspicion of a reference: the engines of a case agree with each other, but not with the
-reference.
+"""Suspicion of a standard: the engines of a case agree with each other, but not with the reference,
+or most of them with each other and not with native.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import combinations
 
 import numpy as np
 
-from ..case.case import TIME, Case
+from ..case.case import TIME, Case, Series
 from ..case.suspension import Camber, Toe, camber_of_front_view
 from ..case.units import ANGLES, LENGTHS, SECOND, Unit
 from ..errors import shortened
 from ..trajectory import PER_TIME, QUANTITIES, Array
 from ..unit_text import motion_word, value_text
 from .compare import deviation, pace
-from .evidence import Explanation, Suspect
+from .evidence import REFERENCE, Explanation, Suspect
 from .record import Deviation, Deviations, OutputSeries, Record
 from .slips import Held, NamedChange, Slip, Uncertain, slips
+from .standard import STANDARD
 
 # Largest number of outputs explained in a sentence; further ones are counted.
 MOST_EXPLAINED = 12
-ADVICE = "suspect the reference, the output's component or a sign"
+ADVICE = {
+    REFERENCE: "suspect the reference, the output's component or a sign",
+    STANDARD: f"suspect {STANDARD}",
+}
+"""What to suspect, by the subject of the suspicion."""
 UNEXPLAINED = (
     "no sign, unit, offset, exchanged column, reversed or shifted order of samples explains it"
 )
@@ -31,27 +37,39 @@ UNEXPLAINED = (
 
 @dataclass(frozen=True, eq=False)
 class _Off:
-    """A quantity of an output out of tolerance."""
+    """A quantity of an output out of tolerance against a standard."""
 
     output: str
     order: int
     held: Held
-    reference: Uncertain
+    standard: Uncertain
     deviation: Deviation
 
     @property
-    def ratio(self) -> float:
+    def rank(self) -> tuple[int, float]:
+        """Sort key: positions first, then the largest deviation in tolerances."""
         tolerance = self.deviation.tolerance
-        return self.deviation.max_abs / tolerance if tolerance else np.inf
+        return self.order, -(self.deviation.max_abs / tolerance if tolerance else np.inf)
 
 
-def suspect(case: Case, records: Sequence[Record]) -> Suspect | None:
-    """Return the suspicion of a reference; None unless the engines agree within tolerance and the
-    reference does not fit.
+def suspect(
+    case: Case, records: Sequence[Record], native: Mapping[str, Series] | None = None
+) -> Suspect | None:
+    """Return the suspicion of the reference, or else of native; None without one.
+
+    Args:
+        native: native's outputs, to find the slip that explains it; without them none is sought.
+    """
+    mine = [record for record in records if record.case == case.name and record.solved]
+    return _of_reference(case, mine) or _of_native(case, mine, native or {})
+
+
+def _of_reference(case: Case, mine: Sequence[Record]) -> Suspect | None:
+    """Return the suspicion of a reference: the engines agree within tolerance, and the reference
+    does not fit.
 
     A single engine agrees with no other, so a slip must explain all deviations.
     """
-    mine = [record for record in records if record.case == case.name and record.solved]
     whole = [record for record in mine if record.solved == record.samples]
     if not case.reference or not any(
         _against(each, case) for record in mine for each in record.errors.values()
@@ -61,18 +79,112 @@ def suspect(case: Case, records: Sequence[Record]) -> Suspect | None:
         return None
     rate_scale = pace(case)
     agreement = _agreement(case, rate_scale, whole[0], mine)
-    off = sorted(_off(case, rate_scale, whole[0]), key=lambda each: (each.order, -each.ratio))
+    off = sorted(_off(case, rate_scale, whole[0]), key=lambda each: each.rank)
     if agreement is None or not off:
         return None
-    explanations, left = _explained(case, rate_scale, whole[0], off)
+    explained = _explained(case, rate_scale, whole[0], off)
     engines = list(dict.fromkeys(record.engine for record in mine))
-    if len(engines) == 1 and (left or not explanations):
+    if len(engines) == 1 and (explained[1] or not explained[0]):
         return None
-    worst = off[0]
-    agreed = agreement.get((worst.output, worst.order), 0.0)
+    agreed = agreement.get((off[0].output, off[0].order), 0.0)
+    within = value_text(_number(agreed), off[0].held.unit)
+    who = (
+        f"{engines[0]} is the only engine that solved it"
+        if len(engines) == 1
+        else f"all {len(engines)} engines agree within {within}"
+    )
+    return _suspicion(case, REFERENCE, engines, agreed, off, explained, who)
+
+
+def _of_native(case: Case, mine: Sequence[Record], native: Mapping[str, Series]) -> Suspect | None:
+    """Return the suspicion of native: a majority of all engines, native among them, agree with each
+    other in a quantity compared with native, and are out of tolerance there.
+    """
+    rate_scale = pace(case)
+    found: list[tuple[_Off, Sequence[Record], int, float]] = []
+    for order, quantity in enumerate(QUANTITIES):
+        held = {id(each): _held(case, rate_scale, each, order) for each in mine}
+        for name in (output.name for output in case.outputs):
+            off: dict[int, Deviation] = {}
+            compared: list[Record] = []
+            for record in mine:
+                each: Deviation | None = getattr(record.errors[name], quantity)
+                if each is not None and each.against == STANDARD:
+                    compared.append(record)
+                    off |= {id(record): each} if each.max_abs > each.tolerance else {}
+            astray = [(record, held[id(record)][name]) for record in compared if id(record) in off]
+            group, agreed = _largest_group(astray)
+            voters = _simulators(compared)
+            if 2 * len(_simulators(group)) > len(voters) + 1:
+                first = group[0]
+                values: Array | None = getattr(native.get(name), quantity, None)
+                standard = Uncertain(np.empty(0) if values is None else values)
+                worst = _Off(name, order, held[id(first)][name], standard, off[id(first)])
+                found.append((worst, group, len(voters), agreed))
+    if not found:
+        return None
+    found.sort(key=lambda each: each[0].rank)
+    worst, group, voters, agreed = found[0]
+    off_too = [each for each, others, *_ in found if {*map(id, group)} <= {*map(id, others)}]
+    explained: tuple[list[Explanation], list[str]] = ([], [])
+    if native:
+        explained = _explained(case, rate_scale, group[0], off_too)
+    engines = list(dict.fromkeys(record.engine for record in group))
+    who = (
+        f"{len(_simulators(group))} of {voters} other engines agree with each other within"
+        f" {value_text(_number(agreed), worst.held.unit)} ({', '.join(engines)})"
+    )
+    return _suspicion(case, STANDARD, engines, agreed, off_too, explained, who)
+
+
+def _largest_group(
+    astray: Sequence[tuple[Record, Held]],
+) -> tuple[Sequence[Record], float]:
+    """Return the most records that agree pairwise within the sum of their tolerances, and their
+    largest difference.
+    """
+    apart: dict[tuple[int, int], float] = {}
+    for (one, (_, a)), (other, (_, b)) in combinations(enumerate(astray), 2):
+        off = deviation(b.values, a.values, a.atol + b.atol, a.rtol + b.rtol, "")
+        if off is not None and off.within:
+            apart[one, other] = off.max_abs
+    best: list[int] = []
+    for first in range(len(astray)):
+        group = [first]
+        for other in range(first + 1, len(astray)):
+            if all((one, other) in apart for one in group):
+                group.append(other)
+        best = max(best, group, key=lambda each: len(_simulators(astray[k][0] for k in each)))
+    agreed = max((apart[pair] for pair in combinations(best, 2)), default=0.0)
+    return [astray[k][0] for k in best], agreed
+
+
+def _simulators(records: Iterable[Record]) -> set[str]:
+    """Return the simulators of records: modes and variants (NAME-VARIANT) of one count once."""
+    return {record.engine.partition("-")[0] for record in records}
+
+
+def _suspicion(
+    case: Case,
+    subject: str,
+    engines: list[str],
+    agreed: float,
+    off: Sequence[_Off],
+    explained: tuple[list[Explanation], list[str]],
+    who: str,
+) -> Suspect:
+    """Return the suspicion of a standard with deviations, the worst one first."""
+    worst, (explanations, left) = off[0], explained
+    outputs: dict[str, list[str]] = {}
+    for each in off:
+        outputs.setdefault(each.output, []).append(QUANTITIES[each.order])
+    reasons = _reasons(subject, explanations, left)
+    difference = _difference(case, subject, worst)
     return Suspect(
+        subject=subject,
         engines=engines,
         agreement=agreed,
+        outputs=outputs,
         output=worst.output,
         quantity=QUANTITIES[worst.order],
         sample=worst.deviation.worst_step,
@@ -81,20 +193,11 @@ def suspect(case: Case, records: Sequence[Record]) -> Suspect | None:
         unit=worst.held.unit,
         explanations=explanations,
         unexplained=left,
-        message=(
-            f"{_engines(engines, agreed, worst)}; {_difference(case, worst)}: {ADVICE};"
-            f" {_reasons(explanations, left)}"
-        ),
+        message="; ".join(filter(None, [who, f"{difference}: {ADVICE[subject]}", reasons])),
     )
 
 
-def _engines(engines: Sequence[str], agreed: float, worst: _Off) -> str:
-    if len(engines) == 1:
-        return f"{engines[0]} is the only engine that solved it"
-    return f"all {len(engines)} engines agree within {value_text(_number(agreed), worst.held.unit)}"
-
-
-def _difference(case: Case, worst: _Off) -> str:
+def _difference(case: Case, subject: str, worst: _Off) -> str:
     step = worst.deviation.worst_step
     at = (
         f"sample {step} ({case.sweep.driver} ="
@@ -103,7 +206,11 @@ def _difference(case: Case, worst: _Off) -> str:
     off = value_text(_number(worst.deviation.max_abs), worst.held.unit)
     tolerance = value_text(_number(worst.deviation.tolerance), worst.held.unit)
     held = f"{motion_word(QUANTITIES[worst.order], worst.held.unit)}, tolerance {tolerance}"
-    return f"the reference differs by {off} at {at} of output {worst.output} ({held})"
+    return f"{_the(subject)} differs by {off} at {at} of output {worst.output} ({held})"
+
+
+def _the(subject: str) -> str:
+    return f"the {subject}" if subject == REFERENCE else subject
 
 
 def _unit(case: Case) -> Unit:
@@ -114,13 +221,15 @@ def _unit(case: Case) -> Unit:
     return ANGLES[case.angle_unit] if turns else LENGTHS[case.length_unit]
 
 
-def _reasons(explanations: Sequence[Explanation], left: Sequence[str]) -> str:
-    reasons = [
-        f"{', '.join(each.outputs)} ({', '.join(each.quantities)}): the reference {each.change}"
-        f" fits within {value_text(_number(each.difference), each.unit)}, tolerance"
-        f" {value_text(_number(each.tolerance), each.unit)}"
-        for each in explanations
-    ]
+def _reasons(subject: str, explanations: Sequence[Explanation], left: Sequence[str]) -> str:
+    reasons: list[str] = []
+    for each in explanations:
+        words = ", ".join(motion_word(quantity, each.unit) for quantity in each.quantities)
+        fits, within = (
+            value_text(_number(x), each.unit) for x in (each.difference, each.tolerance)
+        )
+        fit = f"{_the(subject)} {each.change} fits within {fits}, tolerance {within}"
+        reasons.append(f"{', '.join(each.outputs)} ({words}): {fit}")
     if left:
         reasons.append(f"{shortened(left, MOST_EXPLAINED)}: {UNEXPLAINED}")
     return "; ".join(reasons)
@@ -213,7 +322,7 @@ def _explained(
             }
             all_slips = slips(
                 each.held,
-                each.reference,
+                each.standard,
                 others,
                 offsets=each.order == 0,
                 definitions=_definitions(case, each, others),
@@ -232,7 +341,7 @@ def _explained(
         ):
             orders = sorted(each.order for each in quantities)
             if not changes:
-                unexplained += [QUANTITIES[order] for order in orders]
+                unexplained += [motion_word(QUANTITIES[order], units[name]) for order in orders]
                 continue
             first = min(quantities, key=lambda each: each.order)
             key = ", or ".join(changes), tuple(QUANTITIES[order] for order in orders)

@@ -37,6 +37,7 @@ class Verdict:
     Attributes:
         outcome: pass, fail or unjudged.
         messages: reasons for a failure, or the unjudged parts.
+        faults: reasons for a failure beside deviations.
         errors: deviations of every output.
         seconds: time of the comparison.
     """
@@ -45,6 +46,7 @@ class Verdict:
     messages: Sequence[str]
     errors: Mapping[str, Deviations]
     seconds: float
+    faults: Sequence[str] = ()
 
 
 def judged(case: Case, answer: Answer, native: Standard, tol: float) -> Verdict:
@@ -62,20 +64,25 @@ def judged(case: Case, answer: Answer, native: Standard, tol: float) -> Verdict:
         output.name: _deviations(case, output, answer, native, complete=complete)
         for output in case.outputs
     }
-    faults: list[str] = []
+    reach: list[str] = []
     if not complete:
         why = answer.message or "the engine gives no reason; its adapter must report one"
-        faults.append(
+        reach.append(
             f"{solved} of {samples} samples solved: {why}{_reached_elsewhere(case, answer, native)}"
         )
-    faults += filter(None, (_contradiction(case, answer, native), _worst(case, errors)))
-    # an output without any value has no deviation, so this loop is its only test
-    faults += [
+    reach += filter(None, (_contradiction(case, answer, native),))
+    # an output without any value has no deviation, so this is its only test
+    others = [
         f"{name}: {each.reason}" for name, each in errors.items() if each.lost and each.within
     ]
-    faults += filter(None, (excess(case, answer.residual if solved else 0.0, tol),))
-    if faults:
-        return Verdict(Outcome.FAIL, faults, errors, perf_counter() - begin)
+    dof = answer.details.get("dof")
+    if solved and None not in (dof, native.dof) and dof != native.dof:
+        others.append(f"counts {dof} degrees of freedom without drivers, {STANDARD} {native.dof}")
+    others += filter(None, (excess(case, answer.residual if solved else 0.0, tol), *answer.faults))
+    messages = [*reach, *filter(None, (_worst(case, errors),)), *others]
+    if messages:
+        faults = [*reach, *others]
+        return Verdict(Outcome.FAIL, messages, errors, perf_counter() - begin, faults)
     compared = any(each.items() for each in errors.values())
     outcome = Outcome.PASS if compared else Outcome.UNJUDGED
     messages = _not_judged(case, errors)

@@ -26,6 +26,7 @@ Describe:
     prove, prove_pose                               samples and poses enclosed in balls
     constraints, Cartesian, Frames, Relation        the equations of joints and drivers
     continued, continuous, regular_between          tests of a step
+    motion_defects                                  a motion of bodies against the constraints
 
 The folders:
 
@@ -79,6 +80,7 @@ if TYPE_CHECKING:
     from .followed_attitudes import DOUBTFUL as DOUBTFUL
     from .followed_attitudes import agreement as agreement
     from .followed_way import near_design as near_design
+    from .forces.motion_defects import motion_defects as motion_defects
     from .forces.reactions import forces_of as forces_of
     from .forces.reactions import with_forces as with_forces
     from .formulation.acceptance_criteria import LONGEST_TURN as LONGEST_TURN
@@ -142,6 +144,7 @@ _NAMES = {
     "followed_angles": "in_doubt",
     "followed_attitudes": "DOUBTFUL agreement",
     "followed_way": "near_design",
+    "forces.motion_defects": "motion_defects",
     "forces.reactions": "forces_of with_forces",
     "formulation.acceptance_criteria": "LONGEST_TURN ROUNDING continued continuous regular_between",
     "formulation.cartesian": "COLUMNS Cartesian",

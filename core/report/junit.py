@@ -6,14 +6,20 @@ import re
 from xml.etree import ElementTree
 
 from ..harness.compare import describe
+from ..harness.evidence import REFERENCE
 from ..harness.labels import UNMADE, notes, suspects
 from ..harness.record import Deviations, Outcome, Record, Results
+from ..harness.standard import STANDARD
 
 COUNTS = {"tests": "testcase", "failures": "failure", "errors": "error", "skipped": "skipped"}
 FORBIDDEN = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """Characters that XML 1.0 cannot hold, not even escaped; a simulator's message may contain them."""
 
-SUSPECTED = "suspect the reference rather than the engine: see the suite's output"
+SUSPECTED = {
+    REFERENCE: "suspect the reference rather than the engine: see the suite's output",
+    STANDARD: f"suspect {STANDARD} rather than the engine: see the suite's output",
+}
+"""What to suspect, by the subject of a suspicion."""
 
 
 def to_junit(results: Results) -> bytes:
@@ -32,13 +38,8 @@ def to_junit(results: Results) -> bytes:
         for record in results.records:
             if record.case == case:
                 for output, deviations in record.errors.items():
-                    _test(
-                        suite,
-                        record,
-                        output,
-                        deviations,
-                        suspected=results.blames_reference(record),
-                    )
+                    subject = results.suspects[case].subject if results.explains(record) else ""
+                    _test(suite, record, output, deviations, SUSPECTED.get(subject, ""))
         for name, engine, mode in results.missing:
             if name == case:
                 test = ElementTree.SubElement(
@@ -74,8 +75,7 @@ def _test(
     record: Record,
     output: str,
     deviations: Deviations,
-    *,
-    suspected: bool = False,
+    suspicion: str,
 ) -> None:
     seconds = record.seconds.warm if record.seconds and record.seconds.warm is not None else 0.0
     test = ElementTree.SubElement(
@@ -87,7 +87,7 @@ def _test(
     )
     verdict, message = _verdict(record, output, deviations)
     if verdict:
-        message += f"; {SUSPECTED}" if suspected else ""
+        message += f"; {suspicion}" if suspicion else ""
         ElementTree.SubElement(test, verdict, message=message)
 
 

@@ -11,6 +11,7 @@ from typing import Any, cast
 
 from markupsafe import Markup
 
+from ..harness.evidence import REFERENCE
 from ..harness.labels import (
     TRUTHS,
     engine_name,
@@ -20,6 +21,7 @@ from ..harness.labels import (
     validation,
 )
 from ..harness.record import Outcome, Record, Results
+from ..harness.standard import STANDARD
 from ..trajectory import QUANTITIES
 from .caveats import ANSWERED, caveats
 from .curves import downloads
@@ -41,6 +43,7 @@ FAULTS = (
     ("contradicts", "contradict", "the native engine"),
     ("has", "have", "outputs without a value"),
     ("has", "have", "a residual above the tolerance"),
+    ("has", "have", "forces without a balance of power, or bodies off their constraints"),
     ("lacks", "lack", "samples"),
 )
 """Words of the headline for the fault of one failing record and of several."""
@@ -110,8 +113,7 @@ def render(given: Material, changes: Markup | None = None) -> str:
         problems=_grouped(
             record
             for record in records
-            if record.outcome in (Outcome.FAIL, *BROKEN)
-            and not given.results.blames_reference(record)
+            if record.outcome in (Outcome.FAIL, *BROKEN) and not given.results.explains(record)
         ),
         circumstances={
             key: value
@@ -168,9 +170,12 @@ def headline(results: Results) -> str:
     sentence += f", {broken} could not be completed" if broken else ""
     unjudged = _count(records, Outcome.UNJUDGED)
     sentence += f", {unjudged} {Outcome.UNJUDGED.shown}" if unjudged else ""
-    sentence += (
-        f"; suspect the reference of {', '.join(results.suspects)}" if results.suspects else ""
-    )
+    for subject, words in (
+        (REFERENCE, "suspect the reference of"),
+        (STANDARD, "suspect native in"),
+    ):
+        names = [name for name, each in results.suspects.items() if each.subject == subject]
+        sentence += f"; {words} {', '.join(names)}" if names else ""
     sentence += f"; {unread_count(unread)}" if unread else ""
     return sentence + (f"; the run ended before {missing} more" if missing else "")
 
@@ -183,6 +188,7 @@ def _fault(record: Record, tol: float) -> str:
         any(each.contradicted for each in errors),
         any(each.lost for each in errors),
         record.solved == record.samples and (record.residual_max or 0.0) > tol,
+        record.solved == record.samples and bool(record.faults),
         True,
     )
     return next(what for (_, _, what), true in zip(FAULTS, holds, strict=True) if true)

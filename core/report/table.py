@@ -190,7 +190,7 @@ def print_signs(run: Mapping[str, Any], console: Console) -> None:
 
 
 def print_messages(results: Results, console: Console) -> None:
-    """Print notes on the cases, suspected references, every message, and a count of outcomes."""
+    """Print notes on the cases, suspicions, every message, and a count of outcomes."""
     for case, note in notes(results.run):
         console.print(Text(visible(f"note: {case}: {note}")), soft_wrap=True)
     for case, why in suspects(results):
@@ -248,11 +248,11 @@ def worst(record: Record, quantity: str) -> tuple[Deviation, str] | None:
 
 
 def messages(results: Results) -> dict[tuple[str, Outcome, str], list[str]]:
-    """Return the messages and their cases; a missing engine has one message, and a suspected
-    reference has a separate line.
+    """Return the messages and their cases; a missing engine has one message, and a suspicion has a
+    separate line.
     """
     said: dict[tuple[str, Outcome, str], list[str]] = {}
     for record in results.records:
-        if record.message and not results.blames_reference(record):
+        if record.message and not results.explains(record):
             said.setdefault((record.engine, record.outcome, record.message), []).append(record.case)
     return said

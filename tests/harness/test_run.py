@@ -119,7 +119,7 @@ def test_other_breaches_of_the_protocol_are_errors():
     assert "residual is nan although 9 samples are called solved" in blind.message
     nothing = record_of(Fake(answer=lambda case: None))
     assert nothing.outcome is Outcome.ERROR
-    assert "AttributeError" in nothing.message
+    assert "solve returned NoneType, expected a Trajectory" in nothing.message
 
 
 @pytest.mark.parametrize("count", [0, 1, 3])

@@ -14,6 +14,7 @@ from kincheck.core.cli import engine_loading, main
 from kincheck.core.harness.execution import here
 from kincheck.core.joints import Gear, Planar, Screw
 from kincheck.core.studies.engine_check import check_engine as checking
+from kincheck.core.studies.engine_check import force_cases
 from kincheck.core.studies.findings import Verdict
 
 from ..support.faulty_engine import Odd, Shy, Sound
@@ -27,6 +28,7 @@ def few(monkeypatch):
     """Three joint types and one topology; modules of the tests are found by workers."""
     monkeypatch.syspath_prepend(str(ROOT))
     monkeypatch.setattr(checking, "probes", lambda: [probe(each) for each in (Screw, Planar, Gear)])
+    monkeypatch.setattr(force_cases, "probes", lambda: [probe(Screw)])
     monkeypatch.setattr("kincheck.core.cli.check_engine.TOPOLOGIES", {"one loop": "rssr"})
 
 
@@ -47,13 +49,19 @@ def test_a_sound_engine_passes(few, monkeypatch):
         "joint: planar",
         "joint: gear",
         "topology: one loop",
+        "topology: uneven drives",
+        "forces: screw",
+        "forces: elements",
+        "forces: drivers",
+        "forces: turns",
+        "forces: undetermined",
         "rates: velocity",
         "rates: acceleration",
         "refusal: beyond a fold",
         "refusal: unknown joint",
         "determinism",
     ]
-    assert str(report).endswith("sound: 12 pass\n")
+    assert str(report).endswith("sound: 18 pass\n")
 
 
 def test_each_fault_fails_its_row(few, capsys):
@@ -72,7 +80,7 @@ def test_each_fault_fails_its_row(few, capsys):
     assert "has values at samples that cannot be reached; mark them unsolved" in said
     assert "KeyError: 'unknown_to_engines'; unsupported() is to return the reason" in said
     assert "determinism: keeps a state from one case to the next" in said
-    assert lines[-1] == "faulty: 6 pass, 6 fail"
+    assert lines[-1] == "faulty: 12 pass, 6 fail"
 
 
 def test_what_is_outside_the_protocol_ends_the_check(few):

@@ -17,7 +17,7 @@ from kincheck.core import (
     check_joint,
 )
 from kincheck.core import primitives as p
-from kincheck.core.algebra import ZERO, vec
+from kincheck.core.algebra import ZERO, cross, vec
 from kincheck.core.cli.joint_loading import load_joint
 from kincheck.core.joints.base import triad, unit
 from kincheck.core.primitives import Row
@@ -160,6 +160,56 @@ def measured_backwards(self, freedom, i, j):
     return p.Dot20(-h, i.arm(P), j.arm(P), ZERO)
 
 
+def driving(**methods):
+    """A cylindrical joint whose drivers have the methods changed."""
+
+    def measured(self, freedom, i, j):
+        right = Cylindrical.measured(self, freedom, i, j)
+        return _retyped(right, type(right), methods)
+
+    return mistaken(Cylindrical, measured=measured)
+
+
+def without_own_acceleration(self, i, j, vi, vj):
+    return tuple(x - self.drive.c_tt for x in super(type(self), self).gamma(i, j, vi, vj))
+
+
+def without_bending(self, i, j, vi, vj):
+    return (self.drive.c_tt,) * self.n
+
+
+def slow(self, i, j):
+    return tuple(0.999 * x for x in super(type(self), self).nu(i, j))
+
+
+def short(self, i, j):
+    return tuple(x + 1e-3 * self.drive.c for x in super(type(self), self).phi(i, j))
+
+
+def at_the_origin(self, i, j):
+    """The force acts at the origin of body j."""
+    return tuple(row._replace(pj=ZERO) for row in super(type(self), self).rows(i, j))
+
+
+def beside_the_axis(self, i, j):
+    """Both forces act a little beside the axis, and do the same work."""
+    rows = super(type(self), self).rows(i, j)
+    aside = i.turn(vec((0.01, 0.02, -0.01)))
+    return tuple(
+        row._replace(pi=row.pi + cross(aside, row.ri), pj=row.pj + cross(aside, row.rj))
+        for row in rows
+    )
+
+
+def near_design(self, i, j):
+    """What does not know the drive's value."""
+    return ((i.q.conjugate() * j.q).e0,)
+
+
+def on_one_body(self, i, j):
+    return tuple(row._replace(ri=ZERO, pi=ZERO) for row in super(type(self), self).rows(i, j))
+
+
 def no_rows(self, i, j):
     return ()
 
@@ -207,12 +257,33 @@ MISTAKES = {
         lambda: mistaken(Revolute, freedoms=("rotation", "translation")),
     ),
     "a driver that pulls backwards": (
-        "mixed style",
+        "driver",
         lambda: mistaken(Cylindrical, measured=measured_backwards),
     ),
     "a driver about the opposite axis": (
-        "mixed style",
+        "driver",
         lambda: mistaken(Revolute, measured=lambda self, *_: p.DrivenAngle(-unit(self.axis))),
+    ),
+    "a drive without its acceleration": (
+        "driver",
+        lambda: driving(gamma=without_own_acceleration),
+    ),
+    "a drive along a straight axis": ("driver", lambda: driving(gamma=without_bending)),
+    "a drive a thousandth slow": ("driver", lambda: driving(nu=slow)),
+    "a drive a thousandth short": ("driver", lambda: driving(phi=short)),
+    "a drive at the origin": ("driver", lambda: driving(rows=at_the_origin)),
+    "a drive beside the axis": ("driver", lambda: driving(rows=beside_the_axis)),
+    "a drive on one body": ("driver", lambda: driving(rows=on_one_body)),
+    "a drive of twice the force": (
+        "driver",
+        lambda: driving(rows=doubled_rows),
+    ),
+    "a drive that loses a turn": ("driver", lambda: driving(branch=no_branch)),
+    "a drive refused": ("driver", lambda: driving(branch=negative_branch)),
+    "a drive refused half a turn away": ("driver", lambda: driving(branch=near_design)),
+    "a drive about another axis": (
+        "driver",
+        lambda: mistaken(Revolute, measured=lambda self, *_: p.DrivenAngle(triad(self.axis)[0])),
     ),
     "loop": ("loop: acceleration", lambda: mistaken(Revolute, p.Dot11, gamma=negative_gamma)),
 }

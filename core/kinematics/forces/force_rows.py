@@ -78,7 +78,7 @@ class ForceRows:
     @cached_property
     def demand(self) -> Array:
         """Return M a + h - Q by the unknowns [J], shape (n, unknowns)."""
-        return self._stacked(self.equations.demand)
+        return self.stacked(self.equations.demand)
 
     def solve(self, part: slice) -> Multipliers:
         """Return the multipliers at a part of the samples: the shortest of all solutions."""
@@ -108,7 +108,7 @@ class ForceRows:
 
     def _wrench(self, joint: Joint, multipliers: Array) -> tuple[Array, Array]:
         pair: tuple[Vec3, Vec3] = self.equations.reaction(joint, [*multipliers.T])
-        return self._stacked(pair[0]), self._stacked(pair[1])
+        return self.stacked(pair[0]), self.stacked(pair[1])
 
     def effort(self, driver: Driver, multipliers: Array, null: Array) -> Array:
         """Return the effort of a driver [N or N m], shape (n,); NaN if redundant rows leave it
@@ -121,7 +121,8 @@ class ForceRows:
             effort = np.where(loose <= DETERMINED, effort, np.nan)
         return effort
 
-    def _stacked(self, values: Iterable[Scalar]) -> Array:
+    def stacked(self, values: Iterable[Scalar]) -> Array:
+        """Return scalars over the samples as columns, shape (n, len(values))."""
         return np.stack([x + np.zeros(self.lanes.n) for x in values], axis=1)
 
 

@@ -1,8 +1,8 @@
 """Check of an engine from outside against the engine protocol.
 
-The engine solves a probe of every joint type, mechanisms of several topologies, a motion up to a
-fold and a joint that no engine knows, always in a worker process. Each check is a row of the
-report: the worst number, the limit with its reason, the place.
+The engine solves a probe of every joint type, with and without loads, mechanisms of several
+topologies, a motion up to a fold and a joint that no engine knows, always in a worker process. Each
+check is a row of the report: the worst number, the limit with its reason, the place.
 """
 
 from __future__ import annotations
@@ -22,9 +22,12 @@ from ...harness.execution import Answer, Attempt, Attempts, Pair, Solver, here
 from ...harness.record import Outcome, Record
 from ...harness.resource_limits import Limits
 from ...harness.run import Progress, run
+from ...harness.standard import STANDARD
 from ...harness.workers.pool import in_workers
 from ...joints import Revolute
 from ..findings import Finding, Report, Verdict
+from .force_cases import at_rate, force_cases, uneven_drives
+from .forces import faults_of_forces
 from .rates import rates
 from .unknown_joint import UnknownJoint
 
@@ -64,27 +67,33 @@ def check_engine(
     if any(each.verdict is Verdict.FAIL for each in found):
         return Report(str(engine.name), (), None, tuple(found))
     refused = {BEYOND: _beyond(), UNKNOWN: probe(UnknownJoint)}
-    cases = {f"joint: {case.name}": case for case in probes()}
+    cases = {f"joint: {case.name}": at_rate(case) for case in probes()}
     cases |= {f"topology: {word}": case for word, case in topologies.items()}
-    solver, answers = in_workers(1, limits or Limits()), dict[str, Attempt]()
+    cases |= {"topology: uneven drives": uneven_drives()}
+    cases |= {f"forces: {word}": case for word, case in force_cases()}
+    solver = in_workers(1, limits or Limits())
+    answers: dict[str, dict[str, Attempt]] = {engine.name: {}, STANDARD: {}}
 
     def kept(pairs: Sequence[Pair]) -> Attempts:
         for index, attempt in solver(pairs):
-            if pairs[index].engine is engine:
-                answers[pairs[index].case.name] = attempt
+            answers[pairs[index].engine.name][pairs[index].case.name] = attempt
             yield index, attempt
 
     every = [*cases.values(), *refused.values()]
-    results = run(every, [engine], tol=tol, baseline=native, solver=kept, progress=progress)
-    records = {record.case: record for record in results.records}
-    found += [_compared(name, records[case.name]) for name, case in cases.items()]
+    engines = [engine] if engine.name == STANDARD else [native, engine]
+    results = run(every, engines, tol=tol, solver=kept, progress=progress)
+    records = {record.case: record for record in results.records if record.engine == engine.name}
+    mine, standards = answers[engine.name], answers[STANDARD]
+    for name, case in cases.items():
+        faults = faults_of_forces(case, engine.mode, mine[case.name], standards[case.name])
+        found.append(_compared(name, records[case.name], "; ".join(faults)))
     found += rates([(case, records[case.name]) for case in cases.values()])
     beyond = refused[BEYOND].name
-    found += [_folded(records[beyond], answers[beyond]), _unknown(records[refused[UNKNOWN].name])]
+    found += [_folded(records[beyond], mine[beyond]), _unknown(records[refused[UNKNOWN].name])]
     again = [Pair(case, engine, tol, timed=False) for case in reversed(cases.values())]
-    found.append(_same("determinism", again, answers, in_workers(1, limits or Limits())))
+    found.append(_same("determinism", again, mine, in_workers(1, limits or Limits())))
     if may_run_here(engine):
-        found.append(_same("isolation: in this process", again, answers, here))
+        found.append(_same("isolation: in this process", again, mine, here))
     return Report(engine.name, (), None, tuple(found))
 
 
@@ -121,16 +130,21 @@ def _protocol(engine: Engine) -> Iterator[Finding]:
     yield Finding("version", verdict, message=message if version is None else version)
 
 
-def _compared(name: str, record: Record) -> Finding:
-    """Return the agreement of a case with its reference and the native engine."""
+def _compared(name: str, record: Record, faults: str) -> Finding:
+    """Return the agreement of a case with its reference and the native engine.
+
+    Args:
+        faults: what is wrong with the forces beside their values.
+    """
     shares = [
         (each.max_abs / each.tolerance if each.tolerance else np.inf, f"{output} {quantity}")
         for output, errors in record.errors.items()
         for quantity, each in errors.items()
     ]
     worst, where = max(shares, default=(None, ""))
-    verdict = VERDICTS.get(record.outcome, Verdict.FAIL)
-    message = "" if record.outcome is Outcome.PASS else f"{record.outcome.shown}: {record.message}"
+    verdict = Verdict.FAIL if faults else VERDICTS.get(record.outcome, Verdict.FAIL)
+    passed = record.outcome is Outcome.PASS
+    message = faults or ("" if passed else f"{record.outcome.shown}: {record.message}")
     limit = None if worst is None else 1.0
     why = "" if worst is None else AGREE_WHY
     return Finding(name, verdict, worst, limit, why, row=where, message=message)

@@ -43,6 +43,7 @@ from .checks import (
     right_sides,
     specimen,
 )
+from .driver import driver
 from .loop import loops
 from .variants import axis_lengths, exchange, named_coordinates, rigid_motion, size_and_place
 
@@ -68,6 +69,7 @@ VARIANTS: Mapping[Check, tuple[str, ...]] = {
     rigid_motion: ("rigid motion", "residual elsewhere"),
     size_and_place: ("size", "place"),
     named_coordinates: ("mixed style",),
+    driver: ("driver",),
 }
 """Each check of a variant, with the names of its findings."""
 # Checks of the joint's own equations that every variant repeats: if one fails, the variants fail

@@ -14,9 +14,9 @@ from ...case.joint_probe import alternatives
 from ...errors import MechanismError
 from ...harness.compare import describe, deviations, output_series
 from ...harness.engine import Engine
-from ...harness.execution import check
 from ...harness.record import Deviation, Outcome
 from ...harness.standard import STANDARD
+from ...harness.trajectory_check import check
 from ...harness.verdict import excess
 from ...joints import Joint
 from ...kinematics import solve

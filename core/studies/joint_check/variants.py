@@ -7,19 +7,19 @@ velocity and acceleration.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from ...algebra import quat, rotation_less_identity, vec
-from ...joints import Attachment, AxialJoint
+from ...algebra import quat, rotation_less_identity
+from ...joints import AxialJoint
 from ...kinematics import Style
-from ...primitives.base import Pose, Twist
 from ...trajectory import Array
 from ..findings import Finding, Verdict, judged
 from .checks import AMPLIFIED, AMPLIFIED_WHY, ROUND_OFF, ROUND_OFF_WHY, Specimen, defects, times
+from .driver import coordinate
 from .manifold import min_norm, newton, rank
 from .specimens import moved, stretched
 from .traced import COLUMNS, POSES, Place, TracedJoint
@@ -191,36 +191,21 @@ def named_coordinates(s: Specimen) -> Iterator[Finding]:
         (state, rate, acceleration),
         "mixed() must say the same as primitives(): define both",
     )
-    driven = judged(
+    speed = 1.0 + np.linalg.norm(rate, axis=0)
+    named = judged(
         "mixed style",
-        _apart(s, s.joint, mixed.coordinates, state, rate),
+        np.array(
+            [
+                np.abs(coordinate(s, s.joint, name.rpartition(".")[2])[0][1] - own_rate) / speed
+                for name, own_rate in zip(mixed.coordinates, rate[own], strict=True)
+            ]
+        ),
         AMPLIFIED,
         AMPLIFIED_WHY,
         mixed.coordinates,
-        remedy="measured() must drive the coordinate that mixed() names",
+        remedy="mixed() must name the joint's own coordinates, body j relative to body i",
     )
-    yield max(said, driven, key=lambda each: each.badness)
-
-
-def _apart(
-    s: Specimen, joint: AxialJoint, coordinates: Sequence[str], state: Array, rate: Array
-) -> Array:
-    """Return the differences between the rates of the coordinates and what drives them, shape
-    (coordinates, lanes).
-    """
-    scaled, origins = (
-        joint.scaled(1.0 / s.place.unit),
-        (vec(tuple(each)) for each in s.traced.origins),
-    )
-    i, j = (Attachment(origin) for origin in origins)
-    poses = [Pose.of(vec(tuple(each[:3])), quat(each[3:])) for each in (state[:7], state[7:POSES])]
-    twists = [Twist(vec(tuple(each[:3])), vec(tuple(each[3:]))) for each in (rate[:6], rate[6:12])]
-    found: list[Array] = []
-    for k, name in enumerate(coordinates):
-        (row,) = scaled.measured(name.rpartition(".")[2], i, j).rows(*poses)
-        driven = row.along("i", twists[0]) + row.along("j", twists[1])
-        found.append(np.abs(driven - rate[2 * COLUMNS + k]) / (1.0 + np.linalg.norm(rate, axis=0)))
-    return np.array(found)
+    yield max(said, named, key=lambda each: each.badness)
 
 
 def _same(

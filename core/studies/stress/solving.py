@@ -9,13 +9,12 @@ from dataclasses import replace
 
 from ...case.case import Case
 from ...errors import KincheckError
-from ...harness.compare import output_series
 from ...harness.engine import Engine, may_run_here
-from ...harness.execution import Answer, Failure, Pair, bounded, check, error_text
+from ...harness.execution import Answer, Failure, Pair, error_text
 from ...harness.native_engine import NativeEngine
-from ...harness.provenance import plain
 from ...harness.record import Outcome
 from ...harness.resource_limits import Limits
+from ...harness.trajectory_check import check
 
 # Time limit of a sweep of this size [s]; a slower simulator counts as hanging.
 PATIENCE = 60.0
@@ -75,12 +74,4 @@ def once(pair: Pair) -> Answer | Failure:
         return Failure(Outcome.ERROR, str(error), kind=error.kind)
     except Exception as error:  # a defect
         return Failure(Outcome.ERROR, error_text(error))
-    return Answer(
-        outputs={output.name: output_series(case, output, trajectory) for output in case.outputs},
-        solved=int(trajectory.solved.sum()),
-        iterations=int(trajectory.iterations.sum()),
-        residual=float(trajectory.residual),
-        message=bounded(trajectory.message),
-        details=plain(trajectory.facts),
-        failures=trajectory.failures,
-    )
+    return Answer.of(pair, trajectory)

@@ -132,10 +132,11 @@ def judged(
     worst = Checked(
         variant=variant, outcome=Outcome.UNJUDGED, message="no row has values from both"
     )
-    if fault := _contradicted(study, case, result, ours) or excess(
-        case, result.residual if result.solved else 0.0, tol
-    ):
-        return msgspec.structs.replace(worst, outcome=Outcome.FAIL, message=fault)
+    residual = result.residual if result.solved else 0.0
+    faults = [_contradicted(study, case, result, ours), excess(case, residual, tol), *result.faults]
+    if any(faults):
+        message = "; ".join(filter(None, faults))
+        return msgspec.structs.replace(worst, outcome=Outcome.FAIL, message=message)
     for row, values in zip(study.rows, ours, strict=True):
         series: Series = result.outputs[row.output.name]
         theirs: Array | None = getattr(series, QUANTITIES[row.derivative])

@@ -1,0 +1,304 @@
+"""What an engine's trajectory gets wrong by itself: its form, the balance of power, and bodies."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from kincheck.core.forces import Forces
+from kincheck.core.harness.native_engine import NativeEngine
+from kincheck.core.harness.record import Outcome
+from kincheck.core.harness.run import run
+from kincheck.core.harness.trajectory_check import BadTrajectoryError, check
+from kincheck.core.trajectory import Trajectory
+
+from ..support.engine_forces import force_case
+from ..support.fakes import SAMPLES, Fake, crank, solution
+from ..support.loaded import loaded
+
+NATIVE = NativeEngine(every_body=True)
+
+
+def changed(found, **parts):
+    """The trajectory with other parts."""
+    other = object.__new__(Trajectory)
+    other.__dict__.update(found.__dict__, **parts)
+    return other
+
+
+def with_point(found, **parts):
+    return changed(found, points={"tip": replace(found.points["tip"], **parts)})
+
+
+def with_force(found, **parts):
+    (name, first), *rest = found.forces.joints.items()
+    return changed(
+        found, forces=replace(found.forces, joints={name: replace(first, **parts), **dict(rest)})
+    )
+
+
+def with_body(found, **parts):
+    (name, first), *rest = found.bodies.items()
+    return changed(found, bodies={name: replace(first, **parts), **dict(rest)})
+
+
+FORMS = {
+    "negative residual": (
+        lambda found: changed(found, residual=-1e-15),
+        "residual is -1e-15 although 9 samples are called solved",
+    ),
+    "no residual": (lambda found: changed(found, residual=math.nan), "residual is nan"),
+    "infinite residual": (lambda found: changed(found, residual=math.inf), "residual is inf"),
+    "complex residual": (
+        lambda found: changed(found, residual=1e-15 + 0j),
+        "residual is of complex128, expected a real number",
+    ),
+    "residual of a sample": (
+        lambda found: changed(found, residual=np.zeros(SAMPLES)),
+        "residual has shape (9,), expected ()",
+    ),
+    "complex positions": (
+        lambda found: with_point(found, position=found.points["tip"].position + 0j),
+        "position of point 'tip' is of complex128, expected floats",
+    ),
+    "whole positions": (
+        lambda found: with_point(found, position=np.zeros((SAMPLES, 3), int)),
+        "position of point 'tip' is of int64, expected floats",
+    ),
+    "objects": (
+        lambda found: with_point(found, velocity=found.points["tip"].velocity.astype(object)),
+        "velocity of point 'tip' is of object, expected floats",
+    ),
+    "texts": (
+        lambda found: with_point(found, acceleration=np.full((SAMPLES, 3), "0")),
+        "acceleration of point 'tip' is of <U1, expected floats",
+    ),
+    "no position": (lambda found: with_point(found, position=None), "is of object"),
+    "rows of two lengths": (
+        lambda found: with_point(found, position=[[0.0, 1.0], [0.0]]),
+        "position of point 'tip' is no array",
+    ),
+    "positions turned over": (
+        lambda found: with_point(found, position=found.points["tip"].position.T),
+        "position of point 'tip' has shape (3, 9), expected (9, 3)",
+    ),
+    "a sample too few": (
+        lambda found: with_point(found, velocity=found.points["tip"].velocity[1:]),
+        "velocity of point 'tip' has shape (8, 3), expected (9, 3)",
+    ),
+    "not a number": (
+        lambda found: with_point(found, position=np.full((SAMPLES, 3), math.nan)),
+        "which is called solved; 9 of 9 samples are so",
+    ),
+    "numbers for solved": (
+        lambda found: changed(found, solved=np.ones(SAMPLES)),
+        "solved is of float64, expected booleans",
+    ),
+    "half iterations": (
+        lambda found: changed(found, iterations=np.full(SAMPLES, 2.5)),
+        "iterations is of float64, expected whole numbers",
+    ),
+    "negative iterations": (
+        lambda found: changed(found, iterations=np.full(SAMPLES, -3)),
+        "iterations has -3",
+    ),
+    "no message": (lambda found: changed(found, message=None), "message is None"),
+    "details in a list": (lambda found: changed(found, details=[1]), "details [1]"),
+    "no trajectory": (lambda found: (found.points, found.solved), "returned tuple"),
+}
+
+
+@pytest.mark.parametrize("breach", FORMS)
+def test_a_breach_of_the_form_is_one_message(breach):
+    change, said = FORMS[breach]
+    engine = Fake(answer=lambda case: change(solution(case)))
+    (record,) = run([crank()], [engine], tol=1e-12).records
+    assert record.outcome is Outcome.ERROR
+    assert record.message.startswith("BadTrajectoryError: fake: ")
+    assert said in record.message
+
+
+FORCES = {
+    "complex moment": (
+        lambda found: with_force(found, moment=np.zeros((3, 3)) + 1j),
+        "moment of joint 'pin' is of complex128, expected floats",
+    ),
+    "whole force": (
+        lambda found: with_force(found, force=np.zeros((3, 3), int)),
+        "force of joint 'pin' is of int64",
+    ),
+    "one force for all samples": (
+        lambda found: with_force(found, force=np.zeros(3)),
+        "force of joint 'pin' has shape (3,), expected (3, 3)",
+    ),
+    "infinite force": (
+        lambda found: with_force(found, force=np.full((3, 3), math.inf)),
+        "force of joint 'pin' is infinite",
+    ),
+    "directions of forces alone": (
+        lambda found: with_force(found, free=np.zeros((3, 3, 0))),
+        "free directions of joint 'pin' has shape (3, 3, 0), expected (3, 6, 'any')",
+    ),
+    "effort by columns": (
+        lambda found: changed(
+            found, forces=replace(found.forces, drivers={"turn": np.zeros((3, 1))})
+        ),
+        "effort of driver 'turn' has shape (3, 1), expected (3,)",
+    ),
+    "element in one number": (
+        lambda found: changed(found, forces=replace(found.forces, elements={"spring": 1.0})),
+        "force of element 'spring' has shape (), expected (3,)",
+    ),
+    "power in one number": (
+        lambda found: changed(found, forces=replace(found.forces, power=0.0)),
+        "power has shape ()",
+    ),
+    "complex power": (
+        lambda found: changed(found, forces=replace(found.forces, power=np.zeros(3) + 0j)),
+        "power is of complex128",
+    ),
+    "a body missing": (
+        lambda found: changed(found, bodies={"crank": found.bodies["crank"]}),
+        "motions of bodies crank, but 'slider' is missing; give those of all moving bodies",
+    ),
+    "a body too many": (
+        lambda found: changed(found, bodies={**found.bodies, "wall": found.bodies["crank"]}),
+        "'wall' is no moving body",
+    ),
+    "angles for parameters": (
+        lambda found: with_body(found, p=np.zeros((3, 3))),
+        "p of body 'crank' has shape (3, 3), expected (3, 4)",
+    ),
+    "long parameters": (
+        lambda found: with_body(found, p=1.001 * found.bodies["crank"].p),
+        "p of body 'crank' has length 1.001",
+    ),
+    "a body nowhere": (
+        lambda found: with_body(found, r=np.full((3, 3), math.nan)),
+        "r of body 'crank' is [nan, nan, nan] at sample 0",
+    ),
+}
+
+
+@pytest.fixture(scope="module")
+def case():
+    return force_case(loaded(), [0.0, 0.25, 0.5])
+
+
+@pytest.fixture(scope="module")
+def found(case):
+    return NATIVE.solve(NATIVE.build(case), case, 1e-12)
+
+
+@pytest.mark.parametrize("breach", FORCES)
+def test_a_breach_of_forces_and_bodies_is_one_message(breach, case, found):
+    change, said = FORCES[breach]
+    check(case, "fake", found)
+    with pytest.raises(BadTrajectoryError, match=r"^fake: ") as told:
+        check(case, "fake", change(found))
+    assert said in str(told.value)
+
+
+def outcome(case, found, mode="projection"):
+    """Outcome and message of a trajectory in a run, judged by itself alone."""
+    engine = Fake("native", answer=lambda case: found, mode=mode)
+    (record,) = run([case], [engine], tol=1e-12).records
+    return record.outcome, record.message
+
+
+def unbalanced(found, watts, sample=1):
+    power = found.forces.power.copy()
+    power[sample] += watts
+    return changed(found, forces=replace(found.forces, power=power))
+
+
+@pytest.mark.parametrize("watts", [100.0, -100.0, 1e-3])
+def test_a_missing_balance_of_power_fails_with_its_sample(watts, case, found):
+    case = replace(case, outputs=tuple(replace(each, atol=1e-7) for each in case.outputs))
+    result, message = outcome(case, unbalanced(found, watts))
+    assert result is Outcome.FAIL
+    assert f"the balance of power is off by {abs(watts):.3g} W at sample 1 (turn = 0.25)" in message
+
+
+def test_a_balance_within_round_off_or_tolerance_passes(case, found):
+    assert outcome(case, found)[0] is Outcome.UNJUDGED
+    assert outcome(case, unbalanced(found, 1e-9))[0] is Outcome.UNJUDGED
+    # a force within its own tolerance of 1 N may leave as much at the driver's pace
+    assert outcome(case, unbalanced(found, 0.5))[0] is Outcome.UNJUDGED
+
+
+def test_a_case_with_third_party_data_is_not_validated_without_balance(kincheck_main, capsys):
+    from kincheck import cases
+
+    strut = cases.load("mcpherson_strut_loaded")
+    right = NativeEngine()
+    forces = right.solve(right.build(strut), strut, 1e-12)
+    engine = Fake("other", answer=lambda case: unbalanced(forces, 100.0, 7))
+    assert kincheck_main("run", strut.name, engines=[engine], cases={strut.name: strut}) == 1
+    out = capsys.readouterr().out
+    assert "the balance of power is off by 100 W at sample 7" in out
+    assert "(validated)" not in out
+
+
+def test_power_that_is_nowhere_known_is_not_called_zero(found):
+    none = np.full(3, math.nan)
+    unknown = replace(found.forces, power=none, largest_power=none)
+    assert unknown.account()["power_missing"] is None
+    assert found.forces.account()["power_missing"] < 1e-12
+
+
+BODIES = {
+    "position": (lambda body: {"r": body.r + 1e-6}, "position of points on 'slider'"),
+    "velocity": (lambda body: {"v": body.v * (1.0 + 1e-6)}, "velocity at"),
+    "acceleration": (lambda body: {"a": -body.a}, "acceleration at"),
+    "of another sample": (
+        lambda body: {key: np.roll(getattr(body, key), 1, axis=0) for key in "rpva"},
+        "position",
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", BODIES)
+def test_bodies_off_their_constraints_fail(fault, case, found):
+    change, said = BODIES[fault]
+    slider = found.bodies["slider"]
+    wrong = changed(found, bodies={**found.bodies, "slider": replace(slider, **change(slider))})
+    result, message = outcome(case, wrong)
+    assert result is Outcome.FAIL
+    assert "the motion of bodies is off by" in message
+    assert said in message
+    assert outcome(case, wrong, "simulate")[0] is not Outcome.FAIL
+
+
+def test_bodies_that_do_not_carry_their_points_fail(case, found):
+    (name, moved), *rest = found.points.items()
+    points = {name: replace(moved, position=moved.position + 1e-6), **dict(rest)}
+    result, message = outcome(case, changed(found, points=points))
+    assert result is Outcome.FAIL
+    assert "position of points on" in message
+
+
+def test_bodies_without_rates_are_judged_by_positions(case, found):
+    still = {name: replace(each, v=None, a=None) for name, each in found.bodies.items()}
+    assert outcome(case, changed(found, bodies=still))[0] is Outcome.UNJUDGED
+    still["slider"] = replace(still["slider"], r=still["slider"].r + 1e-6)
+    assert outcome(case, changed(found, bodies=still))[0] is Outcome.FAIL
+
+
+def test_an_engine_without_forces_or_bodies_is_judged_by_points():
+    free = Forces({}, {}, {}, np.zeros(SAMPLES), np.zeros(SAMPLES))
+    engine = Fake(answer=lambda case: changed(solution(case), forces=free, residual=0))
+    (record,) = run([crank()], [engine], tol=1e-12).records
+    assert record.outcome is Outcome.PASS
+
+
+def test_another_number_of_freedoms_than_native_fails():
+    def two(case):
+        found = solution(case)
+        return changed(found, details={**found.details, "dof": 2})
+
+    native, other = run([crank()], [Fake("native"), Fake("other", two)], tol=1e-12).records
+    assert native.outcome is Outcome.PASS
+    assert other.outcome is Outcome.FAIL
+    assert other.message == "counts 2 degrees of freedom without drivers, native 1"
+    assert other.faults == [other.message]
