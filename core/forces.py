@@ -13,9 +13,105 @@ from .errors import number_of
 
 Array: TypeAlias = NDArray[np.float64]
 
-# The null space of redundant rows is orthonormal to round-off over the smallest singular value,
+# A basis of undetermined multipliers is orthonormal to round-off over the smallest singular value,
 # which is above 1e-6 in sound linkages. A larger component is real.
 DETERMINED = 1e-8
+# Rows that are redundant but for digits have a singular value of the size of these digits in place
+# of zero. They turn the basis by about this value over the smallest other one: by 0.1 to 1.1 of it
+# in four-bars with one axis off by 1e-6 to 1e-4. Ten times, since digits can also turn the basis
+# without being seen in that value.
+TURNED = 10.0
+# The pose is singular if a singular value of the rows is below this part of the largest, or below
+# this many times the digits: the balancing effort is then infinite or not unique, or has no two
+# digits.
+SINGULAR, BLURRED = 1e-9, 100.0
+# Numbers of a file have six digits and more. Forces that multiply them by more are told.
+AMPLIFIED = 1e6
+
+
+@dataclass(frozen=True, eq=False)
+class Multipliers:
+    """Multipliers of rows at n samples.
+
+    Attributes:
+        values: shape (n, rows); zero of rows left out within digits.
+        free: orthonormal basis of the multipliers that balance each other, shape (n, rows,
+            redundant rows). No driver takes part: where drivers determine the motion, their rows
+            are independent of those of joints.
+        digits: largest singular value of the joint rows that is zero but for digits, shape (n,).
+        regular: smallest other one, shape (n,).
+        least, largest: singular values of the rows that are solved, shape (n,).
+    """
+
+    values: Array
+    free: Array
+    digits: Array
+    regular: Array
+    least: Array
+    largest: Array
+
+    @staticmethod
+    def of(rows: Array, demand: Array, drivers: Sequence[int], left_out: int) -> Multipliers:
+        """Return the shortest multipliers with J^T values = demand, and what is free beside them.
+
+        Args:
+            rows: J, shape (n, rows, unknowns). The solved ones are as many as unknowns or more, or
+                all independent.
+            demand: shape (n, unknowns).
+            drivers: indices of the drivers' rows.
+            left_out: number of rows at the end that are redundant but for digits. They carry
+                nothing, but what others carry may as well be theirs.
+        """
+        n, count, unknowns = rows.shape
+        solved = rows[:, : count - left_out]
+        rank = min(unknowns, count - left_out) - len(drivers)
+        u, sizes, vh = np.linalg.svd(solved, full_matrices=False)
+        inverse = 1.0 / np.where(sizes > SINGULAR * sizes[:, :1], sizes, np.inf)
+        values = np.zeros((n, count))
+        values[:, : count - left_out] = np.einsum(
+            "nru,nu->nr", u, inverse * np.einsum("nuk,nk->nu", vh, demand)
+        )
+        joints = [k for k in range(count) if k not in drivers]
+        u, of_joints, _ = np.linalg.svd(rows[:, joints], full_matrices=True)
+        # without rows beyond the rank, none is redundant
+        of_joints = np.pad(of_joints, ((0, 0), (0, 1)))
+        free = np.zeros((n, count, len(joints) - rank))
+        free[:, joints] = u[:, :, rank:]
+        regular = of_joints[:, rank - 1] if rank else np.ones(n)
+        return Multipliers(values, free, of_joints[:, rank], regular, sizes[:, -1], sizes[:, 0])
+
+    @property
+    def singular(self) -> NDArray[np.bool_]:
+        """Whether the pose is singular, shape (n,)."""
+        least = np.minimum(self.least, self.regular)
+        return least <= np.maximum(SINGULAR * self.largest, BLURRED * self.digits.max(initial=0.0))
+
+    @property
+    def known(self) -> Array:
+        """See `Reaction.known`. Digits show differently from pose to pose: the largest count."""
+        regular = np.maximum(self.regular, SINGULAR)  # where it is smaller there are no forces
+        return np.maximum(DETERMINED, TURNED * self.digits.max(initial=0.0) / regular)
+
+    def message(self, times: Array) -> str:
+        """Return the message on samples without forces, and on forces that multiply digits.
+
+        Args:
+            times: of the samples [s], shape (n,).
+        """
+        singular, amplified = (
+            self.singular,
+            self.largest / np.maximum(self.least, SINGULAR * self.largest),
+        )
+        said, large = no_forces_at(times[singular]), ~singular & (amplified > AMPLIFIED)
+        if not large.any():
+            return said
+        more = (
+            f"forces at {number_of(int(large.sum()), 'sample')}, the first at time"
+            f" {float(times[large][0]):.9g}, multiply the digits of points and axes by up to"
+            f" {float(amplified[large].max()):.1g}: the pose is nearly singular, or rows are nearly"
+            " redundant; kincheck explain names them"
+        )
+        return "; ".join(filter(None, (said, more)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,11 +123,13 @@ class Reaction:
         moment: about the joint's point as carried by the second body [N m], shape (n, 3).
         free: directions of wrenches (force, then moment per unit of length) left undetermined by
             redundant rows, shape (n, 6, redundant rows).
+        known: largest component of `free` along which the wrench is determined, shape (n,).
     """
 
     force: Array
     moment: Array
     free: Array
+    known: Array | float = DETERMINED
 
     def along(self, direction: Sequence[float] | Array, *, moment: bool = False) -> Array:
         """Return the component of force or moment along a unit direction, shape (n,).
@@ -42,7 +140,7 @@ class Reaction:
         d = np.asarray(direction, dtype=np.float64)
         loose = np.abs(np.einsum("i,nik->nk", d, self.free[:, part])).max(axis=1, initial=0.0)
         values: Array = (self.moment if moment else self.force) @ d
-        return np.where(loose <= DETERMINED, values, np.nan)
+        return np.where(loose <= self.known, values, np.nan)
 
     def determined(self) -> tuple[int, int, int]:
         """Return how many directions of force, of moment and of the wrench are determined.
@@ -50,11 +148,10 @@ class Reaction:
         They are the fewest over the samples, of 3, 3 and 6.
         """
         parts = (slice(0, 3), slice(3, 6), slice(0, 6))
-        known = self.free[np.isfinite(self.free).all(axis=(1, 2))]
+        there = np.isfinite(self.free).all(axis=(1, 2))
+        free, known = self.free[there], np.broadcast_to(self.known, there.shape)[there]
         loose = [
-            int(np.linalg.matrix_rank(known[:, part], tol=DETERMINED).max(initial=0))
-            if known.size
-            else 0
+            int(np.linalg.matrix_rank(free[:, part], tol=known).max(initial=0)) if free.size else 0
             for part in parts
         ]
         return 3 - loose[0], 3 - loose[1], 6 - loose[2]

@@ -3,7 +3,7 @@
 Four hinges that a file makes parallel to 1e-6 leave a planar loop no freedom, because three of its
 rows agree to these digits only. A joint that closes the loop then gets fewer rows: two bodies with
 a common point and axis share a line, or a plane. The result is a mechanism like any other, the same
-for every engine.
+for every engine. It knows the rows left out: they leave reactions undetermined, as redundant rows.
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ from ...joints import (
 )
 from ...joints.base import triad
 from ...mechanism.drivers import JointDriver
-from ...mechanism.mechanism import Mechanism, Vector
+from ...mechanism.loads import TorsionSpringDamper
+from ...mechanism.mechanism import Mechanism, Reduced, Vector
 from ...mechanism.topology import spanning_tree
 from ...primitives.base import GROUND_POSE
 from ...trajectory import Array, BodyMotion
@@ -48,13 +49,12 @@ class Reduction:
     """A mechanism without redundant rows.
 
     Attributes:
-        originals: joints with rows left out, as they were.
+        mechanism: its `reduced` joints are those with rows left out.
         unit: the mechanism's size [m].
-        limit: largest residual that the originals may keep along a motion [m].
+        limit: largest residual that the joints as given may keep along a motion [m].
     """
 
     mechanism: Mechanism
-    originals: tuple[Joint, ...]
     unit: float
     limit: float
 
@@ -82,13 +82,20 @@ class _Held:
                 found[n:, k + 3 : k + COLUMNS] = sign * self.turns
         return found
 
-    def without(self, sums: Array) -> _Held:
-        """Return the rest after ending sums of rows that vanish, shape (sums, directions)."""
+    def parted(self, sums: Array) -> tuple[_Held, _Held]:
+        """Return what is left after ending sums of rows that vanish, and what is left out.
+
+        Args:
+            sums: weights of the rows in each sum, shape (sums, directions).
+        """
         n = len(self.places)
         left, sizes, right = np.linalg.svd(sums[:, n:])
         turning = int((sizes > TURNS).sum())
-        straight = left[:, turning:].T @ sums[:, :n]
-        return _Held(_complement(straight) @ self.places, _complement(right[:turning]) @ self.turns)
+        straight = np.linalg.qr((left[:, turning:].T @ sums[:, :n]).T)[0].T
+        return (
+            _Held(_complement(straight) @ self.places, right[turning:] @ self.turns),
+            _Held(straight @ self.places, right[:turning] @ self.turns),
+        )
 
     def joints(self, joint: Joint) -> list[Joint]:
         """Return joints with these conditions between the bodies of a joint, under its name."""
@@ -123,8 +130,8 @@ def reduce_rows(
 ) -> Reduction:
     """Return the mechanism without redundant rows, to a tolerance [m].
 
-    Joints of closed loops lose rows; driven and coupled ones, and joints of other primitives than
-    points, lines, planes and orientations, keep theirs.
+    Joints of closed loops lose rows; driven and coupled ones, those with torsional springs, and
+    joints of other primitives than points, lines, planes and orientations, keep theirs.
 
     Args:
         carrying: joints with all their rows, as long as others can close the loops.
@@ -135,15 +142,17 @@ def reduce_rows(
     matrix, named = jacobian(formulation), dict[str, list[int]]()
     for k, (owner, _) in enumerate(formulation.owners):
         named.setdefault(owner, []).append(k)
-    tree = spanning_tree(mechanism, carrying)
     keeping = {each.joint for each in mechanism.drivers if isinstance(each, JointDriver)}
     keeping |= {joint for coupler in mechanism.couplers for joint in coupler.joints}
+    keeping |= {each.joint for each in mechanism.forces if isinstance(each, TorsionSpringDamper)}
+    tree = spanning_tree(mechanism, {*carrying, *keeping})
     held = {joint.name: _held(joint) for joint in tree.cut if joint.name not in keeping}
     whole = [name for name in named if held.get(name) is None]
     span = _spanned(
         np.empty((0, formulation.unknowns)), matrix[[k for n in whole for k in named[n]]]
     )
     enough, changed = ADDED_UP * tolerance / frame.unit, dict[str, list[Joint]]()
+    reduced = list[Reduced]()
     for joint in tree.cut:
         if (holds := held.get(joint.name)) is None:
             continue
@@ -151,14 +160,16 @@ def reduce_rows(
         left, sizes, _ = np.linalg.svd(_beyond(span, rows), full_matrices=True)
         weak = np.concatenate([sizes <= enough, np.ones(len(rows) - len(sizes), dtype=np.bool_)])
         if weak.any():
-            holds = holds.without(left[:, weak].T)
-            changed[joint.name] = holds.joints(joint)
+            holds, less = holds.parted(left[:, weak].T)
+            kept = changed[joint.name] = holds.joints(joint)
+            names = tuple(each.name for each in kept)
+            left_out = tuple(each.changed(name=joint.name) for each in less.joints(joint))
+            reduced.append(Reduced(joint, names, left_out))
             rows = holds.rows(joint, frame, formulation)
         span = _spanned(span, rows)
     joints = [each for joint in mechanism.joints for each in changed.get(joint.name, [joint])]
     return Reduction(
-        replace(mechanism, joints=joints) if changed else mechanism,
-        tuple(joint for joint in mechanism.joints if joint.name in changed),
+        replace(mechanism, joints=joints, reduced=reduced) if changed else mechanism,
         frame.unit,
         ADDED_UP * tolerance,
     )

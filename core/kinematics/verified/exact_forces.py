@@ -143,7 +143,8 @@ def force_programs(
     """
     states = _states(frame, traced, given)
     applied = at_work(mechanism, states, given.angles.__getitem__)
-    equations = _Equations(mechanism, traced.formulation, traced.at, states, applied, traced)
+    none = Cartesian((), ())
+    equations = _Equations(mechanism, traced.formulation, traced.at, states, applied, none, traced)
     found: list[Scalar] = []
     for name in wanted.joints:
         force, moment = equations.reaction(mechanism.joint(name), given.multipliers)

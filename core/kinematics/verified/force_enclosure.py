@@ -34,15 +34,15 @@ class EnclosedForces:
     Attributes:
         joints: force [N] and moment [N m] by joint, six balls.
         drivers, elements: effort or force by name [N or N m].
-        free: for each row left out what a multiplier of one adds to the joints and drivers, with
-            the unit of the frames in place of the metre.
+        free: for each row left out what a multiplier of one adds to the joints, with the unit of
+            the frames in place of the metre.
         power: sum of the powers [W], which contains zero.
     """
 
     joints: Mapping[str, Sequence[Ball]]
     drivers: Mapping[str, Ball]
     elements: Mapping[str, Ball]
-    free: Sequence[tuple[Mapping[str, Sequence[Ball]], Mapping[str, Ball]]]
+    free: Sequence[Mapping[str, Sequence[Ball]]]
     power: Ball
 
 
@@ -98,12 +98,12 @@ def enclose_forces(
             f"the powers of drivers, masses and force elements sum up to {power.str(5)} W, expected"
             " zero: an equation of the forces is wrong, please report it"
         )
-    free: list[tuple[Mapping[str, Sequence[Ball]], Mapping[str, Ball]]] = []
+    free: list[Mapping[str, Sequence[Ball]]] = []
     rows = run(programs.left_out, further(nothing, angles))
     for k, row in enumerate(left_out):
         multipliers = carried([-x for x in rows[k * size : (k + 1) * size]])
         multipliers[row] = arb(1)
-        free.append(_split(programs, run(programs.forces, further(multipliers, angles)))[:2])
+        free.append(_split(programs, run(programs.forces, further(multipliers, angles)))[0])
     return EnclosedForces(
         joints, drivers, dict(zip(programs.wanted.elements, amounts, strict=True)), free, power
     )
