@@ -21,7 +21,7 @@ from ...core.joints.base import unit
 from ...core.mechanism.loads import Axes, Force, SpringDamper, Torque, TorsionSpringDamper
 from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
-from ..shared.force_solution import Dynamics
+from ..shared.force_solution import Dynamics, reacting
 from ..shared.frame_constraints import skew
 from ..shared.rows_left_out import left_out_of
 from ..shared.tree_rows import BodyFrame
@@ -134,16 +134,14 @@ class Loads:
         for name, number in self.springs.items():
             force = self.mbs.GetObjectOutput(number, self.kinds.ForceLocal)
             amounts[name] = float(np.atleast_1d(force)[0])
-        wanted = set(self.case.forces)
         rows, owners = [J], [""] * len(J)
         for each in left_out_of(self.mechanism, partial(self._frame, len(v))):
             rows.append(each.rows(len(owners))[0])
             owners += [each.of] * len(rows[-1])
         every = np.vstack(rows)
         reactions = {
-            joint.name: (np.zeros(6), self._on_second(joint, every, owners))
-            for joint in self.mechanism.given_joints
-            if joint.name in wanted
+            name: (np.zeros(6), self._on_second(self.mechanism.joint(name), every, owners))
+            for name in reacting(self.case)
         }
         return Dynamics(demand, reactions, amounts, every[len(J) :])
 

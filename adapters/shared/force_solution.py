@@ -13,7 +13,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from ...core.case.case import Case
-from ...core.forces import Forces, Multipliers, Reaction
+from ...core.forces import Forces, Multipliers, Reaction, in_wrenches
 from ...core.mechanism.loads import Torque, TorsionSpringDamper
 from ...core.trajectory import Array
 from .pose_solver import Sample
@@ -66,6 +66,14 @@ class _Given:
     dynamics: Dynamics
 
 
+def reacting(case: Case) -> list[str]:
+    """Return the names of the joints whose reactions are needed: of outputs, or of all where rows
+    are left out within digits; see `in_wrenches`.
+    """
+    mechanism, wanted = case.mechanism, set(case.forces)
+    return [j.name for j in mechanism.given_joints if mechanism.reduced or j.name in wanted]
+
+
 def solved_forces(
     model: ForceModel, case: Case, samples: Mapping[int, Sample], unit: float
 ) -> Forces:
@@ -79,7 +87,7 @@ def solved_forces(
     n, wanted = len(path.times), set(case.forces)
     force, torque = unit, unit**2  # kg unit/s^2 in N, kg unit^2/s^2 in N m
     names = [each.name for each in mechanism.drivers]
-    joints = [each.name for each in mechanism.given_joints if each.name in wanted]
+    joints = reacting(case)
     scales = np.array([torque if each.turns else force for each in mechanism.drivers])
     turning = {f.name for f in mechanism.forces if isinstance(f, TorsionSpringDamper | Torque)}
     efforts, power, largest = np.full((n, len(names)), np.nan), *np.full((2, n), np.nan)
@@ -103,16 +111,22 @@ def solved_forces(
         rates = path.drive(names, path.times[[k]])[1][:, 0] if names else np.zeros(0)
         powers = np.concatenate([efforts[k] * rates, -torque * dynamics.demand * samples[k].v])
         power[k], largest[k] = powers.sum(), np.abs(powers).max(initial=0.0)
+        undetermined = dict[str, Array]()
         for name in joints:
             alone, by_multiplier = dynamics.reactions[name]
             wrenches[name][k] = alone + by_multiplier @ multipliers
-            free[name][k] = by_multiplier @ basis
+            undetermined[name] = (by_multiplier @ basis)[None]
+        if mechanism.reduced:
+            undetermined = in_wrenches(undetermined, known[[k]])
+        for name, (each_free,) in undetermined.items():
+            free[name][k] = each_free
     return Forces(
         {
             name: Reaction(
                 force * wrenches[name][:, :3], torque * wrenches[name][:, 3:], free[name], known
             )
             for name in joints
+            if name in wanted
         },
         {name: efforts[:, k] for k, name in enumerate(names) if name in wanted},
         amounts,

@@ -21,7 +21,7 @@ from ...core.mechanism.loads import TorsionSpringDamper
 from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
 from .force_elements import Element, axis_of, places
-from .force_solution import Dynamics
+from .force_solution import Dynamics, reacting
 from .rows_left_out import LeftOut, left_out_of
 from .tree_reactions import (
     Carried,
@@ -107,11 +107,9 @@ class TreeForces:
             for body in mechanism.moving
             if body.mass > 0.0
         ]
-        wanted = set(model.case.forces)
         self.points = {
             joint.name: self._frame(joint.j, mechanism.reaction_point(joint))
-            for joint in mechanism.given_joints
-            if joint.name in wanted
+            for joint in map(mechanism.joint, reacting(model.case))
         }
         self.left_out = left_out_of(mechanism, self._frame)
 

@@ -14,8 +14,9 @@ from ..forces.wanted import WantedForces
 from .sample_rows import EFFORT, ELEMENT, FORCE_SIGMA, POWER, REACTION, REDUNDANT
 
 # Where the estimate of the smallest singular value is above this, the pose is far from singular in
-# the sense of forces, which is a billionth of the largest singular value.
-REGULAR = 1e-6
+# the sense of forces, which is a billionth of the largest singular value, and no digits are
+# multiplied by `AMPLIFIED`: rows are of size one.
+REGULAR = 1e-4
 # Rows that are chosen of more may be nearly singular where all of them are not: those that are not
 # lose no more than three digits.
 WELL_CHOSEN = 1e-3

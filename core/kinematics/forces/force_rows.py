@@ -87,20 +87,19 @@ class ForceRows:
         drivers = range(last - len(self.lanes.mechanism.drivers), last)
         return Multipliers.of(rows, demand, drivers, rows.shape[1] - last)
 
-    def reaction(self, joint: Joint, found: Multipliers) -> tuple[Array, Array, Array]:
-        """Return force [N], moment [N m] and undetermined directions of a joint's wrench.
+    def wrench(self, joint: Joint, multipliers: Array) -> tuple[Array, Array]:
+        """Return force [J / unit of the frames] and moment [N m] of a joint, shape (n, 3) each.
 
-        The wrench acts on the joint's second body, about the joint's point carried by this body.
+        They act on the joint's second body, about the joint's point carried by this body.
         """
-        force, moment = self._wrench(joint, found.values)
-        free = np.empty((self.lanes.n, 6, found.free.shape[2]))
-        for k in range(found.free.shape[2]):
-            free[:, :3, k], free[:, 3:, k] = self._wrench(joint, found.free[:, :, k])
-        return force / self.lanes.frame.unit, moment, free
-
-    def _wrench(self, joint: Joint, multipliers: Array) -> tuple[Array, Array]:
         pair: tuple[Vec3, Vec3] = self.equations.reaction(joint, [*multipliers.T])
         return self._stacked(pair[0]), self._stacked(pair[1])
+
+    def free(self, joint: Joint, found: Multipliers) -> Array:
+        """Return the undetermined directions of a joint's wrench, shape (n, 6, redundant rows)."""
+        columns = np.moveaxis(found.free, 2, 0)
+        each = [np.hstack(self.wrench(joint, multipliers)) for multipliers in columns]
+        return np.stack(each, axis=2) if each else np.empty((self.lanes.n, 6, 0))
 
     def effort(self, driver: Driver, found: Multipliers) -> Array:
         """Return the effort of a driver [N or N m], shape (n,)."""

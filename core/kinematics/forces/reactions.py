@@ -13,7 +13,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ...forces import Forces, Reaction
+from ...forces import Forces, Reaction, in_wrenches
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path
 from ...trajectory import Array, Trajectory
@@ -79,11 +79,15 @@ def forces_of(
     table: Array = np.array([each + np.zeros(lanes.n) for each in every])
     table = table.reshape(len(every), lanes.n)
     spread = _Spread(solved, solution.singular)
+    joints = [j for j in mechanism.given_joints if mechanism.reduced or j.name in wanted.joints]
+    free = {joint.name: lines.free(joint, solution) for joint in joints}
+    if mechanism.reduced:
+        free = in_wrenches(free, solution.known)
     known = spread(solution.known)
 
     def reaction(name: str) -> Reaction:
-        force, moment, free = map(spread, lines.reaction(mechanism.joint(name), solution))
-        return Reaction(force, moment, free, known)
+        force, moment = map(spread, lines.wrench(mechanism.joint(name), solution.values))
+        return Reaction(force / lanes.frame.unit, moment, spread(free[name]), known)
 
     return Forces(
         {name: reaction(name) for name in wanted.joints},

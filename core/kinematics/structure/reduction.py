@@ -64,10 +64,15 @@ class _Held:
     """Directions of a joint's conditions: held along (places) and held about (turns).
 
     Both are orthonormal, of shape (directions, 3), global at design.
+
+    Attributes:
+        axes: on the first and the second body, at right angles, if this is all that is held about:
+            the direction of the condition then moves with both bodies.
     """
 
     places: Array
     turns: Array
+    axes: tuple[Vector, Vector] | None
 
     def rows(self, joint: Joint, frame: Frames, formulation: Cartesian) -> Array:
         """Return the rows of both, shape (directions, unknowns)."""
@@ -93,8 +98,8 @@ class _Held:
         turning = int((sizes > TURNS).sum())
         straight = np.linalg.qr((left[:, turning:].T @ sums[:, :n]).T)[0].T
         return (
-            _Held(_complement(straight) @ self.places, right[turning:] @ self.turns),
-            _Held(straight @ self.places, right[:turning] @ self.turns),
+            _Held(_complement(straight) @ self.places, right[turning:] @ self.turns, self.axes),
+            _Held(straight @ self.places, right[:turning] @ self.turns, self.axes),
         )
 
     def joints(self, joint: Joint) -> list[Joint]:
@@ -115,7 +120,7 @@ class _Held:
         match len(turns):
             case 1:
                 f, g, _ = triad(_vector(turns[0]))
-                found.append(PerpendicularAxes(name, *ends, ((*f,), (*g,))))
+                found.append(PerpendicularAxes(name, *ends, self.axes or ((*f,), (*g,))))
             case 2:
                 found.append(ParallelAxes(name, *ends, _normal(turns)))
             case 3:
@@ -198,6 +203,7 @@ def _held(joint: Joint) -> _Held | None:
     if isinstance(joint, AxialJoint) and joint.relations:
         return None
     places, turns, here = list[Vec3](), list[Vec3](), Attachment(ZERO)
+    crossed: list[tuple[Vector, Vector]] = []
     for each in joint.primitives(here, here):
         match each:
             case p.Spherical():
@@ -210,11 +216,13 @@ def _held(joint: Joint) -> _Held | None:
                 places.append(a)
             case p.Dot10(a=a, b=b):
                 turns.append(cross(a, b))
+                crossed.append(((*a,), (*b,)))
             case _:
                 return None
     if places and len(joint.points_on()) != 1:
         return None
-    return _Held(_orthonormal(places), _orthonormal(turns))
+    axes = crossed[0] if len(turns) == 1 and crossed else None
+    return _Held(_orthonormal(places), _orthonormal(turns), axes)
 
 
 def _orthonormal(vectors: Sequence[Vec3]) -> Array:
