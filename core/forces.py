@@ -138,9 +138,10 @@ class Reaction:
         """
         part = slice(3, 6) if moment else slice(0, 3)
         d = np.asarray(direction, dtype=np.float64)
-        loose = np.abs(np.einsum("i,nik->nk", d, self.free[:, part])).max(axis=1, initial=0.0)
+        loose: Array = np.einsum("i,nik->nk", d, self.free[:, part])
         values: Array = (self.moment if moment else self.force) @ d
-        return np.where(loose <= self.known, values, np.nan)
+        # not by a power, which is not defined for a ball around zero
+        return np.where((loose * loose).sum(axis=1) <= self.known**2, values, np.nan)
 
     def determined(self) -> tuple[int, int, int]:
         """Return how many directions of force, of moment and of the wrench are determined.

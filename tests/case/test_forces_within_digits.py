@@ -1,0 +1,197 @@
+"""Forces where rows are left out within the digits of a file: what exact axes leave undetermined is
+undetermined, and the rest is as with exact axes but for the digits.
+"""
+
+from functools import partial
+from io import StringIO
+from itertools import product
+
+import numpy as np
+import pytest
+from kincheck import adapters
+from kincheck.core.case.io.case_file import load_case
+from kincheck.core.case.io.case_writer import case_text
+from kincheck.core.errors import CaseError
+from kincheck.core.kinematics import NativeSolver
+from kincheck.core.report.terminal import console
+from kincheck.core.studies.diagnosis.diagnose import diagnose
+from kincheck.core.studies.diagnosis.text import print_diagnosis
+from kincheck.core.studies.verified_reference import prove_case
+
+from ..oracles import naive
+from ..oracles.four_bar_forces import forces
+from ..support.engine_forces import Beside, values
+from ..support.four_bar_within_digits import ANGLES, components, solved, written
+
+TILTED = naive.A(np.array([0.8, 0.36, 0.48, 0.0]))
+TRUTH = [forces(angle) for angle in ANGLES]
+REACTIONS, EFFORTS = (np.array(each) for each in zip(*TRUTH, strict=True))
+
+
+def off_by(digits, axis=0):
+    """An axis beside y."""
+    found = [0.0, 1.0, 0.0]
+    found[axis] = digits
+    return tuple(found)
+
+
+def within(found, digits):
+    """Whether components and efforts are the true ones but for digits: reactions are some 16 N,
+    and digits shift them by one or two times the largest of it.
+    """
+    reactions, efforts = found
+    assert (np.isnan(reactions) == np.isnan(REACTIONS)).all()
+    assert np.nanmax(np.abs(reactions - REACTIONS)) <= 32.0 * digits + 1e-12
+    assert np.abs(efforts - EFFORTS).max() <= 32.0 * digits + 1e-12
+
+
+def test_exact_axes_give_the_true_forces(tmp_path):
+    case, found = solved(written(tmp_path))
+    assert case.closure is None
+    within(found, 0.0)
+
+
+@pytest.mark.parametrize("digits", [1e-6, 1e-5, 1e-4])
+@pytest.mark.parametrize("hinge", "abcd")
+@pytest.mark.parametrize("axis", [0, 2])
+def test_an_axis_off_by_digits_gives_the_true_forces(tmp_path, hinge, axis, digits):
+    axes, closure = {hinge: off_by(digits, axis)}, {"tolerance": 2.0 * digits}
+    case, found = solved(written(tmp_path, axes, closure=closure))
+    assert case.closure
+    within(found, digits)
+
+
+@pytest.mark.parametrize("order", ["abcd", "dcba", "cabd", "bdac"])
+def test_the_order_of_joints_changes_digits_only(tmp_path, order):
+    """The joint that loses rows is another one: they leave the same undetermined."""
+    axes = {"c": off_by(1e-6), "b": off_by(-2e-6, 2)}
+    case, found = solved(written(tmp_path, axes, order, closure={"tolerance": 1e-5}))
+    assert case.closure
+    within(found, 2e-6)
+
+
+@pytest.mark.parametrize("bodies", [("rocker", "coupler", "crank"), ("coupler", "crank", "rocker")])
+def test_the_order_of_bodies_changes_digits_only(tmp_path, bodies):
+    axes, closure = {"c": off_by(1e-6)}, {"tolerance": 1e-5}
+    _, found = solved(written(tmp_path, axes, bodies=bodies, closure=closure))
+    within(found, 1e-6)
+
+
+@pytest.mark.parametrize("tolerance", [2e-6, 1e-4, 1e-3])
+def test_the_tolerance_does_not_decide_what_is_determined(tmp_path, tolerance):
+    file = written(tmp_path, {"c": off_by(1e-6)}, closure={"tolerance": tolerance})
+    within(solved(file)[1], 1e-6)
+
+
+@pytest.mark.parametrize(("scale", "unit"), [(1.0, "mm"), (1e-3, "m"), (64.0, "mm")])
+def test_units_and_size_change_digits_only(tmp_path, scale, unit):
+    tolerance = 1e-5 * scale * {"m": 1.0, "mm": 1e3}[unit]
+    more = {"closure": {"tolerance": tolerance}, "units": {"length": unit}}
+    file = written(tmp_path, {"c": off_by(1e-6)}, scale=scale, **more)
+    case, found = solved(file, scale=scale)
+    assert case.closure
+    within(found, 1e-6)
+
+
+def test_a_turned_plane_leaves_the_same_undetermined(tmp_path):
+    closure = {"tolerance": 1e-5}
+    case, found = solved(
+        written(tmp_path, {"c": off_by(1e-6)}, turn=TILTED, closure=closure), turn=TILTED
+    )
+    assert case.closure
+    within(found, 1e-6)
+
+
+@pytest.mark.parametrize("order", ["abcd", "dbca"])
+@pytest.mark.parametrize("engine", ["mujoco", "pinocchio", "exudyn", "simbody", "drake", "dart"])
+def test_every_engine_leaves_the_same_undetermined(tmp_path, engine, order):
+    if adapters.engine(engine).version() is None:
+        pytest.skip(f"{engine} is not installed")
+    axes, closure = {"c": off_by(1e-6), "b": off_by(-2e-6, 2)}, {"tolerance": 1e-5}
+    case = load_case(written(tmp_path, axes, order, closure=closure))
+    assert case.closure
+    native, (found, solution) = values(case, "native")[0], values(case, engine)
+    assert Beside(native, found).same_missing
+    assert Beside(native, found).worst <= 1e-11
+    within(components(solution.forces), 2e-6)
+
+
+def test_a_written_case_has_the_joints_as_given(tmp_path):
+    file = written(tmp_path, {"c": off_by(1e-6)}, "dcba", closure={"tolerance": 1e-5})
+    case = load_case(file)
+    (again := tmp_path / "again.toml").write_text(case_text(case))
+    read = load_case(again)
+    assert read.mechanism == case.mechanism
+    assert (read.closure.tolerance, read.assembly) == (case.closure.tolerance, case.assembly)
+    assert 'type = "inline"' not in again.read_text()
+
+
+def test_a_joint_that_is_to_carry_must_exist(tmp_path):
+    file = written(tmp_path, closure={"tolerance": 1e-5, "carrying": ["x"]})
+    with pytest.raises(CaseError, match=r"closure\.carrying: .*joint.* 'x'"):
+        load_case(file)
+
+
+def test_joints_that_are_to_carry_keep_their_rows(tmp_path):
+    closure = {"tolerance": 1e-5, "carrying": ["b", "c", "d"]}
+    case = load_case(written(tmp_path, {"c": off_by(1e-6)}, closure=closure))
+    assert [each.joint.name for each in case.mechanism.reduced] == ["d"]  # the drive has "a"
+    closure["carrying"] = ["c", "d"]
+    case = load_case(written(tmp_path, {"c": off_by(1e-6)}, closure=closure))
+    assert [each.joint.name for each in case.mechanism.reduced] == ["b"]
+
+
+def test_explain_names_redundant_rows_and_determined_directions(tmp_path):
+    file = written(tmp_path, {"c": off_by(1e-6)}, closure={"tolerance": 1e-5})
+    found = diagnose(load_case(file), samples=3, tol=1e-12)
+    assert [each.row.owner for each in found.redundant] == ["d"] * 3
+    assert 1e-7 < max(each.off for each in found.redundant) < 1e-6
+    assert "3 redundant rows" in found.verdict
+    partly = {
+        each.joint: (each.force, each.moment, each.wrench) for each in found.determinacy.partly
+    }
+    assert partly == dict.fromkeys("abcd", (2, 1, 3))
+    for each in found.determinacy.partly:
+        assert np.abs(np.array(each.force_along)[:, 1]).max() < 1e-5
+        assert abs(abs(each.moment_along[0][1]) - 1.0) < 1e-5
+    print_diagnosis(found, console(printed := StringIO()))
+    printed = printed.getvalue()
+    assert "redundant to 3.3e-07: d: Dot11 (about x) = 1 [a: Dot11 (about x)]" in printed
+    assert "all reactions and efforts are determined" not in printed
+
+
+def test_proofs_print_determined_components_only(tmp_path):
+    pytest.importorskip("flint")
+    file = written(tmp_path, {"c": off_by(1e-6)}, closure={"tolerance": 1e-5})
+    case = load_case(file)
+    made, _ = prove_case(case, digits=20, numbers="double", tol=1e-12)
+    assert all(sample.proved for sample in made.samples)
+    for joint, row in zip("abcd", np.moveaxis(REACTIONS, 1, 0), strict=True):
+        for k, (kind, axis) in enumerate(product(("force", "moment"), "xyz")):
+            found = made.outputs[f"{joint} {kind} {axis}"]
+            if np.isnan(row[:, k]).any():
+                assert found.position == [None] * 3
+                assert "redundant rows leave 2 of 3" in found.reason
+            else:
+                exact = np.array(found.position, dtype=float)
+                assert np.abs(exact - row[:, k]).max() <= 32e-6
+
+
+def component(name, k, moment, found):
+    return found.joints[name].along(np.eye(3)[k], moment=moment)
+
+
+def test_variants_of_a_design_leave_the_same_undetermined(tmp_path):
+    file = written(tmp_path, {"c": off_by(1e-6)}, closure={"tolerance": 1e-5})
+    mechanism, path = (case := load_case(file)).mechanism, case.sweep.path
+    designs = NativeSolver(order=2).prepare_designs(
+        mechanism, path, ["joints.c.point"], forces=[*"abcd", "turn"]
+    )
+    geometry = np.array(mechanism.joint("c").point)[:, None] + np.outer([1, 0, 1], [0.0, 1e-3])
+    found = designs.solve(geometry, 1e-12)
+    every = designs.forces(found, geometry, 1e-12)
+    for name, moment, k in product("abcd", (False, True), range(3)):
+        read = every.read(partial(component, name, k, moment))
+        right = REACTIONS[:, "abcd".index(name), 3 * moment + k]
+        assert (np.isnan(read) == np.isnan(right)[:, None]).all()
+        assert not np.nanmax(np.abs(read[:, 0] - right), initial=0.0) > 32e-6
