@@ -48,9 +48,13 @@ def bars(t):
     }
 
 
-def forces(t):
+def forces(t, cross=None):
     """Force and moment of every hinge on its second body, about the hinge, shape (joints, 6), and
     the crank's torque, at its angle: not a number where rigid bodies do not determine them.
+
+    Args:
+        cross: direction in the plane, on the rocker, of the second axis of a universal joint in
+            place of hinge "c"; the first is along y.
     """
     moved = bars(t)
     places = {"crank": lambda p: turned(t) @ np.array(p)}
@@ -75,10 +79,13 @@ def forces(t):
         acceleration = speedup + w_t * np.cross(Y, arm) - w**2 * arm
         right[rows[name] :][:3] = MASS * (acceleration - GRAVITY)
         right[rows[name] + 3 :][:3] = INERTIA * w_t * Y
-    unit = np.eye(6)[[0, 1, 2, 3, 5]]  # a hinge about y carries no moment about y
+    every = {joint: np.eye(6)[[0, 1, 2, 3, 5]] for joint in BODIES}  # no moment about y
+    if cross is not None:
+        normal = np.cross(Y, turned(moved["rocker"][0]) @ np.array(cross))
+        every["c"] = np.vstack([np.eye(6)[:3], [0.0, 0.0, 0.0, *normal]])
     columns = []
     for joint, (first, second) in BODIES.items():
-        for wrench in unit:
+        for wrench in every[joint]:
             column = np.zeros(18)
             for body, sign in ((first, -1.0), (second, 1.0)):
                 if body in rows:
@@ -91,9 +98,12 @@ def forces(t):
     drive[rows["crank"] + 4] = 1.0
     matrix = np.column_stack([*columns, drive])
     _, sizes, vh = np.linalg.svd(matrix)
-    assert sizes[-1] > 1e-3  # 18 independent equations for 21 unknowns
-    loose = np.abs(vh[18:]).max(axis=0) > 1e-9
-    found = np.where(loose, np.nan, np.linalg.lstsq(matrix, right)[0])
-    reactions = np.zeros((4, 6))
-    reactions[:, [0, 1, 2, 3, 5]] = found[:20].reshape(4, 5)
-    return reactions, found[20]
+    assert sizes[-1] > 1e-3  # 18 independent equations for more unknowns
+    solution, _, _, _ = np.linalg.lstsq(matrix, right)
+    reactions, first = np.zeros((4, 6)), 0
+    for k, wrenches in enumerate(every.values()):
+        own = slice(first, first := first + len(wrenches))
+        loose = np.abs(vh[18:, own] @ wrenches).max(axis=0) > 1e-9
+        reactions[k] = np.where(loose, np.nan, solution[own] @ wrenches)
+    assert np.abs(vh[18:, -1]).max() < 1e-9
+    return reactions, solution[-1]

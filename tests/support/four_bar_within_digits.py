@@ -21,7 +21,9 @@ def outputs():
     return found | {"effort": {"type": "driver_effort", "driver": "turn"}}
 
 
-def written(folder, axes=None, order="abcd", bodies=(*CENTERS,), scale=1.0, turn=None, **more):
+def written(
+    folder, axes=None, order="abcd", bodies=(*CENTERS,), scale=1.0, turn=None, cross=None, **more
+):
     """The case as a file.
 
     Args:
@@ -29,6 +31,7 @@ def written(folder, axes=None, order="abcd", bodies=(*CENTERS,), scale=1.0, turn
         order: of joints.
         scale: of all lengths; forces grow by it, moments by its square.
         turn: rotation of everything.
+        cross: second axis of a universal joint in place of hinge "c".
         more: further tables of the file, such as closure and units; in millimetres the numbers are
             a thousand times larger.
     """
@@ -48,6 +51,12 @@ def written(folder, axes=None, order="abcd", bodies=(*CENTERS,), scale=1.0, turn
         }
         for name in order
     }
+    if cross is not None:
+        joint = joints["c"]
+        joint |= {
+            "type": "universal",
+            "axes": [joint.pop("axis"), (turn @ np.array(cross)).tolist()],
+        }
     about = [length**2 * INERTIA] * 3 + [0.0] * 3
     masses = {
         name: {"mass": MASS, "center_of_mass": place(CENTERS[name]), "inertia": about}
