@@ -2,6 +2,7 @@
 undetermined, and the rest is as with exact axes but for the digits.
 """
 
+from dataclasses import replace
 from functools import partial
 from io import StringIO
 from itertools import product
@@ -12,7 +13,8 @@ from kincheck import adapters
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.io.case_writer import case_text
 from kincheck.core.errors import CaseError
-from kincheck.core.kinematics import NativeSolver
+from kincheck.core.forces import Multipliers
+from kincheck.core.kinematics import NativeSolver, solve
 from kincheck.core.report.terminal import console
 from kincheck.core.studies.diagnosis.diagnose import diagnose
 from kincheck.core.studies.diagnosis.text import print_diagnosis
@@ -101,15 +103,33 @@ def test_a_turned_plane_leaves_the_same_undetermined(tmp_path):
     within(found, 1e-6)
 
 
-@pytest.mark.parametrize("order", ["abcd", "dcba", "dbac"])
-def test_a_cross_turns_with_both_bodies(tmp_path, order):
+@pytest.mark.parametrize("carrying", ["bd", "bc", "cd"])
+def test_a_cross_turns_with_both_bodies(tmp_path, carrying):
     """A universal joint carries a moment across its axes, wherever they are."""
-    cross, closure = (0.6, 0.0, 0.8), {"tolerance": 1e-5}
-    file = written(tmp_path, {"b": off_by(1e-6)}, order, cross=cross, closure=closure)
-    case, found = solved(file)
-    assert case.closure
+    cross, closure = (0.6, 0.0, 0.8), {"tolerance": 1e-5, "carrying": [*carrying]}
+    case, found = solved(written(tmp_path, {"b": off_by(1e-6)}, cross=cross, closure=closure))
+    assert [each.joint.name for each in case.mechanism.reduced] == [*{*"bcd"}.difference(carrying)]
     truth = [forces(angle, cross) for angle in ANGLES]
     within(found, 1e-6, [np.array(each) for each in zip(*truth, strict=True)])
+
+
+def test_a_joint_without_a_row_left_is_undetermined(tmp_path):
+    """A second hinge beside another one shares its load in any proportion."""
+    file = written(
+        tmp_path, {"c": off_by(1e-6)}, twin=(0.6, 0.2, 1e-6), closure={"tolerance": 1e-5}
+    )
+    case, (reactions, efforts) = solved(file)
+    kept = {each.joint.name: each.kept for each in case.mechanism.reduced}
+    assert kept["twin"] == ()
+    right = REACTIONS.copy()
+    right[:, 3, [0, 2]] = np.nan
+    within((reactions, efforts), 1e-6, (right, EFFORTS))
+    found = solve(case.mechanism, "turn", case.sweep.values, forces=["twin"]).forces.joints["twin"]
+    assert found.determined() == (0, 1, 1)
+    assert np.abs(found.along((0.0, 1.0, 0.0), moment=True)).max() < 1e-12
+    assert np.isnan(found.along((1.0, 0.0, 0.0))).all()
+    (again := tmp_path / "again.toml").write_text(case_text(case))
+    assert load_case(again).mechanism == case.mechanism
 
 
 def test_a_hinge_with_a_torsional_spring_keeps_its_rows(tmp_path):
@@ -133,10 +153,27 @@ def test_every_engine_leaves_the_same_undetermined(tmp_path, engine, order):
     axes, closure = {"c": off_by(1e-6), "b": off_by(-2e-6, 2)}, {"tolerance": 1e-5}
     case = load_case(written(tmp_path, axes, order, closure=closure))
     assert case.closure
-    native, (found, solution) = values(case, "native")[0], values(case, engine)
+    (native, right), (found, solution) = values(case, "native"), values(case, engine)
     assert Beside(native, found).same_missing
     assert Beside(native, found).worst <= 1e-11
     within(components(solution.forces), 2e-6)
+    # what is undetermined is one space of wrenches of all joints, in any engine
+    expected, spanned = (
+        np.concatenate([each.forces.joints[name].free for name in "abcd"], axis=1)
+        for each in (right, solution)
+    )
+    projected = expected @ (expected.swapaxes(1, 2) @ spanned)
+    assert np.abs(projected - spanned).max() < 1e-4
+    assert np.abs(np.linalg.norm(spanned, axis=1) - 1.0).max() < 1e-12
+
+
+def test_digits_of_all_samples_count_at_each():
+    """At some pose digits may not show."""
+    one, rows = np.ones(2), np.zeros((2, 0))
+    found = Multipliers(rows, rows[..., None], np.array([1e-6, 0.0]), 0.5 * one, one, one)
+    assert found.known[0] == found.known[1] > 1e-6
+    assert not found.singular.any()
+    assert replace(found, regular=np.array([0.5, 5e-5])).singular.tolist() == [False, True]
 
 
 def test_a_written_case_has_the_joints_as_given(tmp_path):

@@ -22,7 +22,15 @@ def outputs():
 
 
 def written(
-    folder, axes=None, order="abcd", bodies=(*CENTERS,), scale=1.0, turn=None, cross=None, **more
+    folder,
+    axes=None,
+    order="abcd",
+    bodies=(*CENTERS,),
+    scale=1.0,
+    turn=None,
+    cross=None,
+    twin=None,
+    **more,
 ):
     """The case as a file.
 
@@ -32,6 +40,7 @@ def written(
         scale: of all lengths; forces grow by it, moments by its square.
         turn: rotation of everything.
         cross: second axis of a universal joint in place of hinge "c".
+        twin: point of a second hinge, "twin", of the bodies of "d".
         more: further tables of the file, such as closure and units; in millimetres the numbers are
             a thousand times larger.
     """
@@ -57,6 +66,8 @@ def written(
             "type": "universal",
             "axes": [joint.pop("axis"), (turn @ np.array(cross)).tolist()],
         }
+    if twin is not None:
+        joints["twin"] = joints["d"] | {"point": place(twin)}
     about = [length**2 * INERTIA] * 3 + [0.0] * 3
     masses = {
         name: {"mass": MASS, "center_of_mass": place(CENTERS[name]), "inertia": about}
