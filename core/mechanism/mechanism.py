@@ -44,12 +44,12 @@ class Point:
 
 @dataclass(frozen=True)
 class Reduced:
-    """A joint of which rows are left out, because others hold them within the digits of a file.
+    """A joint with rows left out, since others hold them within the digits of a file.
 
     Attributes:
         joint: as given, with all its rows.
-        kept: names of the joints of the mechanism that hold the rest.
-        left_out: joints with the conditions that are left out.
+        kept: names of joints of the mechanism, in its place with the rest of its conditions.
+        left_out: joints with the conditions left out.
     """
 
     joint: Joint
@@ -57,7 +57,7 @@ class Reduced:
     left_out: tuple[Joint, ...]
 
     def changed(self, way: Callable[[Joint], Any]) -> Reduced:
-        """Return the same of joints that a function changes."""
+        """Return the same with its joints changed by a function."""
         return replace(self, joint=way(self.joint), left_out=tuple(map(way, self.left_out)))
 
 
@@ -81,8 +81,8 @@ class Mechanism:
             `joints`: they hold in any motion, and no engine has rows for them.
         gravity: acceleration of free fall, global axes [m/s^2].
         forces: force elements.
-        reduced: joints of which `joints` hold less than all rows: a motion needs no more, but what
-            they carry is shared with the rows left out.
+        reduced: joints with fewer rows in `joints` than given. A motion needs no more, but loads
+            are shared with the rows left out.
 
     Raises:
         MechanismError: a name is used twice or does not exist, or a joint between fixed bodies does
@@ -274,19 +274,19 @@ class Mechanism:
 
     @property
     def given_joints(self) -> tuple[Joint, ...]:
-        """The joints as given: those of `joints`, with the reduced ones whole; at the end such as
-        have no row left.
+        """The joints as given: those of `joints`, the reduced ones whole; those without a row left
+        are last.
         """
         every = [self.joint(self.given_name(joint.name)) for joint in self.joints]
         every += [each.joint for each in self.reduced]
         return tuple({joint.name: joint for joint in every}.values())
 
     def given_name(self, name: str) -> str:
-        """Return the name of the given joint that a joint of the mechanism is a part of."""
+        """Return the name of the given joint of a joint of the mechanism."""
         return self._parts.get(name, name)
 
     def parts_of(self, name: str) -> tuple[str, ...]:
-        """Return the names of the joints of the mechanism that hold a given joint."""
+        """Return the names of the mechanism's joints in place of a given joint."""
         return tuple(each.name for each in self.joints if self.given_name(each.name) == name)
 
     @cached_property

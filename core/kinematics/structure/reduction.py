@@ -66,8 +66,8 @@ class _Held:
     Both are orthonormal, of shape (directions, 3), global at design.
 
     Attributes:
-        axes: on the first and the second body, at right angles, if this is all that is held about:
-            the direction of the condition then moves with both bodies.
+        axes: on the first and the second body, at right angles, if their condition is the only one
+            of turns: its direction moves with both bodies.
     """
 
     places: Array
@@ -88,7 +88,7 @@ class _Held:
         return found
 
     def parted(self, sums: Array) -> tuple[_Held, _Held]:
-        """Return what is left after ending sums of rows that vanish, and what is left out.
+        """Return the rest after ending vanishing sums of rows, and the part left out.
 
         Args:
             sums: weights of the rows in each sum, shape (sums, directions).
