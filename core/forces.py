@@ -98,20 +98,24 @@ class Multipliers:
         Args:
             times: of the samples [s], shape (n,).
         """
-        singular, amplified = (
-            self.singular,
-            self.largest / np.maximum(self.least, SINGULAR * self.largest),
-        )
-        said, large = no_forces_at(times[singular]), ~singular & (amplified > AMPLIFIED)
-        if not large.any():
-            return said
-        more = (
-            f"forces at {number_of(int(large.sum()), 'sample')}, the first at time"
-            f" {float(times[large][0]):.9g}, multiply the digits of points and axes by up to"
-            f" {float(amplified[large].max()):.1g}: the pose is nearly singular, or rows are nearly"
-            " redundant; kincheck explain names them"
-        )
-        return "; ".join(filter(None, (said, more)))
+        singular, said = self.singular, list[str]()
+        if singular.any():
+            said.append(
+                f"no forces {_at(times[singular])}: the pose is singular, and rigid bodies"
+                " determine no finite force there; leave these samples out"
+            )
+        large = ~singular & (self.largest > AMPLIFIED * self.least)
+        if large.any():
+            said.append(
+                f"forces {_at(times[large])}, multiply the digits of points and axes by up to"
+                f" {float((self.largest[large] / self.least[large]).max()):.1g}: the pose is nearly"
+                " singular, or rows are nearly redundant; kincheck explain names them"
+            )
+        return "; ".join(said)
+
+
+def _at(times: Array) -> str:
+    return f"at {number_of(times.size, 'sample')}, the first at time {float(times[0]):.9g}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,14 +214,3 @@ def in_wrenches(free: Mapping[str, Array], known: Array) -> dict[str, Array]:
     u, sizes, _ = np.linalg.svd(np.concatenate([*free.values()], axis=1), full_matrices=False)
     kept = np.where(sizes > known[:, None], 1.0, 0.0)[:, None]
     return dict(zip(free, np.split(kept * u, len(free), axis=1), strict=True))
-
-
-def no_forces_at(times: Array) -> str:
-    """Return the message on samples at singular poses, by their times [s]; empty for none."""
-    if not times.size:
-        return ""
-    return (
-        f"no forces at {number_of(times.size, 'sample')}, the first at time"
-        f" {float(times[0]):.9g}: the pose is singular, and rigid bodies determine no finite force"
-        " there; leave these samples out"
-    )

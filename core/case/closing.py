@@ -28,10 +28,18 @@ def within_digits(case: Case, tolerance: float, why: str, carrying: Collection[s
     """
     found = reduce_rows(case.mechanism, tolerance, carrying)
     less = replace(case, mechanism=found.mechanism)
-    if not found.mechanism.reduced or not _driven(less):
+    if not found.mechanism.reduced:
         return case
-    left = _residual_left(less)
     names = ", ".join(str(each.joint) for each in found.mechanism.reduced)
+    if not _driven(less):
+        if not _driven(case):
+            return case
+        note = (
+            f"rows of {names} are redundant within {tolerance:.3g} m ({why}), but without them the"
+            " drivers do not determine the motion: all rows are kept, and forces multiply digits"
+        )
+        return replace(case, assembly=(*case.assembly, note))
+    left = _residual_left(less)
     if left <= _TOL * found.unit and _driven(case):
         return case
     if left <= found.limit:

@@ -2,6 +2,7 @@
 undetermined, and the rest is as with exact axes but for the digits.
 """
 
+import json
 from dataclasses import replace
 from functools import partial
 from io import StringIO
@@ -15,16 +16,20 @@ from kincheck.core.case.io.case_writer import case_text
 from kincheck.core.case.quantity import with_markers
 from kincheck.core.errors import CaseError
 from kincheck.core.forces import Multipliers
+from kincheck.core.harness.run import run
 from kincheck.core.kinematics import NativeSolver, solve
 from kincheck.core.report.terminal import console
 from kincheck.core.studies.diagnosis.diagnose import diagnose
 from kincheck.core.studies.diagnosis.text import print_diagnosis
 from kincheck.core.studies.verified_reference import prove_case
 
+from ..kinematics.test_chain import chain
+from ..kinematics.test_singular import BRANCH
 from ..oracles import naive
 from ..oracles.four_bar_forces import forces
-from ..support.engine_forces import Beside, every_force, values
+from ..support.engine_forces import Beside, every_force, force_case, values
 from ..support.four_bar_within_digits import ANGLES, solved, written
+from ..support.loads import loaded
 
 TILTED = naive.A(np.array([0.8, 0.36, 0.48, 0.0]))
 TRUTH = [forces(angle) for angle in ANGLES]
@@ -170,6 +175,32 @@ def test_every_engine_leaves_the_same_undetermined(tmp_path, engine, more):
     projected = expected @ (expected.swapaxes(1, 2) @ spanned)
     assert np.abs(projected - spanned).max() < 1e-4
     assert np.abs(np.linalg.norm(spanned, axis=1) - 1.0).max() < 1e-12
+
+
+def test_forces_that_multiply_digits_are_told(tmp_path):
+    """Only digits keep the four-bar from moving; what moves is a pendulum beside it."""
+    keys = json.loads((file := written(tmp_path, {"c": off_by(1e-6)})).read_text())
+    keys["bodies"]["pendulum"] = {"mass": 1.0, "center_of_mass": [2.0, 0.0, 0.5]}
+    beside = {"bodies": ["ground", "pendulum"], "point": [2.0, 0.0, 0.0]}
+    keys["joints"]["beside"] = keys["joints"]["a"] | beside
+    keys["drivers"]["turn"]["joint"] = "beside"
+    file.write_text(json.dumps(keys))
+    (record,) = run([load_case(file)], [adapters.engine("native")], tol=1e-12).records
+    assert "forces at 3 samples, the first at time -0.3, multiply the digits" in record.message
+    assert "by up to 7e+06" in record.message
+    file.write_text(json.dumps(keys | {"closure": {"tolerance": 1e-5}}))
+    case = load_case(file)
+    assert case.closure is None
+    (note,) = case.assembly
+    assert "rows of joint 'd' (revolute) are redundant within 1e-05 m" in note
+    assert "without them the drivers do not determine the motion" in note
+
+
+def test_missing_forces_at_a_singular_pose_are_told():
+    case = force_case(loaded(chain(1)), [0.0, 0.7, 1.4, BRANCH, 2.3, 3.0])
+    (record,) = run([case], [adapters.engine("native")], tol=1e-12).records
+    assert (record.solved, record.samples) == (6, 6)
+    assert "no forces at 1 sample" in record.message
 
 
 def test_digits_of_all_samples_count_at_each():
