@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,9 +19,12 @@ from ...core.case.case import Case
 from ...core.joints import Joint
 from ...core.joints.base import unit
 from ...core.mechanism.loads import Axes, Force, SpringDamper, Torque, TorsionSpringDamper
+from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
-from ..shared.force_solution import Dynamics
+from ..shared.force_solution import Dynamics, reacting
 from ..shared.frame_constraints import skew
+from ..shared.rows_left_out import left_out_of
+from ..shared.tree_rows import BodyFrame
 from .rows import Rows
 
 COMPUTED_BY = {
@@ -130,13 +134,16 @@ class Loads:
         for name, number in self.springs.items():
             force = self.mbs.GetObjectOutput(number, self.kinds.ForceLocal)
             amounts[name] = float(np.atleast_1d(force)[0])
-        wanted = set(self.case.forces)
+        rows, owners = [J], [""] * len(J)
+        for each in left_out_of(self.mechanism, partial(self._frame, len(v))):
+            rows.append(each.rows(len(owners))[0])
+            owners += [each.of] * len(rows[-1])
+        every = np.vstack(rows)
         reactions = {
-            joint.name: (np.zeros(6), self._on_second(joint, J))
-            for joint in self.mechanism.joints
-            if joint.name in wanted
+            name: (np.zeros(6), self._on_second(self.mechanism.joint(name), every, owners))
+            for name in reacting(self.case)
         }
-        return Dynamics(demand, reactions, amounts)
+        return Dynamics(demand, reactions, amounts, every[len(J) :])
 
     def _twist(self, each: Twister, model: Any, v: Array) -> float:
         """Set the torques of a torsional spring-damper; return the torque on the second body."""
@@ -150,9 +157,12 @@ class Loads:
             self.mbs.SetLoadParameter(load, "loadVector", [*(sign * amount * axis)])
         return amount
 
-    def _on_second(self, joint: Joint, J: Array) -> Array:
+    def _on_second(self, joint: Joint, J: Array, owners: Sequence[str]) -> Array:
         """Return the wrenches of unit multipliers of a joint's own rows on its second body, about
         the joint's point, shape (6, rows).
+
+        Args:
+            owners: the given joint of each row that is left out, else empty.
         """
         number, origin = self.rows.bodies[joint.j]
         arm = np.array(self.mechanism.reaction_point(joint)) - origin
@@ -160,10 +170,25 @@ class Loads:
         fixed = self.mechanism.is_fixed(joint.j)
         body, sign = (joint.i, -1.0) if fixed else (joint.j, 1.0)
         k = [each.name for each in self.mechanism.moving].index(body)
-        found, own = np.zeros((6, len(J))), self.rows.owned[joint.name]
+        found, own = np.zeros((6, len(J))), [k for k, of in enumerate(owners) if of == joint.name]
+        for part in self.mechanism.parts_of(joint.name):
+            own += range(len(J))[self.rows.owned[part]]
         columns = J[own, 7 * k : 7 * k + 7]
         found[:, own] = sign * (columns @ self._rates(body, point)).T
         return found
+
+    def _frame(self, unknowns: int, body: str, at: Vector) -> BodyFrame:
+        """Return a frame of a body, at a point, global at design."""
+        number, origin = self.rows.bodies[body]
+        moving = [each.name for each in self.mechanism.moving]
+        frame = BodyFrame(number, None, self._position(number, np.array(at) - origin))
+        frame.jacobian = np.zeros((6, unknowns))
+        if body in moving:
+            k = 7 * moving.index(body)
+            frame.jacobian[:, k : k + 7] = np.linalg.pinv(self._rates(body, frame.position))
+            turned = self.mbs.GetObjectOutputBody(number, self.kinds.RotationMatrix)
+            frame.rotation = np.array(turned).reshape(3, 3)
+        return frame
 
     def _position(self, number: int, arm: Array) -> Array:
         if number == self.rows.ground:

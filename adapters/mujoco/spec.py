@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...core.joints import Coupler, Distance, Joint
-from ...core.mechanism.mechanism import GROUND, Mechanism, Vector
+from ...core.mechanism.mechanism import GROUND, Mechanism
 from ...core.mechanism.topology import spanning_tree
 from ..shared.joint_chains import (
     CHAINS,
@@ -27,6 +27,7 @@ from ..shared.joint_chains import (
     polynomial_in_tree,
     relations,
 )
+from ..shared.loop_closures import near
 from ..shared.poses import middle
 
 JOINTS = (*CHAINS, Distance)
@@ -119,14 +120,9 @@ class Sketch:
         """Add a site to a body."""
         return body.add_site(name=str(len(self.spec.sites)), pos=list(position))
 
-    def near(self, joint: Joint) -> Vector:
-        """Return the joint's point, or else the origin of a moving body [m]."""
-        moving = self.mechanism.body(joint.i if self.mechanism.is_fixed(joint.j) else joint.j)
-        return getattr(joint, "point", None) or moving.origin
-
     def links(self, joint: Joint) -> list[Link]:
         """Return a joint's chain, from its first body to its second."""
-        return CHAINS[type(joint)](joint, self.near(joint))
+        return CHAINS[type(joint)](joint, near(self.mechanism, joint))
 
     def attach(self, body: Any, links: Sequence[Link], joint: str = "") -> None:
         """Let a body move relative to its parent by links, in order from the parent.
@@ -161,7 +157,7 @@ class Sketch:
             self.means[joint.name] = "tendon"
             self.span(joint, i, j)
             return
-        links, point, turns = end_of_loop(self.links(joint), self.near(joint))
+        links, point, turns = end_of_loop(self.links(joint), near(self.mechanism, joint))
         kind = "connect" if turns else "weld"
         self.means[joint.name] = kind
         if links:

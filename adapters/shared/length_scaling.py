@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ...core.case.case import Case, size
-from ...core.joints import Kind
+from ...core.joints import Joint, Kind
 from ...core.kinematics import unit_near
 from ...core.mechanism.dimension import ACCELERATION
 from ...core.mechanism.mechanism import Vector
@@ -74,12 +74,15 @@ def in_own_frame(case: Case) -> Case:
     """
     mechanism, frame = case.mechanism, own_frame(case)
     ways: dict[Kind, Any] = {Kind.POSITION: frame.there, Kind.LENGTH: frame.units}
+
+    def scaled(joint: Joint) -> Joint:
+        return joint.changed(**joint.mapped(ways))
+
     return replace(
         case,
-        mechanism=replace(
-            mechanism,
+        mechanism=mechanism.with_joints(
+            scaled,
             bodies=[body.in_frame(frame.there, frame.unit) for body in mechanism.bodies],
-            joints=[joint.changed(**joint.mapped(ways)) for joint in mechanism.joints],
             points=[
                 replace(point, position=frame.there(point.position)) for point in mechanism.points
             ],

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.algebra import Vec3
+from ...core.algebra import Vec3, triple
 from ...core.joints import (
     ConstantVelocity,
     Cylindrical,
@@ -48,6 +48,7 @@ from .frame_constraints import (
     Length,
     Thread,
 )
+from .poses import middle
 
 
 @dataclass(frozen=True)
@@ -165,13 +166,19 @@ CLOSURES: dict[type[Joint], Closure] = {
 """Closures by exact joint type."""
 
 
+def near(mechanism: Mechanism, joint: Joint) -> Vector:
+    """Return the point of a joint, or else the middle of a moving body, global at design [m].
+
+    A fixed joint may lack a point, and some types have none. Any point works, and a near one keeps
+    all digits: the origin in a case file may be far away.
+    """
+    moving = (body for body in mechanism.moving if body.name in joint.bodies)
+    return vars(joint).get("point") or triple(middle(mechanism, next(moving)))
+
+
 def ends_of(mechanism: Mechanism, joint: Joint) -> tuple[Vector, Vector]:
     """Return the points of a joint's frames on its first and second body, global at design [m]."""
-    # a fixed joint may lack a point and some types have none: any point works, and the origin of a
-    # moving body is near
-    P = vars(joint).get("point") or next(
-        body.origin for body in mechanism.moving if body.name in joint.bodies
-    )
+    P = near(mechanism, joint)
     return vars(joint).get("points", (P, P))
 
 

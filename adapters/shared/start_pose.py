@@ -55,10 +55,9 @@ def at_start(mechanism: Mechanism, way: Mapping[str, BodyMotion]) -> Mechanism:
                 angle = coordinate(mechanism.joint(each.joint), "rotation")
                 yield replace(each, free_angle=each.free_angle - angle)
 
-    return replace(
-        mechanism,
+    return mechanism.with_joints(
+        lambda joint: _joint(joint, placed),
         bodies=[_body(body, placed[body.name], way) for body in mechanism.bodies],
-        joints=[_joint(joint, placed) for joint in mechanism.joints],
         points=[
             replace(point, position=_last(placed[point.body].of(vec(point.position))))
             for point in mechanism.points

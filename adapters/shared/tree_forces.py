@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import accumulate
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
@@ -20,7 +21,8 @@ from ...core.mechanism.loads import TorsionSpringDamper
 from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
 from .force_elements import Element, axis_of, places
-from .force_solution import Dynamics
+from .force_solution import Dynamics, reacting
+from .rows_left_out import LeftOut, left_out_of
 from .tree_reactions import (
     Carried,
     Cut,
@@ -105,12 +107,11 @@ class TreeForces:
             for body in mechanism.moving
             if body.mass > 0.0
         ]
-        wanted = set(model.case.forces)
         self.points = {
             joint.name: self._frame(joint.j, mechanism.reaction_point(joint))
-            for joint in mechanism.joints
-            if joint.name in wanted
+            for joint in map(mechanism.joint, reacting(model.case))
         }
+        self.left_out = left_out_of(mechanism, self._frame)
 
     def _frame(self, body: str, at: Vector) -> Any:
         self.frames.append(self.model.add_frame(self.model.carrier[body], at))
@@ -132,14 +133,24 @@ class TreeForces:
         """Return the requested joints."""
         model, found = self.model, list[Site]()
         for name, frame in self.points.items():
-            joint = model.case.mechanism.joint(name)
-            if name in model.branch_of:
-                body, sign = model.branch_of[name]
-                kind = Carried(carried_by(body, model.parents), sign)
-            else:
-                kind = Cut(model.carrier[joint.j], model.rows_of(name))
-            found.append(Site(joint, frame, kind))
+            joint, parts = model.case.mechanism.joint(name), list[Carried | Cut]()
+            for part in model.case.mechanism.parts_of(name):
+                if part in model.branch_of:
+                    body, sign = model.branch_of[part]
+                    parts.append(Carried(carried_by(body, model.parents), sign))
+                else:
+                    parts.append(Cut(model.carrier[joint.j], model.rows_of(part)))
+            left_out = [rows for each, rows in self.slices if each.of == name]
+            parts.append(Cut(model.carrier[joint.j], left_out))
+            found.append(Site(joint, frame, parts))
         return found
+
+    @cached_property
+    def slices(self) -> list[tuple[LeftOut, slice]]:
+        """Return the rows left out, which follow those of the model."""
+        first = len(self.model.jacobian())
+        ends = [*accumulate((each.joint.rows for each in self.left_out), initial=first)]
+        return [*zip(self.left_out, map(slice, ends, ends[1:]), strict=False)]
 
     @cached_property
     def shares(self) -> Mapping[str, Sequence[tuple[int, str]]]:
@@ -158,8 +169,14 @@ class TreeForces:
             for frame, wrench in zip(element.frames, wrenches, strict=True):
                 demand = demand - frame.jacobian.T @ wrench
                 loads[frame.body] += about_origin(frame.position, wrench[None])[:, 0]
-        exerted = np.zeros((bodies, 6, len(model.jacobian())))
-        for each in model.exerted():
+        left_out, exerting = [np.zeros((0, len(v)))], [*model.exerted()]
+        for each, place in self.slices:
+            rows, wrenches = each.rows(place.start)
+            left_out.append(rows)
+            exerting += wrenches
+        total = np.vstack(left_out)
+        exerted = np.zeros((bodies, 6, len(model.jacobian()) + len(total)))
+        for each in exerting:
             exerted[each.body][:, each.rows] += about_origin(each.point, each.wrenches)
         passed_on, reactions = self._passed_on(bodies), dict[str, tuple[Array, Array]]()
         for site in self.sites:
@@ -169,7 +186,7 @@ class TreeForces:
                 weight = model.coordinate_weight(row, name, freedom)
                 by_multiplier[:, row] -= weight * site.along(freedom)
             reactions[name] = alone, by_multiplier
-        return Dynamics(demand, reactions, amounts)
+        return Dynamics(demand, reactions, amounts, total)
 
     def _passed_on(self, bodies: int) -> Callable[[int, Array], Array]:
         """Return the function for the wrench that the joint of a body transmits, about a point: the

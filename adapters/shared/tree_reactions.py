@@ -66,11 +66,15 @@ class Cut:
 
 @dataclass(frozen=True, eq=False)
 class Site:
-    """A joint whose reaction is requested, and a frame at its point on its second body."""
+    """A joint whose reaction is requested, and a frame at its point on its second body.
+
+    Attributes:
+        parts: the joint itself, or what holds its rows.
+    """
 
     joint: Joint
     frame: Frame
-    kind: Carried | Cut
+    parts: Sequence[Carried | Cut]
 
     def reaction(
         self, passed_on: Callable[[int, Array], Array], exerted: Array, loads: Array
@@ -85,16 +89,17 @@ class Site:
                 rows).
             loads: wrenches of force elements on each body, about the origin, shape (bodies, 6).
         """
-        kind, to_point = self.kind, from_origin(self.frame.position)
-        if isinstance(kind, Cut):
-            by_multiplier = np.zeros(exerted.shape[1:])
-            for rows in kind.rows:
-                by_multiplier[:, rows] = exerted[kind.second][:, rows]
-            return np.zeros(6), to_point @ by_multiplier
-        total = passed_on(kind.bodies[0], self.frame.position)
-        alone = total - to_point @ loads[kind.bodies].sum(axis=0)
-        by_multiplier = to_point @ exerted[kind.bodies].sum(axis=0)
-        return kind.sign * alone, -kind.sign * by_multiplier
+        to_point = from_origin(self.frame.position)
+        alone, by_multiplier = np.zeros(6), np.zeros(exerted.shape[1:])
+        for part in self.parts:
+            if isinstance(part, Cut):
+                for rows in part.rows:
+                    by_multiplier[:, rows] += to_point @ exerted[part.second][:, rows]
+                continue
+            total = passed_on(part.bodies[0], self.frame.position)
+            alone += part.sign * (total - to_point @ loads[part.bodies].sum(axis=0))
+            by_multiplier -= part.sign * (to_point @ exerted[part.bodies].sum(axis=0))
+        return alone, by_multiplier
 
     def along(self, freedom: str) -> Array:
         """Return the wrench of a unit force or torque of a coordinate on the second body."""
@@ -134,7 +139,7 @@ def of_relations(
         rows: joint and freedom of the coordinates in each row. A row with two coordinates of one
             joint is the joint's own (a screw).
     """
-    found: dict[str, list[tuple[int, str]]] = {joint.name: [] for joint in mechanism.joints}
+    found: dict[str, list[tuple[int, str]]] = {joint.name: [] for joint in mechanism.given_joints}
     for row, terms in rows.items():
         if len(terms) > 1 and len({joint for joint, _ in terms}) == 1:
             continue

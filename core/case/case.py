@@ -142,6 +142,21 @@ class Origin:
     limits: Mapping[str, str] = field(default_factory=dict[str, str])
 
 
+@dataclass(frozen=True)
+class Closure:
+    """The tolerance within which redundant rows of a case are left out; its mechanism has them.
+
+    Attributes:
+        tolerance: of closure [m].
+        carrying: joints that were to keep all their rows.
+        note: on the joints, and on the residual that they keep; one of `assembly`.
+    """
+
+    tolerance: float
+    carrying: tuple[str, ...]
+    note: str
+
+
 @dataclass(frozen=True, eq=False)
 class Case:
     """The input of engines, and of the harness that judges their results, in SI units.
@@ -152,6 +167,7 @@ class Case:
         origin: source of the reference; None for the source of the case itself.
         length_unit, angle_unit: units of the file of the case, by their names in `units`.
         assembly: notes on how the start was closed, and on rows left out.
+        closure: of rows left out; None if all rows hold.
     """
 
     name: str
@@ -165,6 +181,7 @@ class Case:
     length_unit: str = "m"
     angle_unit: str = "rad"
     assembly: tuple[str, ...] = ()
+    closure: Closure | None = None
 
     def __repr__(self) -> str:
         """Return name, truth, sweep and outputs in one line."""

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import replace
 
 from ..errors import MechanismError
-from ..joints import Joint
 from ..kinematics import NativeSolver, degrees_of_freedom, largest_residual, reduce_rows
-from .case import Case
+from .case import Case, Closure
 
 # Largest accepted residual of the rows that are solved, relative to the mechanism's size.
 _TOL = 1e-12
@@ -29,10 +28,18 @@ def within_digits(case: Case, tolerance: float, why: str, carrying: Collection[s
     """
     found = reduce_rows(case.mechanism, tolerance, carrying)
     less = replace(case, mechanism=found.mechanism)
-    if not found.originals or not _driven(less):
+    if not found.mechanism.reduced:
         return case
-    left = _residual_left(less, found.originals)
-    names = ", ".join(map(str, found.originals))
+    names = ", ".join(str(each.joint) for each in found.mechanism.reduced)
+    if not _driven(less):
+        if not _driven(case):
+            return case
+        note = (
+            f"rows of {names} are redundant within {tolerance:.3g} m ({why}), but without them the"
+            " drivers do not determine the motion: all rows are kept, and forces multiply digits"
+        )
+        return replace(case, assembly=(*case.assembly, note))
+    left = _residual_left(less)
     if left <= _TOL * found.unit and _driven(case):
         return case
     if left <= found.limit:
@@ -40,7 +47,8 @@ def within_digits(case: Case, tolerance: float, why: str, carrying: Collection[s
             f"rows that are redundant within {tolerance:.3g} m ({why}) are left out, of {names};"
             f" along the motion they keep a residual of {left:.2g} m"
         )
-        return replace(less, assembly=(*case.assembly, note))
+        closure = Closure(tolerance, tuple(carrying), note)
+        return replace(less, assembly=(*case.assembly, note), closure=closure)
     if _driven(case):  # no digits: beside a singular pose
         return case
     raise MechanismError(
@@ -55,8 +63,9 @@ def _driven(case: Case) -> bool:
     return degrees_of_freedom(case.mechanism) == len(case.mechanism.drivers)
 
 
-def _residual_left(case: Case, joints: Sequence[Joint]) -> float:
-    """Return the largest residual of joints along the motion of a case [m]."""
+def _residual_left(case: Case) -> float:
+    """Return the largest residual of the reduced joints along the motion of a case [m]."""
+    joints = [each.joint for each in case.mechanism.reduced]
     bodies = tuple(body.name for body in case.mechanism.moving)
     motion = NativeSolver(order=0).prepare(case.mechanism, case.sweep.path, bodies=bodies)(_TOL)
     solved = {

@@ -24,7 +24,9 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     listing: argparse.ArgumentParser
     listing = commands.add_parser(
-        "assemblies", help="list all assemblies of a mechanism", description=_assemblies.__doc__
+        "assemblies",
+        help="list assemblies of a mechanism, found from random starts",
+        description=_assemblies.__doc__,
     )
     listing.set_defaults(do=_assemblies)
     listing.add_argument(
@@ -110,9 +112,9 @@ def _assemblies(options: argparse.Namespace, registry: Registry) -> int:
 def _print(found: Survey, json: str | None) -> None:
     from ..report.terminal import columns, page
 
-    console, all_of_them = page(json), found.assemblies
+    console, listed = page(json), found.assemblies
     values = ", ".join(f"{name} = {value:.9g}" for name, value in found.drivers.items())
-    count, starts = len(all_of_them.found), all_of_them.starts
+    count, starts = len(listed.found), listed.starts
     console.print(
         f"{found.case.name} at {values}: {count} assembl{'y' if count == 1 else 'ies'} from"
         f" {starts} starts (seed {found.seed})",
@@ -120,13 +122,13 @@ def _print(found: Survey, json: str | None) -> None:
     )
     telling = [
         name
-        for name in (all_of_them.found[0].signs if count else ())
-        if len({a.signs[name] for a in all_of_them.found}) > 1
+        for name in (listed.found[0].signs if count else ())
+        if len({a.signs[name] for a in listed.found}) > 1
     ]
     table = columns(
         ">#", "which", ">distance", ">starts", ">residual", ">smallest sv", "det", *telling
     )
-    for index, each in enumerate(all_of_them.found, 1):
+    for index, each in enumerate(listed.found, 1):
         which = (
             "intended"
             if found.intended(each)
@@ -148,10 +150,12 @@ def _print(found: Survey, json: str | None) -> None:
     console.print(
         f"distance: from {found.ranked_by}, rms over the bodies of turn [rad] and shift [mechanism"
         " sizes]; det, joints: signs of the determinant and of triple products, + as at design;"
-        f" residual: of the mechanism's size. {all_of_them.lost} starts did not close,"
-        f" {all_of_them.spurious} ended on spurious zeros. There may be more: raise --samples.",
+        f" residual: of the mechanism's size. {listed.lost} starts did not close,"
+        f" {listed.spurious} ended on spurious zeros.",
         soft_wrap=True,
     )
+    missing = listed.missing or "There may be some"
+    console.print(f"{missing}; raise --samples.", soft_wrap=True)
 
 
 def _sign(value: int) -> str:

@@ -83,7 +83,7 @@ class NativeEngine:
 
     def _forces(self, case: Case) -> tuple[str, ...]:
         mechanism = case.mechanism
-        every = (*mechanism.joints, *mechanism.drivers, *mechanism.forces)
+        every = (*mechanism.given_joints, *mechanism.drivers, *mechanism.forces)
         return tuple(each.name for each in every) if self.every_force else case.forces
 
     def solve(self, model: Solver, case: Case, tol: float) -> Trajectory:

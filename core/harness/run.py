@@ -251,6 +251,8 @@ def _answered(
     details = dict(answer.details)
     # a correct answer may have notes too, for example on a singular pose it passed
     messages = [*verdict.messages, *details.pop("notes", [])]
+    if solved == samples and answer.message:  # on forces; else the verdict has it
+        messages.append(answer.message)
     numbers = {
         "residual_max": answer.residual if solved else None,
         "rank": details.pop("rank", None),

@@ -6,8 +6,8 @@ All points and axes are global, at the design position, in SI units, as in a tab
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -42,6 +42,25 @@ class Point:
         require_finite(who, self.position, Kind.POSITION.value)
 
 
+@dataclass(frozen=True)
+class Reduced:
+    """A joint with rows left out, since others hold them within the digits of a file.
+
+    Attributes:
+        joint: as given, with all its rows.
+        kept: names of joints of the mechanism, in its place with the rest of its conditions.
+        left_out: joints with the conditions left out.
+    """
+
+    joint: Joint
+    kept: tuple[str, ...]
+    left_out: tuple[Joint, ...]
+
+    def changed(self, way: Callable[[Joint], Any]) -> Reduced:
+        """Return the same with its joints changed by a function."""
+        return replace(self, joint=way(self.joint), left_out=tuple(map(way, self.left_out)))
+
+
 KINDS: Mapping[str, type] = {
     "bodies": Body,
     "joints": Joint,
@@ -62,6 +81,8 @@ class Mechanism:
             `joints`: they hold in any motion, and no engine has rows for them.
         gravity: acceleration of free fall, global axes [m/s^2].
         forces: force elements.
+        reduced: joints with fewer rows in `joints` than given. A motion needs no more, but loads
+            are shared with the rows left out.
 
     Raises:
         MechanismError: a name is used twice or does not exist, or a joint between fixed bodies does
@@ -77,8 +98,10 @@ class Mechanism:
     grounded: Sequence[Joint] = field(default=())
     gravity: Vector = (0.0, 0.0, 0.0)
     forces: Sequence[ForceElement] = field(default=())
+    reduced: Sequence[Reduced] = field(default=())
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "reduced", tuple(self.reduced))
         if self.grounded:
             object.__setattr__(self, "joints", (*self.joints, *self.grounded))
         for what, kind in KINDS.items():
@@ -221,7 +244,7 @@ class Mechanism:
         return self._named["bodies"][name]
 
     def joint(self, name: str) -> Joint:
-        """Return the joint of this name."""
+        """Return the joint of this name, as given."""
         return self._named["joints"][name]
 
     def point(self, name: str) -> Point:
@@ -243,6 +266,32 @@ class Mechanism:
         """
         free = joint.i if self.is_fixed(joint.j) else joint.j
         return next(iter(joint.points_on(joint.j)), None) or self.body(free).origin
+
+    def with_joints(self, way: Callable[[Joint], Any], **changes: Any) -> Mechanism:
+        """Return the mechanism with all joints changed by a function, and with other changes."""
+        reduced = [each.changed(way) for each in self.reduced]
+        return replace(self, joints=[*map(way, self.joints)], reduced=reduced, **changes)
+
+    @property
+    def given_joints(self) -> tuple[Joint, ...]:
+        """The joints as given: those of `joints`, the reduced ones whole; those without a row left
+        are last.
+        """
+        every = [self.joint(self.given_name(joint.name)) for joint in self.joints]
+        every += [each.joint for each in self.reduced]
+        return tuple({joint.name: joint for joint in every}.values())
+
+    def given_name(self, name: str) -> str:
+        """Return the name of the given joint of a joint of the mechanism."""
+        return self._parts.get(name, name)
+
+    def parts_of(self, name: str) -> tuple[str, ...]:
+        """Return the names of the mechanism's joints in place of a given joint."""
+        return tuple(each.name for each in self.joints if self.given_name(each.name) == name)
+
+    @cached_property
+    def _parts(self) -> Mapping[str, str]:
+        return {part: each.joint.name for each in self.reduced for part in each.kept}
 
     @property
     def has_loads(self) -> bool:
@@ -276,7 +325,9 @@ class Mechanism:
             "drivers": self.drivers,
             "forces": self.forces,
         }
-        return {what: {each.name: each for each in found} for what, found in all_of.items()}
+        named = {what: {each.name: each for each in found} for what, found in all_of.items()}
+        named["joints"] |= {each.joint.name: each.joint for each in self.reduced}
+        return named
 
     @property
     def moving(self) -> tuple[Body, ...]:

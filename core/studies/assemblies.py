@@ -38,8 +38,14 @@ class Found(msgspec.Struct, frozen=True):
 
 
 class Report(msgspec.Struct, frozen=True):
-    """Assemblies of a case as a file. drivers: values [m or rad]; ranked_by: origin
-    of the distances.
+    """Assemblies of a case as a file.
+
+    Attributes:
+        drivers: values [m or rad].
+        ranked_by: origin of the distances.
+        found_once: number of assemblies to which one start only led.
+        estimated: how many there are at the least (Chao 1984).
+        unlisted: share of starts, of those that close, to other assemblies (Good 1953).
     """
 
     schema: str
@@ -50,6 +56,9 @@ class Report(msgspec.Struct, frozen=True):
     seed: int
     lost: int
     spurious: int
+    found_once: int
+    estimated: float
+    unlisted: float
     assemblies: list[Found]
 
 
@@ -100,8 +109,11 @@ class Survey:
             )
             for number, each in enumerate(self.assemblies.found, 1)
         ]
-        counts = self.assemblies.starts, self.seed, self.assemblies.lost, self.assemblies.spurious
-        return Report(SCHEMA, self.case.name, dict(self.drivers), self.ranked_by, *counts, found)
+        every = self.assemblies
+        counts = every.starts, self.seed, every.lost, every.spurious, every.once
+        more = every.estimated, every.unlisted
+        drivers = dict(self.drivers)
+        return Report(SCHEMA, self.case.name, drivers, self.ranked_by, *counts, *more, found)
 
 
 def survey(case: Case, at: float | None = None, *, samples: int, seed: int) -> Survey:

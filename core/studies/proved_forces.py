@@ -14,7 +14,9 @@ from .native_error import Column
 FORCES_NOTE = (
     " Forces are those of the solved rows; redundant rows, which are left out, carry nothing. A"
     " component is printed only if a unit multiplier of a redundant row changes it by at most"
-    f" {DETERMINED:g}. Turns of torsional springs are counted as the native engine counts them."
+    f" {DETERMINED:g}, and if the native engine finds it determined, which counts rows left out"
+    " within the digits of the case too. Turns of torsional springs are counted as the native"
+    " engine counts them."
 )
 
 
@@ -33,12 +35,14 @@ def force_values(output: Any, found: Proofs) -> tuple[Sequence[Column], str | No
     }
     if not there:
         return [none] * 3, None
-    forces = _forces([*there.values()])
-    values: list[Any] = output.values(forces).tolist()
+    native = found.native.forces
+    assert native is not None  # forces are proved near the native ones
+    determined = np.isfinite(output.values(native))
+    values: list[Any] = output.values(_forces([*there.values()])).tolist()
     for k, value in zip(there, values, strict=True):
-        column[k] = None if isinstance(value, float) else value
+        column[k] = None if isinstance(value, float) or not determined[k] else value
     known = any(value is not None for value in column)
-    return [column, none, none], None if known else output.undetermined(_as_floats(forces)) or None
+    return [column, none, none], None if known else output.undetermined(native) or None
 
 
 def _forces(samples: Sequence[EnclosedForces]) -> Forces:
@@ -49,33 +53,17 @@ def _forces(samples: Sequence[EnclosedForces]) -> Forces:
         table: Any = np.array([each.joints[name] for each in samples], dtype=object)
         free: Any = np.zeros((n, 6, len(first.free)), dtype=object)
         for k, each in enumerate(samples):
-            for column, (joints, _) in enumerate(each.free):
+            for column, joints in enumerate(each.free):
                 free[k, :, column] = joints[name]
         return Reaction(table[:, :3], table[:, 3:], free)
-
-    def effort(each: EnclosedForces, name: str) -> Any:
-        unknown = any(not abs(drivers[name]) <= DETERMINED for _, drivers in each.free)
-        return np.nan if unknown else each.drivers[name]
 
     def lanes(values: Sequence[Any]) -> Any:
         return np.array(values, dtype=object)
 
     return Forces(
         {name: reaction(name) for name in first.joints},
-        {name: lanes([effort(each, name) for each in samples]) for name in first.drivers},
+        {name: lanes([each.drivers[name] for each in samples]) for name in first.drivers},
         {name: lanes([each.elements[name] for each in samples]) for name in first.elements},
         lanes([each.power for each in samples]),
         np.zeros(n),
     )
-
-
-def _as_floats(forces: Forces) -> Forces:
-    def floats(values: Any) -> Any:
-        return np.array(values, dtype=np.float64)
-
-    joints = {
-        name: Reaction(floats(each.force), floats(each.moment), floats(each.free))
-        for name, each in forces.joints.items()
-    }
-    drivers = {name: floats(each) for name, each in forces.drivers.items()}
-    return Forces(joints, drivers, {}, floats(forces.power), forces.largest_power)

@@ -38,7 +38,11 @@ def four_bar(tmp_path, tail="", turn=None, **kinds):
         point = (turn @ np.array(place)).tolist()
         kind = kinds.get(name, "revolute")
         text += f'[joints.{name}]\ntype = "{kind}"\nbodies = {[*BODIES[name]]}\npoint = {point}\n'
-        text += f"axis = {axis.tolist()}\n" if kind != "spherical" else ""
+        if kind == "universal":
+            axes = [axis.tolist(), (turn @ np.array([0.6, 0.8, 0.0])).tolist()]
+            text += f"axes = {axes}\n"
+        elif kind != "spherical":
+            text += f"axis = {axis.tolist()}\n"
     text += f'[points.B]\nbody = "rocker"\nposition = {(turn @ np.array(B)).tolist()}\n'
     file = tmp_path / "loop.toml"
     file.write_text(text)
@@ -71,7 +75,7 @@ def turned(angles=(0.3, 1.1, -0.7)):
     return found
 
 
-@pytest.mark.parametrize("last", ["revolute", "spherical", "cylindrical"])
+@pytest.mark.parametrize("last", ["revolute", "spherical", "cylindrical", "universal"])
 @pytest.mark.parametrize("turn", [np.eye(3), turned()], ids=["level", "turned"])
 def test_a_tilted_loop_moves_like_the_ideal_one(tmp_path, last, turn):
     file = four_bar(tmp_path, f"[closure]\ntolerance = {TILT}\n", turn, g=last)

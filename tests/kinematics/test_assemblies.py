@@ -10,6 +10,7 @@ import pytest
 from kincheck import cases
 from kincheck.core import find_assemblies
 from kincheck.core.cli.main import main
+from kincheck.core.kinematics.assembly.assembly_modes import Assemblies, Assembly
 
 from ..oracles import naive
 from ..support.exported import READERS, read
@@ -116,6 +117,50 @@ def test_a_gough_platform_has_several():
     assert len(found.found) >= 8
     assert all(closes(mechanism, each) for each in found.found)
     assert found.spurious == 0
+    assert found.once > 4
+    assert found.missing.startswith("The list is not known to be complete: ")
+
+
+def counted(*starts):
+    """Assemblies with these numbers of starts."""
+    found = tuple(Assembly({}, 0.0, n, 0.0, 1.0, 1, {}) for n in starts)
+    return Assemblies(found, sum(starts) + 3, 3, 0)
+
+
+def test_few_starts_tell_how_many_assemblies_are_missing():
+    """Chao's and Good's estimates by hand: four found once, one twice, one three times."""
+    found = counted(1, 1, 1, 1, 2, 3)
+    assert (found.once, found.estimated, found.unlisted) == (4, 6 + 4 * 3 / (2 * 2), 4 / 9)
+    for words in ("4 of these 6", "44.4 % of further starts", "about 9 or more exist"):
+        assert words in found.missing
+    assert found.missing in found.summary()
+
+
+def test_estimates_are_right_for_many_classes():
+    """512 ways that random starts lead to alike: the estimates hit the number and the share."""
+    random = np.random.default_rng(3)
+    for n in (600, 2400):
+        seen = np.bincount(random.integers(512, size=n), minlength=512)
+        found = counted(*seen[seen > 0].tolist())
+        assert abs(found.estimated - 512) < 0.1 * 512
+        assert abs(found.unlisted - (seen == 0).mean()) < 0.05
+
+
+def test_a_list_found_often_is_not_called_complete():
+    found = counted(98, 102)
+    assert (found.once, found.estimated, found.unlisted) == (0, 2.0, 0.0)
+    assert "fewer than 1 of 66 starts that close lead can be missing" in found.missing
+    assert counted().missing == ""
+
+
+def test_the_command_says_what_may_be_missing(tmp_path, capsys):
+    file = tmp_path / "found.json"
+    assert main(["assemblies", "gough_platform", "--samples", "24", "--json", str(file)]) == 0
+    out, written = capsys.readouterr().out, json.loads(file.read_text())
+    assert f"{written['found_once']} of these {len(written['assemblies'])}" in out
+    assert written["estimated"] > len(written["assemblies"])
+    assert 0.0 < written["unlisted"] <= 1.0
+    assert out.rstrip().endswith("raise --samples.")
 
 
 def test_assemblies_that_meet_are_one_and_singular():

@@ -20,7 +20,7 @@ UNUSED = {"atol": 1.0, "rtol": 0.0, "why": "not judged here"}
 
 def every_force(mechanism, names=None):
     """Outputs of all reactions, efforts and element forces, or of the joints named."""
-    joints = [each for each in mechanism.joints if names is None or each.name in names]
+    joints = [each for each in mechanism.given_joints if names is None or each.name in names]
     found = [
         kind(f"{joint.name} {kind.type} {axis}", joint=joint.name, component=axis, **UNUSED)
         for joint in joints

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
+from ...errors import MechanismError, unknown
 from ...joints import Kind
 from ...mechanism.dimension import ACCELERATION
 from ...mechanism.mechanism import Body, Mechanism, Point
@@ -109,11 +110,15 @@ def _within_digits(case: Case, keys: ClosureKeys, closure: float | None) -> Case
     case, why = replace(case, assembly=keys.notes), "--closure"
     if closure is None and keys.tolerance is not None:
         closure, why = LENGTHS[case.length_unit](keys.tolerance), "[closure] tolerance"
+    known = [joint.name for joint in case.mechanism.joints]
+    for name in keys.carrying:
+        if name not in known:
+            raise MechanismError(unknown("joint", name, known), "closure.carrying")
     if closure is None:
         return case
     from ..closing import within_digits  # it imports the solver, and few cases need it
 
-    return within_digits(case, closure, why)
+    return within_digits(case, closure, why, keys.carrying)
 
 
 def _mechanism(file: Path, keys: CaseKeys, length: Unit, angle: Unit) -> Mechanism:

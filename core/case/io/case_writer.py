@@ -65,7 +65,7 @@ def case_text(case: Case, comments: Sequence[str] = ()) -> str:
                 if f.name != "name" and (value := getattr(body, f.name)) != getattr(PLAIN, f.name)
             },
         )
-    for joint in (*mechanism.joints, *mechanism.grounded, *mechanism.couplers):
+    for joint in (*mechanism.given_joints, *mechanism.grounded, *mechanism.couplers):
         what = {"joints": joint.joints} if isinstance(joint, Coupler) else {"bodies": joint.bodies}
         lines += _table("joints", joint.name, {"type": joint.type, **what, **_own(joint)})
     for point in mechanism.points:
@@ -83,8 +83,8 @@ def case_text(case: Case, comments: Sequence[str] = ()) -> str:
         ends = {"bodies": force.bodies} if len(force.bodies) == 2 else {}
         lines += _table("forces", force.name, {"type": force.type, **ends, **_own(force)})
     lines += ["", "[sweep]", *_keys(_sweep(case, values, own_grid=bool(reference)))]
-    if case.assembly:
-        lines += ["", "[closure]", *_keys({"notes": case.assembly})]
+    if closing := _closing(case):
+        lines += ["", "[closure]", *_keys(closing)]
     for name, keys in suspension_tables(case).items():
         lines += ["", f"[{name}]", *_keys(keys)]
     for output in case.outputs:
@@ -126,6 +126,16 @@ def _values(case: Case) -> Array:
     if sweep.driver == TIME:
         return sweep.values
     return sweep.values - (sweep.design - case.mechanism.design_value(sweep.driver))
+
+
+def _closing(case: Case) -> Mapping[str, Any]:
+    """Return the keys of [closure]. Joints are written as given, and reduced again on reading."""
+    closure, notes = case.closure, case.assembly
+    if closure is None:
+        return {"notes": notes} if notes else {}
+    notes = tuple(note for note in notes if note != closure.note)
+    keys = {"tolerance": closure.tolerance, "carrying": closure.carrying, "notes": notes}
+    return {key: value for key, value in keys.items() if value}
 
 
 def _sweep(case: Case, values: Array, *, own_grid: bool) -> Mapping[str, Any]:

@@ -60,6 +60,8 @@ left out. `kincheck list --joints` prints all types with their keys.
     [closure]            (tolerance) [length]: points and axes have few digits; rows redundant
                          within the tolerance are left out, with a note; strict without it;
                          --closure of the command line overrides it
+                         (carrying) = [JOINT, ...]: joints that keep all their rows, as long as
+                         others can close the loops
                          (notes) = [...]: on the closure of the start before the file was written
     [outputs.NAME]       (type) = "coordinate": point, component = "x", "y" or "z", or direction
                          type = "distance": points = [A, B]
@@ -220,6 +222,7 @@ class ClosureKeys(msgspec.Struct, forbid_unknown_fields=True):
     tolerance: Annotated[float, Meta(gt=0.0, description="a length greater than zero")] | None = (
         None
     )
+    carrying: Annotated[tuple[str, ...], Meta(description="a list of names of joints")] = ()
     notes: Annotated[tuple[str, ...], Meta(description="a list of texts")] = ()
 
 

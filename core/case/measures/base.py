@@ -66,7 +66,7 @@ class Measure(TypedQuantity):
         """Raise MechanismError unless the mechanism has all its names."""
         known: Mapping[str, Iterable[str]] = {
             "point": [p.name for p in mechanism.points if not p.name.startswith(MARKER)],
-            "joint": [joint.name for joint in (*mechanism.joints, *mechanism.grounded)],
+            "joint": [joint.name for joint in (*mechanism.given_joints, *mechanism.grounded)],
             "body": [GROUND, *(body.name for body in mechanism.bodies)],
             "driver": [driver.name for driver in mechanism.drivers],
             "force": [force.name for force in mechanism.forces],

@@ -1,5 +1,8 @@
-"""All assemblies of a mechanism found from many starts, distinguished by their poses and named by
-their branch.
+"""Assemblies of a mechanism found from many starts, distinguished by their poses and named by their
+branch.
+
+No count of starts proves a list complete. Counts of starts by assembly tell how many are missing:
+Good, Biometrika 40 (1953) 237, and Chao, Scandinavian Journal of Statistics 11 (1984) 265.
 """
 
 from __future__ import annotations
@@ -82,11 +85,50 @@ class Assemblies(Tabular):
     lost: int
     spurious: int
 
+    @property
+    def once(self) -> int:
+        """The number of assemblies to which one start only led."""
+        return sum(each.starts == 1 for each in self.found)
+
+    @property
+    def estimated(self) -> float:
+        """Chao's estimate of how many there are at the least: as many are missing as pairs can be
+        made of the ones found once, by those found twice and one more.
+        """
+        twice = sum(each.starts == 2 for each in self.found)
+        return len(self.found) + 0.5 * self.once * (self.once - 1) / (twice + 1)
+
+    @property
+    def unlisted(self) -> float:
+        """Good's estimate of the share of starts, of those that close, to other assemblies."""
+        return self.once / max(1, sum(each.starts for each in self.found))
+
+    @property
+    def missing(self) -> str:
+        """A sentence on what the list may lack; empty for an empty one."""
+        closed = sum(each.starts for each in self.found)
+        if not closed:
+            return ""
+        head = "The list is not known to be complete: "
+        if not self.once:
+            # with a share above 3 / n, no start of n leads to it with a chance of 5 % at most
+            rare = max(1, closed // 3)
+            return (
+                f"{head}an assembly to which fewer than 1 of {rare} starts that close lead can be"
+                " missing"
+            )
+        return (
+            f"{head}{self.once} of these {len(self.found)} were found by one start only; by such"
+            f" counts, some {100.0 * self.unlisted:.3g} % of further starts would lead to others"
+            f" (Good 1953), and about {round(self.estimated)} or more exist (Chao 1984)"
+        )
+
     def summary(self) -> str:
-        """Return the number of assemblies and of starts."""
+        """Return the number of assemblies and of starts, and what may be missing."""
         ended = f"{self.lost} without closure, {self.spurious} spurious"
         found = number_of(len(self.found), "assembly", "assemblies")
-        return f"{found} from {number_of(self.starts, 'start')} ({ended})"
+        counted = f"{found} from {number_of(self.starts, 'start')} ({ended})"
+        return ". ".join(filter(None, (counted, self.missing)))
 
     def dataset(self) -> Dataset:
         """Return the numbers and the poses of the assemblies."""

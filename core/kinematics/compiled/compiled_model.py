@@ -107,7 +107,7 @@ class Model(Tracing):
             return None
         from .force_table import ForceTable  # most motions are without forces
 
-        return ForceTable(self.mechanism, wanted, self.rows, self.frame.unit)
+        return ForceTable(wanted, self.rows, self.frame.unit)
 
     @property
     def orders(self) -> int:

@@ -8,15 +8,15 @@ from typing import TypeVar
 
 import numpy as np
 
-from ...forces import DETERMINED, Forces, Reaction
-from ...mechanism.mechanism import Mechanism
+from ...forces import Forces, Reaction
 from ...trajectory import Array
 from ..forces.wanted import WantedForces
 from .sample_rows import EFFORT, ELEMENT, FORCE_SIGMA, POWER, REACTION, REDUNDANT
 
 # Where the estimate of the smallest singular value is above this, the pose is far from singular in
-# the sense of forces, which is a billionth of the largest singular value.
-REGULAR = 1e-6
+# the sense of forces, which is a billionth of the largest singular value, and no digits are
+# multiplied by `AMPLIFIED`: rows are of size one.
+REGULAR = 1e-4
 # Rows that are chosen of more may be nearly singular where all of them are not: those that are not
 # lose no more than three digits.
 WELL_CHOSEN = 1e-3
@@ -56,12 +56,11 @@ class ForceTable:
 
     def __init__(
         self,
-        mechanism: Mechanism,
         wanted: WantedForces,
         rows: Mapping[str, slice],
         unit: float,
     ) -> None:
-        self.mechanism, self.wanted, self.rows, self.unit = mechanism, wanted, rows, unit
+        self.wanted, self.rows, self.unit = wanted, rows, unit
         self._power = rows[POWER].start
         products = rows[REDUNDANT] if REDUNDANT in rows else slice(0, 0)
         # with r redundant rows there are r + r (r + 1) / 2 products
@@ -87,9 +86,6 @@ class ForceTable:
         """Return the forces of samples that are all far from singular poses; see `read`."""
         samples, wanted = _Samples(self, table), self.wanted
         power, largest = table[:, self._power], table[:, self._power + 1]
-        if self.redundant:
-            efforts = [samples.effort(driver.name) for driver in self.mechanism.drivers]
-            power = power + 0.0 * np.sum(efforts, axis=0)  # NaN where an effort is
         return Forces(
             _Read(wanted.joints, samples.reaction),
             _Read(wanted.drivers, samples.effort),
@@ -121,11 +117,8 @@ class _Samples:
         return Reaction(found[:, :3], found[:, 3:], free)
 
     def effort(self, name: str) -> Array:
-        """Return the effort of a driver, shape (n,); NaN if undetermined."""
-        found, free = self._shortest(self._vector(EFFORT, name)[:, None], np.ones(1))
-        unit = 1.0 if self._of.mechanism.driver(name).turns else self._of.unit
-        loose = unit * np.abs(free[:, 0]).max(axis=1, initial=0.0)
-        return np.where(loose <= DETERMINED, found[:, 0], np.nan)
+        """Return the effort of a driver, shape (n,)."""
+        return self._vector(EFFORT, name)[:, 0]
 
     def _vector(self, kind: str, name: str) -> Array:
         return self._table[:, self._of.rows[kind + name]]

@@ -29,8 +29,10 @@ from .sample_rows import EFFORT, ELEMENT, FORCE_SIGMA, POWER, REACTION, REDUNDAN
 
 
 def can_trace(mechanism: Mechanism) -> bool:
-    """Return whether programs can follow all inputs of forces: the angles of torsional springs."""
-    return all(
+    """Return whether programs can compute the forces: they follow the angles of torsional springs,
+    and no row is left out within digits, where singular values decide.
+    """
+    return not mechanism.reduced and all(
         isinstance(mechanism.joint(each.joint), AxialJoint)
         for each in mechanism.forces
         if isinstance(each, TorsionSpringDamper)
@@ -91,7 +93,9 @@ class TracedForces:
     ) -> None:
         self._mechanism, self._rows, self._states, self._drives = mechanism, rows, states, drives
         applied = at_work(mechanism, states, lambda joint: at.state[f"x {joint}.rotation"][0])
-        self._equations = ForceEquations(mechanism, rows.formulation, at, states, applied)
+        self._equations = ForceEquations(
+            mechanism, rows.formulation, at, states, applied, Cartesian((), ())
+        )
 
     @cached_property
     def _multipliers(self) -> list[Scalar]:
@@ -121,8 +125,7 @@ class TracedForces:
         mechanism, equations = self._mechanism, self._equations
         every = [self._multipliers, *self._loose]
         efforts = {
-            driver.name: [equations.effort(driver, each) for each in every]
-            for driver in mechanism.drivers
+            driver.name: equations.effort(driver, self._multipliers) for driver in mechanism.drivers
         }
         for name in wanted.joints:
             joint, values = mechanism.joint(name), list[Scalar]()
@@ -131,15 +134,15 @@ class TracedForces:
                 force = force if k else (1.0 / self._states.frame.unit) * force
                 values += [*force, *moment]
             yield f"{REACTION}{name}", values
-        for name, values in efforts.items():
-            yield f"{EFFORT}{name}", values
+        for name, effort in efforts.items():
+            yield f"{EFFORT}{name}", [effort]
         for name in wanted.elements:
             yield f"{ELEMENT}{name}", [equations.applied[name].amount]
         found = powers(
             mechanism,
             self._states,
             equations.applied,
-            {name: effort[0] for name, effort in efforts.items()},
+            efforts,
             {driver.name: self._rate(driver.name) for driver in mechanism.drivers},
         )
         sizes = (absolute(each) for each in found)

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import repeat
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from ...mechanism.mechanism import Mechanism
 from ...trajectory import Array
 from ..compiled.request import CONSISTENT
 from ..formulation.cartesian import COLUMNS, Cartesian
-from ..formulation.constraints import Constraint, Style, frames
+from ..formulation.constraints import Constraint, Style, constraints_left_out, frames
 from ..formulation.state_vectors import jacobian
 from ..structure.degrees_of_freedom import FreedomAccount, account
 from ..structure.redundancy import DIGITS, RANK_TOLERANCE, independent_joint_rows, independent_rows
@@ -57,10 +58,15 @@ class NamedRow:
 
 @dataclass(frozen=True)
 class Dependency:
-    """A redundant row: the sum of the others times their weights."""
+    """A redundant row: the sum of the others times their weights.
+
+    Attributes:
+        off: of a row left out within digits, the largest difference of an entry from that sum.
+    """
 
     row: NamedRow
     repeats: tuple[tuple[float, NamedRow], ...]
+    off: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -113,21 +119,20 @@ class Ranks:
     @cached_property
     def rows(self) -> list[NamedRow]:
         """All rows by name."""
+        return self._named(self.formulation, self.matrix)
+
+    def _named(self, formulation: Cartesian, matrix: Array) -> list[NamedRow]:
+        """Return rows by name, and by the motion that their entries prevent."""
         found: list[NamedRow] = []
-        for c in self.formulation.constraints:
-            count = c.primitive.n if isinstance(c, Constraint) else 1
-            kind = type(c.primitive).__name__ if isinstance(c, Constraint) else "Relation"
-            found += [
-                NamedRow(
-                    c.owner,
-                    kind,
-                    self._holds(len(found) + k, c.j if isinstance(c, Constraint) else ""),
-                )
-                for k in range(count)
-            ]
+        for c in formulation.constraints:
+            body, count, kind = "", 1, "Relation"
+            if isinstance(c, Constraint):
+                body, count, kind = c.j, c.primitive.n, type(c.primitive).__name__
+            for row in matrix[len(found) : len(found) + count]:
+                found.append(NamedRow(c.owner, kind, self._holds(row, body)))
         return found
 
-    def _holds(self, k: int, body: str) -> str:
+    def _holds(self, row: Array, body: str) -> str:
         """Return the motion prevented by a row, from its entries on a moving body."""
         names = (
             [body, *self.formulation.bodies]
@@ -137,8 +142,8 @@ class Ranks:
         for name in names:
             first = self.formulation.columns[name]
             for what, block in (
-                ("along", self.matrix[k, first : first + 3]),
-                ("about", self.matrix[k, first + 3 : first + 6]),
+                ("along", row[first : first + 3]),
+                ("about", row[first + 3 : first + 6]),
             ):
                 size = float(np.linalg.norm(block))
                 if size > OWED:
@@ -147,19 +152,32 @@ class Ranks:
 
     @cached_property
     def dependencies(self) -> list[Dependency]:
-        """Return the redundant joint rows, each in terms of kept rows."""
+        """Return the redundant joint rows, and then those left out within digits, each in terms of
+        kept rows.
+        """
         joints = self.matrix[: self.joint_rows]
         kept = independent_joint_rows(self.formulation, joints)
-        found: list[Dependency] = []
-        for k in sorted(set(range(self.joint_rows)) - set(kept)):
-            weights: Array = joints[k] @ np.linalg.pinv(joints[kept])
+        inverse = np.linalg.pinv(joints[kept])
+
+        def dependency(named: NamedRow, row: Array, least: float) -> Dependency:
+            weights: Array = row @ inverse
             terms = [
                 (float(weights[at]), self.rows[kept[at]])
                 for at in _largest_first(weights)
-                if abs(weights[at]) > OWED
+                if abs(weights[at]) > least
             ]
-            found.append(Dependency(self.rows[k], tuple(terms)))
-        return found
+            off = float(np.abs(row - weights @ joints[kept]).max()) if least > OWED else 0.0
+            return Dependency(named, tuple(terms), off)
+
+        redundant = sorted({*range(self.joint_rows)} - {*kept})
+        found = [dependency(self.rows[k], joints[k], OWED) for k in redundant]
+        left_out = Cartesian(
+            constraints_left_out(self.mechanism, self.frame),
+            self.formulation.bodies,
+            [*self.formulation.coordinates],
+        )
+        rows = jacobian(left_out, self.at)
+        return [*found, *map(dependency, self._named(left_out, rows), rows, repeat(NEARLY))]
 
     @cached_property
     def nearly(self) -> list[tuple[float, list[NamedRow]]]:

@@ -32,6 +32,7 @@ class ForceEquations:
         at: its configuration.
         states: poses, twists and accelerations of the bodies.
         applied: force elements at work, by name.
+        left_out: rows left out within digits, which follow the others; none without self-stress.
     """
 
     mechanism: Mechanism
@@ -39,11 +40,12 @@ class ForceEquations:
     at: Configuration
     states: BodyStates
     applied: Mapping[str, Applied]
+    left_out: Cartesian
 
     @cached_property
     def rows(self) -> Rows:
         """Return the Jacobian of all rows, lengths in the unit of the frames."""
-        return self.formulation.rows(self.at)
+        return self.formulation.rows(self.at) + self.left_out.rows(self.at)
 
     @cached_property
     def demand(self) -> list[Scalar]:
@@ -69,24 +71,26 @@ class ForceEquations:
 
     @cached_property
     def _numbered(self) -> list[tuple[int, Constraint | Relation]]:
-        """Return the constraint and number of every row: joints, couplers, drivers."""
+        """Return the constraint and number of every row: joints, couplers, drivers, left out."""
         every = (
             c
-            for c in self.formulation.constraints
+            for c in (*self.formulation.constraints, *self.left_out.constraints)
             for _ in range(c.primitive.n if isinstance(c, Constraint) else 1)
         )
         return list(enumerate(every))
 
     @cached_property
     def _of_joints(self) -> Mapping[str, list[tuple[int, Constraint | Relation]]]:
-        """Return the rows by joint; a coupler or driver may have the name of a joint."""
+        """Return the rows by given joint; a coupler or driver may have the name of a joint."""
         mechanism, every = self.mechanism, self.formulation.constraints
         last = len(every) - len(mechanism.couplers) - len(mechanism.drivers)
-        own = {id(c) for c in every[:last]}
-        found: dict[str, list[tuple[int, Constraint | Relation]]] = {}
+        own = {id(c) for c in (*every[:last], *self.left_out.constraints)}
+        found: dict[str, list[tuple[int, Constraint | Relation]]] = {
+            joint.name: [] for joint in mechanism.given_joints
+        }
         for k, c in self._numbered:
             if id(c) in own:
-                found.setdefault(c.owner, []).append((k, c))
+                found[mechanism.given_name(c.owner)].append((k, c))
         return found
 
     @cached_property

@@ -13,7 +13,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ...forces import Forces, Reaction, no_forces_at
+from ...forces import Forces, Reaction, in_wrenches
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path
 from ...trajectory import Array, Trajectory
@@ -23,8 +23,6 @@ from .power import powers
 from .wanted import wanted_forces
 
 Lanes: TypeAlias = NDArray[np.bool_]
-# Size limit of the matrices solved at once, in numbers over all samples: some 64 MB.
-AT_ONCE = 8_000_000
 
 
 def with_forces(
@@ -73,28 +71,31 @@ def forces_of(
     solved = motion.solved
     lanes = MotionLanes(mechanism, path, motion, follow)
     lines = ForceRows(lanes)
-    step = max(1, AT_ONCE // max(1, lines.count * lines.formulation.unknowns))
-    parts = [lines.solve(slice(k, k + step)) for k in range(0, max(1, lanes.n), step)]
-    multipliers = np.concatenate([each.multipliers for each in parts])
-    null = np.concatenate([each.null for each in parts])
-    singular = np.concatenate([each.singular for each in parts])
-    efforts = {each.name: lines.effort(each, multipliers, null) for each in mechanism.drivers}
+    solution = lines.solve()
+    efforts = {each.name: lines.effort(each, solution) for each in mechanism.drivers}
     elements = {name: each.amount + np.zeros(lanes.n) for name, each in lanes.applied.items()}
     every = powers(mechanism, lanes.at, lanes.applied, efforts, lanes.rates)
     # its shape is given: without a mass, or without a solved sample, the list alone has none
     table: Array = np.array([each + np.zeros(lanes.n) for each in every])
     table = table.reshape(len(every), lanes.n)
-    spread = _Spread(solved, singular)
+    spread = _Spread(solved, solution.singular)
+    joints = [j for j in mechanism.given_joints if mechanism.reduced or j.name in wanted.joints]
+    free = {joint.name: lines.free(joint, solution) for joint in joints}
+    if mechanism.reduced:
+        free = in_wrenches(free, solution.known)
+    known = spread(solution.known)
+
+    def reaction(name: str) -> Reaction:
+        force, moment = map(spread, lines.wrench(mechanism.joint(name), solution.values))
+        return Reaction(force / lanes.frame.unit, moment, spread(free[name]), known)
+
     return Forces(
-        {
-            name: Reaction(*map(spread, lines.reaction(mechanism.joint(name), multipliers, null)))
-            for name in wanted.joints
-        },
+        {name: reaction(name) for name in wanted.joints},
         {name: spread(efforts[name]) for name in wanted.drivers},
         {name: spread(elements[name], ill=False) for name in wanted.elements},
         spread(table.sum(axis=0)),
         spread(np.abs(table).max(axis=0, initial=0.0)),
-        no_forces_at(lanes.times[singular]),
+        solution.message(lanes.times),
     )
 
 

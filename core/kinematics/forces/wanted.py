@@ -28,7 +28,7 @@ def wanted_forces(mechanism: Mechanism, names: Collection[str] | None) -> Wanted
     """
     if isinstance(names, str):
         raise SolveError(f"forces is {names!r}, expected a list of names, or True for all")
-    every = (mechanism.joints, mechanism.drivers, mechanism.forces)
+    every = (mechanism.given_joints, mechanism.drivers, mechanism.forces)
     known = [each.name for members in every for each in members]
     for name in names or ():
         if name not in known:

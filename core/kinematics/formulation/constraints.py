@@ -157,21 +157,12 @@ def constraints(
         for joint, freedom, _ in coupler.terms
     }.union(named)
     found: list[Constraint | Relation] = []
-    for original in mechanism.joints:
-        if isinstance(original, AxialJoint):
-            found += _axial(
-                original, frame, coupled, mixed=mixed, fixed_last=mechanism.is_fixed(original.j)
-            )
-            continue
-        # the ground as body i: its rows are constant and the simplified ones need nothing of body j
-        joint = (
-            original.reversed()
-            if original.symmetric and mechanism.is_fixed(original.j)
-            else original
-        )
-        i, j = Attachment(frame.origins[joint.i]), Attachment(frame.origins[joint.j])
-        composed = joint.scaled(1.0 / frame.unit).primitives(i, j)
-        found += [Constraint(joint.name, primitive, joint.i, joint.j) for primitive in composed]
+    for joint in mechanism.joints:
+        if isinstance(joint, AxialJoint):
+            fixed_last = mechanism.is_fixed(joint.j)
+            found += _axial(joint, frame, coupled, mixed=mixed, fixed_last=fixed_last)
+        else:
+            found += _composed(mechanism, joint, frame)
     for coupler in mechanism.couplers:
         weights = {f"{joint}.{freedom}": k for joint, freedom, k in coupler.terms}
         found.append(_relation(coupler.name, weights, frame, coupler.curve))
@@ -180,6 +171,21 @@ def constraints(
         for each in mechanism.drivers
     ]
     return _restyled(found, style)
+
+
+def constraints_left_out(mechanism: Mechanism, frame: Frames) -> list[Constraint]:
+    """Return the constraints of reduced joints that are left out."""
+    joints = (joint for each in mechanism.reduced for joint in each.left_out)
+    return [each for joint in joints for each in _composed(mechanism, joint, frame)]
+
+
+def _composed(mechanism: Mechanism, original: Joint, frame: Frames) -> list[Constraint]:
+    # the ground as body i: its rows are constant and the simplified ones need nothing of body j
+    backwards = original.symmetric and mechanism.is_fixed(original.j)
+    joint = original.reversed() if backwards else original
+    i, j = Attachment(frame.origins[joint.i]), Attachment(frame.origins[joint.j])
+    composed = joint.scaled(1.0 / frame.unit).primitives(i, j)
+    return [Constraint(joint.name, primitive, joint.i, joint.j) for primitive in composed]
 
 
 def _axial(

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from ...algebra import Scalar
@@ -44,11 +45,23 @@ def kinds(mechanism: Mechanism) -> dict[str, Kind]:
 def placed(mechanism: Mechanism, values: Mapping[str, Sequence[Scalar]]) -> Mechanism:
     """Return the mechanism with other values, of any scalar type, at some places, unchecked."""
     joints = [joint.changed(**_changes(joint, values)) for joint in mechanism.joints]
+    reduced = [each.changed(partial(_at_points, values)) for each in mechanism.reduced]
     points = [
         _moved(point, values.get(f"points.{point.name}.position")) for point in mechanism.points
     ]
     bodies, forces = with_loads(mechanism, values)
-    return replace(mechanism, joints=joints, points=points, bodies=bodies, forces=forces)
+    return replace(
+        mechanism, joints=joints, points=points, bodies=bodies, forces=forces, reduced=reduced
+    )
+
+
+def _at_points(values: Mapping[str, Sequence[Scalar]], joint: Joint) -> Joint:
+    """Return a joint of a reduced one with its points moved: its directions are not those of the
+    joint that holds the rest.
+    """
+    changes = _changes(joint, values)
+    kinds = {name: kind.single for name, kind, _ in joint.geometry()}
+    return joint.changed(**{k: x for k, x in changes.items() if kinds[k] is Kind.POSITION})
 
 
 def _changes(joint: Joint, values: Mapping[str, Sequence[Scalar]]) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 Four hinges that a file makes parallel to 1e-6 leave a planar loop no freedom, because three of its
 rows agree to these digits only. A joint that closes the loop then gets fewer rows: two bodies with
 a common point and axis share a line, or a plane. The result is a mechanism like any other, the same
-for every engine.
+for every engine. It knows the rows left out: they leave reactions undetermined, as redundant rows.
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ from ...joints import (
 )
 from ...joints.base import triad
 from ...mechanism.drivers import JointDriver
-from ...mechanism.mechanism import Mechanism, Vector
+from ...mechanism.loads import TorsionSpringDamper
+from ...mechanism.mechanism import Mechanism, Reduced, Vector
 from ...mechanism.topology import spanning_tree
 from ...primitives.base import GROUND_POSE
 from ...trajectory import Array, BodyMotion
@@ -48,13 +49,12 @@ class Reduction:
     """A mechanism without redundant rows.
 
     Attributes:
-        originals: joints with rows left out, as they were.
+        mechanism: its `reduced` joints are those with rows left out.
         unit: the mechanism's size [m].
-        limit: largest residual that the originals may keep along a motion [m].
+        limit: largest residual that the joints as given may keep along a motion [m].
     """
 
     mechanism: Mechanism
-    originals: tuple[Joint, ...]
     unit: float
     limit: float
 
@@ -64,10 +64,15 @@ class _Held:
     """Directions of a joint's conditions: held along (places) and held about (turns).
 
     Both are orthonormal, of shape (directions, 3), global at design.
+
+    Attributes:
+        axes: on the first and the second body, at right angles, if their condition is the only one
+            of turns: its direction moves with both bodies.
     """
 
     places: Array
     turns: Array
+    axes: tuple[Vector, Vector] | None
 
     def rows(self, joint: Joint, frame: Frames, formulation: Cartesian) -> Array:
         """Return the rows of both, shape (directions, unknowns)."""
@@ -82,13 +87,20 @@ class _Held:
                 found[n:, k + 3 : k + COLUMNS] = sign * self.turns
         return found
 
-    def without(self, sums: Array) -> _Held:
-        """Return the rest after ending sums of rows that vanish, shape (sums, directions)."""
+    def parted(self, sums: Array) -> tuple[_Held, _Held]:
+        """Return the rest after ending vanishing sums of rows, and the part left out.
+
+        Args:
+            sums: weights of the rows in each sum, shape (sums, directions).
+        """
         n = len(self.places)
         left, sizes, right = np.linalg.svd(sums[:, n:])
         turning = int((sizes > TURNS).sum())
-        straight = left[:, turning:].T @ sums[:, :n]
-        return _Held(_complement(straight) @ self.places, _complement(right[:turning]) @ self.turns)
+        straight = np.linalg.qr((left[:, turning:].T @ sums[:, :n]).T)[0].T
+        return (
+            _Held(_complement(straight) @ self.places, right[turning:] @ self.turns, self.axes),
+            _Held(straight @ self.places, right[:turning] @ self.turns, self.axes),
+        )
 
     def joints(self, joint: Joint) -> list[Joint]:
         """Return joints with these conditions between the bodies of a joint, under its name."""
@@ -108,7 +120,7 @@ class _Held:
         match len(turns):
             case 1:
                 f, g, _ = triad(_vector(turns[0]))
-                found.append(PerpendicularAxes(name, *ends, ((*f,), (*g,))))
+                found.append(PerpendicularAxes(name, *ends, self.axes or ((*f,), (*g,))))
             case 2:
                 found.append(ParallelAxes(name, *ends, _normal(turns)))
             case 3:
@@ -123,8 +135,8 @@ def reduce_rows(
 ) -> Reduction:
     """Return the mechanism without redundant rows, to a tolerance [m].
 
-    Joints of closed loops lose rows; driven and coupled ones, and joints of other primitives than
-    points, lines, planes and orientations, keep theirs.
+    Joints of closed loops lose rows; driven and coupled ones, those with torsional springs, and
+    joints of other primitives than points, lines, planes and orientations, keep theirs.
 
     Args:
         carrying: joints with all their rows, as long as others can close the loops.
@@ -135,15 +147,17 @@ def reduce_rows(
     matrix, named = jacobian(formulation), dict[str, list[int]]()
     for k, (owner, _) in enumerate(formulation.owners):
         named.setdefault(owner, []).append(k)
-    tree = spanning_tree(mechanism, carrying)
     keeping = {each.joint for each in mechanism.drivers if isinstance(each, JointDriver)}
     keeping |= {joint for coupler in mechanism.couplers for joint in coupler.joints}
+    keeping |= {each.joint for each in mechanism.forces if isinstance(each, TorsionSpringDamper)}
+    tree = spanning_tree(mechanism, {*carrying, *keeping})
     held = {joint.name: _held(joint) for joint in tree.cut if joint.name not in keeping}
     whole = [name for name in named if held.get(name) is None]
     span = _spanned(
         np.empty((0, formulation.unknowns)), matrix[[k for n in whole for k in named[n]]]
     )
     enough, changed = ADDED_UP * tolerance / frame.unit, dict[str, list[Joint]]()
+    reduced = list[Reduced]()
     for joint in tree.cut:
         if (holds := held.get(joint.name)) is None:
             continue
@@ -151,14 +165,16 @@ def reduce_rows(
         left, sizes, _ = np.linalg.svd(_beyond(span, rows), full_matrices=True)
         weak = np.concatenate([sizes <= enough, np.ones(len(rows) - len(sizes), dtype=np.bool_)])
         if weak.any():
-            holds = holds.without(left[:, weak].T)
-            changed[joint.name] = holds.joints(joint)
+            holds, less = holds.parted(left[:, weak].T)
+            kept = changed[joint.name] = holds.joints(joint)
+            names = tuple(each.name for each in kept)
+            left_out = tuple(each.changed(name=joint.name) for each in less.joints(joint))
+            reduced.append(Reduced(joint, names, left_out))
             rows = holds.rows(joint, frame, formulation)
         span = _spanned(span, rows)
     joints = [each for joint in mechanism.joints for each in changed.get(joint.name, [joint])]
     return Reduction(
-        replace(mechanism, joints=joints) if changed else mechanism,
-        tuple(joint for joint in mechanism.joints if joint.name in changed),
+        replace(mechanism, joints=joints, reduced=reduced) if changed else mechanism,
         frame.unit,
         ADDED_UP * tolerance,
     )
@@ -187,6 +203,7 @@ def _held(joint: Joint) -> _Held | None:
     if isinstance(joint, AxialJoint) and joint.relations:
         return None
     places, turns, here = list[Vec3](), list[Vec3](), Attachment(ZERO)
+    crossed: list[tuple[Vector, Vector]] = []
     for each in joint.primitives(here, here):
         match each:
             case p.Spherical():
@@ -199,11 +216,13 @@ def _held(joint: Joint) -> _Held | None:
                 places.append(a)
             case p.Dot10(a=a, b=b):
                 turns.append(cross(a, b))
+                crossed.append(((*a,), (*b,)))
             case _:
                 return None
     if places and len(joint.points_on()) != 1:
         return None
-    return _Held(_orthonormal(places), _orthonormal(turns))
+    axes = crossed[0] if len(turns) == 1 and crossed else None
+    return _Held(_orthonormal(places), _orthonormal(turns), axes)
 
 
 def _orthonormal(vectors: Sequence[Vec3]) -> Array:

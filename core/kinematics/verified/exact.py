@@ -150,9 +150,8 @@ def exact_mechanism(mechanism: Mechanism, reading: Reading) -> Mechanism:
     def each(item: Any) -> Any:
         return replace(item, **{f.name: read(getattr(item, f.name)) for f in fields(item)})
 
-    return replace(
-        mechanism,
-        joints=[*map(each, mechanism.joints)],
+    return mechanism.with_joints(
+        each,
         points=[*map(each, mechanism.points)],
         drivers=[*map(each, mechanism.drivers)],
         couplers=[*map(each, mechanism.couplers)],

@@ -177,9 +177,8 @@ def equations(
 
 def _lifted(mechanism: Mechanism, inputs: _Inputs) -> Mechanism:
     """Return the mechanism with inputs in place of the numbers that forces depend on."""
-    return replace(
-        mechanism,
-        joints=inputs.members(mechanism.joints),
+    return mechanism.with_joints(
+        lambda joint: converted(joint, inputs.lift),
         grounded=(),
         points=inputs.members(mechanism.points),
         drivers=inputs.members(mechanism.drivers),

@@ -152,7 +152,8 @@ def force_programs(
     """
     states = _states(frame, traced, given)
     applied = at_work(mechanism, states, given.angles.__getitem__)
-    equations = _Equations(mechanism, traced.formulation, traced.at, states, applied, traced)
+    none = Cartesian((), ())
+    equations = _Equations(mechanism, traced.formulation, traced.at, states, applied, none, traced)
     efforts = {
         driver.name: _effort(traced, driver.name, given.multipliers)
         * (1.0 if driver.turns else 1.0 / frame.unit)

@@ -40,15 +40,15 @@ class EnclosedForces:
     Attributes:
         joints: force [N] and moment [N m] by joint, six balls.
         drivers, elements: effort or force by name [N or N m].
-        free: for each row left out what a multiplier of one adds to the joints and drivers, with
-            the unit of the frames in place of the metre.
+        free: for each row left out what a multiplier of one adds to the joints, with the unit of
+            the frames in place of the metre.
         power: sum of the powers [W], which contains zero.
     """
 
     joints: Mapping[str, Sequence[Ball]]
     drivers: Mapping[str, Ball]
     elements: Mapping[str, Ball]
-    free: Sequence[tuple[Mapping[str, Sequence[Ball]], Mapping[str, Ball]]]
+    free: Sequence[Mapping[str, Sequence[Ball]]]
     power: Ball
 
 
@@ -125,7 +125,7 @@ def enclose_forces(
             "a driver or coupler measures another coordinate than the turn about its joint's axis"
             " or the displacement along it: see measured() of the joint's type"
         )
-    free = [forces([arb(0)] * size, [row])[0][:2] for row in left_out]
+    free = [forces([arb(0)] * size, [row])[0][0] for row in left_out]
     return EnclosedForces(
         joints, drivers, dict(zip(programs.wanted.elements, amounts, strict=True)), free, power
     )

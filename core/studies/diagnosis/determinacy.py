@@ -8,7 +8,7 @@ import msgspec
 import numpy as np
 
 from ...case.case import Case
-from ...forces import DETERMINED, Reaction
+from ...forces import Reaction
 from ...kinematics import forces_of
 from ...trajectory import Array, Trajectory
 
@@ -74,7 +74,7 @@ def determinacy(case: Case, motion: Trajectory) -> Determinacy:
     }
     known = np.ones(len(few), np.bool_)
     poses = Trajectory({}, known, motion.iterations[few], 0.0, bodies=still)
-    names = {joint.name for joint in mechanism.joints}
+    names = {joint.name for joint in mechanism.given_joints}
     asked = [name for name in case.forces if name in names]
     found = forces_of(mechanism, replace(path, times=path.times[few]), poses)
     joints = {name: found.joints[name] for name in asked or found.joints}
@@ -88,14 +88,14 @@ def determinacy(case: Case, motion: Trajectory) -> Determinacy:
 
 def _joint(name: str, found: Reaction) -> JointDeterminacy:
     force, moment, wrench = found.determined()
-    return JointDeterminacy(
-        name, force, moment, wrench, _along(found.free[0, :3]), _along(found.free[0, 3:])
-    )
+    known = float(np.ravel(found.known)[0])
+    along = [_along(part, known) for part in np.split(found.free[0], 2)]
+    return JointDeterminacy(name, force, moment, wrench, *along)
 
 
-def _along(free: Array) -> list[list[float]]:
+def _along(free: Array, known: float) -> list[list[float]]:
     """Return the directions across all that are undetermined, shape (3, redundant rows)."""
     if not np.isfinite(free).all():
         return []
     axes, sizes, _ = np.linalg.svd(np.hstack([free, np.zeros((3, 3))]))
-    return axes[:, sizes <= DETERMINED].T.tolist()
+    return np.where(np.abs(axes) <= known, 0.0, axes)[:, sizes <= known].T.tolist()

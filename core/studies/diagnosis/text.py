@@ -83,8 +83,9 @@ def _freedom(found: Diagnosis, terms: int) -> Iterator[Text | Table]:
     if not found.redundant:
         yield Text("redundant rows: none")
     for each in found.redundant:
-        yield Text(f"redundant: {each.row} = {_sum(each.repeats, terms)}")
-    if found.redundant_residual is not None and found.redundant:
+        digits = f" to {each.off:.1e}" if each.off else ""
+        yield Text(f"redundant{digits}: {each.row} = {_sum(each.repeats, terms)}")
+    if found.redundant_residual is not None and not all(each.off for each in found.redundant):
         yield Text(f"  along the sweep they hold to {found.redundant_residual:.1e} m")
     for each in found.nearly_redundant:
         yield Text(

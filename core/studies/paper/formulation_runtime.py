@@ -119,12 +119,9 @@ def _moved(mechanism: Mechanism, by: Vector) -> Mechanism:
         x, y, z = (a + b for a, b in zip(point, by, strict=True))
         return x, y, z
 
-    return replace(
-        mechanism,
+    return mechanism.with_joints(
+        lambda joint: replace(joint, **joint.mapped({Kind.POSITION: shifted})),
         bodies=[body.in_frame(shifted) for body in mechanism.bodies],
-        joints=[
-            replace(joint, **joint.mapped({Kind.POSITION: shifted})) for joint in mechanism.joints
-        ],
         points=[replace(point, position=shifted(point.position)) for point in mechanism.points],
         forces=[force.in_frame(shifted) for force in mechanism.forces],
     )
