@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.motions import Absolute, Motion, Path, Ramp
 from ..trajectory import Array
+from .hardpoint import Hardpoint
 from .quantity import MARKER as MARKER
 from .quantity import ORDERS as ORDERS
 from .quantity import Output as Output
@@ -152,6 +153,7 @@ class Case:
         origin: source of the reference; None for the source of the case itself.
         length_unit, angle_unit: units of the file of the case, by their names in `units`.
         assembly: notes on how the start was closed, and on rows left out.
+        hardpoints: rows of the table of hardpoints that the case is of; empty for another file.
     """
 
     name: str
@@ -165,6 +167,7 @@ class Case:
     length_unit: str = "m"
     angle_unit: str = "rad"
     assembly: tuple[str, ...] = ()
+    hardpoints: tuple[Hardpoint, ...] = ()
 
     def __repr__(self) -> str:
         """Return name, truth, sweep and outputs in one line."""
