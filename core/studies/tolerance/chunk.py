@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from ...trajectory import Array
 from .reduce import Summary
 
-COUNTS = 5
-"""Counts of a limit, five numbers of variants: all; with a sample below; with a sample above; with
-a sample outside; with missing samples and none outside.
+COUNTS = 7
+"""Counts of a limit, seven numbers of variants: all; incomplete; with a sample below, and with a
+sample above; then of the complete ones: with a sample below, above and outside.
 """
 
 
@@ -32,24 +32,27 @@ class RowLimit:
         return max(abs(each) for each in (self.low, self.high) if math.isfinite(each))
 
 
-def limit_counts(values: Array, limits: Sequence[RowLimit]) -> NDArray[np.int64]:
+def limit_counts(
+    values: Array, limits: Sequence[RowLimit], incomplete: NDArray[np.bool_]
+) -> NDArray[np.int64]:
     """Return the counts of each limit, then of all together, shape (limits + 1, COUNTS).
 
     Args:
         values: values of variants, NaN if missing, shape (rows, n, V).
+        incomplete: whether a variant lacks values of the limited row, shape (limits, V).
     """
     found = np.zeros((len(limits) + 1, COUNTS), dtype=np.int64)
     if not limits:
         return found
     states: list[NDArray[np.bool_]] = []
-    for each in limits:
+    for each, lacking in zip(limits, incomplete, strict=True):
         row = values[each.row]
-        below, above = (row < each.low).any(axis=0), (row > each.high).any(axis=0)
-        states.append(np.stack([below, above, below | above, np.isnan(row).any(axis=0)]))
+        states.append(np.stack([lacking, (row < each.low).any(0), (row > each.high).any(0)]))
     states.append(np.logical_or.reduce(states))
-    for counts, state in zip(found, states, strict=True):
-        state[3] &= ~state[2]
-        counts[:] = [values.shape[2], *state.sum(axis=1)]
+    for counts, (lacking, below, above) in zip(found, states, strict=True):
+        complete = [each & ~lacking for each in (below, above, below | above)]
+        some = [lacking, below, above, *complete]
+        counts[:] = [values.shape[2], *(each.sum() for each in some)]
     return found
 
 
