@@ -16,7 +16,7 @@ from kincheck.core.case.models.files import load
 from kincheck.core.case.models.hardpoints.sample_table import sample_table
 from kincheck.core.case.models.hardpoints.templates import TEMPLATES
 from kincheck.core.cli.main import main
-from kincheck.core.kinematics import placed
+from kincheck.core.kinematics import placed, solve_designs
 from kincheck.core.studies.diagnosis import diagnose
 from kincheck.core.studies.tolerance.gradients import gradients
 from kincheck.core.studies.tolerance.study import Ready, Study
@@ -177,6 +177,28 @@ def test_both_sides_of_an_axle_follow_a_row(tmp_path):
     found = moved(vary(tmp_path, case, ball={"at": "lca_outer", "sigma": 1.0}), ball__y=1e-3)
     assert [*found["joints.left_lower_ball.point"]] == pytest.approx([0, 1e-3, 0], abs=1e-15)
     assert [*found["joints.right_lower_ball.point"]] == pytest.approx([0, -1e-3, 0], abs=1e-15)
+
+
+def test_designs_of_python_move_rows(tmp_path):
+    """The places that follow, for `solve_designs`, against the table moved."""
+    rows = rows_of("double_wishbone")
+    case = load(table(tmp_path, "double_wishbone", rows), CORNER)
+    offsets = {"uca_rear": [[0.0, 0.0, 0.0], [1e-3, 0.0, -2e-3]], "wheel_axis": np.zeros((2, 3))}
+    places = case.geometry(offsets)
+    found = solve_designs(case.mechanism, "stroke", case.sweep.values, places)
+    for k, (x, z) in enumerate(((0, 0), (1, -2))):
+        there = [
+            [row[0], repr(float(row[1]) + x), row[2], repr(float(row[3]) + z)]
+            if row[0] == "uca_rear"
+            else row
+            for row in rows
+        ]
+        again = solved(load(table(tmp_path, "double_wishbone", there), CORNER))
+        for axis in range(3):
+            own = found.points["lca_outer"].position[k][:, axis]
+            np.testing.assert_allclose(own, again[f"lca_outer.{'xyz'[axis]}"], atol=CLOSE)
+    with pytest.raises(CaseError, match="did you mean 'uca_rear'"):
+        case.geometry({"uca_rar": np.zeros((2, 3))})
 
 
 FAULTS = [
