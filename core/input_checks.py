@@ -64,10 +64,8 @@ def plain(number: Any) -> Any:
 
 
 def require_direction(who: str, numbers: Sequence[float]) -> None:
-    """Raise MechanismError unless a vector has a direction: its squared length must be normal.
-    Scalars of later evaluation have none yet.
-    """
-    if any(map(_of_later, numbers)):
+    """Raise MechanismError unless a vector has a direction: its squared length must be normal."""
+    if not all(map(finite, numbers)):  # scalars of later evaluation have no length yet
         return
     length = math.hypot(*numbers)
     if length == 0.0:

@@ -113,7 +113,7 @@ IMPORTS = {
         "studies/stress/truth studies/stress/families"
     ),
     "studies/paper": ". primitives program joints mechanism kinematics case harness report",
-    "studies/diagnosis": ". joints mechanism kinematics case harness report studies/variation",
+    "studies/diagnosis": ". joints kinematics case harness report studies/variation",
     "studies/bench": (
         ". program/llvm joints mechanism kinematics case case/io harness report "
         "studies/variation studies studies/tolerance studies/paper"

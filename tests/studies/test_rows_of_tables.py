@@ -37,13 +37,14 @@ AXIS = ["wheel_axis", "0.4", "860", "308"]
 """A wheel with toe and camber at design: a point of its axis of rotation [mm]."""
 
 
-def rows_of(name):
-    """The rows of the sample table, with all optional points."""
+def rows_of(name, *, wheel=True):
+    """The rows of the sample table, with all optional points, or without those of the wheel."""
     text = "".join(
         line for line in io.StringIO(sample_table(TEMPLATES[name])) if not line.startswith("#")
     )
     _, *rows = csv.reader(io.StringIO(text))
-    return [row[:4] for row in rows] + [AXIS]
+    found = [row[:4] for row in rows] + [AXIS]
+    return [row for row in found if wheel or row[0] not in ("wheel_axis", "wheel_contact")]
 
 
 def table(folder, name, rows, axes="forward,left,up"):
@@ -69,17 +70,20 @@ def study_of(folder, case):
     return Ready.of(Study(case, read_variation(path, case), 1, 0))
 
 
-def motions(name):
-    yield CORNER
-    yield replace(CORNER, axle="steer" if TEMPLATES[name].steered else "heave")
+def tables(name):
+    """Rows and options: a wheel with its points, and an axle with wheels of a given radius."""
+    axle = "steer" if TEMPLATES[name].steered else "heave"
+    yield rows_of(name), CORNER
+    yield rows_of(name, wheel=False), replace(CORNER, axle=axle, wheel_radius="0.3")
 
 
-@pytest.mark.parametrize(
-    ("name", "supplied"), [(name, supplied) for name in TEMPLATES for supplied in motions(name)]
-)
-def test_variant_of_a_row_equals_moved_table(tmp_path, name, supplied):
+CASES = [(name, *each) for name in TEMPLATES for each in tables(name)]
+
+
+@pytest.mark.parametrize(("name", "rows", "supplied"), CASES)
+def test_variant_of_a_row_equals_moved_table(tmp_path, name, rows, supplied):
     """Every row of every template, moved by a millimetre and more along the axes of the table."""
-    rows, move = rows_of(name), (1.0, -1.3, 0.7)
+    move = (1.0, -1.3, 0.7)
     ready = study_of(tmp_path, case_of(table(tmp_path, name, rows), supplied))
     names = [each.name for each in ready.study.variation.coordinates]
     moved_rows = [row for row in rows if f"{row[0]}.x" in names]
@@ -118,11 +122,9 @@ def compared(ready):
     assert not known
 
 
-@pytest.mark.parametrize(
-    ("name", "supplied"), [(name, supplied) for name in TEMPLATES for supplied in motions(name)]
-)
-def test_explain_of_a_table_equals_gradients(tmp_path, name, supplied):
-    case = case_of(table(tmp_path, name, rows_of(name)), supplied)
+@pytest.mark.parametrize(("name", "rows", "supplied"), CASES)
+def test_explain_of_a_table_equals_gradients(tmp_path, name, rows, supplied):
+    case = case_of(table(tmp_path, name, rows), supplied)
     assert [each for each in compared(study_of(tmp_path, case)) if each[2] > ACCURATE] == []
 
 
@@ -136,13 +138,32 @@ def test_explain_of_a_suspension_equals_gradients(tmp_path, name):
     assert [each for each in compared(study_of(tmp_path, case)) if each[2] > ACCURATE] == []
 
 
-def test_mirrored_axes_keep_those_of_the_table(tmp_path):
-    """The table of Adams/Car has x rearward and y to the right; moves are along these."""
-    rows = rows_of("mcpherson")
-    turned = [[row[0], *(repr(-float(x)) for x in row[1:3]), row[3]] for row in rows]
-    case = load(table(tmp_path, "mcpherson", turned, "rearward,right,up"), CORNER)
-    found = moved(vary(tmp_path, case, ball={"at": "lca_outer", "sigma": 1.0}), ball__y=1e-3)
-    assert [*found["joints.lower_ball.point"]] == pytest.approx([0.0, -1e-3, 0.0], abs=1e-15)
+def test_moves_are_along_the_axes_of_the_table(tmp_path):
+    """With x to the right, y up and z rearward."""
+    rows = [
+        [name, *(repr(sign * float(at[k])) for k, sign in ((1, -1.0), (2, 1.0), (0, -1.0)))]
+        for name, *at in rows_of("mcpherson")
+    ]
+    case = load(table(tmp_path, "mcpherson", rows, "right,up,rearward"), CORNER)
+    variation = vary(tmp_path, case, ball={"at": "lca_outer", "sigma": 1.0})
+    place, move = "joints.lower_ball.point", np.array([1e-3, 2e-3, 3e-3])
+    found = moved(variation, ball__x=move[0], ball__y=move[1], ball__z=move[2])
+    assert [*found[place]] == pytest.approx([-3e-3, -1e-3, 2e-3], abs=1e-15)
+    (there,) = case.geometry({"lca_outer": [move]})[place]
+    np.testing.assert_allclose(
+        there, np.add(case.mechanism.joint("lower_ball").point, found[place])
+    )
+    iso = load(table(tmp_path, "mcpherson", rows_of("mcpherson")), CORNER)
+    by_number = [
+        {
+            each.number: each.by_sample
+            for each in diagnose(one, samples=3, tol=1e-12).sensitivities
+            if each.output == "toe"
+        }
+        for one in (case, iso)
+    ]
+    assert by_number[0]["lca_outer x"] == pytest.approx([-x for x in by_number[1]["lca_outer y"]])
+    assert by_number[0]["lca_outer y"] == pytest.approx(by_number[1]["lca_outer z"])
 
 
 def test_arm_axis_follows_its_two_rows(tmp_path):

@@ -21,7 +21,6 @@ from kincheck.core.mechanism.mechanism import Body, Mechanism, Point
 from kincheck.core.studies.tolerance.chunk import RowLimit, limit_counts
 from kincheck.core.studies.tolerance.csv_tables import limits_csv
 from kincheck.core.studies.tolerance.page import page
-from kincheck.core.studies.tolerance.study import Ready, Study
 from kincheck.core.studies.tolerance.sweep import sweep_designs
 from kincheck.core.studies.tolerance.tables import print_sweep
 from kincheck.core.studies.variation.limits import Limit
@@ -114,24 +113,27 @@ def test_variants_are_counted_by_side_and_whether_complete():
         ]
     )
     limits = [RowLimit(0, -1.0, 1.0), RowLimit(1, -1.0, np.inf)]
-    incomplete = np.isnan(values).any(axis=1)
+    reached = np.ones((2, 6), dtype=np.bool_)
     # variants, incomplete, below, above; of the complete ones below, above, outside
-    assert limit_counts(values, limits, incomplete).tolist() == [
+    assert limit_counts(values, reached, np.zeros((2, 2)), limits).tolist() == [
         [6, 2, 2, 3, 2, 2, 3],
         [6, 1, 0, 0, 0, 0, 0],
         [6, 3, 2, 3, 1, 1, 2],
     ]
 
 
-def test_samples_without_a_nominal_value_are_not_judged(tmp_path):
-    """A force of redundant rows has no value in any variant, an undefined angle at some samples."""
-    ready = Ready.of(Study(four_bar(), limited(tmp_path), 4, 0))
-    values, solved, _, _ = ready.values(np.zeros((2, 4)))
-    ready.nominal[0, 3] = values[0, 3] = np.nan  # in no variant, nor at the nominal design
-    values[0, 5, 1] = np.nan
-    values[0, :, 2] = np.nan
-    solved[7, 3] = False
-    assert ready.incomplete(values, solved).tolist() == [[False, True, True, True]]
+def test_samples_without_a_nominal_value_are_not_judged():
+    """Ackermann of straight wheels has no value in any variant; a lock-up is of one."""
+    values, reached = np.zeros((1, 4, 5)), np.ones((4, 5), dtype=np.bool_)
+    nominal = np.array([[0.0, 0.0, np.nan, 0.0]])
+    values[0, 2] = np.nan  # in no variant: all are complete
+    values[0, 1, 1] = np.nan  # a value is missing
+    values[0, :, 2] = np.nan  # all are
+    reached[2, 3] = False  # a sample is
+    counts = limit_counts(values, reached, nominal, [RowLimit(0, -1.0, 1.0)])
+    assert counts[:, 1].tolist() == [3, 3]
+    unknown = np.full((1, 4), np.nan)
+    assert limit_counts(values, reached, unknown, [RowLimit(0, -1.0, 1.0)])[0, 1] == 2
 
 
 class _Cells(HTMLParser):

@@ -26,16 +26,7 @@ from ...kinematics import (
 )
 from ..variation.places import Geometry
 from .determinacy import Determinacy, determinacy
-from .outputs import (
-    Budget,
-    Sensitivity,
-    binding,
-    budgets,
-    known,
-    moves,
-    read_points,
-    sensitivities,
-)
+from .outputs import Budget, Sensitivity, binding, budgets, read_points, sensitivities
 
 SCHEMA = "kincheck-explain/1"
 # Joints that a sentence names as alternatives.
@@ -137,7 +128,8 @@ def diagnose(case: Case, *, samples: int, tol: float) -> Diagnosis:
     ranks = Ranks(mechanism)
     account = ranks.account
     findings = _findings(ranks)
-    variables = Geometry(case).variables
+    geometry = Geometry(case)
+    variables = geometry.variables
     swept: Conditioning | None = None
     programs: list[str] = []
     if not findings:
@@ -148,7 +140,7 @@ def diagnose(case: Case, *, samples: int, tol: float) -> Diagnosis:
                 case.sweep.path,
                 case.sweep.values,
                 read_points(case),
-                moves(case.mechanism, variables),
+                geometry.moves(variables),
                 samples,
                 tol,
             )
@@ -189,7 +181,7 @@ def diagnose(case: Case, *, samples: int, tol: float) -> Diagnosis:
         budgets=budgets(case, swept, tol, design) if swept and derived else [],
         sensitivities=sensitivities(case, swept, design, variables) if swept and derived else [],
         binding=binding(swept, variables) if swept and derived else [],
-        moves={each.name: known(each) for each in variables},
+        moves={each.name: each.places for each in variables},
         signs=case.signs,
         not_derived=[output.name for output in case.outputs if output.orders != ORDERS],
         programs=programs,

@@ -9,11 +9,10 @@ import msgspec
 import numpy as np
 
 from ...algebra import Vec3, vec
-from ...case.case import MARKER, ORDERS, Case, Quantity
+from ...case.case import ORDERS, Case, Quantity
 from ...jet import Jet
 from ...joints import Kind
-from ...kinematics import Conditioning, Gradient, PoseConditioning, places
-from ...mechanism.mechanism import Mechanism
+from ...kinematics import Conditioning, Gradient, PoseConditioning
 from ...trajectory import Array
 from ..variation.places import Variable
 
@@ -109,22 +108,6 @@ def _budget(output: Quantity, found: Conditioning, tol: float, design: dict[str,
     )
 
 
-def moves(mechanism: Mechanism, variables: Sequence[Variable]) -> dict[str, Array]:
-    """Return the derivatives of each place by all numbers of the variables, shape (numbers of the
-    place, numbers of the variables).
-    """
-    values = places(mechanism)
-    count = sum(len(each.numbers) for each in variables)
-    found: dict[str, Array] = {}
-    first = 0
-    for each in variables:
-        own = slice(first, first := first + len(each.numbers))
-        for place, slopes in each.moves.items():
-            if place in values:
-                found.setdefault(place, np.zeros((len(slopes), count)))[:, own] = slopes
-    return found
-
-
 def sensitivities(
     case: Case, found: Conditioning, design: dict[str, Array], variables: Sequence[Variable]
 ) -> list[Sensitivity]:
@@ -159,11 +142,6 @@ def binding(found: Conditioning, variables: Sequence[Variable]) -> list[str]:
     )
     names = [name for each in variables for name in each.numbers]
     return [name for name, rate in zip(names, contradicted, strict=True) if rate > NOTHING]
-
-
-def known(variable: Variable) -> list[str]:
-    """Return the places that follow, without those of markers."""
-    return [place for place in variable.moves if not place.startswith(f"points.{MARKER}")]
 
 
 def _derivative(

@@ -33,25 +33,30 @@ class RowLimit:
 
 
 def limit_counts(
-    values: Array, limits: Sequence[RowLimit], incomplete: NDArray[np.bool_]
+    values: Array, solved: NDArray[np.bool_], nominal: Array, limits: Sequence[RowLimit]
 ) -> NDArray[np.int64]:
     """Return the counts of each limit, then of all together, shape (limits + 1, COUNTS).
 
+    A variant is incomplete if a sample is not reached, or if the limited row lacks a value at a
+    sample where the nominal design has one, or at all samples.
+
     Args:
         values: values of variants, NaN if missing, shape (rows, n, V).
-        incomplete: whether a variant lacks values of the limited row, shape (limits, V).
+        solved: whether each sample is reached, shape (n, V).
+        nominal: values of the nominal design, shape (rows, n).
     """
-    found = np.zeros((len(limits) + 1, COUNTS), dtype=np.int64)
-    if not limits:
-        return found
     states: list[NDArray[np.bool_]] = []
-    for each, lacking in zip(limits, incomplete, strict=True):
-        row = values[each.row]
-        states.append(np.stack([lacking, (row < each.low).any(0), (row > each.high).any(0)]))
+    for each in limits:
+        row, missing = values[each.row], np.isnan(values[each.row])
+        lacking = missing[np.isfinite(nominal[each.row])].any(axis=0) | missing.all(axis=0)
+        incomplete = ~solved.all(axis=0) | lacking
+        below, above = (row < each.low).any(axis=0), (row > each.high).any(axis=0)
+        states.append(np.stack([incomplete, below, above]))
     states.append(np.logical_or.reduce(states))
-    for counts, (lacking, below, above) in zip(found, states, strict=True):
-        complete = [each & ~lacking for each in (below, above, below | above)]
-        some = [lacking, below, above, *complete]
+    found = np.empty((len(states), COUNTS), dtype=np.int64)
+    for counts, (incomplete, below, above) in zip(found, states, strict=True):
+        complete = [each & ~incomplete for each in (below, above, below | above)]
+        some = [incomplete, below, above, *complete]
         counts[:] = [values.shape[2], *(each.sum() for each in some)]
     return found
 

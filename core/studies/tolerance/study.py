@@ -227,22 +227,6 @@ class Ready:
             found[place] = slice(first, first := first + size)
         return found
 
-    def incomplete(self, values: Array, solved: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Return the variants that are incomplete by each limit, shape (limits, V): some sample is
-        not reached, or the row lacks a value at a sample where the nominal design has one.
-
-        Args:
-            values: shape (rows, n, V).
-            solved: shape (n, V).
-        """
-        unreached = ~solved.all(axis=0)
-        found = np.empty((len(self.study.limits), solved.shape[1]), dtype=np.bool_)
-        for each, limit in zip(found, self.study.limits, strict=True):
-            missing = np.isnan(values[limit.row])
-            defined = np.isfinite(self.nominal[limit.row])
-            each[:] = unreached | missing[defined].any(axis=0) | missing.all(axis=0)
-        return found
-
     def chunk(self, index: int) -> Chunk:
         """Solve a chunk."""
         study, first = self.study, index * self.study.of_a_chunk
@@ -263,7 +247,8 @@ class Ready:
             part = slice(start, min(start + self.lanes, count))
             values, solved, again, messages = self.values(offsets[:, part])
             totals.take(values, first + start)
-            limited += limit_counts(values, study.limits, self.incomplete(values, solved))
+            if study.limits:
+                limited += limit_counts(values, solved, self.nominal, study.limits)
             kept.append(values[:, :, chosen[part]])
             picked |= {k: values[:, :, k - first - start].copy() for k in self._picked(first, part)}
             failures += len(messages)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -48,6 +48,11 @@ class Variable:
         alone = self.kind in (Kind.LENGTH, Kind.NUMBER)
         return [self.name] if alone else [f"{self.name} {axis}" for axis in "xyz"]
 
+    @property
+    def places(self) -> list[str]:
+        """The places that follow, without those of markers."""
+        return [place for place in self.moves if not place.startswith(f"points.{MARKER}")]
+
 
 class Geometry:
     """The places of a case, and what moves them.
@@ -74,7 +79,7 @@ class Geometry:
         roles = {role: self.rows[each.name] for each in case.hardpoints for role in each.roles}
         self._by_name = roles | self.rows
 
-    @property
+    @cached_property
     def named(self) -> list[str]:
         """Places known to the user: all except the places of markers."""
         return [place for place in self.values if not place.startswith(f"points.{MARKER}")]
@@ -117,6 +122,21 @@ class Geometry:
         together = self.together(place)
         moved = dict.fromkeys(self.with_markers(together), np.eye(3))
         return Variable(together[0], kind, moved)
+
+    def moves(self, variables: Sequence[Variable]) -> dict[str, Array]:
+        """Return the derivatives of each place without loads by all numbers of the variables, shape
+        (numbers of the place, numbers of the variables).
+        """
+        count = sum(len(each.numbers) for each in variables)
+        found: dict[str, Array] = {}
+        first = 0
+        for each in variables:
+            own = slice(first, first := first + len(each.numbers))
+            for place, slopes in each.moves.items():
+                if not place.startswith(_LOADS):
+                    still = np.zeros((len(slopes), count))
+                    found.setdefault(place, still)[:, own] = slopes
+        return found
 
     def only(self, whole: Variable, chosen: Iterable[str]) -> Variable:
         """Return a variable that moves the chosen places alone, with the markers beside them."""
@@ -176,13 +196,15 @@ class Geometry:
     def with_markers(self, moved: Iterable[str]) -> tuple[str, ...]:
         """Return places, with the places of the markers beside any points among them."""
         found = [*moved]
+        return (*found, *(marker for each in found for marker in self._markers.get(each, ())))
+
+    @cached_property
+    def _markers(self) -> dict[str, list[str]]:
+        """The places of markers, by the place of the point that they are named after."""
+        found: dict[str, list[str]] = {}
+        head = f"points.{MARKER}"
         for place in self.values:
-            if place.startswith(f"points.{MARKER}"):
-                center = (
-                    place.removeprefix(f"points.{MARKER}")
-                    .removesuffix(".position")
-                    .rpartition(".")[0]
-                )
-                if f"points.{center}.position" in found:
-                    found.append(place)
-        return tuple(found)
+            if place.startswith(head):
+                center = place.removeprefix(head).removesuffix(".position").rpartition(".")[0]
+                found.setdefault(f"points.{center}.position", []).append(place)
+        return found
