@@ -46,10 +46,8 @@ class Geometry:
 
     def __init__(self, mechanism: Mechanism, moves: Mapping[str, Array]) -> None:
         values = places(mechanism)
-        self.slopes = {
-            place: tuple(map(Slope, values[place], each)) for place, each in moves.items()
-        }
-        self.parameters = next((each.shape[1] for each in moves.values()), 0)
+        self.slopes = {place: tuple(map(Slope, values[place], moves[place])) for place in moves}
+        self.parameters = next((moves[place].shape[1] for place in moves), 0)
 
     def derivatives_of(self, x: Any) -> Array:
         """Return the derivatives of a number by all parameters, shape (parameters,); zero for an
