@@ -65,6 +65,8 @@ def plain(number: Any) -> Any:
 
 def require_direction(who: str, numbers: Sequence[float]) -> None:
     """Raise MechanismError unless a vector has a direction: its squared length must be normal."""
+    if not all(map(finite, numbers)):  # scalars of later evaluation have no length yet
+        return
     length = math.hypot(*numbers)
     if length == 0.0:
         raise MechanismError(

@@ -64,7 +64,7 @@ IMPORTS = {
         "kinematics/structure kinematics/compiled kinematics/continuation"
     ),
     "kinematics/diagnosis": (
-        ". primitives joints mechanism kinematics/formulation kinematics/structure "
+        ". primitives mechanism kinematics/formulation kinematics/structure "
         "kinematics/compiled kinematics/continuation"
     ),
     "kinematics": (
@@ -79,7 +79,8 @@ IMPORTS = {
     "case/measures": ". joints mechanism kinematics case",
     "case/io": ". joints mechanism kinematics case case/suspension case/measures",
     "case/models/hardpoints": (
-        ". joints mechanism case/models/hardpoints/templates case case/suspension case/io"
+        ". joints mechanism kinematics case/models/hardpoints/templates case case/suspension "
+        "case/io"
     ),
     "case/models/mjcf": ". joints mechanism kinematics case case/io",
     "case/models/robots": ". joints mechanism case/io case/models/mjcf",
@@ -113,7 +114,7 @@ IMPORTS = {
         "studies/stress/truth studies/stress/families"
     ),
     "studies/paper": ". primitives program joints mechanism kinematics case harness report",
-    "studies/diagnosis": ". joints kinematics case harness report",
+    "studies/diagnosis": ". joints kinematics case harness report studies/variation",
     "studies/bench": (
         ". program/llvm joints mechanism kinematics case case/io harness report "
         "studies/variation studies studies/tolerance studies/paper"

@@ -7,11 +7,14 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from ..errors import CaseError, unknown
+from ..kinematics import places
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.motions import Absolute, Motion, Path, Ramp
 from ..trajectory import Array
+from .hardpoint import Hardpoint
 from .quantity import MARKER as MARKER
 from .quantity import ORDERS as ORDERS
 from .quantity import Output as Output
@@ -168,6 +171,7 @@ class Case:
         length_unit, angle_unit: units of the file of the case, by their names in `units`.
         assembly: notes on how the start was closed, and on rows left out.
         closure: of rows left out; None if all rows hold.
+        hardpoints: rows of the table of hardpoints that the case is of; empty for another file.
     """
 
     name: str
@@ -182,6 +186,7 @@ class Case:
     angle_unit: str = "rad"
     assembly: tuple[str, ...] = ()
     closure: Closure | None = None
+    hardpoints: tuple[Hardpoint, ...] = ()
 
     def __repr__(self) -> str:
         """Return name, truth, sweep and outputs in one line."""
@@ -191,6 +196,26 @@ class Case:
             f" {self.sweep.driver}, {values[0]:g} to {values[-1]:g}; outputs:"
             f" {', '.join(output.name for output in self.outputs) or 'none'}>"
         )
+
+    def geometry(self, offsets: Mapping[str, ArrayLike]) -> dict[str, Array]:
+        """Return the places of the geometry in designs with moved hardpoints, for `solve_designs`.
+
+        Args:
+            offsets: by row of the table of hardpoints, along its axes [m], shape (designs, 3).
+
+        Raises:
+            CaseError: there is no such row.
+        """
+        rows = {each.name: each for each in self.hardpoints}
+        found: dict[str, Array] = {}
+        values = places(self.mechanism)
+        for name, given in offsets.items():
+            if name not in rows:
+                raise CaseError(unknown("row of a table of hardpoints", name, rows))
+            moved = np.asarray(given, dtype=np.float64)
+            for place, slopes in rows[name].moves.items():
+                found[place] = found.get(place, np.array(values[place])) + moved @ slopes.T
+        return found
 
     @property
     def points(self) -> tuple[str, ...]:

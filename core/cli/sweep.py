@@ -194,6 +194,7 @@ def _solve(
             seed=options.seed,
             sampling=options.sampling,
             order=options.order,
+            incomplete=options.incomplete,
             tol=options.tol,
             jobs=options.jobs or default_jobs(),
             source=None if options.scheduler is None else on_cluster(options.scheduler),

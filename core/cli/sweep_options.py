@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..studies.variation.modes import Sampling
+from ..studies.variation.modes import Incomplete, Sampling
 from . import import_options
 from .option_types import positive, whole
 from .run_options import TOL
@@ -60,6 +60,16 @@ def add_options(sweep: argparse.ArgumentParser) -> None:
         help=(
             "specification limits of an output, in the units of the --vary file; one may be empty."
             " The study counts the variants inside, with Cp and Cpk"
+        ),
+    )
+    sweep.add_argument(
+        "--incomplete",
+        type=Incomplete,
+        choices=[*Incomplete],
+        default=Incomplete.OUTSIDE,
+        help=(
+            "variants that do not reach all samples: outside of the limits, or left out of the"
+            " yield; default %(default)s"
         ),
     )
     sweep.add_argument(

@@ -121,14 +121,14 @@ def _wheels(case: Case) -> list[SceneWheel]:
     outputs = [each for each in case.outputs if isinstance(each, SuspensionOutput)]
     found: dict[str, SceneWheel] = {}
     for vehicle in (vehicle for output in outputs for vehicle in output.vehicles):
-        if vehicle.wheel_radius is not None:
+        if (radius := vehicle.radius(case.mechanism)) is not None:
             center = case.mechanism.point(vehicle.wheel_center)
             found[center.name] = SceneWheel(
                 body=center.body,
                 center=list(center.position),
-                spin=[float(x) for x in vehicle.spin],
+                spin=[float(x) for x in vehicle.spin(case.mechanism)],
                 up=list(vehicle.up),
-                radius=vehicle.wheel_radius,
+                radius=radius,
             )
     return list(found.values())
 

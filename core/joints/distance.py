@@ -4,7 +4,6 @@ or massless link.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -53,7 +52,8 @@ class Distance(Joint):
     @property
     def design_distance(self) -> float:
         """Distance of the points at design [m]."""
-        return math.dist(*self.points)
+        along = vec(self.points[1]) - vec(self.points[0])
+        return root(along @ along)
 
     @property
     def rod_length(self) -> float:

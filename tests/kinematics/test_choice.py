@@ -139,7 +139,7 @@ def test_a_singular_pose_is_passed_by_the_rows_that_were_chosen_before_it(first,
 
 def test_a_diagnosis_follows_the_sign_of_the_determinant_over_a_bifurcation():
     turn = np.linspace(0.0, 3.0, 31)
-    found = conditioning(chain(1), Path({"turn": Ramp(1.0)}, turn), turn, ["end"], [], 31, 1e-12)
+    found = conditioning(chain(1), Path({"turn": Ramp(1.0)}, turn), turn, ["end"], {}, 31, 1e-12)
     assert [pose.orientation for pose in found.poses] == [
         1.0 if value < BRANCH else -1.0 for value in turn
     ]
@@ -147,7 +147,7 @@ def test_a_diagnosis_follows_the_sign_of_the_determinant_over_a_bifurcation():
 
 def test_a_diagnosis_knows_no_singular_pose_there():
     turn = np.linspace(0.0, 2.0 * np.pi, 41)
-    found = conditioning(loop(), Path({"turn": Ramp(1.0)}, turn), turn, ["tracer"], [], 41, 1e-12)
+    found = conditioning(loop(), Path({"turn": Ramp(1.0)}, turn), turn, ["tracer"], {}, 41, 1e-12)
     assert [pose.orientation for pose in found.poses] == [1.0] * 41
     assert min(pose.smallest for pose in found.poses) > 0.03
     assert len({tuple(pose.owners) for pose in found.poses}) > 1

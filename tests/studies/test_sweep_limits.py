@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from kincheck.core.cli.main import main
 from kincheck.core.errors import KincheckError
-from kincheck.core.studies.tolerance.chunk import RowLimit, limit_counts
 from kincheck.core.studies.tolerance.histograms import sparkline
 from kincheck.core.studies.tolerance.page import page
 from kincheck.core.studies.tolerance.sweep import sweep_designs
@@ -88,23 +87,6 @@ def test_the_page_has_limits_histograms_and_legends(found):
         assert f"</svg> {words}" in text
     assert "Sobol" not in text
     assert "--sampling sobol --replay" in text
-
-
-def test_variants_are_counted_by_side_and_missing_ones_are_unknown():
-    nan = np.nan
-    values = np.array(
-        [
-            [[0.0, 0.0, 9.0, nan, nan, -9.0], [0.0, -9.0, 0.0, 0.0, 9.0, 9.0]],
-            [[0.0] * 6, [0.0, 0.0, 0.0, 0.0, 0.0, nan]],
-        ]
-    )
-    limits = [RowLimit(0, -1.0, 1.0), RowLimit(1, -1.0, np.inf)]
-    # variants, below, above, outside, unknown
-    assert limit_counts(values, limits).tolist() == [
-        [6, 2, 3, 4, 1],
-        [6, 0, 0, 0, 1],
-        [6, 2, 3, 4, 1],
-    ]
 
 
 def test_counts_do_not_depend_on_chunks_and_jobs(tmp_path):

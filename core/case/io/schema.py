@@ -85,10 +85,12 @@ left out. `kincheck list --joints` prints all types with their keys.
                          (wheel_center) = "wheel_center", the name of a point;
                          (center_plane) = [0, 0, 0], a point in the middle
                          (static_toe) = 0, toe-in, and (static_camber) = 0, top outboard: angles of
-                         the wheel at design
+                         the wheel at design; or (wheel_axis), a point of the carrier on the axis
+                         of rotation, outboard
                          (kingpin) = ["lower", "upper"], names of points; or (kingpin_links), of
                          four rods: [["on the body", "on the wheel carrier"], ...], all but the
-                         steering rod; (wheel_radius), loaded, to the contact centre
+                         steering rod; (wheel_radius), loaded, to the contact centre; or
+                         (wheel_contact), a point of the carrier as far from the wheel centre
                          (axle) = "front" or "rear"; (wheelbase), (cg_height), above the road
                          (brakes) = "outboard", (drive) = "inboard": support of the torque; outboard
                          on the wheel carrier, inboard on the vehicle body
@@ -99,7 +101,8 @@ left out. `kincheck list --joints` prints all types with their keys.
                          (travel), name of the travel's driver; default: the driver of the wheel
                          centre; derivatives by travel hold all other drivers
     [suspension.other]   the axle's other wheel: wheel_center, (kingpin) or (kingpin_links),
-                         (static_toe), (static_camber), (travel); the rest is as in [suspension];
+                         (static_toe), (static_camber), (wheel_axis), (wheel_contact), (travel);
+                         the rest is as in [suspension];
                          outputs of one wheel may then have (side)
     [reference]          true values: file, the name of a CSV file beside the case file, or rows,
                          with (columns)

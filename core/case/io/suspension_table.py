@@ -56,7 +56,9 @@ class SuspensionKeys(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
     center_plane: Numbers3 = (0.0, 0.0, 0.0)
     static_toe: Number = 0.0
     static_camber: Number = 0.0
+    wheel_axis: Text | None = None
     wheel_radius: Length | None = None
+    wheel_contact: Text | None = None
     kingpin: Points | None = None
     kingpin_links: Rods | None = None
     axle: Axles | None = None
@@ -77,6 +79,8 @@ class OtherWheelKeys(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
     wheel_center: Text
     static_toe: Number | None = None
     static_camber: Number | None = None
+    wheel_axis: Text | None = None
+    wheel_contact: Text | None = None
     kingpin: Points | None = None
     kingpin_links: Rods | None = None
     travel: Text | None = None
@@ -137,6 +141,7 @@ def read_suspension(
     given |= {"forward": forward, "up": up, "middle": tuple(map(length, keys.center_plane))}
     vehicle = Vehicle(**given)
     _check_side(file, "suspension", vehicle, mechanism, length)
+    vehicle = _with_points(file, "suspension", vehicle, mechanism)
     travel = travel_driver(file, "suspension", keys.travel, vehicle, case)
     if keys.other is None:
         alone = [travel] == list(case.sweep.path.motions)
@@ -152,8 +157,12 @@ def read_suspension(
         kingpin=_kingpin(file, key, of_other, mechanism),
         static_toe=vehicle.static_toe if toe is None else angle(toe),
         static_camber=vehicle.static_camber if camber is None else angle(camber),
+        wheel_axis=of_other.wheel_axis,
+        wheel_radius=keys.wheel_radius and vehicle.wheel_radius,
+        wheel_contact=of_other.wheel_contact,
     )
     _check_side(file, key, other, mechanism, length)
+    other = _with_points(file, key, other, mechanism)
     beside = travel_driver(file, key, of_other.travel, other, case)
     both = () if travel is None or beside is None else (travel, beside)
     return SuspensionTable(
@@ -176,6 +185,38 @@ def _kingpin(
         problem = "found beside kingpin, expected one of them; remove the other"
         raise fault(file, join(key, "kingpin_links"), problem)
     return keys.kingpin or rods
+
+
+def _with_points(file: Path, key: str, vehicle: Vehicle, mechanism: Mechanism) -> Vehicle:
+    """Return the vehicle with the radius by the point of the wheel's contact, after checks of this
+    point and of that of the axis: on the wheel carrier, instead of numbers.
+    """
+    carrier = mechanism.point(vehicle.wheel_center).body
+    angles = vehicle.static_toe or vehicle.static_camber
+    for name, given, numbers in (
+        ("wheel_axis", bool(angles), "static_toe and static_camber"),
+        ("wheel_contact", vehicle.wheel_radius is not None, "wheel_radius"),
+    ):
+        if (point := getattr(vehicle, name)) is None:
+            continue
+        where = join(key, name)
+        check_point(file, where, point, mechanism)
+        if given:
+            problem = f"found beside {numbers}, expected one of them"
+            raise fault(file, where, f"{problem}; remove the other")
+        if (body := mechanism.point(point).body) != carrier:
+            problem = f"found {shown(point)}, which is on {shown(body)}, expected a point of"
+            raise fault(file, where, f"{problem} the wheel carrier {shown(carrier)}; name one")
+    if vehicle.wheel_axis is not None and vehicle.aside(mechanism) <= 0.0:
+        problem = f"found {shown(vehicle.wheel_axis)}, which is not outboard of the wheel's centre"
+        where = join(key, "wheel_axis")
+        raise fault(file, where, f"{problem}, expected a point that is; name another")
+    radius = vehicle.radius(mechanism)
+    if radius == 0.0:
+        problem = f"found {shown(vehicle.wheel_contact)}, which is at the wheel's centre"
+        where = join(key, "wheel_contact")
+        raise fault(file, where, f"{problem}, expected a point at the road; name another")
+    return replace(vehicle, wheel_radius=radius)
 
 
 def check_point(file: Path, key: str, name: str, mechanism: Mechanism) -> None:

@@ -11,7 +11,14 @@ from ..case import Case
 from ..quantity import own_keys
 from ..suspension import AxleOutput, PerTravel, SuspensionOutput, Vehicle
 
-_OWN = ("wheel_center", "kingpin", "static_toe", "static_camber")
+_OWN = (
+    "wheel_center",
+    "kingpin",
+    "static_toe",
+    "static_camber",
+    "wheel_axis",
+    "wheel_contact",
+)
 """Attributes of a vehicle with a value for each wheel of an axle, in addition to the side."""
 
 
@@ -31,7 +38,8 @@ def suspension_tables(case: Case) -> Mapping[str, Mapping[str, Any]]:
     if not others:
         return tables
     other, *more = others
-    alike = replace(other, side=first.side, **{name: getattr(first, name) for name in _OWN})
+    own = (*_OWN, "wheel_radius") if other.wheel_contact is not None else _OWN
+    alike = replace(other, side=first.side, **{name: getattr(first, name) for name in own})
     if more or alike != first or other.side is first.side:
         raise CaseError(
             f"case {case.name!r}: its outputs are of several axles, and [suspension] is of one;"
@@ -69,6 +77,8 @@ def _keys(wheel: Vehicle, place: int) -> dict[str, Any]:
         for each in fields(Vehicle)
         if (value := getattr(wheel, each.name)) != each.default
     }
+    if wheel.wheel_contact is not None:
+        del keys["wheel_radius"]
     if names := keys.pop("travel", ()):
         keys["travel"] = names[place]
     return keys

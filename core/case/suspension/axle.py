@@ -36,7 +36,7 @@ class AxleOutput(SuspensionOutput):
 
     measure = "m"
     needs = ("wheel_radius",)
-    reads = ("wheel_center", "spin_marker")
+    reads = ("wheel_center", "spin_marker", "wheel_contact")
 
     other: Vehicle = field(metadata=HIDDEN)
 

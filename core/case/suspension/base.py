@@ -56,8 +56,8 @@ class SuspensionOutput(TypedQuantity):
         """Return the names of the points it reads of a wheel."""
         read: list[str] = []
         for each in self.reads:
-            found: str | tuple[str, ...] = getattr(vehicle, each)
-            read += [found] if isinstance(found, str) else found
+            found: str | tuple[str, ...] | None = getattr(vehicle, each)
+            read += [found] if isinstance(found, str) else found or ()
         return tuple(read)
 
     @property
@@ -69,11 +69,10 @@ class SuspensionOutput(TypedQuantity):
         """Return the points on the wheel carrier that it reads beyond those of the case."""
         found: list[Point] = []
         for wheel in self.vehicles:
-            center = mechanism.point(wheel.wheel_center)
-            places = wheel.marker_positions(center.position)
+            body = mechanism.point(wheel.wheel_center).body
             found += [
-                Point(name, center.body, place)
-                for name, place in places.items()
+                Point(name, body, place)
+                for name, place in wheel.markers(mechanism).items()
                 if name in self.points
             ]
         return found

@@ -12,6 +12,7 @@ All angles come from vectors: toe and camber of a turned wheel are no Euler angl
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
@@ -47,51 +48,57 @@ class Corner:
         x, y, z = (axis @ arm for axis in self._axes)
         return Vec3(x, y, z)
 
-    @property
+    @cached_property
     def center(self) -> Vec3:
         """Wheel centre [m]."""
         return self.point(self.vehicle.wheel_center)
 
-    @property
+    @cached_property
     def spin(self) -> Vec3:
         """Unit vector along the wheel's axis of rotation, outboard [-]."""
         return _unit(self.point(self.vehicle.spin_marker) - self.center)
 
-    @property
+    @cached_property
     def _level(self) -> Jet:
         """Length of the spin's projection on the road [-]; NaN for a wheel on its side."""
         s = self.spin
         level = sqrt(s.x * s.x + s.y * s.y)
         return where(doubles(level) > PARALLEL, level)
 
-    @property
+    @cached_property
     def heading(self) -> Vec3:
         """Unit vector along the intersection of wheel plane and road, forward [-]; z is zero."""
         s, level = self.spin, self._level
         return Vec3(s.y / level, -s.x / level, 0.0)
 
-    @property
+    @cached_property
     def aside(self) -> Vec3:
         """Unit vector in the road plane, perpendicular to the heading, outboard [-]; z is zero."""
         h = self.heading
         return Vec3(-h.y, h.x, 0.0)
 
-    @property
+    @cached_property
     def rise(self) -> Vec3:
         """Unit vector of steepest ascent in the wheel plane [-]."""
         s, level = self.spin, self._level
         return Vec3(-s.x * s.z / level, -s.y * s.z / level, level)
 
-    @property
+    @cached_property
+    def radius(self) -> Scalar:
+        """The wheel's radius [m]."""
+        if self.vehicle.wheel_contact is not None:
+            return distance(self.point(self.vehicle.wheel_contact), self.center)
+        assert self.vehicle.wheel_radius is not None
+        return self.vehicle.wheel_radius
+
+    @cached_property
     def contact(self) -> Vec3:
         """Contact centre [m]: the lowest point of a disc with the wheel's radius. The road is at
         its height.
         """
-        radius = self.vehicle.wheel_radius
-        assert radius is not None
-        return self.center - radius * self.rise
+        return self.center - self.radius * self.rise
 
-    @property
+    @cached_property
     def contact_velocity(self) -> Vec3:
         """Velocity of the wheel carrier's point at the contact centre, with the wheel locked to the
         carrier [m/s].
@@ -100,15 +107,15 @@ class Corner:
         the carrier and perpendicular to the axis of rotation; only these turn. The third direction,
         a cross product, appears twice, so its sign cancels.
         """
-        radius, w, s = self.vehicle.wheel_radius, self.rise, self.spin
-        assert radius is not None
-        top = _unit(self.point(self.vehicle.top_marker) - self.center)
+        w, s = self.rise, self.spin
+        beside = self.point(self.vehicle.top_marker) - self.center
+        top = _unit(beside - (beside @ s) * s)
         third = cross(s, top)
-        return velocity(self.center) - radius * (
+        return velocity(self.center) - self.radius * (
             (top @ w) * velocity(top) + (third @ w) * velocity(third)
         )
 
-    @property
+    @cached_property
     def kingpin(self) -> tuple[Vec3, Vec3]:
         """A point of the steering axis [m], and a vector along it, upwards."""
         ends = [self.point(name) for name in self.vehicle.kingpin_points]
@@ -117,7 +124,7 @@ class Corner:
             return lower, upper - lower
         return rods_axis(self.center, ends[::2], ends[1::2])
 
-    @property
+    @cached_property
     def kingpin_offset(self) -> Vec3:
         """Vector from the contact centre to the steering axis in the road plane [m]; z is zero. It
         is NaN for an axis parallel to the road.

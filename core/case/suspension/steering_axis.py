@@ -54,7 +54,7 @@ class _GroundOffset(Attitude):
 
     measure = "m"
     needs = ("wheel_radius", "kingpin")
-    reads = ("wheel_center", "spin_marker", "kingpin_points")
+    reads = ("wheel_center", "spin_marker", "wheel_contact", "kingpin_points")
 
 
 @dataclass(frozen=True)

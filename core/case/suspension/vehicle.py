@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 from enum import StrEnum
 
-from ...algebra import Vec3, cross, triple, vec
-from ...mechanism.mechanism import Vector
+from ...algebra import Vec3, cross, vec
+from ...mechanism.mechanism import Mechanism, Vector
 from ..case import MARKER
 
 # Distance from the wheel centre to the markers on the wheel carrier [m]: a rim's radius, so
@@ -75,8 +75,12 @@ class Vehicle:
         forward, up: perpendicular unit vectors fixed to the vehicle's body [-].
         wheel_center: name of the point.
         static_toe, static_camber: angles at design [rad], as defined in `wheel`.
+        wheel_axis: name of a point of the carrier on the axis of rotation, outboard of the centre,
+            instead of both angles.
         middle: a point of the vehicle's centre plane [m].
         wheel_radius: loaded, from the wheel centre to the contact centre in the wheel plane [m].
+        wheel_contact: name of a point of the carrier at this distance from the wheel centre, which
+            variants of the design may move.
         kingpin: names of the lower and the upper point of the steering axis; or of the ends of four
             rods, on the body and on the wheel carrier each: the axis is then that of the screw
             about which the wheel turns when the fifth rod moves and the height of its centre is
@@ -95,9 +99,11 @@ class Vehicle:
     wheel_center: str
     static_toe: float = 0.0
     static_camber: float = 0.0
+    wheel_axis: str | None = None
     middle: Vector = (0.0, 0.0, 0.0)
     axle: Axle | None = None
     wheel_radius: float | None = None
+    wheel_contact: str | None = None
     kingpin: tuple[str, str] | tuple[tuple[str, str], ...] | None = None
     wheelbase: float | None = None
     cg_height: float | None = None
@@ -121,32 +127,51 @@ class Vehicle:
         """Global unit vector to the left or to the right, away from the centre plane."""
         return self.side.left * cross(vec(self.up), vec(self.forward))
 
-    @property
-    def spin(self) -> Vec3:
-        """Global unit vector along the wheel's axis of rotation at design, outboard."""
-        toe, camber = self.static_toe, self.static_camber
-        level = math.sin(toe) * vec(self.forward) + math.cos(toe) * self.outboard
-        return math.cos(camber) * level + -math.sin(camber) * vec(self.up)
+    def spin(self, mechanism: Mechanism) -> Vec3:
+        """Return the global unit vector along the wheel's axis of rotation at design, outboard."""
+        if self.wheel_axis is None:
+            toe, camber = self.static_toe, self.static_camber
+            level = math.sin(toe) * vec(self.forward) + math.cos(toe) * self.outboard
+            return math.cos(camber) * level + -math.sin(camber) * vec(self.up)
+        along = self._arm(mechanism, self.wheel_axis)
+        return (1.0 / math.sqrt(along @ along)) * along
+
+    def radius(self, mechanism: Mechanism) -> float | None:
+        """Return the wheel's radius at design [m]; None if unknown."""
+        if self.wheel_contact is None:
+            return self.wheel_radius
+        ends = (mechanism.point(name) for name in (self.wheel_center, self.wheel_contact))
+        return math.dist(*(end.position for end in ends))
+
+    def aside(self, mechanism: Mechanism) -> float:
+        """Return how far outboard of the wheel centre the point of the axis is at design [m]."""
+        assert self.wheel_axis is not None
+        return self.outboard @ self._arm(mechanism, self.wheel_axis)
+
+    def _arm(self, mechanism: Mechanism, point: str) -> Vec3:
+        center = mechanism.point(self.wheel_center).position
+        return vec(mechanism.point(point).position) - vec(center)
 
     @property
     def spin_marker(self) -> str:
         """Name of the carrier's point on the axis of rotation, outboard of the wheel centre."""
-        return f"{MARKER}{self.wheel_center}.spin"
+        return self.wheel_axis or f"{MARKER}{self.wheel_center}.spin"
 
     @property
     def top_marker(self) -> str:
-        """Name of the carrier's point beside the wheel centre in the wheel plane, up at design."""
-        return f"{MARKER}{self.wheel_center}.top"
+        """Name of a point of the carrier beside the axis of rotation, above or below the centre."""
+        return self.wheel_contact or f"{MARKER}{self.wheel_center}.top"
 
-    def marker_positions(self, center: Vector) -> dict[str, Vector]:
-        """Return the positions of both markers at design, by name [m]."""
-        s, u = self.spin, vec(self.up)
-        top = u - (u @ s) * s
-        top = (1.0 / math.sqrt(top @ top)) * top
-        sides = {self.spin_marker: s, self.top_marker: top}
-        return {
-            name: triple(vec(center) + MARKER_DISTANCE * along) for name, along in sides.items()
-        }
+    def markers(self, mechanism: Mechanism) -> dict[str, Vector]:
+        """Return the positions of the points that the mechanism lacks at design, by name [m]."""
+        sides: dict[str, Vec3] = {}
+        if self.wheel_axis is None:
+            sides[self.spin_marker] = self.spin(mechanism)
+        if self.wheel_contact is None:
+            sides[self.top_marker] = vec(self.up)
+        center = vec(mechanism.point(self.wheel_center).position)
+        places = {name: center + MARKER_DISTANCE * along for name, along in sides.items()}
+        return {name: (at.x, at.y, at.z) for name, at in places.items()}
 
     @property
     def signs(self) -> str:

@@ -104,7 +104,7 @@ def camber_of_front_view(seen: Array, toe: Array) -> Array:
 
 @dataclass(frozen=True)
 class _Shift(Change):
-    reads = ("wheel_center", "spin_marker")
+    reads = ("wheel_center", "spin_marker", "wheel_contact")
 
     at: Place = Place.CONTACT
 

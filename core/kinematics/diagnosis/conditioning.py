@@ -2,13 +2,13 @@
 hardpoints.
 
 With J the solved rows and phi their residuals at a pose that closes, q the unknowns and g the
-numbers of the geometry,
+parameters of the geometry,
 
     dq = J^-1 d(residual)          shift of the pose by a solver's residuals
     dq = -J^-1 (d phi / dg) dg     shift of the pose by a moved hardpoint, drivers held
 
 so both are one factorisation and no neighbouring design is solved; d phi / dg is exact (see
-`dual_numbers`). A redundant row, left out of J, need not hold for the changed geometry: its
+`core.dual_numbers`). A redundant row, left out of J, need not hold for the changed geometry: its
 residual is the contradiction in this geometry.
 """
 
@@ -50,8 +50,8 @@ class PoseConditioning:
             more, followed from pose to pose.
         direction: the motion least determined by the rows.
         points: gradients by point.
-        contradicted: derivative of each redundant row's residual by the numbers of the places,
-            shape (redundant rows, numbers).
+        contradicted: derivative of each redundant row's residual by the parameters of the geometry,
+            shape (redundant rows, parameters).
     """
 
     value: float
@@ -76,13 +76,10 @@ class Conditioning:
     Attributes:
         trajectory: of the whole sweep, with its message if it cannot be followed.
         poses: at the examined samples, without those not reached.
-        numbers: place and component of each number of the geometry, and the length of its vector
-            for a direction, else 1.
     """
 
     trajectory: Trajectory
     poses: Sequence[PoseConditioning]
-    numbers: Sequence[tuple[str, int, float]]
 
 
 def conditioning(
@@ -90,7 +87,7 @@ def conditioning(
     path: Path,
     values: Array,
     points: Sequence[str],
-    varied: Sequence[str],
+    moves: Mapping[str, Array],
     samples: int,
     tol: float,
 ) -> Conditioning:
@@ -99,7 +96,8 @@ def conditioning(
     Args:
         values: reported value of the sweep at each sample.
         points: names of the observed points.
-        varied: places of the geometry to vary; see `places`.
+        moves: derivatives of the numbers of each place of the geometry that depends on parameters,
+            see `places`, shape (numbers, parameters).
 
     Raises:
         SolveError: the mechanism cannot be solved as described.
@@ -114,7 +112,7 @@ def conditioning(
         int(k) for k in np.linspace(0, len(path.times) - 1, min(samples, len(path.times))).round()
     }
     at |= {int(np.abs(path.times).argmin()), *(reached[[0, -1]].tolist() if len(reached) else [])}
-    geometry = Geometry(mechanism, varied)
+    geometry = Geometry(mechanism, moves)
     elsewhere = placed(mechanism, geometry.slopes)
     looked, matrices = list[PoseConditioning](), list[Array]()
     seen = sorted(at & set(reached.tolist()))
@@ -164,7 +162,6 @@ def conditioning(
     return Conditioning(
         found,
         [replace(pose, orientation=x) for pose, x in zip(looked, turned, strict=True)],
-        geometry.numbers,
     )
 
 

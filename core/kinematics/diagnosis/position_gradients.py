@@ -1,14 +1,13 @@
 """Gradients of point positions by residuals and by geometry."""
 
-import math
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ...algebra import Vec3, vec
-from ...joints import Kind
+from ...dual_numbers import Slope, derivatives
 from ...mechanism.mechanism import Mechanism, Point
 from ...primitives.base import GROUND_POSE, Twist
 from ...trajectory import Array
@@ -16,8 +15,7 @@ from ..formulation.body_kinematics import position_of
 from ..formulation.cartesian import Cartesian
 from ..formulation.constraints import Frames
 from ..formulation.formulation import Configuration
-from ..formulation.parameters import kinds, places
-from .dual_numbers import Slope, derivatives
+from ..formulation.parameters import places
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,8 +25,8 @@ class Gradient:
     Attributes:
         position: at the sample and at design, global [m], shape (3,).
         by_residuals: by the residuals of the solved rows [m or rad], shape (3, rows).
-        by_geometry: by the numbers of the places, shape (3, numbers).
-        design_by_geometry: of the position at design, shape (3, numbers).
+        by_geometry: by the parameters of the geometry, shape (3, parameters).
+        design_by_geometry: of the position at design, shape (3, parameters).
     """
 
     position: Array
@@ -39,37 +37,23 @@ class Gradient:
 
 
 class Geometry:
-    """The varied places.
+    """A geometry that depends on parameters.
 
     Attributes:
-        slopes: their values by place, each number with its derivatives by all of them.
-        numbers: as `Conditioning.numbers`.
+        slopes: values of the places that move, each number with its derivatives by all parameters.
+        parameters: number of parameters.
     """
 
-    def __init__(self, mechanism: Mechanism, varied: Sequence[str]) -> None:
-        every, holds = places(mechanism), kinds(mechanism)
-        values = {place: every[place] for place in varied}
-        # a derivative by the components of a direction becomes one by its angle
-        lengths = {
-            place: math.hypot(*value)
-            for place, value in values.items()
-            if holds[place] is Kind.DIRECTION
-        }
-        self.numbers = [
-            (place, k, lengths.get(place, 1.0))
-            for place, value in values.items()
-            for k in range(len(value))
-        ]
-        rows = iter(np.eye(len(self.numbers)))
-        self.slopes = {
-            place: tuple(Slope(x, next(rows)) for x in value) for place, value in values.items()
-        }
+    def __init__(self, mechanism: Mechanism, moves: Mapping[str, Array]) -> None:
+        values = places(mechanism)
+        self.slopes = {place: tuple(map(Slope, values[place], moves[place])) for place in moves}
+        self.parameters = next((moves[place].shape[1] for place in moves), 0)
 
     def derivatives_of(self, x: Any) -> Array:
-        """Return the derivatives of a number by all numbers of the places, shape (numbers,); zero
-        for an independent number.
+        """Return the derivatives of a number by all parameters, shape (parameters,); zero for an
+        independent number.
         """
-        return np.broadcast_to(derivatives(x), (len(self.numbers),))
+        return np.broadcast_to(derivatives(x), (self.parameters,))
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,8 +63,8 @@ class Dependence:
     Attributes:
         by_residuals: derivatives of the unknowns by the residuals of the solved rows [m or rad],
             shape (unknowns, rows).
-        by_geometry: derivatives of the unknowns by the numbers of the places, shape (unknowns,
-            numbers).
+        by_geometry: derivatives of the unknowns by the parameters of the geometry, shape
+            (unknowns, parameters).
     """
 
     formulation: Cartesian

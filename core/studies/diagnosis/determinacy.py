@@ -38,7 +38,7 @@ class Determinacy(msgspec.Struct, frozen=True):
 
     Attributes:
         joints: how many were looked at: those of the outputs, or all.
-        partly: those that are not wholly determined.
+        partly: joints not wholly determined.
         efforts: drivers whose efforts are undetermined.
     """
 

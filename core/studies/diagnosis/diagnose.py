@@ -7,7 +7,7 @@ from __future__ import annotations
 import msgspec
 import numpy as np
 
-from ...case.case import MARKER, ORDERS, Case
+from ...case.case import ORDERS, Case
 from ...case.notes import notes
 from ...errors import SolveError, number_of, shortened
 from ...harness.program_account import explain
@@ -23,8 +23,8 @@ from ...kinematics import (
     conditioning,
     describe_screws,
     freeing,
-    places,
 )
+from ..variation.places import Geometry
 from .determinacy import Determinacy, determinacy
 from .outputs import Budget, Sensitivity, binding, budgets, read_points, sensitivities
 
@@ -71,6 +71,7 @@ class Diagnosis(msgspec.Struct, frozen=True):
         notes: remarks on the joints' geometry.
         freeing: joints of which any one, taken out alone, frees the blocked drivers.
         binding: numbers of the geometry not to be changed alone: redundant rows contradict then.
+        moves: places of the case that follow each hardpoint, direction or length, by its name.
         signs: sign conventions of the outputs; empty without.
         not_derived: outputs of more than the pose, without budget and sensitivities.
         programs: lines on the native engine's programs and the parts left out.
@@ -97,6 +98,7 @@ class Diagnosis(msgspec.Struct, frozen=True):
     budgets: list[Budget]
     sensitivities: list[Sensitivity]
     binding: list[str]
+    moves: dict[str, list[str]]
     signs: str
     not_derived: list[str]
     programs: list[str]
@@ -126,20 +128,19 @@ def diagnose(case: Case, *, samples: int, tol: float) -> Diagnosis:
     ranks = Ranks(mechanism)
     account = ranks.account
     findings = _findings(ranks)
+    geometry = Geometry(case)
+    variables = geometry.variables
     swept: Conditioning | None = None
     programs: list[str] = []
     if not findings:
         try:
             programs = explain(case)
-            varied = [
-                place for place in places(mechanism) if not place.startswith(f"points.{MARKER}")
-            ]
             swept = conditioning(
                 mechanism,
                 case.sweep.path,
                 case.sweep.values,
                 read_points(case),
-                varied,
+                geometry.moves(variables),
                 samples,
                 tol,
             )
@@ -178,8 +179,9 @@ def diagnose(case: Case, *, samples: int, tol: float) -> Diagnosis:
         samples=_samples(swept) if swept else [],
         redundant_residual=swept.trajectory.details["redundant_residual"] if swept else None,
         budgets=budgets(case, swept, tol, design) if swept and derived else [],
-        sensitivities=sensitivities(case, swept, design) if swept and derived else [],
-        binding=binding(swept) if swept and derived else [],
+        sensitivities=sensitivities(case, swept, design, variables) if swept and derived else [],
+        binding=binding(swept, variables) if swept and derived else [],
+        moves={each.name: each.places for each in variables},
         signs=case.signs,
         not_derived=[output.name for output in case.outputs if output.orders != ORDERS],
         programs=programs,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Sequence
 
 import msgspec
@@ -13,8 +12,9 @@ from ...algebra import Vec3, vec
 from ...case.case import ORDERS, Case, Quantity
 from ...jet import Jet
 from ...joints import Kind
-from ...kinematics import Conditioning, Gradient, PoseConditioning, kinds
+from ...kinematics import Conditioning, Gradient, PoseConditioning
 from ...trajectory import Array
+from ..variation.places import Variable
 
 # The house formula for tolerances: 10 for engines that scale their rows otherwise, 10 for
 # accelerations, whose rows carry rates.
@@ -52,7 +52,8 @@ class Sensitivity(msgspec.Struct, frozen=True):
     """Derivative of an output by one number of the geometry, drivers held.
 
     Attributes:
-        number: "joints.NAME.point x", "joints.NAME.length".
+        number: row and axis of a table, "lca_front x"; else the first place at a point, and the
+            axis, "joints.NAME.point x"; or "joints.NAME.length".
         unit: the output's unit by m, or by rad for a direction.
         by_sample: at the examined samples.
     """
@@ -107,46 +108,40 @@ def _budget(output: Quantity, found: Conditioning, tol: float, design: dict[str,
     )
 
 
-def sensitivities(case: Case, found: Conditioning, design: dict[str, Array]) -> list[Sensitivity]:
+def sensitivities(
+    case: Case, found: Conditioning, design: dict[str, Array], variables: Sequence[Variable]
+) -> list[Sensitivity]:
     """Return the nonzero derivatives, the largest of each output first."""
-    scales = np.array([scale for _, _, scale in found.numbers])
-    names, turning = (
-        _names(found),
-        [place for place, kind in kinds(case.mechanism).items() if kind is Kind.DIRECTION],
-    )
+    numbers = [
+        (name, "rad" if each.kind is Kind.DIRECTION else "m")
+        for each in variables
+        for name in each.numbers
+    ]
     result: list[Sensitivity] = []
     for output in case.outputs:
         if output.orders != ORDERS:
             continue
         table = np.array(
-            [_derivative(output, pose, design, "by_geometry")[1] * scales for pose in found.poses]
+            [_derivative(output, pose, design, "by_geometry")[1] for pose in found.poses]
         )
         own: list[Sensitivity] = []
-        for k, (place, _, _) in enumerate(found.numbers):
-            if np.abs(table[:, k]).max() > NOTHING:
-                by = f"{output.unit}/{'rad' if place in turning else 'm'}"
-                own.append(Sensitivity(output.name, names[k], by, table[:, k].tolist()))
+        for slopes, (name, unit) in zip(table.T, numbers, strict=True):
+            if np.abs(slopes).max() > NOTHING:
+                by = f"{output.unit}/{unit}"
+                own.append(Sensitivity(output.name, name, by, slopes.tolist()))
         result += sorted(own, key=lambda each: -abs(each.largest))
     return result
 
 
-def binding(found: Conditioning) -> list[str]:
+def binding(found: Conditioning, variables: Sequence[Variable]) -> list[str]:
     """Return the numbers of the geometry not to be changed alone: redundant rows would contradict
     the others.
     """
     contradicted = np.max(
         [np.abs(pose.contradicted).max(axis=0, initial=0.0) for pose in found.poses], axis=0
     )
-    return [name for name, rate in zip(_names(found), contradicted, strict=True) if rate > NOTHING]
-
-
-def _names(found: Conditioning) -> list[str]:
-    """Return the names of the geometry's numbers; a length has no components."""
-    count = Counter(place for place, _, _ in found.numbers)
-    return [
-        place if count[place] == 1 else f"{place} {'xyz'[component]}"
-        for place, component, _ in found.numbers
-    ]
+    names = [name for each in variables for name in each.numbers]
+    return [name for name, rate in zip(names, contradicted, strict=True) if rate > NOTHING]
 
 
 def _derivative(

@@ -227,6 +227,9 @@ def _sensitivities(found: Diagnosis, most: int) -> Iterator[Text | Table]:
         name = each.output if shown[each.output] == 1 else ""
         table.add_row(name, each.number, f"{each.largest:+.4g}", each.unit, f"{at:.4g}")
     yield table
+    together = [places for name, places in found.moves.items() if name in places[:-1]]
+    if together:
+        yield Text(f"moved together: {listed([' = '.join(each) for each in together])}")
     if found.binding:
         places = dict.fromkeys(number.removesuffix(" " + number[-1]) for number in found.binding)
         yield Text(

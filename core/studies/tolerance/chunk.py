@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from ...trajectory import Array
 from .reduce import Summary
 
-COUNTS = 5
-"""Counts of a limit, five numbers of variants: all; with a sample below; with a sample above; with
-a sample outside; with missing samples and none outside.
+COUNTS = 7
+"""Counts of a limit, seven numbers of variants: all; incomplete; with a sample below, and with a
+sample above; then of the complete ones: with a sample below, above and outside.
 """
 
 
@@ -32,24 +32,32 @@ class RowLimit:
         return max(abs(each) for each in (self.low, self.high) if math.isfinite(each))
 
 
-def limit_counts(values: Array, limits: Sequence[RowLimit]) -> NDArray[np.int64]:
+def limit_counts(
+    values: Array, solved: NDArray[np.bool_], nominal: Array, limits: Sequence[RowLimit]
+) -> NDArray[np.int64]:
     """Return the counts of each limit, then of all together, shape (limits + 1, COUNTS).
+
+    A variant is incomplete if a sample is not reached, or if the limited row lacks a value at a
+    sample where the nominal design has one, or at all samples.
 
     Args:
         values: values of variants, NaN if missing, shape (rows, n, V).
+        solved: whether each sample is reached, shape (n, V).
+        nominal: values of the nominal design, shape (rows, n).
     """
-    found = np.zeros((len(limits) + 1, COUNTS), dtype=np.int64)
-    if not limits:
-        return found
     states: list[NDArray[np.bool_]] = []
     for each in limits:
-        row = values[each.row]
+        row, missing = values[each.row], np.isnan(values[each.row])
+        lacking = missing[np.isfinite(nominal[each.row])].any(axis=0) | missing.all(axis=0)
+        incomplete = ~solved.all(axis=0) | lacking
         below, above = (row < each.low).any(axis=0), (row > each.high).any(axis=0)
-        states.append(np.stack([below, above, below | above, np.isnan(row).any(axis=0)]))
+        states.append(np.stack([incomplete, below, above]))
     states.append(np.logical_or.reduce(states))
-    for counts, state in zip(found, states, strict=True):
-        state[3] &= ~state[2]
-        counts[:] = [values.shape[2], *state.sum(axis=1)]
+    found = np.empty((len(states), COUNTS), dtype=np.int64)
+    for counts, (incomplete, below, above) in zip(found, states, strict=True):
+        complete = [each & ~incomplete for each in (below, above, below | above)]
+        some = [incomplete, below, above, *complete]
+        counts[:] = [values.shape[2], *(each.sum() for each in some)]
     return found
 
 

@@ -1,8 +1,10 @@
 """Variants inside and outside of specification limits, and capability indices.
 
 A variant is inside the limits of an output if it is inside at every sample. It is outside if it is
-outside at any sample. A variant with missing samples is unknown unless another sample is outside.
-The yield is the share of inside variants among the known variants.
+outside at any sample. An incomplete variant does not reach all samples, or lacks a value of the
+output at a sample where the nominal design has one. It is outside too, as it was never seen to be
+inside; or all incomplete variants are left out, whatever their other samples are. The yield is the
+share of inside variants among the judged ones.
 
     Cp  = (high - low) / (6 s)
     Cpk = min(high - m, m - low) / (3 s)
@@ -27,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...trajectory import Array
-from ..variation.modes import Mode
+from ..variation.modes import Incomplete, Mode
 from .reduce import Summary
 from .study import Study
 
@@ -44,11 +46,14 @@ class Capability(msgspec.Struct, frozen=True, kw_only=True):
     Attributes:
         output: name of the output; empty for all limits together.
         low, high: the limits; null without a limit.
-        known: number of variants inside or outside.
-        below, above: number of variants below or above at some sample; a variant may be both.
-        outside: number of variants outside at some sample.
-        unknown: number of variants with missing samples and no sample outside.
+        known: number of judged variants: all, or the complete ones.
+        below, above: number of judged variants below or above at some sample; a variant may be
+            both.
+        outside: number of judged variants outside.
+        incomplete: number of incomplete variants.
         share: the yield, (known - outside) / known.
+        share_of_all, share_of_complete: the yield with incomplete variants outside and left out;
+            one of them is `share`.
         interval: 95 % confidence interval of the yield, by Clopper and Pearson; null unless
             the variants are drawn.
         cp, cpk, by_quantiles: smallest index over the samples; null if the spread is zero or no
@@ -64,8 +69,10 @@ class Capability(msgspec.Struct, frozen=True, kw_only=True):
     below: int
     above: int
     outside: int
-    unknown: int
+    incomplete: int
     share: float | None
+    share_of_all: float | None
+    share_of_complete: float | None
     interval: tuple[float, float] | None
     cp: float | None = None
     cpk: float | None = None
@@ -90,7 +97,11 @@ class _Least:
 
 
 def capabilities(
-    study: Study, counts: NDArray[np.int64], whole: Summary, kept: Sequence[Sequence[Array]]
+    study: Study,
+    counts: NDArray[np.int64],
+    whole: Summary,
+    kept: Sequence[Sequence[Array]],
+    incomplete: Incomplete,
 ) -> list[Capability]:
     """Return the conformance of every limited output, then of all limits together.
 
@@ -101,15 +112,21 @@ def capabilities(
     if not study.limits:
         return []
     found = [
-        _with_indices(study, k, _of_counts(study, k, counts[k]), whole, kept)
+        _with_indices(study, k, _of_counts(study, k, counts[k], incomplete), whole, kept)
         for k in range(len(study.limits))
     ]
-    return [*found, _of_counts(study, None, counts[-1])]
+    return [*found, _of_counts(study, None, counts[-1], incomplete)]
 
 
-def _of_counts(study: Study, index: int | None, counts: NDArray[np.int64]) -> Capability:
-    total, below, above, outside, unknown = map(int, counts)
-    known = total - unknown
+def _of_counts(
+    study: Study, index: int | None, counts: NDArray[np.int64], incomplete: Incomplete
+) -> Capability:
+    total, lacking, *of_all = map(int, counts[:4])
+    *of_complete, off = map(int, counts[4:])
+    complete = total - lacking
+    inside = complete - off
+    ignored = incomplete is Incomplete.IGNORE
+    known, (below, above) = (complete, of_complete) if ignored else (total, of_all)
     drawn = study.variation.mode is Mode.MONTE_CARLO
     limit = None if index is None else study.limits[index]
     row = None if limit is None else study.rows[limit.row]
@@ -121,10 +138,12 @@ def _of_counts(study: Study, index: int | None, counts: NDArray[np.int64]) -> Ca
         known=known,
         below=below,
         above=above,
-        outside=outside,
-        unknown=unknown,
-        share=(known - outside) / known if known else None,
-        interval=_interval(known - outside, known) if known and drawn else None,
+        outside=known - inside,
+        incomplete=lacking,
+        share=inside / known if known else None,
+        share_of_all=inside / total if total else None,
+        share_of_complete=inside / complete if complete else None,
+        interval=_interval(inside, known) if known and drawn else None,
     )
 
 

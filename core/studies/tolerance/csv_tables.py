@@ -62,17 +62,19 @@ def gradient_csv(results: SweepResults) -> str:
 
 def limits_csv(results: SweepResults) -> str:
     """Return a line for each limited output, and one for all limits together."""
-    columns = ["output", "unit", "low", "high", "known", "below", "above", "outside", "unknown"]
-    columns += ["yield", "yield_from", "yield_to", "cp", "cpk", "cpk_by_quantiles", "sample"]
+    columns = ["output", "unit", "low", "high", "known", "below", "above", "outside", "incomplete"]
+    columns += ["yield", "yield_from", "yield_to", "yield_of_all", "yield_of_complete"]
+    columns += ["cp", "cpk", "cpk_by_quantiles", "sample"]
     rows: list[Sequence[Any]] = []
     for each in results.limits:
         unit, scale = results.shown_unit(each.unit)
-        counts = (each.known, each.below, each.above, each.outside, each.unknown)
+        counts = (each.known, each.below, each.above, each.outside, each.incomplete)
         interval = each.interval or (None, None)
         indices = (each.cp, each.cpk, each.by_quantiles, each.sample)
         limits = scaled(scale, [each.low, each.high])
         name = each.output or "all"
-        rows.append([name, unit, *limits, *counts, each.share, *interval, *indices])
+        shares = (each.share_of_all, each.share_of_complete)
+        rows.append([name, unit, *limits, *counts, each.share, *interval, *shares, *indices])
     return _csv(columns, rows)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from ...errors import number_of
+from ..variation.modes import Incomplete
 from .conformance import Capability
 from .results import SweepResults
 
@@ -19,12 +21,33 @@ def limit_notes(results: SweepResults) -> list[str]:
             f"The confidence interval assumes independent variants; for {results.sampling}"
             " sampling it is usually too wide."
         )
-    if unknown := max((each.unknown for each in results.limits), default=0):
+    if some := incomplete(results):
+        variants = number_of(some, "variant")
         lines.append(
-            f"{unknown} variants with missing samples are neither inside nor outside, and do not"
-            " count in the yield."
+            f"Incomplete, and left out: {variants} without all samples."
+            if results.incomplete == Incomplete.IGNORE
+            else f"Incomplete, and so outside: {variants} without all samples; --incomplete ignore"
+            " leaves them out."
         )
+        if any(each.cpk is not None for each in results.limits):
+            lines.append("Cp and Cpk are of all variants with a value at the sample.")
     return lines
+
+
+def incomplete(results: SweepResults) -> int:
+    """Return the number of incomplete variants."""
+    return max((each.incomplete for each in results.limits), default=0)
+
+
+def other_yield(results: SweepResults) -> list[tuple[str, str]]:
+    """Return head and attribute of the yield that is not judged; none without incomplete variants,
+    as both are equal.
+    """
+    if not incomplete(results):
+        return []
+    if results.incomplete == Incomplete.IGNORE:
+        return [("yield of all", "share_of_all")]
+    return [("yield of complete", "share_of_complete")]
 
 
 def percent(share: float | None) -> str:

@@ -16,7 +16,7 @@ from ...report.figures import Figure, layout_over
 from ...report.page_parts import environment, figure_parts
 from ...unit_text import with_unit
 from .histograms import Histogram
-from .limit_words import interval, limit_notes, percent
+from .limit_words import interval, limit_notes, other_yield, percent
 from .output_view import DIGITS, OutputView, scaled_number
 from .results import Gradient, Numbers, SweepResults
 
@@ -78,6 +78,7 @@ def page(results: SweepResults) -> str:
             shown=partial(in_file_unit, results),
             shown_unit=results.shown_unit,
             limit_notes=limit_notes(results),
+            other_yield=other_yield(results),
             percent=percent,
             interval=interval,
             **figure_parts(figures, drivers={"sweep": axis.shown}),

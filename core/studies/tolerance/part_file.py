@@ -22,7 +22,7 @@ from ...history.run_digest import digest
 from .chunk import Chunk
 from .study import Study
 
-MAGIC = b"kincheck-part/1\n"
+MAGIC = b"kincheck-part/2\n"
 HASH = hashlib.sha256().digest_size
 LENGTH = 8
 

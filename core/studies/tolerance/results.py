@@ -126,6 +126,7 @@ class SweepResults(Tabular, msgspec.Struct, frozen=True, kw_only=True):
         sampling: choice of the drawn variants: random, latin or sobol.
         length_unit, angle_unit: units of tables and figures.
         limits: conformance to the specification limits; the last entry is of all limits together.
+        incomplete: judgement of variants that do not reach all samples: outside or ignore.
         driver: values at the samples by name, as in a run's records.
         unsolved: number of variants without a solution at some samples; `failed` lists the first.
         retried: number of variants solved again alone, with divided steps.
@@ -158,6 +159,7 @@ class SweepResults(Tabular, msgspec.Struct, frozen=True, kw_only=True):
     length_unit: str = "m"
     angle_unit: str = "rad"
     limits: list[Capability] = []
+    incomplete: str = "outside"
 
     def shown_unit(self, unit: str) -> tuple[str, float]:
         """Return the unit of tables and figures for an SI unit, and the factor to it."""

@@ -247,7 +247,8 @@ class Ready:
             part = slice(start, min(start + self.lanes, count))
             values, solved, again, messages = self.values(offsets[:, part])
             totals.take(values, first + start)
-            limited += limit_counts(values, study.limits)
+            if study.limits:
+                limited += limit_counts(values, solved, self.nominal, study.limits)
             kept.append(values[:, :, chosen[part]])
             picked |= {k: values[:, :, k - first - start].copy() for k in self._picked(first, part)}
             failures += len(messages)

@@ -19,7 +19,7 @@ from ...harness.execution import Solver
 from ...harness.interrupts import deferred, hold
 from ...harness.provenance import circumstances
 from ...harness.workers.distributed import ClusterError
-from ..variation.modes import Mode, Sampling
+from ..variation.modes import Incomplete, Mode, Sampling
 from ..variation.variation import Variation
 from . import cross_check, result_tables, results
 from .chunk import Chunk
@@ -80,6 +80,7 @@ def sweep_designs(
     seed: int = 0,
     sampling: Sampling = Sampling.RANDOM,
     order: int = 0,
+    incomplete: Incomplete = Incomplete.OUTSIDE,
     tol: float = 1e-12,
     jobs: int = 1,
     source: Source | None = None,
@@ -99,6 +100,7 @@ def sweep_designs(
         seed: seed of the draws; equal seeds give equal variants on any machine with any `jobs`.
         sampling: choice of the drawn points.
         order: highest time derivative of the outputs to reduce: 0, 1 or 2.
+        incomplete: judgement of variants that do not reach all samples, by the limits.
         tol: largest accepted constraint residual, relative to the mechanism's size.
         jobs: number of threads.
         source: solver of the chunks; None for threads of this process.
@@ -178,7 +180,7 @@ def sweep_designs(
         and found.done == study.samples
     )
     by_row = [[each[k] for each in found.kept] for k in range(len(study.rows))]
-    limits = capabilities(study, found.limited, found.summary, by_row)
+    limits = capabilities(study, found.limited, found.summary, by_row, incomplete)
     histograms = [
         histogram(parts, worst_sample(study, limits, found.summary, k))
         for k, parts in enumerate(by_row)
@@ -202,6 +204,7 @@ def sweep_designs(
         angle_unit=variation.units.angle,
         outputs=result_tables.envelopes(study, found.summary, kept, ready.nominal, histograms),
         limits=limits,
+        incomplete=str(incomplete),
         quantiles_of=kept[0].kept,
         gradients=result_tables.gradient_table(study, slopes),
         gradient_messages={

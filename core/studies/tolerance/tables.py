@@ -12,7 +12,7 @@ from ...report import terminal
 from ...report.fitting_table import FittingTable
 from ...report.table import print_signs
 from .histograms import sparkline
-from .limit_words import interval, limit_notes, percent
+from .limit_words import interval, limit_notes, other_yield, percent
 from .page import effect, headline
 from .results import Envelope, Numbers, SweepResults
 
@@ -95,7 +95,9 @@ def _print_limits(results: SweepResults, console: Console) -> None:
     table = FittingTable(title="Specification limits")
     table.add_column("output")
     table.add_column("unit")
-    for name in ("low", "high", "below", "above", "yield", "95 % interval", "Cp", "Cpk"):
+    other = other_yield(results)
+    beside = [head.replace(" of", "\nof") for head, _ in other]
+    for name in ("low", "high", "below", "above", "yield", "95 % interval", *beside, "Cp", "Cpk"):
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("Cpk by\nquantiles", justify="right", no_wrap=True)
     for each in results.limits:
@@ -107,6 +109,7 @@ def _print_limits(results: SweepResults, console: Console) -> None:
             *(str(each.below), str(each.above)),
             percent(each.share),
             interval(each),
+            *(percent(getattr(each, share)) for _, share in other),
             *(number(value) for value in (each.cp, each.cpk, each.by_quantiles)),
         )
     console.print()

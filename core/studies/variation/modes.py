@@ -13,6 +13,13 @@ class Mode(StrEnum):
     ONE_AT_A_TIME = "one_at_a_time"
 
 
+class Incomplete(StrEnum):
+    """Judgement of variants that do not reach all samples, by specification limits."""
+
+    OUTSIDE = "outside"
+    IGNORE = "ignore"
+
+
 class Sampling(StrEnum):
     """Choice of the points of a Monte Carlo study."""
 

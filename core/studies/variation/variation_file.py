@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -21,9 +22,11 @@ from .correlations import Correlation, problem_of
 from .file_units import FileUnits, unit_of_offsets
 from .limits import read_limits
 from .modes import Mode
-from .places import Geometry, PlaceError
+from .places import Geometry, PlaceError, Variable
 from .variation import Coordinate, Variation
 from .variation_schema import SCHEMA, CorrelationKeys, HardpointKeys, LineKeys, VaryKeys, VaryUnits
+
+_Named = TypeVar("_Named")
 
 LARGEST_FILE = 1_000_000
 # Case files give directions to about five digits; with a larger error, the direction is not along
@@ -46,9 +49,9 @@ def read_variation(path: str | Path, case: Case) -> Variation:
 
 @dataclass(frozen=True, eq=False)
 class _Block:
-    """Coordinates of one hardpoint, and the places moved by its offsets, each with a factor."""
+    """Coordinates of one hardpoint, each with its index in it, and what they move."""
 
-    places: Mapping[str, float]
+    moved: Variable
     coordinates: list[tuple[int, Coordinate]]
 
 
@@ -56,20 +59,11 @@ class _Reader:
     def __init__(self, file: Path, keys: VaryKeys, case: Case) -> None:
         self.file, self.keys, self.case = file, keys, case
         self.units = typed(file, "units", keys.units, VaryUnits)
-        self.geometry = Geometry(case.mechanism)
+        self.geometry = Geometry(case)
 
     def variation(self) -> Variation:
         blocks = {name: self._block(name, table) for name, table in self.keys.hardpoints.items()}
-        owners: dict[str, str] = {}
-        for name, block in blocks.items():
-            for place in block.places:
-                if owner := owners.get(place):
-                    problem = (
-                        f"moves {place}, as does hardpoints.{owner}, expected one of them to; give"
-                        " one `only`"
-                    )
-                    raise fault(self.file, join("hardpoints", name), problem)
-                owners[place] = name
+        self._check_owners({name: block.moved for name, block in blocks.items()})
         coordinates = [each for block in blocks.values() for _, each in block.coordinates]
         if not coordinates:
             raise fault(
@@ -78,12 +72,10 @@ class _Reader:
         moves: dict[str, Array] = {}
         column = 0
         for block in blocks.values():
-            for row, _ in block.coordinates:
-                for place, factor in block.places.items():
-                    size = len(self.geometry.values[place])
-                    moves.setdefault(place, np.zeros((size, len(coordinates))))[row, column] = (
-                        factor
-                    )
+            for number, _ in block.coordinates:
+                for place, each in block.moved.moves.items():
+                    still = np.zeros((len(each), len(coordinates)))
+                    moves.setdefault(place, still)[:, column] = each[:, number]
                 column += 1
         for name, table in self.keys.lines.items():
             self._line(join("lines", name), table, moves)
@@ -104,43 +96,52 @@ class _Reader:
     def _block(self, name: str, table: object) -> _Block:
         key = join("hardpoints", name)
         keys = typed(self.file, key, table, HardpointKeys)
-        place = self._found(join(key, "at"), keys.at)
-        kind = self.geometry.kinds[place]
-        together = self.geometry.together(place)
+        moved = self._found(join(key, "at"), keys.at, self.geometry.variable)
         if keys.only is not None:
-            chosen = [self._found(join(key, "only"), each) for each in keys.only]
-            for each in chosen:
-                if each not in together:
-                    problem = (
-                        f"found {shown(each)}, which is not at {place} at design; expected some of"
-                        f" {', '.join(together)}"
-                    )
-                    raise fault(self.file, join(key, "only"), f"{problem}; correct the list")
-            together = tuple(chosen)
-        length = math.hypot(*self.geometry.values[place])
-        factor = length if kind is Kind.DIRECTION else 1.0
-        moved = self.geometry.with_markers(together) if kind is Kind.POSITION else together
-        dimension = self.geometry.dimensions.get(place)
-        unit, scale = unit_of_offsets(self.file, key, self.units, kind, dimension)
+            moved = self._only(join(key, "only"), moved, keys.only)
+        dimension = self.geometry.dimensions.get(moved.name)
+        unit, scale = unit_of_offsets(self.file, key, self.units, moved.kind, dimension)
         reader = CoordinateReader(self.file, key, name, self.keys.mode, unit, scale)
-        coordinates = reader.read(keys, 1 if kind in (Kind.LENGTH, Kind.NUMBER) else 3)
+        coordinates = reader.read(keys, len(moved.numbers))
         if dimension is not None:
-            value = self.geometry.values[place][0]
+            value = self.geometry.values[moved.name][0]
             for _, each in coordinates:
                 reader.require_physical(value, each, dimension)
-        return _Block(dict.fromkeys(moved, factor), coordinates)
+        return _Block(moved, coordinates)
 
-    def _found(self, key: str, name: str) -> str:
+    def _only(self, key: str, moved: Variable, names: Sequence[str]) -> Variable:
+        chosen = [self._found(key, each, self.geometry.find) for each in names]
+        there = [place for place in self.geometry.named if place in moved.moves]
+        for each in chosen:
+            if each not in there:
+                at = f"does not follow {moved.name}" if moved.row else f"is not at {moved.name}"
+                problem = f"found {shown(each)}, which {at} at design; expected some of"
+                raise fault(self.file, key, f"{problem} {', '.join(there)}; correct the list")
+        return self.geometry.only(moved, chosen)
+
+    def _check_owners(self, blocks: Mapping[str, Variable]) -> None:
+        """Refuse what two hardpoints move, unless both are rows of a table, whose moves add up."""
+        owners: dict[str, tuple[str, Variable]] = {}
+        for name, each in blocks.items():
+            for place in each.moves:
+                owner, other = owners.setdefault(place, (name, each))
+                rows = each.row and other.row and each.name != other.name
+                if owner != name and not rows:
+                    problem = f"moves {place}, as does hardpoints.{owner}, expected one of them to"
+                    raise fault(self.file, join("hardpoints", name), f"{problem}; give one `only`")
+
+    def _found(self, key: str, name: str, find: Callable[[str], _Named]) -> _Named:
         try:
-            return self.geometry.find(name)
+            return find(name)
         except PlaceError as error:
             raise fault(self.file, key, f"found {shown(name)}, {error}") from None
 
     def _line(self, key: str, table: object, moves: dict[str, Array]) -> None:
         """Let a direction follow the two positions on its line; unvaried ends are fixed."""
         keys = typed(self.file, key, table, LineKeys)
-        axis = self._found(join(key, "axis"), keys.axis)
-        ends = [self._found(join(key, "through"), each) for each in keys.through]
+        find = self.geometry.find
+        axis = self._found(join(key, "axis"), keys.axis, find)
+        ends = [self._found(join(key, "through"), each, find) for each in keys.through]
         for each, wanted, place in (
             ("axis", Kind.DIRECTION, axis),
             *(("through", Kind.POSITION, end) for end in ends),
@@ -151,12 +152,6 @@ class _Reader:
                     join(key, each),
                     f"found {place}, {kind.value}, expected {wanted.value}; name another",
                 )
-        if axis in moves:
-            raise fault(
-                self.file,
-                join(key, "axis"),
-                f"found {axis}, which varies by itself, expected one that follows; leave out one",
-            )
         direction = np.array(self.geometry.values[axis])
         way = np.subtract(self.geometry.values[ends[1]], self.geometry.values[ends[0]])
         long = float(np.linalg.norm(way))
@@ -169,8 +164,16 @@ class _Reader:
             raise fault(self.file, join(key, "through"), f"{problem}; correct the names")
         still = np.zeros((3, len(next(iter(moves.values()))[0])))
         follows = moves.get(ends[1], still) - moves.get(ends[0], still)
+        follows *= math.copysign(float(np.linalg.norm(direction)) / long, cosine)
+        # the rows of a table move their axes by themselves
+        if axis in moves and not np.allclose(moves[axis], follows, rtol=0.0, atol=ALONG):
+            raise fault(
+                self.file,
+                join(key, "axis"),
+                f"found {axis}, which varies by itself, expected one that follows; leave out one",
+            )
         if follows.any():
-            moves[axis] = math.copysign(float(np.linalg.norm(direction)) / long, cosine) * follows
+            moves.setdefault(axis, follows)
 
     def _check_drivers(self, moves: Mapping[str, Array]) -> None:
         """Refuse a driver by the absolute position of a varied point, as drivers start at each

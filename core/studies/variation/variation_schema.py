@@ -10,16 +10,21 @@ Reference. Keys in brackets may be left out.
     [units]              length = "m" or "mm", required if a position or length varies: no default
                          is safe
                          (angle) = "rad" or "deg", of directions
-    [hardpoints.NAME]    at: a position, direction or length of the case:
+    [hardpoints.NAME]    at: of a table of hardpoints, the name of a row, or its role in the
+                         template: "lca_front". All that follows from the row moves as if it
+                         were moved in the table: joints, axes through it, wheel radius, the other
+                         side of an axle.
+                         Of another case: a position, direction or length:
                          "joints.tie_rod.points.0", "joints.hinge.axis", "joints.rod.length",
                          "points.wheel_center.position"; or the name of a joint or point with
                          one position only: "ball". Every position of the case at the same point at
                          design moves along, so a ball stays at the end of its rod or spring;
                          markers of a wheel's rotation move with its centre.
+                         Such names also find the rows of a table.
                          Or a number of the masses and loads: "bodies.knuckle.mass",
                          "forces.spring.stiffness", damping, free_length or free_angle; or
                          "bodies.knuckle.center_of_mass", which moves alone
-                         (only) = ["joints.ball.point", ...]: just these of them
+                         (only) = ["joints.ball.point", ...]: just these of all that moves
                          sigma, or half_width, or values: a number for all three coordinates or
                          three numbers; 0 does not vary
                          monte_carlo: sigma (normal) or half_width (uniform); or distribution =
@@ -30,9 +35,10 @@ Reference. Keys in brackets may be left out.
                          to half_width
                          one_at_a_time: values, or half_width (both ends; with steps, as in a
                          grid), or sigma (both sides)
-                         offsets are along the case's axes; the offsets of a direction, scaled to
-                         length one, are angles. Masses are in kg; stiffness and damping in N and s
-                         with the units of length and angle, as in a case file
+                         offsets are along the axes of the case, or of its table; the offsets of a
+                         direction, scaled to length one, are angles. Masses are in kg; stiffness
+                         and damping in N and s with the units of length and angle, as in a case
+                         file
     [lines.NAME]         axis = "joints.strut_slide.axis", through = ["strut_foot", "strut_top"]:
                          a direction through two positions as they vary; named like `at`. Other
                          directions do not change.

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+from ....algebra import vec
 from ....mechanism.mechanism import Vector
 from ...case import Case, Quantity, size
 from ...io.coordinates import with_all_coordinates
@@ -15,6 +16,7 @@ from ...io.suspension import with_slopes
 from ...io.tolerance import default
 from ...quantity import with_markers
 from ...suspension import Convention, Side, SuspensionOutput, Vehicle
+from ...suspension.vehicle import MARKER_DISTANCE
 from ...suspension.wheel import Place
 from .axle import STROKE, AxleMotion, name_of
 from .car import Car, read_length
@@ -24,7 +26,6 @@ from .templates.base import (
     WHEEL_CENTER,
     WHEEL_CONTACT,
     Template,
-    between,
     prefixed,
 )
 
@@ -44,12 +45,14 @@ class Wheel:
 
     Attributes:
         radius: distance from the centre to the road in the wheel plane [m]; None if unknown.
-        toe, camber: angles at design [rad].
+        toe, camber: angles at design, unless a point gives the axis of rotation [rad].
+        by_points: whether points give the axis and the radius.
     """
 
     radius: float | None
     toe: float
     camber: float
+    by_points: tuple[bool, bool]
 
 
 def wheel_of(
@@ -58,7 +61,7 @@ def wheel_of(
     at: Mapping[str, Vector],
     radius: str | None,
 ) -> Wheel:
-    """Return the wheel; its radius and attitude follow from points if the table has them.
+    """Return the wheel; its radius and axis follow from points if the table has them.
 
     Args:
         named: names of the points in the file, by role.
@@ -69,17 +72,13 @@ def wheel_of(
         CaseError: a length is unusable or contradicts the points, or the axis points inboard.
     """
     center = at[WHEEL_CENTER.name]
-    toe, camber = table.static_toe, table.static_camber
-    if WHEEL_AXIS.name in at:
-        x, y, z = between(center, at[WHEEL_AXIS.name])
-        if y <= 0.0:
-            raise fault(
-                table.file,
-                named[WHEEL_AXIS.name],
-                f"found a point inboard of {named[WHEEL_CENTER.name]}, expected one outboard;"
-                " mirror it at the wheel's centre",
-            )
-        toe, camber = math.atan2(x, y), math.atan2(-z, math.hypot(x, y))
+    if WHEEL_AXIS.name in at and at[WHEEL_AXIS.name][1] <= center[1]:
+        raise fault(
+            table.file,
+            named[WHEEL_AXIS.name],
+            f"found a point inboard of {named[WHEEL_CENTER.name]}, expected one outboard;"
+            " mirror it at the wheel's centre",
+        )
     contact = at.get(WHEEL_CONTACT.name)
     measured = None if contact is None else math.dist(center, contact)
     if radius is not None and measured is not None:
@@ -98,7 +97,26 @@ def wheel_of(
             f"found a wheel's radius of {given:.6g} m, expected {RADII[0]:g} to {RADII[1]:g} m;"
             " correct it",
         )
-    return Wheel(given, toe, camber)
+    by_points = WHEEL_AXIS.name in at, contact is not None
+    toe, camber = (0.0, 0.0) if by_points[0] else (table.static_toe, table.static_camber)
+    return Wheel(given, toe, camber, by_points)
+
+
+def far_out(at: Mapping[str, Vector]) -> float:
+    """Return the factor from the distance of the given point of the wheel's axis to the distance of
+    markers from the wheel's centre: directions then keep all digits of positions.
+    """
+    axis = at.get(WHEEL_AXIS.name)
+    return 1.0 if axis is None else MARKER_DISTANCE / math.dist(at[WHEEL_CENTER.name], axis)
+
+
+def with_axis(at: Mapping[str, Vector], far: float) -> Mapping[str, Vector]:
+    """Return the positions by role with the point of the wheel's axis so many times as far out."""
+    if WHEEL_AXIS.name not in at:
+        return at
+    center = vec(at[WHEEL_CENTER.name])
+    place = center + far * (vec(at[WHEEL_AXIS.name]) - center)
+    return {**at, WHEEL_AXIS.name: (place.x, place.y, place.z)}
 
 
 def with_suspension_outputs(
@@ -152,7 +170,7 @@ def with_suspension_outputs(
 
 def _vehicle(side: Side, template: Template, wheel: Wheel, car: Car, axle: bool) -> Vehicle:
     """Return the vehicle with the wheel of a side."""
-    prefix = f"{side}_" if axle else ""
+    prefix, (axis, contact) = f"{side}_" if axle else "", wheel.by_points
     return Vehicle(
         convention=Convention.ISO_8855,
         side=side,
@@ -161,7 +179,9 @@ def _vehicle(side: Side, template: Template, wheel: Wheel, car: Car, axle: bool)
         wheel_center=prefix + WHEEL_CENTER.name,
         static_toe=wheel.toe,
         static_camber=wheel.camber,
+        wheel_axis=prefix + WHEEL_AXIS.name if axis else None,
         wheel_radius=wheel.radius,
+        wheel_contact=prefix + WHEEL_CONTACT.name if contact else None,
         axle=car.position,
         wheelbase=car.wheelbase,
         cg_height=car.cg_height,

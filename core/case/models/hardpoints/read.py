@@ -11,15 +11,17 @@ from dataclasses import replace
 from pathlib import Path
 
 from ....errors import MOST_NAMED, brief, shortened, similar
-from ....mechanism.mechanism import Vector
-from ...case import Case, Truth
+from ....mechanism.mechanism import Mechanism, Vector
+from ...case import Case, Sweep, Truth
 from ...io.document import explained, fault, parse, read_text, shown, unknown_name
 from ...io.escape import visible
 from ...io.reader_options import LEFT_OUT, Supplied
+from ...quantity import with_markers
 from .axle import one_wheel, whole_axle
 from .car import read_car
-from .default_outputs import wheel_of, with_suspension_outputs
-from .table import HardpointTable, coordinate, placed, require_size, unit_of
+from .default_outputs import far_out, wheel_of, with_axis, with_suspension_outputs
+from .followers import hardpoints_of
+from .table import HardpointTable, axes_of, coordinate, placed, require_size, unit_of
 from .templates import TEMPLATES, Template
 from .templates.base import WHEEL_CONTACT, compact, side_of
 from .travels import read_travels
@@ -60,11 +62,16 @@ def case_of_hardpoints(table: HardpointTable, supplied: Supplied) -> Case:
     car = read_car(file, supplied)
     travels = read_travels(file, supplied.travel, supplied.rack)
     _require_left_and_upright(table, template, named, at, supplied)
-    with explained(file, "", unit_of(table, supplied.units)):
+    far = far_out(at)
+
+    def design(at: Mapping[str, Vector]) -> tuple[Mechanism, Sweep]:
+        moved = with_axis(at, far)
         if supplied.axle is None:
-            mechanism, sweep = one_wheel(file, template, at, travels)
-        else:
-            mechanism, sweep = whole_axle(file, supplied.axle, template, at, travels)
+            return one_wheel(file, template, moved, travels)
+        return whole_axle(file, supplied.axle, template, moved, travels)
+
+    with explained(file, "", unit_of(table, supplied.units)):
+        mechanism, sweep = design(at)
     others = [*(name for name in points if name not in named.values()), *table.left_out]
     source = (
         f"{table.tool} hardpoints of {file.name} on the template {template.name},"
@@ -75,9 +82,14 @@ def case_of_hardpoints(table: HardpointTable, supplied: Supplied) -> Case:
     source += f"{LEFT_OUT}{_listed(others)}"
     case = Case(file.stem, source, Truth.CONSENSUS_ONLY, mechanism, sweep, ())
     case = replace(case, length_unit=unit_of(table, supplied.units).name)
-    return with_suspension_outputs(
+    case = with_suspension_outputs(
         case, template, wheel, car, at, supplied.axle, steered=supplied.rack is not None
     )
+    axes = axes_of(table, supplied.axes)
+    hardpoints = hardpoints_of(
+        named, at, axes, lambda at: with_markers(design(at)[0], case.outputs)
+    )
+    return replace(case, hardpoints=hardpoints)
 
 
 def _template(table: HardpointTable, said: str | None) -> Template:

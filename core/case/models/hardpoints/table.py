@@ -9,6 +9,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeAlias
 
 from ....errors import CaseError
 from ....mechanism.mechanism import Vector
@@ -44,6 +45,10 @@ _ADVICE: Sequence[tuple[re.Pattern[str], str]] = (
     (re.compile(r"\d{4}-\d\d-\d\d"), "a spreadsheet took the number for a date: type it anew"),
 )
 """Remedies for invalid coordinates."""
+
+
+Axes: TypeAlias = Sequence[tuple[int, float]]
+"""Axis of the case, 0 to 2, and sign of x, y and z of a table."""
 
 
 @dataclass(frozen=True)
@@ -135,7 +140,7 @@ def placed(table: HardpointTable, units: str | None, axes: str | None) -> dict[s
         CaseError: unit or axes are unknown, or the user contradicts the file.
     """
     convert = unit_of(table, units)
-    places = _axes(table, axes)
+    places = axes_of(table, axes)
     points: dict[str, Vector] = {}
     for name, point in table.points.items():
         position = [0.0, 0.0, 0.0]
@@ -150,7 +155,7 @@ def coordinate(
     table: HardpointTable, name: str, k: int, units: str | None, axes: str | None
 ) -> str:
     """Return the source of a point's x, y or z (0, 1, 2) as text, as in the file: "y = 750 mm"."""
-    column = next(column for column, (axis, _) in enumerate(_axes(table, axes)) if axis == k)
+    column = next(column for column, (axis, _) in enumerate(axes_of(table, axes)) if axis == k)
     return (
         f"{'xyz'[column]} = {plain(table.points[name].position[column])}"
         f" {unit_of(table, units).name}"
@@ -202,7 +207,15 @@ def length_name(text: str) -> str:
     return UNIT_NAMES.get(name, name)
 
 
-def _axes(table: HardpointTable, said: str | None) -> list[tuple[int, float]]:
+def axes_of(table: HardpointTable, said: str | None) -> Axes:
+    """Return the axes of a table.
+
+    Args:
+        said: axes from the user.
+
+    Raises:
+        CaseError: they are unknown, or the user contradicts the file.
+    """
     if said is None and table.axes is None:
         raise fault(
             table.file,

@@ -83,6 +83,7 @@ class Template:
         """Return the points for outputs, from the roles with a place."""
         read = [*self.watched, *flattened(self.kingpin or ())]
         read += [role for ends in self.springs.values() if all(map(at.get, ends)) for role in ends]
+        read += [role.name for role in WHEEL if role.name in at]
         return [
             Point(role, self.bodies.get(role, KNUCKLE), at[role]) for role in dict.fromkeys(read)
         ]
