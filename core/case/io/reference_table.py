@@ -205,7 +205,9 @@ def _samples(
         numbers.append((place, found))
         for column, n in zip(printed, wanted, strict=True):
             cell = cells[n]
-            column.add(cell.replace(sign, ".") if isinstance(cell, str) else repr(cell))
+            text = cell.replace(sign, ".") if isinstance(cell, str) else repr(cell)
+            # a workbook has integers as 5.0
+            column.add(text if isinstance(cell, str) else text.removesuffix(".0"))
     if not numbers:
         raise fault(file, "", f"found column names only, {ROWS}")
     first = wanted[:1] == [0]  # messages quote the driver values of the first column
