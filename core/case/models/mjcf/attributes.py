@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from .elements import Element
+
 ORIENTATION = ("quat", "axisangle", "xyaxes", "zaxis", "euler")
 _FRAME = ("name", "childclass", "pos", *ORIENTATION)
 _SOFT = ("solref", "solimp", "class", "active", "name")
@@ -72,6 +74,32 @@ _COMPILER = (
     ),
 )
 
+_TENDON = (
+    *("actuatorfrclimited", "actuatorfrcrange", "armature", "damping", "frictionloss", "group"),
+    *("limited", "margin", "range", "solimpfriction", "solimplimit", "solreffriction"),
+    *("solreflimit", "springlength", "springyield", "stiffness", "user", "class", "name"),
+)
+_SPATIAL = (*_TENDON, "material", "rgba", "width")
+_GEOM = (
+    *("adhesion", "castshadow", "class", "conaffinity", "condim", "contype", "density"),
+    *("fitscale", "fluidcoef", "fluidshape", "friction", "fromto", "gap", "group", "hfield"),
+    *("margin", "mass", "material", "mesh", "name", "pos", "priority", "rgba", "shellinertia"),
+    *("size", "solimp", "solmix", "solref", "surfacevel", "type", "user", *ORIENTATION),
+)
+_OPTION = (
+    *("actuatorgroupdisable", "ccd_iterations", "ccd_tolerance", "cone", "density", "gravity"),
+    *("impratio", "integrator", "iterations", "jacobian", "ls_iterations", "ls_tolerance"),
+    *("magnetic", "noslip_iterations", "noslip_tolerance", "o_friction", "o_margin"),
+    *("o_solimp", "o_solref", "sdf_initpoints", "sdf_iterations", "sleep_tolerance", "solver"),
+    *("timestep", "tolerance", "viscosity", "wind"),
+)
+_FLAG = (
+    *("actuation", "autoreset", "clampctrl", "constraint", "contact", "damper", "diagexact"),
+    *("energy", "equality", "eulerdamp", "filterparent", "frictionloss", "fwdinv", "gravity"),
+    *("invdiscrete", "ipc", "island", "limit", "midphase", "multiccd", "nativeccd", "override"),
+    *("refsafe", "sensor", "sleep", "speculative", "spring", "warmstart", "passive"),
+)
+
 KNOWN = {
     "compiler": _COMPILER,
     "worldbody": (),
@@ -99,7 +127,21 @@ KNOWN = {
     "weld": (*_SOFT, "body1", "body2", "relpose", "anchor", "torquescale", "site1", "site2"),
     "equality joint": (*_SOFT, "joint1", "joint2", "polycoef"),
     "equality tendon": (*_SOFT, "tendon1", "tendon2", "polycoef"),
+    "default equality": _SOFT,
+    "default tendon": _SPATIAL,
+    "inertial": ("pos", "mass", "diaginertia", "fullinertia", *ORIENTATION),
+    "geom": _GEOM,
+    "option": _OPTION,
+    "flag": _FLAG,
+    "spatial": _SPATIAL,
+    "spatial site": ("site",),
+    "spatial geom": ("geom", "sidesite"),
+    "pulley": ("divisor",),
+    "fixed": _TENDON,
+    "fixed joint": ("joint", "coef"),
 }
+# Other releases of MuJoCo have further ones, of no matter for motion or masses.
+_OPEN = ("geom", "option", "flag", "spatial", "fixed", "default tendon")
 
 _READ = ("compiler", "option", "default", "worldbody", "tendon", "equality")
 _NOT_READ = (
@@ -146,3 +188,24 @@ DYNAMIC = {
 """Attributes of joints that move nothing where motion is given; they are counted for the list of
 what is left out.
 """
+
+
+def require_known_attributes(root: Element) -> None:
+    """Refuse attributes unknown to MJCF, for a mistyped one would silently be its default.
+
+    Raises:
+        CaseError: there is one.
+    """
+    for section in root.only(*_READ, "keyframe"):
+        if section.tag != "compiler":  # read before
+            _require_known(section, root.tag)
+
+
+def _require_known(element: Element, around: str) -> None:
+    inner = f"{around} {element.tag}"
+    key = inner if inner in KNOWN else element.tag
+    if key in KNOWN:
+        element.require_known(KNOWN[key], closed=key not in _OPEN)
+    if element.tag not in MAKE_BODIES:
+        for child in element.children:
+            _require_known(child, element.tag)

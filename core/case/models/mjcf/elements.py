@@ -14,11 +14,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from xml.parsers import expat
 
-from ....errors import CaseError, remedy
+from ....errors import CaseError, remedy, similar
 from ...io.document import decimal, fault, shown, unknown_name, usable
 
 # Robots are some ten bodies deep; what nests beyond this only exhausts the stack.
 DEEPEST = 200
+# Two words are alike if a typing error makes one of the other.
+ALIKE = 0.75
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,10 +69,18 @@ class Element:
             yield child
             yield from child.below()
 
-    def require_known(self, known: Sequence[str], format_name: str = "MJCF") -> None:
-        """Refuse unknown attributes."""
+    def require_known(
+        self, known: Sequence[str], format_name: str = "MJCF", *, closed: bool = True
+    ) -> None:
+        """Refuse unknown attributes, but for declarations of prefixes.
+
+        Args:
+            closed: refuse all of them, and not only those that are almost known ones.
+        """
         for name in self.attributes:
-            if name not in known:
+            if name in known or name.startswith("xmlns:"):
+                continue
+            if closed or similar(name, known, ALIKE):
                 raise self.fault(
                     f"found the attribute {shown(name)}, which {format_name} does not have"
                     " here;"

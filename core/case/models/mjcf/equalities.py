@@ -9,7 +9,6 @@ from typing import TypeAlias
 
 from ....algebra import Quat, Vec3, quat, vec
 from ....mechanism.mechanism import GROUND
-from .attributes import KNOWN
 from .classes import MAIN
 from .elements import Element
 from .frames import Place, unit_quaternion
@@ -98,8 +97,6 @@ def read_equalities(root: Element, tree: Tree) -> Iterator[Equality]:
                     "cannot be read: there is no joint for it; expected one of"
                     f" {', '.join(_READERS)}; remove it"
                 )
-            known = KNOWN.get(f"equality {element.tag}") or KNOWN[element.tag]
-            element.require_known(known)
             if off or element.choice("active", ("true", "false"), "true") == "false":
                 tree.count("equalities that are not active")
                 continue

@@ -64,9 +64,13 @@ def together(masses: Sequence[Mass]) -> Mass:
 
 
 def weighed(body: Body, mass: Mass | None) -> Body | None:
-    """Return a body with a mass given in global axes; None if no rigid body has it."""
-    if mass is None or mass.mass == 0.0:
+    """Return a body with a mass given in global axes; None if no rigid body has it, as no one has a
+    moment of inertia alone.
+    """
+    if mass is None or not (mass.mass or mass.inertia.any()):
         return body
+    if mass.mass == 0.0:
+        return None
     mass = Mass(mass.mass, vec(coordinates(mass.center)), mass.inertia)
     matrix = 0.5 * (mass.inertia + mass.inertia.T)
     xx, yy, zz = np.diag(matrix).tolist()
@@ -123,14 +127,13 @@ class Scales:
             found = _inertial(inertial)
             at = place.then(read_place(inertial, compiler))
             return None if found is None else self._bounded(found.seen_in(at))
-        if self.from_geoms == "false":
-            return None
         masses: list[Mass] = []
-        for geom, place, within in geoms:
+        for geom, place, within in geoms if self.from_geoms != "false" else ():
             complete = classes.complete(geom, "geom", within)
             if (found := self._geom(complete)) is not None:
                 masses.append(found.seen_in(place.then(read_place(complete, compiler))))
-        return self._bounded(together(masses)) if masses else None
+        # a body without a mass has the least one too (measured: MuJoCo 4.0)
+        return self._bounded(together(masses)) if masses or any(self.least) else None
 
     def _geom(self, element: Element) -> Mass | None:
         """Return the mass of a geom in its own frame; None without one."""
