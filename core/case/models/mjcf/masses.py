@@ -132,8 +132,10 @@ class Scales:
             complete = classes.complete(geom, "geom", within)
             if (found := self._geom(complete)) is not None:
                 masses.append(found.seen_in(place.then(read_place(complete, compiler))))
-        # a body without a mass has the least one too (measured: MuJoCo 4.0)
-        return self._bounded(together(masses)) if masses or any(self.least) else None
+        if not masses and any(self.least):
+            # the least mass is at the body's own `pos`, in its own axes (measured: MuJoCo 4.0)
+            masses.append(Mass(0.0, read_place(element, compiler).at, np.zeros((3, 3))))
+        return self._bounded(together(masses)) if masses else None
 
     def _geom(self, element: Element) -> Mass | None:
         """Return the mass of a geom in its own frame; None without one."""
