@@ -74,6 +74,8 @@ LOOPS = {
     '<pose relative_to="pivot">-0.1 0 0.45 0 0 0</pose></frame>'
     '<joint name="c" type="ball"><parent>strut</parent><child>end</child></joint></gazebo>',
     "Drake's ball": BALL,
+    "Drake's balls on an axis": BALL
+    + BALL.replace('"0.3 0 0.2"', '"0.3 1 0.2"').replace('"-0.1 0 0.45"', '"-0.1 1 0.45"'),
 }
 
 

@@ -22,7 +22,7 @@ from .column_units import is_unit_row
 from .decimal_sign import find_decimal_sign
 from .document import LARGEST, SMALLEST, decimal, fault, read_text, shown
 from .reference_samples import ROWS, Samples, check_width
-from .workbook import WORKBOOKS, Cell, Row, one_sheet, read_sheets
+from .workbook import WORKBOOKS, Cell, Row, one_sheet, read_sheets, require_narrow
 
 LARGEST_FILE = 64_000_000
 # A line for each sample of the largest sweep, and as many other lines.
@@ -73,6 +73,7 @@ def from_table(
     # blank comment lines, not drop them: the reader's line numbers are then the file's
     lines = ["" if line.lstrip('" \t').startswith("#") else line for line in lines]
     delimiter = _delimiter(lines)
+    require_narrow(file, ((f"line {k}", line) for k, line in enumerate(lines, 1)), delimiter)
     if delimiter == " ":
         lines = [_BLANKS.sub(" ", _BEFORE_UNIT.sub("", line.strip())) for line in lines]
     reader = csv.reader(lines, delimiter=delimiter, skipinitialspace=True, strict=True)

@@ -14,6 +14,9 @@ from .elements import Element
 from .frames import Place, unit_quaternion
 from .tree import WORLD, Tree
 
+# Their rows are solved together, in some seconds.
+MOST_EQUALITIES = 6_000
+
 
 @dataclass(frozen=True)
 class Connect:
@@ -104,6 +107,11 @@ def read_equalities(root: Element, tree: Tree) -> Iterator[Equality]:
             if name in names:
                 raise element.repeated_name(name, "the equalities")
             names.add(name)
+            if len(names) > MOST_EQUALITIES:
+                raise element.fault(
+                    f"found more than the {MOST_EQUALITIES} equalities that are read, expected"
+                    " fewer; take out those that are not looked at"
+                )
             found = _READERS[element.tag](name, element, tree, tendons)
             if isinstance(found, Connect) and found.i == found.j == GROUND:
                 tree.count("equalities of what stands still")

@@ -7,12 +7,13 @@ together as a whole. In SDF their values are texts, and in URDF attributes.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from typing import TypeAlias
 
 from ....algebra import Vec3, X, cross, vec
 from ....errors import CaseError
-from ..mjcf.elements import Element
+from ..mjcf.elements import Element, unlike
 from ..mjcf.frames import Place, of_axes
 from .dynamics import STRUT_LAW, strut_spring
 from .robot import Connection, Loop, Mimic, Move, Robot, Strut
@@ -40,6 +41,15 @@ def add_ties(robot: Robot, elements: Iterable[tuple[Element, LinkOf]]) -> None:
             found.setdefault(links, []).append((element, *points))
         elif element.tag == STRUT:
             _add_strut(robot, element, link_of)
+    taken, again = set[str](), Counter[str]()
+
+    def name_of(element: Element, links: Sequence[str]) -> str:
+        name = _name(element, links)
+        if "name" not in element.attributes:  # several may hold two links together
+            name = unlike(name, taken, again=again)
+        taken.add(name)
+        return name
+
     for links, ties in found.items():
         if links[0] == links[1]:
             raise ties[0][0].fault(
@@ -48,12 +58,12 @@ def add_ties(robot: Robot, elements: Iterable[tuple[Element, LinkOf]]) -> None:
         here, there = (robot.links[link] for link in links)
         frame = _frame([each for _, each, _ in ties]), _frame([each for _, _, each in ties])
         if frame[0] is not None and frame[1] is not None:
-            whole = Connection(_name(ties[0][0], links), links, (), ties[0][0])
+            whole = Connection(name_of(ties[0][0], links), links, (), ties[0][0])
             robot.loops.append(Loop(whole, (here.then(frame[0]), there.then(frame[1]))))
             continue
         for element, first, second in ties:
             at = here.then(Place(first)), there.then(Place(second))
-            ball = Move("ball", _name(element, links), at[0].at, X)
+            ball = Move("ball", name_of(element, links), at[0].at, X)
             robot.loops.append(Loop(Connection(ball.name, links, (ball,), element), at))
 
 

@@ -68,14 +68,15 @@ class Unread:
                 f"may close a loop, and is not read, expected {self.advice}; write it so, or"
                 " remove it"
             )
-        for each in (element, *element.below()):
-            self._require_uncoupled(each)
+        self._uncoupled(element)
 
-    def _require_uncoupled(self, element: Element) -> None:
-        inside = [element, *element.below()]
-        joints = {name for each in inside for name in self._joints(each)}
+    def _uncoupled(self, element: Element) -> set[str]:
+        """Return the joints that an element and those in it name, if it couples none."""
+        joints = {*self._joints(element)}
+        for child in element.children:
+            joints |= self._uncoupled(child)
         if len(joints) < 2 or any(joints <= {*pair} for pair in self.followers):
-            return
+            return joints
         why = ""
         if any(map(_says_mimic, (element, *element.children))):
             why = "couples the joints"
@@ -88,6 +89,7 @@ class Unread:
                 f"{why} {' and '.join(map(shown, sorted(joints)))}, and is not read, expected"
                 " <mimic> in one of them; write it so, or remove it"
             )
+        return joints
 
     def _links(self, element: Element) -> Iterator[str]:
         """Yield the links that an element and those in it name."""
