@@ -194,6 +194,24 @@ def test_what_joins_nothing_is_left_out(text: str, tmp_path: Path):
     assert case.source.split(LEFT_OUT)[1] not in ("", "nothing")
 
 
+def test_numbers_name_links_only_where_links_are_named(tmp_path: Path):
+    numbered = GATE.replace('"strut"', '"1"').replace('"follower"', '"2"')
+    read(tmp_path, numbered.format('<gazebo reference="1"><mu1>2</mu1></gazebo>'))
+    with pytest.raises(CaseError, match="names the links '1' and '2'"):
+        read(tmp_path, numbered.format("<tie><link>1</link><link>2</link></tie>"))
+
+
+def test_a_screw_of_drake_advances_by_its_pitch_in_a_turn(tmp_path: Path):
+    screw = (
+        '<link name="tip"/><drake:joint name="q" type="screw"><parent link="base"/>'
+        '<child link="tip"/><axis xyz="0 1 0"/><drake:screw_thread_pitch value="0.5"/>'
+        "</drake:joint>"
+    )
+    supplied = Supplied(drive=(f"q.rotation:0:{np.pi}:2",), hold_rest=True)
+    found = solution(read(tmp_path, GATE.format(screw), supplied=supplied)).bodies["tip"]
+    assert found.r[-1] == pytest.approx((0.0, 0.25, 0.0), abs=EXACT)
+
+
 def test_a_plugin_that_repeats_a_mimic_is_left_out(tmp_path: Path):
     text = GATE.format(JOINING["mimic plugin"][0] + JOINING["mimic of ros2_control"][0])
     case = read(
@@ -314,6 +332,12 @@ def test_mistyped_attributes_of_mjcf_are_refused(old: str, new: str, said: str, 
     with pytest.raises(CaseError, match="which MJCF does not have here") as caught:
         read(tmp_path, text, "model.xml")
     assert said in str(caught.value)
+
+
+def test_attributes_of_other_releases_are_left_out_where_they_move_nothing(tmp_path: Path):
+    read(tmp_path, IN_MJCF.format("").replace('name="g"', 'name="g" mystery="1"'), "model.xml")
+    with pytest.raises(CaseError, match="the attribute 'mystery', which MJCF does not have here"):
+        read(tmp_path, IN_MJCF.format("").replace('"drive"', '"drive" mystery="1"'), "model.xml")
 
 
 @pytest.mark.parametrize("kind", ["flex", "flexvert", "flexstrain", "distance"])
