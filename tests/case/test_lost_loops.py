@@ -1,11 +1,14 @@
 """What joins links and is not read stops a model by name; extensions that join nothing do not."""
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 from kincheck.core.case.io.reader_options import LEFT_OUT, Supplied
 from kincheck.core.case.models.files import load
+from kincheck.core.case.models.mjcf.attributes import require_known_attributes
+from kincheck.core.case.models.mjcf.elements import parse_xml
 from kincheck.core.errors import CaseError
 
 from ..support.model_poses import coordinate, solution
@@ -338,6 +341,37 @@ def test_attributes_of_other_releases_are_left_out_where_they_move_nothing(tmp_p
     read(tmp_path, IN_MJCF.format("").replace('name="g"', 'name="g" mystery="1"'), "model.xml")
     with pytest.raises(CaseError, match="the attribute 'mystery', which MJCF does not have here"):
         read(tmp_path, IN_MJCF.format("").replace('"drive"', '"drive" mystery="1"'), "model.xml")
+
+
+def test_all_attributes_of_mujoco_are_accepted(tmp_path: Path):
+    """Of its own schema: no attribute that is not read is taken for a mistyped one."""
+    mujoco = pytest.importorskip("mujoco")
+    path: list[str] = []
+    found: dict[str, list[str]] = {}
+    for line in mujoco.mj_printSchema(False, False).splitlines():
+        if head := re.match(r"( *)(?:\(world\))?([a-z]+) \(.\)(.*)", line):
+            path[len(head[1]) // 3 :] = [head[2]]
+            found["/".join(path)] = head[3].split()
+        elif path:
+            found["/".join(path)] += line.split()
+    tested = {
+        **{each: each.split("/")[-1:] for each in ("mujoco/body/geom", "mujoco/body/inertial")},
+        "mujoco/option": ["option"],
+        "mujoco/option/flag": ["option", "flag"],
+        "mujoco/default/geom": ["default", "geom"],
+        "mujoco/default/tendon": ["default", "tendon"],
+        "mujoco/tendon/spatial": ["tendon", "spatial"],
+        "mujoco/tendon/fixed": ["tendon", "fixed"],
+    }
+    for schema, tags in tested.items():
+        text = " ".join(f'{name}=""' for name in found[schema])
+        whole = f"<{tags[-1]} {text}/>"
+        for tag in reversed(tags[:-1]):
+            whole = f"<{tag}>{whole}</{tag}>"
+        if "body" in schema:
+            whole = f"<worldbody><body>{whole}</body></worldbody>"
+        require_known_attributes(parse_xml(tmp_path / "m.xml", f"<mujoco>{whole}</mujoco>"))
+    assert len(found["mujoco/body/geom"]) > 30
 
 
 @pytest.mark.parametrize("kind", ["flex", "flexvert", "flexstrain", "distance"])

@@ -74,32 +74,6 @@ _COMPILER = (
     ),
 )
 
-_TENDON = (
-    *("actuatorfrclimited", "actuatorfrcrange", "armature", "damping", "frictionloss", "group"),
-    *("limited", "margin", "range", "solimpfriction", "solimplimit", "solreffriction"),
-    *("solreflimit", "springlength", "springyield", "stiffness", "user", "class", "name"),
-)
-_SPATIAL = (*_TENDON, "material", "rgba", "width")
-_GEOM = (
-    *("adhesion", "castshadow", "class", "conaffinity", "condim", "contype", "density"),
-    *("fitscale", "fluidcoef", "fluidshape", "friction", "fromto", "gap", "group", "hfield"),
-    *("margin", "mass", "material", "mesh", "name", "pos", "priority", "rgba", "shellinertia"),
-    *("size", "solimp", "solmix", "solref", "surfacevel", "type", "user", *ORIENTATION),
-)
-_OPTION = (
-    *("actuatorgroupdisable", "ccd_iterations", "ccd_tolerance", "cone", "density", "gravity"),
-    *("impratio", "integrator", "iterations", "jacobian", "ls_iterations", "ls_tolerance"),
-    *("magnetic", "noslip_iterations", "noslip_tolerance", "o_friction", "o_margin"),
-    *("o_solimp", "o_solref", "sdf_initpoints", "sdf_iterations", "sleep_tolerance", "solver"),
-    *("timestep", "tolerance", "viscosity", "wind"),
-)
-_FLAG = (
-    *("actuation", "autoreset", "clampctrl", "constraint", "contact", "damper", "diagexact"),
-    *("energy", "equality", "eulerdamp", "filterparent", "frictionloss", "fwdinv", "gravity"),
-    *("invdiscrete", "ipc", "island", "limit", "midphase", "multiccd", "nativeccd", "override"),
-    *("refsafe", "sensor", "sleep", "speculative", "spring", "warmstart", "passive"),
-)
-
 KNOWN = {
     "compiler": _COMPILER,
     "worldbody": (),
@@ -128,20 +102,24 @@ KNOWN = {
     "equality joint": (*_SOFT, "joint1", "joint2", "polycoef"),
     "equality tendon": (*_SOFT, "tendon1", "tendon2", "polycoef"),
     "default equality": _SOFT,
-    "default tendon": _SPATIAL,
     "inertial": ("pos", "mass", "diaginertia", "fullinertia", *ORIENTATION),
-    "geom": _GEOM,
-    "option": _OPTION,
-    "flag": _FLAG,
-    "spatial": _SPATIAL,
     "spatial site": ("site",),
     "spatial geom": ("geom", "sidesite"),
     "pulley": ("divisor",),
-    "fixed": _TENDON,
     "fixed joint": ("joint", "coef"),
 }
-# Other releases of MuJoCo have further ones, of no matter for motion or masses.
-_OPEN = ("geom", "option", "flag", "spatial", "fixed", "default tendon")
+_TENDON = ("name", "class", "stiffness", "damping", "springlength")
+_OPEN = {
+    "geom": (
+        *("name", "class", "type", "size", "fromto", "pos", *ORIENTATION),
+        *("mass", "density", "group", "shellinertia", "mesh"),
+    ),
+    "option": ("gravity",),
+    "flag": ("gravity", "equality", "spring", "damper", "passive"),
+    **dict.fromkeys(("spatial", "fixed", "default tendon"), _TENDON),
+}
+"""Attributes that are read of elements with many others, and more in other releases of MuJoCo."""
+_ALL = KNOWN | _OPEN
 
 _READ = ("compiler", "option", "default", "worldbody", "tendon", "equality")
 _NOT_READ = (
@@ -203,9 +181,9 @@ def require_known_attributes(root: Element) -> None:
 
 def _require_known(element: Element, around: str) -> None:
     inner = f"{around} {element.tag}"
-    key = inner if inner in KNOWN else element.tag
-    if key in KNOWN:
-        element.require_known(KNOWN[key], closed=key not in _OPEN)
+    key = inner if inner in _ALL else element.tag
+    if key in _ALL:
+        element.require_known(_ALL[key], closed=key in KNOWN)
     if element.tag not in MAKE_BODIES:
         for child in element.children:
             _require_known(child, element.tag)
