@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from .caches import clear_caches
     from .case.case import Case
     from .case.io.reader_options import Supplied
-    from .errors import CaseError, KincheckError, MechanismError, SolveError
+    from .errors import CaseError, KincheckError, MechanismError, SolveError, UnknownNameError
     from .harness.engine import Engine
     from .harness.record import Outcome, Record, Results
     from .joints import (
@@ -105,6 +105,7 @@ __all__ = [
     "Trajectory",
     "Translational",
     "Universal",
+    "UnknownNameError",
     "__version__",
     "assemble",
     "check_joint",
@@ -117,7 +118,7 @@ __all__ = [
 
 _NAMES = {
     "caches": "clear_caches",
-    "errors": "CaseError KincheckError MechanismError SolveError",
+    "errors": "CaseError KincheckError MechanismError SolveError UnknownNameError",
     "trajectory": "BodyMotion PointMotion Trajectory",
     "mechanism.mechanism": "GROUND Body Mechanism Point",
     "mechanism.drivers": "JointAngle JointDisplacement PointCoordinate",

@@ -8,6 +8,10 @@ from itertools import islice
 
 from .failures import FailureKind
 
+MARKER = "~"
+"""Prefix of the points that the case reader adds, to measure a body's rotation or for forces; no
+hardpoints, and not shown.
+"""
 LONGEST_NAME = 200
 """Characters of a name that a message repeats; a longer one hides the rest of the message."""
 # A message that lists all names of a large file is not read. The search for a similar name is cubic
@@ -71,6 +75,17 @@ class SolveError(KincheckError, RuntimeError):
         self.kind = kind
 
 
+class UnknownNameError(KincheckError, KeyError):
+    """There is nothing of a name that is looked up; the message suggests another one."""
+
+    def __init__(self, what: str, name: object, known: Iterable[str]) -> None:
+        super().__init__(what, name, tuple(known))
+
+    def __str__(self) -> str:  # only now, for a mapping is also asked whether it has a name
+        what, name, known = self.args
+        return unknown(what, str(name), known)
+
+
 def with_article(noun: str) -> str:
     """Return a noun with its indefinite article: a joint, an output, a universal joint."""
     vowel = noun[:1].lower() in {*"aeiou"} and not noun.lower().startswith("uni")
@@ -88,6 +103,7 @@ def number_of(count: int, one: str, several: str = "") -> str:
 
 def unknown(what: str, name: str, known: Iterable[str]) -> str:
     """Return the message for an unknown name of a kind, with a remedy."""
+    known = [each for each in known if not each.startswith(MARKER)]
     return f"there is no {what} {name!r}; {remedy(name, known)}"
 
 

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from .dataset import Dataset, Variable
 from .driving import Driving, in_words
-from .errors import number_of
+from .errors import MARKER as MARKER
+from .errors import UnknownNameError, number_of
 from .failures import FailureKind
 from .forces import Forces
 from .tabular import Tabular
@@ -24,10 +25,6 @@ QUANTITIES = ("position", "velocity", "acceleration")
 """Quantities of a motion: each is the rate of the one before."""
 PER_TIME = ("", "/s", "/s^2")
 """Suffixes of their units."""
-MARKER = "~"
-"""Prefix of the points that the case reader adds, to measure a body's rotation or for forces; no
-hardpoints, and not shown.
-"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +82,8 @@ class Motions(Mapping[str, _Motion], Generic[_Motion]):
         self._kind, self._table, self._columns = kind, table, columns
 
     def __getitem__(self, name: str) -> _Motion:
+        if name not in self._columns:
+            raise UnknownNameError("motion", name, self._columns)
         table = self._table
         return self._kind(
             *(None if each is None else table[:, each] for each in self._columns[name])

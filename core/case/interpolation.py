@@ -15,6 +15,8 @@ FEWEST = 4
 """Fewest rows to interpolate a curve with an estimate of the error."""
 # Slopes are taken over this part of the range at least, so that noise of near rows is no slope.
 _WINDOW = 0.02
+# Rows are taken in blocks, with as many rows beside them as change a spline there by 1e-12.
+_BLOCK, _NEAR = 64, 40
 
 
 def matched(rows: Array, at: Array, allowed: float) -> NDArray[np.intp] | None:
@@ -65,6 +67,34 @@ def interpolated(x: Array, y: Array, at: Array) -> tuple[Array, Array]:
     wider = (x[above] - x[above - 1]) / (x[around + 1] - x[around - 1])
     largest: Array = np.max(error[around] * np.maximum(1.0, wider**4), axis=0)
     return spline(x, y)(at), largest
+
+
+def bounded(x: Array, half: Array, at: Array, within: NDArray[np.bool_]) -> Array:
+    """Return by how much the spline through a curve changes at most, if each row changes by up to
+    half a unit of its last digit; zero at samples outside.
+
+    A row changes the spline ever less at intervals away from it: there, by a factor of two or more
+    for each, because twice the sum of two neighbours is the diagonal of the spline's equations.
+
+    Args:
+        x: driver values of the curve, increasing, at least `FEWEST`.
+        half: largest changes of its rows.
+        at: samples.
+        within: those that are not outside x.
+    """
+    from scipy.interpolate import CubicSpline  # pyright: ignore[reportMissingTypeStubs]
+
+    spline: Any = CubicSpline
+    found = np.zeros_like(at)
+    if not half.any():
+        return found
+    block = np.clip(np.searchsorted(x, at), 1, len(x) - 1) // _BLOCK
+    for k in np.unique(block[within]).tolist():
+        here = within & (block == k)
+        near = slice(max(0, k * _BLOCK - _NEAR), (k + 1) * _BLOCK + _NEAR)
+        weights: Array = spline(x[near], np.eye(len(x[near])))(at[here])
+        found[here] = np.abs(weights) @ half[near]
+    return found
 
 
 def slopes(x: Array, y: Array, at: Array) -> Array:

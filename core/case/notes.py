@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from ..errors import Phrase
 from ..joints.base import unit
 from ..mechanism.drivers import JointDriver, PointCoordinate
@@ -10,6 +12,9 @@ from .case import Case
 from .quantity import Output
 from .sizes import size_notes
 from .units import LENGTHS
+
+# Of the largest value of a reference, an error that hides most mistakes of a mechanism.
+COARSE = 0.1
 
 
 def notes(case: Case) -> list[str]:
@@ -36,7 +41,22 @@ def _closure_notes(case: Case) -> list[str]:
 
 def _reference_notes(case: Case) -> list[str]:
     grid = [f"the reference has {case.origin.grid}"] if case.origin and case.origin.grid else []
-    return grid + _source_notes(case)
+    return [*grid, *_coarse_notes(case), *_source_notes(case)]
+
+
+def _coarse_notes(case: Case) -> list[str]:
+    names: list[str] = []
+    for name, series in (case.reference or {}).items():
+        known = series.position[np.isfinite(series.position)]
+        half = series.uncertainty.get("position", np.zeros(1))
+        if known.size and half.max() > COARSE * np.abs(known).max():
+            names.append(name)
+    if not names:
+        return []
+    return [
+        f"{', '.join(names)}: the reference is known to a tenth of its largest value or worse, by"
+        " too few digits or rows: agreement says little; give more of them"
+    ]
 
 
 def _source_notes(case: Case) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 
@@ -9,10 +10,11 @@ import numpy as np
 
 from ..trajectory import Array
 
-_NUMBER = re.compile(r"[-+]?(\d*)(\.?)(\d*)(?:[eE]([-+]?\d+))?")
-# A double holds any decimal of 15 digits: with as many or more, a column is not rounded. With fewer
-# than four digits, numbers that somebody chose (0.25, 1.5) cannot be told from rounded ones.
-EXACT, FEWEST = 15, 4
+_NUMBER = re.compile(r"[-+]?(\d*)\.?(\d*)(?:[eE]([-+]?\d{1,9}))?")
+# A double holds any decimal of 15 digits: with as many or more, a column is not rounded.
+EXACT = 15
+# Driver values with fewer digits are those that somebody set.
+FEWEST_OF_DRIVER = 3
 # Differences of an even grid agree to this part of the step; those of rounded numbers do not.
 _EVEN = 1e-9
 
@@ -21,48 +23,72 @@ _EVEN = 1e-9
 class Printed:
     """The digits of a column of numbers, printed with as many decimals, or with as many digits.
 
+    A spreadsheet leaves out the zeros at the end of a number: 0.4 beside 0.412 has three decimals.
+    Of the two formats, the column has the one that leaves out fewer of them.
+
     Attributes:
         significant: most significant digits of a number.
         decimals: most decimals, less the exponent.
-        pointed: whether any number has a point or an exponent.
+        numbers: how many there are but for zeros, which have no significant digit.
+        all_significant, all_decimals: sums over these.
     """
 
     significant: int = 0
-    decimals: int = 0
-    pointed: bool = False
+    decimals: int | None = None
+    numbers: int = 0
+    all_significant: int = 0
+    all_decimals: int = 0
 
     def add(self, text: str) -> None:
         """Take a further number of the column."""
-        if self.significant >= EXACT or (found := _NUMBER.fullmatch(text.strip())) is None:
+        if self.exact or (found := _NUMBER.fullmatch(text.strip())) is None:
             return
-        whole, point, part, exponent = found.groups()
-        pointed = bool(point or exponent)
-        digits = (whole + part).lstrip("0")
-        self.significant = max(self.significant, len(digits if pointed else digits.rstrip("0")))
-        self.decimals = max(self.decimals, len(part) - int(exponent or 0))
-        self.pointed = self.pointed or pointed
+        whole, part, exponent = found.groups()
+        decimals = len(part) - int(exponent or 0)
+        self.decimals = decimals if self.decimals is None else max(self.decimals, decimals)
+        if digits := (whole + part).lstrip("0"):
+            self.significant = max(self.significant, len(digits))
+            self.numbers += 1
+            self.all_significant += len(digits)
+            self.all_decimals += decimals
 
     @property
-    def rounded(self) -> bool:
-        """Whether the numbers are taken for rounded ones."""
-        return self.pointed and FEWEST <= self.significant < EXACT
+    def exact(self) -> bool:
+        """Whether the numbers have all digits of doubles."""
+        return self.significant >= EXACT
+
+    @property
+    def as_set(self) -> bool:
+        """Whether the numbers have so few digits that somebody may have set them."""
+        return self.significant < FEWEST_OF_DRIVER
 
     def half(self, values: Array) -> Array:
-        """Return half a unit of the last digit of each number, zero if they are not rounded.
-
-        The last digit is the coarser of the one after `decimals` and the one after `significant`
-        digits: a column printed in one format has one of the two, and a number that lost its
-        trailing zeros has more digits than it shows.
+        """Return half a unit of the last digit of each number; zero if they have all digits, or are
+        zeros without decimals.
         """
-        if not self.rounded:
-            return np.zeros_like(values)
-        size = np.abs(values)
-        first = np.floor(np.log10(np.where(size > 0.0, size, 1e-300)))
-        last = np.maximum(-float(self.decimals), first + 1.0 - self.significant)
-        return 0.5 * 10.0**last
+        places = self.decimals or 0
+        if self.exact or self.decimals is None or (self.numbers == 0 and places <= 1):
+            return np.zeros(values.shape)
+        fixed = np.full(values.shape, 0.5 * 10.0**-places)
+        left_out = self.numbers * places - self.all_decimals
+        if left_out <= self.numbers * self.significant - self.all_significant:
+            return fixed
+        first = np.floor(np.log10(np.where(values == 0.0, 1.0, np.abs(values))))
+        return np.where(values == 0.0, fixed, 0.5 * 10.0 ** (first + 1.0 - self.significant))
 
 
 def even(values: Array) -> bool:
     """Return whether the values are an even grid, which somebody chose and nobody rounded."""
     steps = np.diff(values)
     return len(steps) < 2 or float(np.ptp(steps)) <= _EVEN * float(np.abs(steps).max())
+
+
+def multiples(values: Array, decimals: int) -> bool:
+    """Return whether the values, in units of their last decimal, have a common factor, so that
+    somebody set them.
+    """
+    largest = float(np.abs(values).max())
+    if largest > 0.0 and decimals + math.log10(largest) > EXACT:
+        return False
+    units = np.round(values * 10.0**decimals) if largest else values
+    return math.gcd(*map(int, units.tolist())) != 1

@@ -19,9 +19,6 @@ from ..trajectory import Array
 # Below this square of |e| = sin(angle / 2) a series is exact in double precision, and a quotient by
 # |e| loses digits.
 _SMALL, _TERMS = 1e-3, 7
-# Closer than |e| = 0.01 to a whole turn, a degree, accelerations of the rotation vector keep less
-# than nine digits.
-_WHOLE = 1e-4
 
 
 def euler_parameters(x: Vec3, y: Vec3) -> list[Jet]:
@@ -43,11 +40,14 @@ def euler_parameters(x: Vec3, y: Vec3) -> list[Jet]:
     return [_select(largest, products[i]) / (2.0 * own) for i in range(4)]
 
 
-def smallest(e: Sequence[Jet]) -> list[Jet]:
+def smallest(e: Sequence[Jet], within: float = 0.0) -> list[Jet]:
     """Return the Euler parameters of the same rotation with e0 not negative, for one up to half a
     turn.
+
+    Args:
+        within: a rotation that is larger by no more than this keeps its sign [rad].
     """
-    return signed(np.where(floats(e)[0] < 0.0, -1.0, 1.0), e)
+    return signed(np.where(floats(e)[0] < -0.5 * within, -1.0, 1.0), e)
 
 
 def signed(sign: Array, e: Sequence[Jet]) -> list[Jet]:
@@ -69,10 +69,7 @@ def angular_velocity(e: Sequence[Jet]) -> Array:
 
 
 def rotation_vector(e: Sequence[Jet]) -> list[Jet]:
-    """Return axis times angle [rad] of Euler parameters, for angles of -2 pi to 2 pi.
-
-    Within a degree of a whole turn the axis is hardly known, and the vector is NaN.
-    """
+    """Return axis times angle [rad] of Euler parameters of about half a turn at most."""
     e0, *along = e
     square = along[0] * along[0] + along[1] * along[1] + along[2] * along[2]
     # exact numbers, which are objects, have digits enough for the quotient
@@ -86,10 +83,7 @@ def rotation_vector(e: Sequence[Jet]) -> list[Jet]:
         series = series + coefficient * power
         power = power * square
         coefficient *= (2 * k + 1) ** 2 / ((2 * k + 2) * (2 * k + 3))
-    whole = (doubles(square) < _WHOLE) & (doubles(e0) < 0.0)
-    which = np.where(whole, 2, small.astype(int))
-    unknown = np.full((), np.nan)
-    factor = _select(which, [quotient, series, Jet(unknown, unknown, unknown)])
+    factor = _select(small.astype(int), [quotient, series])
     return [factor * each for each in along]
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..dataset import Dataset, Variable
-from ..errors import number_of
+from ..errors import UnknownNameError, number_of
 from ..tabular import Tabular
 from ..trajectory import PER_TIME, QUANTITIES
 
@@ -86,12 +86,13 @@ class ResultsTable(Tabular):
         """Return the first record of a case and an engine.
 
         Raises:
-            KeyError: there is none.
+            UnknownNameError: there is none.
         """
         for each in self.records:
             if (each.case, each.engine) == (case, engine):
                 return each
-        raise KeyError((case, engine))
+        known = [f"{each.case} · {each.engine}" for each in self.records]
+        raise UnknownNameError("record", f"{case} · {engine}", known)
 
 
 def _share(record: Any, quantity: str) -> float:

@@ -44,6 +44,17 @@ class _About(msgspec.Struct):
     notes: list[str] = []
     driver: _Driver = _Driver()
     motions: dict[str, _Driver] = {}
+    outputs: dict[str, dict[str, Any]] = {}
+
+
+_FACTS: Mapping[str, Any] = {
+    "cases": dict[str, _About],
+    "missing": list[tuple[str, str, str]],
+    "unread": dict[str, str],
+    "git": dict[str, str | bool | None] | None,
+    "tol": float,
+}
+"""Facts of a run that are read; further ones are allowed."""
 
 
 class _Details(msgspec.Struct):
@@ -65,9 +76,9 @@ def read_results(file: Path) -> Results:
         results = from_json(text.encode())
     except (msgspec.DecodeError, RecursionError) as error:
         raise fault(file, "", f"found {error}, expected results; {_ADVICE}") from None
-    _convert(file, "run.cases", results.run.get("cases", {}), dict[str, _About])
-    _convert(file, "run.missing", results.run.get("missing", []), list[tuple[str, str, str]])
-    _convert(file, "run.unread", results.run.get("unread", {}), dict[str, str])
+    for key, kind in _FACTS.items():
+        if key in results.run:
+            _convert(file, f"run.{key}", results.run[key], kind)
     samples: dict[str, int] = {}
     for k, record in enumerate(results.records):
         _check_record(file, f"records[{k}]", record, samples)

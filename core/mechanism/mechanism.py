@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
-from ..errors import MechanismError, Phrase, unknown, with_article
+from ..errors import MechanismError, Phrase, UnknownNameError, unknown, with_article
 from ..input_checks import held, require_finite, triple
 from ..joints.base import Joint, Kind, unit
 from ..joints.coupler import Coupler
@@ -240,24 +240,51 @@ class Mechanism:
         return name == GROUND or self.body(name).fixed
 
     def body(self, name: str) -> Body:
-        """Return the body of this name."""
-        return self._named["bodies"][name]
+        """Return the body of this name.
+
+        Raises:
+            UnknownNameError: there is none.
+        """
+        return self._member("bodies", "body", name)
 
     def joint(self, name: str) -> Joint:
-        """Return the joint of this name, as given."""
-        return self._named["joints"][name]
+        """Return the joint of this name, as given.
+
+        Raises:
+            UnknownNameError: there is none.
+        """
+        return self._member("joints", "joint", name)
 
     def point(self, name: str) -> Point:
-        """Return the point of this name."""
-        return self._named["points"][name]
+        """Return the point of this name.
+
+        Raises:
+            UnknownNameError: there is none.
+        """
+        return self._member("points", "point", name)
 
     def driver(self, name: str) -> Driver:
-        """Return the driver of this name."""
-        return self._named["drivers"][name]
+        """Return the driver of this name.
+
+        Raises:
+            UnknownNameError: there is none.
+        """
+        return self._member("drivers", "driver", name)
 
     def force(self, name: str) -> ForceElement:
-        """Return the force element of this name."""
-        return self._named["forces"][name]
+        """Return the force element of this name.
+
+        Raises:
+            UnknownNameError: there is none.
+        """
+        return self._member("forces", "force element", name)
+
+    def _member(self, kind: str, what: str, name: str) -> Any:
+        named = self._named[kind]
+        try:
+            return named[name]
+        except (KeyError, TypeError):
+            raise UnknownNameError(what, name, named) from None
 
     def reaction_point(self, joint: Joint) -> Vector:
         """Return the point of a joint's reaction, which its second body carries, global at design

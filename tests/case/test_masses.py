@@ -20,7 +20,7 @@ mujoco = pytest.importorskip("mujoco")
 # Sums of some ten masses in metre-sized frames.
 EXACT = 1e-12
 
-WEIGHED = """<mujoco><compiler boundmass="0.01" balanceinertia="true" inertiagrouprange="0 2"/>
+WEIGHED = """<mujoco><compiler boundmass="0.01" boundinertia="0.001" balanceinertia="true" inertiagrouprange="0 2"/>
 <default><geom density="500"/><default class="c"><geom type="capsule" size="0.1 0.2"/></default></default>
 <worldbody><geom size="1"/>
 <body name="a" pos="1 0 2" euler="0 40 0"><joint name="h"/><geom class="c" pos="1 2 3" euler="10 20 30"/>
@@ -34,11 +34,14 @@ WEIGHED = """<mujoco><compiler boundmass="0.01" balanceinertia="true" inertiagro
 <body name="c" euler="1 2 3" pos="0 1 0"><joint type="ball"/><geom size="3"/>
   <frame euler="20 30 40"><inertial pos="1 2 3" mass="2" fullinertia="1 2 2.5 .1 .2 .3"/></frame></body>
 <body name="d"><joint/><inertial pos="0 0 0" mass="0.001" diaginertia="1 2 4.5"/></body>
+<body name="e" pos="0 2 0"><joint/><body pos="0 0 1" euler="30 0 0"/></body>
+<body name="f"><joint type="slide"/><geom size="1" mass="0"/><geom size="1" group="4"/><site pos="1 0 0"/></body>
 </worldbody></mujoco>"""  # noqa: E501
 SETTINGS = {
     "auto": "",
     "geoms alone": '<compiler inertiafromgeom="true"/>',
     "bounds": '<compiler boundmass="3" boundinertia="4"/>',
+    "no geoms": '<compiler inertiafromgeom="false" boundinertia="0.1"/>',
     "all groups": '<compiler inertiagrouprange="0 5"/>',
 }
 
@@ -157,6 +160,16 @@ def test_a_mesh_has_an_unknown_mass(tmp_path):
     case = case_of(tmp_path, text)
     assert "masses that cannot be read, of arm" in case.source
     assert case.mechanism.gravity == (0.0, 0.0, 0.0)  # as long as nothing has a mass
+
+
+def test_moments_without_a_mass_are_told(tmp_path):
+    text = MJCF.replace(
+        "<compiler angle", '<compiler inertiafromgeom="false" boundinertia="1" angle'
+    )
+    start, end = text.index('<inertial pos="0.5'), text.index('<body name="tip"')
+    case = case_of(tmp_path, text[:start] + text[end:].replace('mass="1"', 'mass="0"'))
+    assert "masses that cannot be read, of arm" in case.source
+    assert case.mechanism.body("arm").mass == 0.0
 
 
 def test_settings_of_masses_are_checked(tmp_path):

@@ -8,14 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from kincheck.adapters.native import Native
-from kincheck.core.case.interpolation import interpolated, matched, slopes
+from kincheck.core.case.interpolation import bounded, interpolated, matched, slopes
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.notes import notes
-from kincheck.core.case.printed import Printed, even
+from kincheck.core.case.printed import Printed, even, multiples
 from kincheck.core.harness.compare import deviation
 from kincheck.core.harness.record import Outcome, from_json, to_json
 from kincheck.core.harness.run import run
 from kincheck.core.harness.slips import Held, Uncertain, slips
+from scipy.interpolate import CubicSpline
 
 from ..support.case_texts import complains, write
 
@@ -87,7 +88,8 @@ def test_a_curve_on_its_own_grid_is_judged_by_its_own_accuracy(tmp_path):
     # 1e-6 mm are asked; half of the sixth digit, 5e-7 mm, and 40 nrad of the driver's are more
     assert 1e-9 + 5e-10 < off.tolerance < 2e-7
     assert record.evidence.limits.keys() == {"x", "y"}
-    for part in ("printed to 8 digits: 5e-07 mm", "driver values printed to 7", "between 53 rows"):
+    # between rows, the spline has up to 1.97 times the half unit of a row, at its ends
+    for part in ("printed to 8 digits: 9.", "driver values printed to 7", "between 53 rows"):
         assert part in record.evidence.limits["x"]
     assert record.evidence.units == {"turn": "rad", "x": "mm", "y": "mm"}
     digest = hashlib.sha256((tmp_path / "rig.csv").read_bytes()).hexdigest()
@@ -199,10 +201,18 @@ def test_samples_of_a_missing_reference_are_refused(tmp_path):
         (["0.123457", "0.500000", "-12.345678"], [5e-7] * 3),
         (["0.123457", "0.5", "-12.3457"], [5e-7, 5e-7, 5e-5]),
         (["1.23457e-03", "5.00000e+02"], [5e-9, 5e-4]),
-        (["0.25", "0.5", "1.75"], [0.0] * 3),  # numbers that somebody chose
-        (["100", "1234", "1235"], [0.0] * 3),
+        (["0.4", "0.412", "0.05"], [5e-4] * 3),  # a spreadsheet leaves out zeros at the end
+        (["12.3", "0.412", "1.57"], [5e-2, 5e-4, 5e-3]),
+        (["12.3", "0.412", "0.05", "1.571"], [5e-4] * 4),
+        (["1.5e-3", "2.25e-2"], [5e-5] * 2),
+        (["0.25", "0.5", "1.75"], [5e-3] * 3),
+        (["100", "1234", "1200"], [0.5] * 3),
+        (["1", "0", "-1"], [0.5] * 3),
+        (["123457", "7.5"], [0.05] * 2),
+        (["0", "0.0"], [0.0] * 2),  # no digit that anything could be rounded to
+        (["0.000", "0.000"], [5e-4] * 2),
         (["0.1234567890123456", "0.5"], [0.0] * 2),
-        (["0.0", "0.00012"], [0.0] * 2),
+        (["0.0", "0.00012"], [5e-6] * 2),
         (["0.00000", "0.12345"], [5e-6, 5e-6]),
     ],
 )
@@ -213,9 +223,118 @@ def test_printed_digits(texts, half):
     assert column.half(np.array([*map(float, texts)])) == pytest.approx(half, rel=1e-9)
 
 
-def test_even_grids_are_exact():
+def test_driver_values_that_somebody_set_are_exact():
     assert even(np.array([0.0625, 0.125, 0.1875]))
     assert not even(np.round(np.arange(9) / 7.0, 6))
+    assert multiples(np.array([-80.0, -65.0, -5.0, 0.0]), 0)
+    assert multiples(np.array([0.25, 0.5, 1.75]), 2)
+    assert not multiples(np.array([-79.9, -65.2, -5.1]), 1)
+    assert not multiples(np.array([1e60, 3e60]), 2)
+
+
+def stripped(decimals: int):
+    """Return the writer of a spreadsheet that rounds to some decimals."""
+    return lambda value: repr(round(float(value), decimals)).removesuffix(".0")
+
+
+WRITERS = {
+    **{f"{n} decimals": (f"{{:.{n}f}}".format, n, 0) for n in (0, 1, 2, 3, 5)},
+    **{f"{n} decimals without zeros": (stripped(n), n, 0) for n in (1, 2, 3, 4)},
+    **{f"{n} digits": (f"{{:.{n}g}}".format, 0, n) for n in (2, 3, 4, 6)},
+    **{f"{n} digits, exponent": (f"{{:.{n - 1}e}}".format, 0, n) for n in (2, 3, 5)},
+}
+"""By name, the writer, its decimals or else its digits."""
+ARM = np.array([97.31, 11.7])
+
+
+def rounded(folder: Path, form, grid, shifts):
+    """Return the verdict on the rounded curve of a tip at `ARM`, shifted in y."""
+    lines = ["turn,x,y"]
+    for t, shift in zip(grid, np.broadcast_to(shifts, len(grid)), strict=True):
+        cos, sin = math.cos(t), math.sin(t)
+        x, y = ARM[0] * cos - ARM[1] * sin, ARM[0] * sin + ARM[1] * cos
+        lines.append(f"{t:.17g},{form(x)},{form(y + shift)}")
+    write(folder, "\n".join(lines) + "\n", "rig.csv")
+    text = CRANK.replace("SWEEP", EVEN).replace("ATOL", "1e-6")
+    return judged(load_case(write(folder, text.replace("100, 0, 0", "97.31, 11.7, 0"))))
+
+
+@pytest.mark.parametrize(("form", "decimals", "digits"), WRITERS.values(), ids=WRITERS)
+def test_a_rightly_rounded_curve_passes(form, decimals, digits, tmp_path):
+    """And one that is off by a whole unit of a last digit fails, in one row or in all."""
+    grid = np.linspace(-1.0, 1.0, 21)
+    assert rounded(tmp_path, form, grid, 0.0).outcome is Outcome.PASS
+    assert rounded(tmp_path, form, OWN, 0.0).outcome is Outcome.PASS
+    place = 2 - digits if digits else -decimals  # numbers of the last rows have two whole digits
+    shift = 1.01 * 10.0**place
+    for row in (0, 20):
+        off = rounded(tmp_path, form, grid, np.where(np.arange(21) == row, shift, 0.0))
+        assert off.outcome is Outcome.FAIL, off.message
+        assert off.errors["y"].position.worst_step == row
+    assert rounded(tmp_path, form, grid, shift).outcome is Outcome.FAIL
+
+
+@pytest.mark.parametrize("count", [4, 7, 30, 400])
+def test_rounding_of_rows_moves_a_spline_by_no_more(count):
+    """Against the splines of rows of nothing and one, and the whole matrix of weights."""
+    rng = np.random.default_rng(count)
+    x = np.arange(count) + rng.uniform(-0.3, 0.3, count)
+    half = rng.uniform(0.5, 1.0, count)
+    at = rng.uniform(x[0], x[-1], 50)
+    within = at > 1.0
+    weights = np.abs(CubicSpline(x, np.eye(count))(at))
+    expected = np.where(within, weights @ half, 0.0)
+    assert bounded(x, half, at, within) == pytest.approx(expected, rel=1e-9)
+
+
+VELOCITIES = """
+[reference]
+columns = ["driver", "x", "x.velocity", "x.acceleration"]
+rows = ROWS
+citation = "made up"
+"""
+
+
+@pytest.mark.parametrize("name", ["velocity", "acceleration"])
+def test_rates_are_judged_by_their_own_digits(name, tmp_path):
+    text = CRANK.partition("[reference]")[0].replace("SWEEP", EVEN).replace("ATOL", "1e-6")
+    rows = [
+        [t, round(100 * math.cos(t), 3), round(-100 * math.sin(t), 1), round(-100 * math.cos(t))]
+        for t in np.linspace(-1.0, 1.0, 21).tolist()
+    ]
+    case = load_case(write(tmp_path, text + VELOCITIES.replace("ROWS", repr(rows))))
+    assert judged(case).outcome is Outcome.PASS
+    rows[3][2 + (name == "acceleration")] += 0.1 if name == "velocity" else 1
+    off = judged(load_case(write(tmp_path, text + VELOCITIES.replace("ROWS", repr(rows)))))
+    assert off.outcome is Outcome.FAIL
+    assert f"x: {name} is off" in off.message
+
+
+@pytest.mark.parametrize(("truth", "half"), [("closed_form", 0.0), ("third_party_data", 0.05)])
+def test_rows_of_a_formula_are_exact(truth, half, tmp_path):
+    """A wrong result would pass as the rounding of 1.0 and 0.0; data may be printed so."""
+    text = CRANK.partition("[reference]")[0].replace("SWEEP", EVEN).replace("ATOL", "1e-6")
+    rows = '[reference]\nrows = [[0.0, 99.9]]\ncolumns = ["turn", "x"]\ncitation = "made up"\n'
+    case = load_case(write(tmp_path, text.replace("third_party_data", truth) + rows))
+    known = case.reference["x"].uncertainty.get("position", np.zeros(1))
+    assert known.max() == pytest.approx(half / 1000.0)
+    assert judged(case).outcome is Outcome.FAIL
+
+
+def test_a_column_of_all_digits_is_exact_beside_short_numbers(tmp_path):
+    """Zeros, constants and even numbers of a file of all digits are no rounded ones."""
+    t = np.linspace(-1.0, 1.0, 21)
+    lines = ["turn,x,y", *(f"{a:.17g},{100 * math.cos(a):.17g},{0.5 + k}" for k, a in enumerate(t))]
+    write(tmp_path, "\n".join(lines) + "\n", "rig.csv")
+    case = load_case(write(tmp_path, CRANK.replace("SWEEP", EVEN).replace("ATOL", "1e-6")))
+    assert case.reference["x"].uncertainty == case.reference["y"].uncertainty == {}
+
+
+def test_a_reference_of_too_few_digits_is_told(tmp_path):
+    rows = curve(np.linspace(-1.0, 1.0, 21))
+    told = [note for note in notes(case_of(tmp_path, rows, form="{:.0e}")) if "too few" in note]
+    assert [note.partition(": ")[0] for note in told] == ["x"]  # 100 mm, known to 50 mm
+    assert not any("too few" in note for note in notes(case_of(tmp_path, rows, form="{:.2e}")))
 
 
 def test_rows_are_matched_by_driver_value():

@@ -221,3 +221,16 @@ def test_a_sheet_of_a_reference_is_chosen(tmp_path):
     assert judged(tmp_path, sheets, 'sheet = "Rig"').outcome is Outcome.PASS
     with pytest.raises(CaseError, match=r"sheets 'Rig', 'Old'.*sheet = \"NAME\" in \[reference\]"):
         judged(tmp_path, sheets)
+
+
+def test_whole_numbers_of_a_workbook_have_no_decimal(tmp_path):
+    """Its file has them as 5.0 or 5, and a program may have rounded them."""
+    rows = [
+        ["turn", "x", "y"],
+        *([t, round(x), round(y, 1)] for t, x, y in curve([-1.0, 0.3, 1.0])),
+    ]
+    book(tmp_path, {"rig": rows}, "rig.xlsx")
+    text = CRANK.replace("SWEEP", AT).replace("ATOL", "1e-6").replace("rig.csv", "rig.xlsx")
+    case = load_case(write(tmp_path, text))
+    halves = [case.reference[name].uncertainty["position"].max() for name in "xy"]
+    assert halves == pytest.approx([0.5e-3, 0.05e-3])

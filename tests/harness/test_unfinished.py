@@ -127,11 +127,10 @@ def test_a_file_of_a_run_that_ended_early_is_judged_likewise(path, tmp_path):
         to_json(Results(run={**FACTS, "started": "now", "missing": pairs}, records=records()[:1]))
     )
     assert kinds(reported(path, str(file), "1")) == [(Kind.LOST, *pair[:2]) for pair in pairs]
-    file.write_bytes(
-        to_json(Results(run={**FACTS, "missing": [["first", "mujoco"]]}, records=records()[:1]))
-    )
-    with pytest.raises(CaseError, match=r"run.missing"):
-        reported(path, str(file), "1")
+    for key, value in {"missing": [["first", "mujoco"]], "git": "main", "tol": "small"}.items():
+        file.write_bytes(to_json(Results(run={**FACTS, key: value}, records=records()[:1])))
+        with pytest.raises(CaseError, match=rf"run\.{key}: found"):
+            reported(path, str(file), "1")
 
 
 def test_the_command_says_what_it_did_not_come_to(tmp_path, monkeypatch):

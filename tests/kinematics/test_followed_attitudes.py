@@ -5,10 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from kincheck import adapters
 from kincheck.core.case.case import Case, Sweep, Truth
 from kincheck.core.case.measures import Component, Orientation
 from kincheck.core.case.quantity import with_markers
 from kincheck.core.harness.compare import output_series
+from kincheck.core.harness.record import Outcome
+from kincheck.core.harness.run import run
 from kincheck.core.joints import Gear, Revolute
 from kincheck.core.kinematics import NativeSolver
 from kincheck.core.mechanism.drivers import JointAngle
@@ -69,7 +72,10 @@ def tumbled(turn, bend):
     rows = []
     for e in (p, both, half(AXES[0], 0.0 * turn)):
         size = np.sqrt((e[1:] ** 2).sum(axis=0))
-        vector = 2.0 * np.arctan2(size, e[0]) * e[1:] / np.where(size > 0.0, size, 1.0)
+        sign = np.where(e[0] < 0.0, -1.0, 1.0)
+        vector = (
+            2.0 * np.arctan2(size, sign * e[0]) * sign * e[1:] / np.where(size > 0.0, size, 1.0)
+        )
         rows += [*vector, *e]
     return np.array(rows)
 
@@ -144,6 +150,21 @@ def test_attitudes_are_followed_where_the_motion_starts_elsewhere(start):
     turn, bend = (motion.at(times)[0] for motion in motions.values())
     of = case(Sweep("time", times, motions=motions))
     np.testing.assert_allclose(found(of), tumbled(turn, bend), rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", [name for name in adapters.ENGINES if name != "native"])
+@pytest.mark.parametrize("steps", [3, 4, 8, 25])
+def test_all_engines_have_the_same_orientations(steps, name):
+    """Half and whole turns are among the samples."""
+    tested = adapters.engine(name)
+    if tested.version() is None:
+        pytest.skip(f"{name} is not installed")
+    of = swept(np.linspace(-3.0 * math.pi, 4.0 * math.pi, steps))
+    native, other = run([of], [adapters.engine("native"), tested], tol=1e-12).records
+    assert other.outcome is Outcome.PASS, other.message
+    for output in of.outputs:
+        vector = np.array(native.outputs[output.name].position)
+        assert np.abs(vector).max() <= math.pi + 1e-9
 
 
 def test_proofs_follow_the_same_way():

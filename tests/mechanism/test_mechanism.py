@@ -4,6 +4,7 @@ point is told so.
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -17,10 +18,12 @@ from kincheck.core import (
     Point,
     PointCoordinate,
     Revolute,
+    UnknownNameError,
     solve,
 )
 from kincheck.core.caches import clear_caches
 from kincheck.core.joints import Gear, Joint, RackPinion, Screw
+from kincheck.core.mechanism.loads import TorsionSpringDamper
 from kincheck.core.mechanism.motions import Ramp, Table
 from kincheck.core.studies.joint_check.specimens import specimens
 
@@ -296,3 +299,37 @@ def test_a_joint_between_fixed_bodies_must_hold_and_nothing_may_need_it_to_move(
         held(hinge, couplers=[Gear("g", ("pivot", "hinge"), ratio=2.0)])
     with pytest.raises(MechanismError, match="the name 'pivot' is used more than once"):
         held(replace(hinge, name="pivot"))
+
+
+@pytest.mark.parametrize("kind", ["body", "joint", "point", "driver", "force"])
+def test_a_look_up_of_an_unknown_name_suggests_another(kind: str):
+    """It is a KeyError too, as of any mapping."""
+    mechanism = Mechanism(
+        "arm",
+        [Body("turned", mass=1.0)],
+        [Revolute("turns", "ground", "turned", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))],
+        [Point("turning", "turned", (1.0, 0.0, 0.0)), Point("~hidden", "turned", (0.0, 0.0, 0.0))],
+        [JointAngle("turn", "turns")],
+        forces=[TorsionSpringDamper("turner", "turns", 1.0, 0.0)],
+    )
+    known = {"body": "turned", "joint": "turns", "point": "turning", "driver": "turn"}
+    meant = known.get(kind, "turner")
+    assert getattr(mechanism, kind)(meant).name == meant
+    what = "force element" if kind == "force" else kind
+    with pytest.raises(UnknownNameError) as caught:
+        getattr(mechanism, kind)(meant[:-1])
+    assert str(caught.value) == f"there is no {what} {meant[:-1]!r}; did you mean {meant!r}?"
+    assert isinstance(caught.value, KeyError)
+    with pytest.raises(UnknownNameError, match=f"there is no {what} '3'"):
+        getattr(mechanism, kind)(3)
+    with pytest.raises(UnknownNameError) as caught:
+        getattr(mechanism, kind)("xyz")
+    assert "~" not in str(caught.value)
+    assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)
+
+
+def test_look_ups_through_a_mechanism_are_told_too():
+    mechanism = Mechanism("arm", [Body("turned")], [], [], [])
+    for asked in (mechanism.is_fixed, mechanism.design_value):
+        with pytest.raises(UnknownNameError, match="there is no"):
+            asked("tuned")

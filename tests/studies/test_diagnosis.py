@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from kincheck import cases
+from kincheck.adapters import engine
 from kincheck.core import (
     Body,
     Distance,
@@ -18,8 +19,13 @@ from kincheck.core import (
     Translational,
 )
 from kincheck.core.case.case import Case, Output, Sweep, Truth
+from kincheck.core.case.measures import DriverEffort
+from kincheck.core.case.quantity import with_markers
+from kincheck.core.harness.record import Outcome
+from kincheck.core.harness.run import run
 from kincheck.core.joints import Kind
 from kincheck.core.kinematics import Ranks, kinds
+from kincheck.core.mechanism.loads import TorsionSpringDamper
 from kincheck.core.studies.diagnosis import diagnose
 
 from ..support.mechanisms import four_bar, mcpherson, slider_crank
@@ -239,3 +245,19 @@ def test_directions_are_told_by_what_they_are_not_by_their_names():
     }
     # the tip, in the arm, is its place at design less the point's: it turns about the point
     assert found["joints.rear.axis.point x"] == ("m/m", pytest.approx(-np.sin(0.5)))
+
+
+def test_a_sprung_joint_of_a_motion_never_reached_is_no_traceback():
+    """A rocker far beyond its dead centres: how far the spring's joint turned is not known."""
+    spring = TorsionSpringDamper("spring", "B", 2.0, 0.1)
+    rocker = [JointAngle("rock", "D")]
+    bodies = [replace(body, mass=1.0) for body in four_bar().bodies]
+    mechanism = replace(four_bar(), bodies=bodies, drivers=rocker, forces=[spring])
+    of = case(mechanism, [2.5, 2.6, 2.7], "C")
+    outputs = (*of.outputs, DriverEffort("effort", 1e-9, 0.0, "made up", "rock"))
+    of = replace(of, outputs=outputs, mechanism=with_markers(mechanism, outputs))
+    (record,) = run([of], [engine("native")], tol=1e-12).records
+    assert record.outcome is Outcome.FAIL
+    assert record.message.startswith("0 of 3 samples solved: cannot be followed beyond rock = ")
+    assert record.outputs["effort"].position == [None] * 3
+    assert diagnose(of, samples=41, tol=1e-12).samples == []

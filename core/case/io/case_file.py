@@ -100,6 +100,7 @@ def load_case(path: str | Path, closure: float | None = None) -> Case:
         sweep.values,
         case.outputs,
         convention,
+        keys.truth,
         own_grid=own_grid,
     )
     return replace(case, truth=keys.truth, reference=series, origin=origin)

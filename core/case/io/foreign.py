@@ -14,7 +14,9 @@ from contextlib import suppress
 EXCEL, ARCHIVE = "an Excel workbook", "a zip archive"
 _TABLE = "export the table as CSV or .xlsx"
 _OFFICE = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
-_ZIP = b"PK\x03\x04"
+_ZIP, _MEMBER = b"PK\x03\x04", b"PK\x01\x02"
+MOST_MEMBERS = 10_000
+"""Of an archive; an office document has some tens."""
 _SIGNATURES: Sequence[tuple[bytes, str, str]] = (
     (b"%PDF", "a PDF document", "export the numbers from the program that made it, as CSV"),
     (b"%!PS", "a PostScript document", "export the numbers from the program that made it, as CSV"),
@@ -98,12 +100,18 @@ def recognised(data: bytes) -> tuple[str, str]:
     return "", ""
 
 
+def members(data: bytes) -> int:
+    """Return how many members an archive lists, at least."""
+    return data.count(_MEMBER)
+
+
 def _archive(data: bytes) -> tuple[str, str]:
     """Return the kind of an archive by the names inside it, and the remedy; if damaged, the kind is
     "archive".
     """
     with suppress(zipfile.BadZipFile, ValueError, NotImplementedError, OSError):
-        names = zipfile.ZipFile(io.BytesIO(data)).namelist()
+        few = members(data) <= MOST_MEMBERS
+        names = zipfile.ZipFile(io.BytesIO(data)).namelist() if few else []
         for known, what, advice in _MEMBERS:
             if any(map(known, names)):
                 return what, advice

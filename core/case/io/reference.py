@@ -19,7 +19,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from ...trajectory import QUANTITIES, Array
-from ..case import Origin, Quantity, Series
+from ..case import Origin, Quantity, Series, Truth
+from ..printed import Printed
 from ..units import Unit
 from .document import fault, shown
 from .reference_columns import (
@@ -45,6 +46,8 @@ from .workbook import WORKBOOKS
 
 PROVED = ".json"
 """Suffix of the files of proved references."""
+# Of the rows of a formula, those with fewer digits are not rounded.
+FEWEST = 4
 CHOICE = 'sheet = "NAME" in [reference]'
 
 
@@ -63,14 +66,21 @@ def read_grid(case_file: Path, keys: ReferenceKeys, driver: Unit) -> Sequence[fl
     if keys.file is None and keys.rows is not None and keys.columns is None:
         # the columns are the outputs, and `read_reference` checks them
         return [driver(row[0]) for row in keys.rows if row]
-    samples = _samples(case_file, keys, ())
+    samples = _samples(case_file, keys, (), Truth.THIRD_PARTY_DATA)
     _, driver = driver_unit(samples, driver)
     return [driver(row[0]) for _, row in samples.rows]
 
 
-def _samples(case_file: Path, keys: ReferenceKeys, outputs: Sequence[Quantity]) -> Samples:
+def _samples(
+    case_file: Path, keys: ReferenceKeys, outputs: Sequence[Quantity], truth: Truth
+) -> Samples:
     if keys.file is None:
-        return inline(case_file, keys, outputs)
+        samples = inline(case_file, keys, outputs)
+        if truth is Truth.THIRD_PARTY_DATA:
+            return samples
+        # values of a formula: those with few digits, such as 0.5 and 1.0, are exact
+        printed = [each if each.significant >= FEWEST else Printed() for each in samples.printed]
+        return replace(samples, printed=printed)
     file = only_beside(case_file, keys)
     if keys.sheet is not None and file.suffix.lower() not in WORKBOOKS:
         problem = f"found {shown(keys.sheet)}, but {keys.file} is no workbook (.xlsx)"
@@ -86,6 +96,7 @@ def read_reference(
     values: Array,
     outputs: Sequence[Quantity],
     convention: str,
+    truth: Truth,
     *,
     own_grid: bool = False,
 ) -> tuple[dict[str, Series], Origin]:
@@ -97,6 +108,7 @@ def read_reference(
         values: grid of the sweep [m or rad], shape (n,).
         outputs: outputs of the case.
         convention: sign convention of suspension outputs.
+        truth: kind of the reference.
         own_grid: whether the sweep has the samples of the reference.
 
     Raises:
@@ -107,7 +119,7 @@ def read_reference(
         file = only_beside(case_file, keys)
         known = series(file, read(file), values, outputs)
         return known, replace(_origin(case_file, keys), signs=convention)
-    samples = _samples(case_file, keys, outputs)
+    samples = _samples(case_file, keys, outputs, truth)
     columns = read_columns(samples, driver, units, outputs)
     signed = any(output.signs for output in outputs if output.name in columns.of)
     if keys.file is not None:

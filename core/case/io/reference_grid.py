@@ -4,9 +4,8 @@ A row belongs to the sample with its driver value. If every row belongs to a sam
 is compared at these samples, possibly fewer than the sweep's. Otherwise it is interpolated at the
 samples within its range.
 
-Three known errors of the values enter the tolerance: the rounding of the numbers to their printed
-digits, the rounding of the driver values times the slope, and the estimated error of the
-interpolation.
+Three known errors of the values enter the tolerance: half a unit of the last printed digit, that of
+the driver values times the slope, and the estimated error of the interpolation.
 """
 
 from __future__ import annotations
@@ -17,8 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...trajectory import Array
-from ..interpolation import FEWEST, interpolated, matched, slopes
-from ..printed import even
+from ..interpolation import FEWEST, bounded, interpolated, matched, slopes
+from ..printed import even, multiples
 from ..units import Unit
 from .document import fault
 from .reference_samples import Samples
@@ -61,8 +60,9 @@ class Grid:
         rows = np.array([driver(x) for x in self._written.tolist()])
         self._allowed = allowed = SAME_GRID * float(np.max(np.abs(values)))
         self._index = np.arange(len(rows)) if own else matched(rows, values, allowed)
+        self._full = any(printed.exact for printed in samples.printed[1:])
         half = samples.printed[0].half(self._written) * abs(driver(1.0))
-        if (self._index is not None and not own) or even(self._written):
+        if (self._index is not None and not own) or self._set():
             half = np.zeros_like(half)  # the driver values are exact as printed
         self._order = np.argsort(rows, kind="stable")
         self._x, self._half = rows[self._order], float(half.max())
@@ -70,6 +70,11 @@ class Grid:
         self._within = (values >= self._x[0] - slack) & (values <= self._x[-1] + slack)
         if self._index is None:
             self._check(driver, values)
+
+    def _set(self) -> bool:
+        """Return whether somebody set the driver values, so that they are not rounded."""
+        printed, values = self._samples.printed[0], self._written
+        return printed.as_set or even(values) or multiples(values, printed.decimals or 0)
 
     def _check(self, driver: Unit, values: Array) -> None:
         """Refuse rows unfit for interpolation."""
@@ -119,6 +124,8 @@ class Grid:
         printed = self._samples.printed[k]
         y = np.array([scale(value) for value in written.tolist()])
         half = printed.half(written) * abs(scale(1.0))
+        if self._full and even(written):  # a file of all digits has them here too
+            half = np.zeros_like(half)
         error = np.zeros_like(self._at)
         if self._index is not None:
             there = self._index >= 0
@@ -132,7 +139,7 @@ class Grid:
             around = np.stack([above - 1, above])
             at_row = (np.abs(self._x[around] - self._at) <= self._allowed).any(axis=0)
             error = np.where(self._within & ~at_row, error, 0.0)
-            rounding = np.where(self._within, half[self._order][around].max(axis=0), 0.0)
+            rounding = bounded(self._x, half[self._order], self._at, self._within)
         shifted = np.zeros_like(self._at)
         if self._half and len(self._x) > 1:
             shifted = self._half * slopes(self._x, y[self._order], self._at)

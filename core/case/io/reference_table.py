@@ -22,7 +22,7 @@ from .column_units import is_unit_row
 from .decimal_sign import find_decimal_sign
 from .document import LARGEST, SMALLEST, decimal, fault, read_text, shown
 from .reference_samples import ROWS, Samples, check_width
-from .workbook import WORKBOOKS, Cell, Row, one_sheet, read_sheets
+from .workbook import WORKBOOKS, Cell, Row, one_sheet, read_sheets, require_narrow
 
 LARGEST_FILE = 64_000_000
 # A line for each sample of the largest sweep, and as many other lines.
@@ -73,6 +73,7 @@ def from_table(
     # blank comment lines, not drop them: the reader's line numbers are then the file's
     lines = ["" if line.lstrip('" \t').startswith("#") else line for line in lines]
     delimiter = _delimiter(lines)
+    require_narrow(file, ((f"line {k}", line) for k, line in enumerate(lines, 1)), delimiter)
     if delimiter == " ":
         lines = [_BLANKS.sub(" ", _BEFORE_UNIT.sub("", line.strip())) for line in lines]
     reader = csv.reader(lines, delimiter=delimiter, skipinitialspace=True, strict=True)
@@ -205,7 +206,9 @@ def _samples(
         numbers.append((place, found))
         for column, n in zip(printed, wanted, strict=True):
             cell = cells[n]
-            column.add(cell.replace(sign, ".") if isinstance(cell, str) else repr(cell))
+            text = cell.replace(sign, ".") if isinstance(cell, str) else repr(cell)
+            # a workbook has integers as 5.0
+            column.add(text if isinstance(cell, str) else text.removesuffix(".0"))
     if not numbers:
         raise fault(file, "", f"found column names only, {ROWS}")
     first = wanted[:1] == [0]  # messages quote the driver values of the first column

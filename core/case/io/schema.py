@@ -67,8 +67,8 @@ left out. `kincheck list --joints` prints all types with their keys.
                          type = "distance": points = [A, B]
                          type = "joint_angle" or "joint_displacement": joint
                          type = "orientation": body, component of its rotation since design, global
-                         axes: "x", "y" or "z" of the rotation vector, or Euler parameter "e0" to
-                         "e3"
+                         axes: "x", "y" or "z" of the rotation vector of the smallest rotation, at
+                         most pi, or Euler parameter "e0" to "e3", whose sign is continuous
                          type = "angle": bodies = [first, second], directions, one on each
                          type = "toe", "camber", ...: of the wheel in [suspension]; `kincheck list
                          --outputs` prints them with their keys, signs and needs; each has its

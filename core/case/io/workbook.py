@@ -7,7 +7,8 @@ from __future__ import annotations
 import io
 import warnings
 import zipfile
-from collections.abc import Iterator, Sequence
+import zlib
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -15,7 +16,7 @@ from typing import Any, TypeAlias
 from ...errors import MOST_NAMED, KincheckError, brief, remedy, shortened
 from ...extras import library
 from .document import fault, read_bytes, shown
-from .foreign import ARCHIVE, EXCEL, binary, recognised
+from .foreign import ARCHIVE, EXCEL, MOST_MEMBERS, binary, members, recognised
 
 WORKBOOKS = (".xlsx", ".xlsm")
 Cell: TypeAlias = str | float
@@ -25,9 +26,16 @@ Row: TypeAlias = tuple[str, Sequence[Cell]]
 
 LARGEST_FILE = 64_000_000
 # A sheet is compressed about ten times; a far larger ratio is an attack on the memory.
-MOST_BYTES = 512_000_000
-# A sheet can have 16384 columns; a table of points or curves has far fewer.
-MOST_COLUMNS = 1000
+MOST_BYTES = 128_000_000
+# Some microseconds for each: a cell has four tags. Styles take ten times as long.
+MOST_TAGS, MOST_TAGS_ELSEWHERE = 4_000_000, 400_000
+CHUNK = 1_000_000
+# A sheet can have 16384 columns and a million rows; a table of points or curves has far fewer.
+MOST_COLUMNS, MOST_COLUMNS_OF_TEXT = 1000, 100_000
+MOST_ROWS = 1_048_576
+MOST_CELLS = 1_000_000
+"""Of a sheet, those of blank rows and columns among them."""
+LESS = "take out what is not the table, or save it as CSV"
 
 
 @dataclass(frozen=True)
@@ -61,7 +69,7 @@ def read_sheets(file: Path, wanted: str | None, most_rows: int) -> list[Sheet]:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # about styles and extensions; values need neither
-            written = openpyxl.load_workbook(io.BytesIO(data), read_only=True)
+            written = openpyxl.load_workbook(io.BytesIO(data), read_only=True, keep_links=False)
             names = [sheet.title for sheet in written.worksheets]
             if wanted is not None and wanted not in names:
                 raise fault(
@@ -76,7 +84,7 @@ def read_sheets(file: Path, wanted: str | None, most_rows: int) -> list[Sheet]:
                 rows, formulas = _rows(file, written[name], most_rows)
                 if formulas:
                     computed = computed or openpyxl.load_workbook(
-                        io.BytesIO(data), read_only=True, data_only=True
+                        io.BytesIO(data), read_only=True, data_only=True, keep_links=False
                     )
                     values, _ = _rows(file, computed[name], most_rows)
                     rows = _computed(rows, values)
@@ -90,6 +98,21 @@ def read_sheets(file: Path, wanted: str | None, most_rows: int) -> list[Sheet]:
         raise fault(
             file, "", f"is no readable workbook ({what}); save it anew as .xlsx, or as CSV"
         ) from None
+
+
+def require_narrow(file: Path, lines: Iterable[tuple[str, str]], delimiter: str) -> None:
+    """Refuse a line of a text table with more columns than people write.
+
+    Args:
+        lines: each with its place.
+
+    Raises:
+        CaseError: there is one.
+    """
+    for where, line in lines:
+        if line.count(delimiter) >= MOST_COLUMNS_OF_TEXT:
+            problem = f"found more than {MOST_COLUMNS_OF_TEXT} columns, expected a table"
+            raise fault(file, where, f"{problem}; take out what is not the table")
 
 
 def one_sheet(file: Path, sheets: Sequence[Sheet], option: str) -> Sheet:
@@ -121,36 +144,64 @@ def _require_workbook(file: Path, data: bytes) -> None:
         advice = advice or "save it as .xlsx, or name a table of text .csv"
         raise fault(file, "", f"found {what}, expected a workbook (.xlsx); {advice}")
     try:
-        size = sum(each.file_size for each in zipfile.ZipFile(io.BytesIO(data)).infolist())
-    except (zipfile.BadZipFile, ValueError, NotImplementedError, OSError) as error:
+        problem = _too_much(data)
+    except _DAMAGED as error:
         raise fault(
             file, "", f"is a damaged workbook ({error}); save it anew as .xlsx, or as CSV"
         ) from None
-    if size > MOST_BYTES:
-        raise fault(
-            file,
-            "",
-            f"unpacks to {size} bytes, expected {MOST_BYTES} at most; take out what is not the"
-            " table",
-        )
+    if problem:
+        raise fault(file, "", f"{problem}; {LESS}")
+
+
+_DAMAGED = (
+    *(zipfile.BadZipFile, zlib.error, ValueError, NotImplementedError, OSError, EOFError),
+    RuntimeError,  # a password
+)
+
+
+def _too_much(data: bytes) -> str:
+    """Return why an archive would take too long to read; empty if not."""
+    if (count := members(data)) > MOST_MEMBERS:
+        return f"has {count} parts, expected {MOST_MEMBERS} at most"
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        size = sum(each.file_size for each in archive.infolist())
+        if size > MOST_BYTES:
+            return f"unpacks to {size} bytes, expected {MOST_BYTES} at most"
+        tags = 0
+        for each in archive.infolist():
+            elsewhere = 0
+            with archive.open(each) as part:
+                for chunk in iter(lambda: part.read(CHUNK), b""):
+                    elsewhere += chunk.count(b"<")
+            if each.filename.startswith(("xl/worksheets/", "xl/sharedStrings")):
+                tags, elsewhere = tags + elsewhere, 0
+            for found, most in ((tags, MOST_TAGS), (elsewhere, MOST_TAGS_ELSEWHERE)):
+                if found > most:
+                    return f"has {found} tags in {each.filename}, expected {most} at most"
+    return ""
 
 
 def _rows(file: Path, sheet: Any, most: int) -> tuple[list[Row], bool]:
     """Return the rows with filled cells, and whether any cell is a formula."""
     rows: list[Row] = []
     formulas = False
+    read = 0
     sheet.reset_dimensions()  # the dimensions in a workbook are often wrong
     for k, cells in enumerate(sheet.iter_rows(), 1):
-        if all(cell.value is None for cell in cells):
+        read += len(cells)
+        filled = any(cell.value is not None for cell in cells)
+        wide = filled and any(cell.value is not None for cell in cells[MOST_COLUMNS:])
+        for found, limit, what in (
+            (wide * (MOST_COLUMNS + 1), MOST_COLUMNS, "columns"),
+            (len(rows) + filled, most, "rows"),
+            (k, MOST_ROWS, "rows, blank ones among them"),
+            (read, MOST_CELLS, "cells, blank ones among them"),
+        ):
+            if found > limit:
+                problem = f"found more than {limit} {what}, expected a table; {LESS}"
+                raise fault(file, f"sheet {shown(sheet.title)}", problem)
+        if not filled:
             continue
-        wide = any(cell.value is not None for cell in cells[MOST_COLUMNS:])
-        if wide or len(rows) == most:
-            many = f"{MOST_COLUMNS} columns" if wide else f"{most} rows"
-            raise fault(
-                file,
-                f"sheet {shown(sheet.title)}",
-                f"found more than {many}, expected a table; take out what is not the table",
-            )
         formulas = formulas or any(cell.data_type == "f" for cell in cells)
         rows.append((f"row {k}", _trimmed([_cell(cell.value) for cell in cells])))
     return rows, formulas

@@ -13,6 +13,9 @@ from ..quantity import MARKER
 from ..rotation import euler_parameters, rotation_vector, smallest
 from .base import Measure, length, place_on, reach_of
 
+ROUND_OFF = 1e-9
+"""Of an angle, a thousand times what engines differ by [rad]."""
+
 
 class Component(StrEnum):
     """A component of the rotation vector [rad], or an Euler parameter [-]."""
@@ -30,8 +33,8 @@ class Component(StrEnum):
 class Orientation(Measure):
     """Rotation of a body since design: of its rotation vector or Euler parameters, global axes.
 
-    The rotation vector is axis times angle, up to a whole turn. Turns are followed from the design,
-    so that a rotation by more than half a turn is not taken for the one the other way round.
+    The rotation vector is axis times angle, up to half a turn: beyond it, it is that of the smaller
+    rotation the other way round. The sign of Euler parameters is continuous from the design.
     """
 
     type = "orientation"
@@ -72,4 +75,6 @@ class Orientation(Measure):
         """Return the component of a rotation given by its Euler parameters, [rad] or [-]."""
         if self.unit == "1":
             return e[int(self.component[1])]
-        return rotation_vector(e)["xyz".index(self.component)]
+        # engines that agree but for round-off must not differ by a whole turn at half a turn
+        rotation = rotation_vector(smallest(e, max(ROUND_OFF, self.atol)))
+        return rotation["xyz".index(self.component)]

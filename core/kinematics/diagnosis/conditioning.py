@@ -186,7 +186,7 @@ def _orientations(matrices: Sequence[Array], design: Array, nearest: int) -> lis
     choices of rows of the products of their determinants; for square matrices the product itself.
     """
     found, n = np.ones(len(matrices)), len(matrices)
-    for way in (range(nearest, n), range(nearest, -1, -1)):
+    for way in (range(nearest, n), range(nearest, -1, -1)) if n else ():
         before, sign = design, 1.0
         for k in way:
             sign *= float(np.linalg.slogdet(before.T @ matrices[k])[0])

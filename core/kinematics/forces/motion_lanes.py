@@ -94,8 +94,8 @@ class MotionLanes:
         rates from the sample nearest to the design, and `follow` corrects their turns.
         """
         known = self._driven.get((name, "rotation"))
-        if known is not None:
-            return known
+        if known is not None or not self.n:
+            return np.zeros(0) if known is None else known
         joint: Any = self.mechanism.joint(name)
         i, j = (self.poses.get(body, GROUND_POSE) for body in joint.bodies)
         axis = vec([*unit(joint.axis)])

@@ -14,15 +14,17 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ...io.document import fault, shown
-from ...io.workbook import Row
+from ...io.workbook import Row, require_narrow
 from .assignments import is_assignments, read_assignments
 from .forms import is_number
 from .head import HEAD, head_place
-from .rows import read_rows, remark
+from .rows import MOST_ROWS, read_rows, remark
 from .table import HardpointTable
 
 COMMENTS = ("#", "%", "//")
 DELIMITERS = ";\t,"
+# Further ones hold no points.
+MOST_LINES = 2 * MOST_ROWS
 _SEPARATOR = re.compile(r"\"?sep=(.)\"?", re.IGNORECASE)
 _BEFORE_UNIT = re.compile(r"\s+(?=[\[(])")
 _SIGNS = re.compile(rf"[{DELIMITERS}]+")
@@ -58,6 +60,13 @@ def read_plain(file: Path, text: str, wanted: str | None = None) -> HardpointTab
         )
     if is_assignments(lines):
         return read_assignments(file, lines, said, wanted)
+    if len(lines) > MOST_LINES:
+        raise fault(
+            file,
+            "",
+            f"found {len(lines)} lines, expected a suspension's, {MOST_LINES} at most; take out the"
+            " others",
+        )
     if wanted is not None:
         raise fault(
             file,
@@ -99,6 +108,7 @@ def _delimiter(file: Path, lines: Sequence[tuple[str, str]], possible: str) -> s
 
 
 def _rows(file: Path, lines: Sequence[tuple[str, str]], delimiter: str) -> list[Row]:
+    require_narrow(file, lines, delimiter)
     rows: list[Row] = []
     for where, line in lines:
         try:

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from .elements import Element
+
 ORIENTATION = ("quat", "axisangle", "xyaxes", "zaxis", "euler")
 _FRAME = ("name", "childclass", "pos", *ORIENTATION)
 _SOFT = ("solref", "solimp", "class", "active", "name")
@@ -99,7 +101,25 @@ KNOWN = {
     "weld": (*_SOFT, "body1", "body2", "relpose", "anchor", "torquescale", "site1", "site2"),
     "equality joint": (*_SOFT, "joint1", "joint2", "polycoef"),
     "equality tendon": (*_SOFT, "tendon1", "tendon2", "polycoef"),
+    "default equality": _SOFT,
+    "inertial": ("pos", "mass", "diaginertia", "fullinertia", *ORIENTATION),
+    "spatial site": ("site",),
+    "spatial geom": ("geom", "sidesite"),
+    "pulley": ("divisor",),
+    "fixed joint": ("joint", "coef"),
 }
+_TENDON = ("name", "class", "stiffness", "damping", "springlength")
+_OPEN = {
+    "geom": (
+        *("name", "class", "type", "size", "fromto", "pos", *ORIENTATION),
+        *("mass", "density", "group", "shellinertia", "mesh"),
+    ),
+    "option": ("gravity",),
+    "flag": ("gravity", "equality", "spring", "damper", "passive"),
+    **dict.fromkeys(("spatial", "fixed", "default tendon"), _TENDON),
+}
+"""Attributes that are read of elements with many others, and more in other releases of MuJoCo."""
+_ALL = KNOWN | _OPEN
 
 _READ = ("compiler", "option", "default", "worldbody", "tendon", "equality")
 _NOT_READ = (
@@ -146,3 +166,24 @@ DYNAMIC = {
 """Attributes of joints that move nothing where motion is given; they are counted for the list of
 what is left out.
 """
+
+
+def require_known_attributes(root: Element) -> None:
+    """Refuse attributes unknown to MJCF, for a mistyped one would silently be its default.
+
+    Raises:
+        CaseError: there is one.
+    """
+    for section in root.only(*_READ, "keyframe"):
+        if section.tag != "compiler":  # read before
+            _require_known(section, root.tag)
+
+
+def _require_known(element: Element, around: str) -> None:
+    inner = f"{around} {element.tag}"
+    key = inner if inner in _ALL else element.tag
+    if key in _ALL:
+        element.require_known(_ALL[key], closed=key in KNOWN)
+    if element.tag not in MAKE_BODIES:
+        for child in element.children:
+            _require_known(child, element.tag)

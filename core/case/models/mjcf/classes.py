@@ -6,14 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from ...io.document import shown
-from .attributes import KNOWN, ORIENTATION
+from .attributes import ORIENTATION
 from .elements import Element
 
 MAIN = "main"
-READ = {"joint": "joint", "site": "site", "equality": "connect"}
-"""Kinds of elements whose defaults matter, and where their attributes are listed."""
-WEIGHED_OR_SPRUNG = ("geom", "tendon")
-"""Kinds of elements with masses or springs alone, whose other attributes are left out unread."""
+READ = ("joint", "site", "equality", "geom", "tendon")
+"""Kinds of elements whose defaults matter."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +49,7 @@ def read_classes(root: Element) -> Classes:
     """The classes of a model.
 
     Raises:
-        CaseError: one without a name inside another, one given twice, or unknown attributes.
+        CaseError: one without a name inside another, or one given twice.
     """
     found: dict[str, dict[str, dict[str, str]]] = {MAIN: {}}
 
@@ -59,8 +57,6 @@ def read_classes(root: Element) -> Classes:
         own = {kind: dict(values) for kind, values in inherited.items()}
         for child in element.children:
             if child.tag in READ:
-                child.require_known(KNOWN[READ[child.tag]])
-            if child.tag in (*READ, *WEIGHED_OR_SPRUNG):
                 own[child.tag] = _over(own.get(child.tag, {}), child.attributes)
         found[name] = own
         for child in element.only("default"):

@@ -9,16 +9,21 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.parsers import expat
 
-from ....errors import CaseError, remedy
+from ....errors import CaseError, remedy, similar
 from ...io.document import decimal, fault, shown, unknown_name, usable
 
 # Robots are some ten bodies deep; what nests beyond this only exhausts the stack.
 DEEPEST = 200
+# Each takes some microseconds and a kilobyte.
+MOST_ELEMENTS = 200_000
+# Two words are alike if a typing error makes one of the other.
+ALIKE = 0.75
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +62,12 @@ class Element:
             f"name: found {shown(name)} again, expected a name of its own; rename one of {these}"
         )
 
+    def too_many(self) -> CaseError:
+        """Return the error of a document with more elements than are read."""
+        return self.fault(
+            f"found more than {MOST_ELEMENTS} elements, expected fewer; take out what does not move"
+        )
+
     def only(self, *tags: str) -> Iterator[Element]:
         """The elements of these tags in it."""
         return (child for child in self.children if child.tag in tags)
@@ -67,10 +78,18 @@ class Element:
             yield child
             yield from child.below()
 
-    def require_known(self, known: Sequence[str], format_name: str = "MJCF") -> None:
-        """Refuse unknown attributes."""
+    def require_known(
+        self, known: Sequence[str], format_name: str = "MJCF", *, closed: bool = True
+    ) -> None:
+        """Refuse unknown attributes, but for declarations of prefixes.
+
+        Args:
+            closed: refuse all of them, and not only those that are almost known ones.
+        """
         for name in self.attributes:
-            if name not in known:
+            if name in known or name.startswith("xmlns:"):
+                continue
+            if closed or similar(name, known, ALIKE):
                 raise self.fault(
                     f"found the attribute {shown(name)}, which {format_name} does not have"
                     " here;"
@@ -108,6 +127,19 @@ class Element:
         return found
 
 
+def unlike(wanted: str, *taken: Container[str], again: Counter[str]) -> str:
+    """Return a name unlike all that are taken.
+
+    Args:
+        again: how often each name was wanted again; it is counted on.
+    """
+    name = wanted
+    while any(name in names for names in taken):
+        again[wanted] += 1
+        name = f"{wanted}'{again[wanted] if again[wanted] > 1 else ''}"
+    return name
+
+
 def _without_declaration(text: str) -> str:
     """Return a text without its declaration, which other parsers take after white space too."""
     found = re.match(r"\s*<\?xml\b[^>]*\?>", text)
@@ -118,8 +150,8 @@ def parse_xml(file: Path, text: str) -> Element:
     """The root element of a text.
 
     Raises:
-        CaseError: not well-formed, nested too deeply, or with a document type, which MJCF has none
-            of and which may hold entities.
+        CaseError: not well-formed, nested too deeply, of too many elements, or with a document
+            type, which MJCF has none of and which may hold entities.
     """
     # a declared encoding is not looked up: the text has been decoded, and Python knows encodings
     # that expat cannot take
@@ -127,10 +159,15 @@ def parse_xml(file: Path, text: str) -> Element:
     roots: list[Element] = []
     open_: list[Element] = []
     inside: list[list[Element]] = []
+    count = 0
 
     def start(tag: str, attributes: Mapping[str, str]) -> None:
         children: list[Element] = []
         element = Element(file, tag, attributes, parser.CurrentLineNumber, children)
+        nonlocal count
+        count += 1
+        if count > MOST_ELEMENTS:
+            raise element.too_many()
         if len(open_) >= DEEPEST:
             raise element.fault(
                 f"nested more than {DEEPEST} deep, expected the tree of a mechanism; correct the"

@@ -9,11 +9,13 @@ from typing import TypeAlias
 
 from ....algebra import Quat, Vec3, quat, vec
 from ....mechanism.mechanism import GROUND
-from .attributes import KNOWN
 from .classes import MAIN
 from .elements import Element
 from .frames import Place, unit_quaternion
 from .tree import WORLD, Tree
+
+# Their rows are solved together, in some seconds.
+MOST_EQUALITIES = 6_000
 
 
 @dataclass(frozen=True)
@@ -98,8 +100,6 @@ def read_equalities(root: Element, tree: Tree) -> Iterator[Equality]:
                     "cannot be read: there is no joint for it; expected one of"
                     f" {', '.join(_READERS)}; remove it"
                 )
-            known = KNOWN.get(f"equality {element.tag}") or KNOWN[element.tag]
-            element.require_known(known)
             if off or element.choice("active", ("true", "false"), "true") == "false":
                 tree.count("equalities that are not active")
                 continue
@@ -107,6 +107,11 @@ def read_equalities(root: Element, tree: Tree) -> Iterator[Equality]:
             if name in names:
                 raise element.repeated_name(name, "the equalities")
             names.add(name)
+            if len(names) > MOST_EQUALITIES:
+                raise element.fault(
+                    f"found more than the {MOST_EQUALITIES} equalities that are read, expected"
+                    " fewer; take out those that are not looked at"
+                )
             found = _READERS[element.tag](name, element, tree, tendons)
             if isinstance(found, Connect) and found.i == found.j == GROUND:
                 tree.count("equalities of what stands still")

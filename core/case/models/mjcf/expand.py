@@ -10,11 +10,11 @@ from ....algebra import ZERO, vec
 from ...io.case_file import LARGEST_FILE
 from ...io.document import read_text, shown
 from .attributes import KNOWN, WRITE_OUT
-from .elements import DEEPEST, Element, parse_xml
+from .elements import DEEPEST, MOST_ELEMENTS, Element, parse_xml
 from .frames import Compiler, Place, euler_turn, read_compiler
 
 MODELS = (".xml", ".mjcf")
-MOST_INCLUDES, MOST_COPIES, MOST_ELEMENTS = 100, 1_000, 200_000
+MOST_INCLUDES, MOST_COPIES = 100, 1_000
 
 
 @dataclass
@@ -61,10 +61,7 @@ class Expansion:
                     found.append(child)
             self.elements += 1
             if self.elements > MOST_ELEMENTS:
-                raise child.fault(
-                    f"found more than {MOST_ELEMENTS} elements, expected fewer; take out what does"
-                    " not move"
-                )
+                raise child.too_many()
         return found
 
     def _included(self, element: Element) -> Element:

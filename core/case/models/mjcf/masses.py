@@ -64,9 +64,13 @@ def together(masses: Sequence[Mass]) -> Mass:
 
 
 def weighed(body: Body, mass: Mass | None) -> Body | None:
-    """Return a body with a mass given in global axes; None if no rigid body has it."""
-    if mass is None or mass.mass == 0.0:
+    """Return a body with a mass given in global axes; None if no rigid body has it, as no one has a
+    moment of inertia alone.
+    """
+    if mass is None or not (mass.mass or mass.inertia.any()):
         return body
+    if mass.mass == 0.0:
+        return None
     mass = Mass(mass.mass, vec(coordinates(mass.center)), mass.inertia)
     matrix = 0.5 * (mass.inertia + mass.inertia.T)
     xx, yy, zz = np.diag(matrix).tolist()
@@ -123,13 +127,14 @@ class Scales:
             found = _inertial(inertial)
             at = place.then(read_place(inertial, compiler))
             return None if found is None else self._bounded(found.seen_in(at))
-        if self.from_geoms == "false":
-            return None
         masses: list[Mass] = []
-        for geom, place, within in geoms:
+        for geom, place, within in geoms if self.from_geoms != "false" else ():
             complete = classes.complete(geom, "geom", within)
             if (found := self._geom(complete)) is not None:
                 masses.append(found.seen_in(place.then(read_place(complete, compiler))))
+        if not masses and any(self.least):
+            # the least mass is at the body's own `pos`, in its own axes (measured: MuJoCo 4.0)
+            masses.append(Mass(0.0, read_place(element, compiler).at, np.zeros((3, 3))))
         return self._bounded(together(masses)) if masses else None
 
     def _geom(self, element: Element) -> Mass | None:

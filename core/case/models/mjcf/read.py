@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ....errors import remedy
+from ....errors import MOST_NAMED, remedy, shortened
 from ....joints import Revolute
 from ....kinematics import degrees_of_freedom
 from ....mechanism.drivers import JointAngle, JointDisplacement, JointDriver
@@ -21,7 +21,7 @@ from ...io.coordinates import with_all_motions
 from ...io.document import explained, fault
 from ...io.reader_options import LEFT_OUT, Supplied
 from .assembly import Assembled, assemble, size_of
-from .attributes import EXPANDED, MAKE_BODIES, ROOT, WRITE_OUT
+from .attributes import EXPANDED, MAKE_BODIES, ROOT, WRITE_OUT, require_known_attributes
 from .bodies import bodies_of, gravity_of
 from .classes import read_classes
 from .digits import Digits, digits_of
@@ -71,6 +71,8 @@ def read_mjcf(file: Path, root: Element, supplied: Supplied) -> Case:
     _require_model(root)
     root = expanded(file, root)
     _require_model(root)
+    require_known_attributes(root)
+    _require_rigid(root)
     model = root.attributes.get("model", file.stem)
     return case_of(file, Document(f"MJCF model {model!r} of {file.name}", root, root), supplied)
 
@@ -201,6 +203,20 @@ def _require_model(root: Element) -> None:
             raise element.fault(f"cannot be read, because {MAKE_BODIES[element.tag]}; {WRITE_OUT}")
         if element.tag not in (*ROOT, *EXPANDED):
             raise element.fault(f"unknown in a model; {remedy(element.tag, ROOT)}")
+
+
+def _require_rigid(root: Element) -> None:
+    """Refuse soft bodies between bodies."""
+    for section in root.only("deformable"):
+        for flex in section.only("flex"):
+            names = {
+                name for key in ("body", "node") for name in flex.attributes.get(key, "").split()
+            }
+            if len(names) > 1:
+                raise flex.fault(
+                    f"holds the bodies {shortened(sorted(names), MOST_NAMED)} together as a soft"
+                    " one, expected rigid bodies; remove it, or write what joins them as <equality>"
+                )
 
 
 def _driver(parts: Parts, joint: str) -> JointDriver:

@@ -7,18 +7,20 @@ and those that MuJoCo's compiler tunes.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping
 
 import numpy as np
 
-from ....errors import CaseError
+from ....errors import CaseError, MechanismError
 from ....joints import Revolute, Translational
 from ....mechanism.loads import ForceElement, SpringDamper, TorsionSpringDamper
 from ....mechanism.mechanism import GROUND
 from ...io.document import usable
 from .classes import MAIN
 from .driving import Driving
-from .elements import Element
+from .elements import Element, unlike
+from .equalities import MOST_EQUALITIES
 from .frames import coordinates
 from .parts import Parts
 from .tree import ModelJoint, Tree
@@ -44,23 +46,27 @@ def springs_of(
         for what, switch in (("stiffness", "spring"), ("damping", "damper"))
     }
     found: dict[str, ForceElement] = {}
+    again = Counter[str]()
     for joint in tree.chain:
         try:
             law = _law(joint.element, acting)
             if any(law.values()) and (element := _of_joint(tree, parts, driving, joint, law, size)):
                 found[joint.name] = element
-        except CaseError:
+        except (CaseError, MechanismError):
             for key, what in (("stiffness", "springs"), ("damping", "damping")):
                 if {key, "springdamper"} & joint.element.attributes.keys():
                     tree.count(f"{what} of joints")
     for section in root.only("tendon"):
         for tendon in section.children:
-            name = tendon.attributes.get("name", "tendon")
-            while name in found:
-                name += "'"
+            if len(found) > MOST_EQUALITIES:
+                raise tendon.fault(
+                    f"found more than the {MOST_EQUALITIES} springs that are read, expected fewer;"
+                    " take out those that are not looked at"
+                )
+            name = unlike(tendon.attributes.get("name", "tendon"), found, again=again)
             try:
                 found[name] = _of_tendon(name, zero, tree, parts, tendon, acting)
-            except CaseError:
+            except (CaseError, MechanismError):
                 tree.count(f"{section.tag}: {tendon.tag}")
     return [*found.values()]
 

@@ -10,7 +10,6 @@ from pathlib import Path
 from ....algebra import quat, vec
 from ....errors import remedy, with_article
 from ...io.document import decimal, fault, shown, unknown_name, usable
-from .attributes import KNOWN
 from .elements import Element
 from .frames import HERE, Place, unit_quaternion
 from .pose import Pose, Value
@@ -93,7 +92,6 @@ def _keyframe(file: Path, root: Element, tree: Tree, name: str) -> list[Value]:
             f" number from 0; {remedy(name, named)}",
         )
     key = named[name]
-    key.require_known(KNOWN["key"])
     count = sum(COORDINATES[joint.type] for joint in tree.chain)
     if "qpos" not in key.attributes:
         return [*Pose.of(tree).values]

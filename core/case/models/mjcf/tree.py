@@ -15,7 +15,7 @@ from ....algebra import Vec3, X, vec
 from ....errors import CaseError, remedy
 from ....mechanism.mechanism import GROUND
 from ...io.document import shown
-from .attributes import DYNAMIC, IN_BODY, KNOWN, MAKE_BODIES, WRITE_OUT
+from .attributes import DYNAMIC, IN_BODY, MAKE_BODIES, WRITE_OUT
 from .classes import MAIN, Classes
 from .elements import Element
 from .frames import HERE, Compiler, Place, joint_axis, read_place
@@ -117,7 +117,6 @@ class Tree:
                 self.count(f"{element.tag}s")
 
     def _frame(self, element: Element, around: Place) -> Place:
-        element.require_known(KNOWN["frame"])
         return around.then(read_place(element, self.compiler))
 
     def _joints_in(
@@ -138,7 +137,6 @@ class Tree:
         self.left_out[what] = self.left_out.get(what, 0) + 1
 
     def _body(self, element: Element, around: Place, outer: str, childclass: str) -> None:
-        element.require_known(KNOWN["body"])
         name = element.attributes.get("name", self._unused(f"body{len(self.places)}"))
         if name in self.places:
             raise element.repeated_name(name, "the bodies")
@@ -222,7 +220,6 @@ class Tree:
         return wanted
 
     def _kind(self, element: Element) -> str:
-        element.require_known(KNOWN[element.tag])
         kind = (
             "free"
             if element.tag == "freejoint"
@@ -252,7 +249,6 @@ class Tree:
         )
 
     def _site(self, element: Element, place: Place, body: str) -> None:
-        element.require_known(KNOWN["site"])
         name = element.attributes.get("name")
         if name is None:
             return
@@ -269,7 +265,6 @@ def read_tree(root: Element, classes: Classes, compiler: Compiler) -> Tree:
     """Read the tree of a model."""
     tree = Tree(classes, compiler, read_scales(root))
     for world in root.only("worldbody"):
-        world.require_known(KNOWN["worldbody"])
         tree.names |= {
             each.attributes["name"]
             for each in world.below()

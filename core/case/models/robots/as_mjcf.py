@@ -8,10 +8,12 @@ second link: it can be driven, held and compared like a joint of the tree.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 
 from ....algebra import Quat, Vec3
-from ..mjcf.elements import DEEPEST, Element
+from ..mjcf.elements import DEEPEST, Element, unlike
+from ..mjcf.equalities import MOST_EQUALITIES
 from ..mjcf.frames import HERE, Place, unit_quaternion
 from ..mjcf.tree import WORLD
 from .robot import Connection, Described, Inertial, Loop, Move, Robot, Rod, Spring, Strut
@@ -45,10 +47,17 @@ class _Writer:
         self.equalities: list[Element] = []
         self.world: list[Element] = []
         self.copies = set(robot.links)
+        self.again = Counter[str]()
 
     def document(self) -> Element:
         """Return the root."""
         robot = self.robot
+        ties = [each.joint for each in robot.loops], robot.rods, robot.struts, robot.mimics
+        for each in [each.element for them in ties for each in them][MOST_EQUALITIES:]:
+            raise each.fault(
+                f"found more than {MOST_EQUALITIES} elements that join others, expected fewer; take"
+                " out those that are not looked at"
+            )
         tree, loops = spanned(robot)
         hung = {joint.links[1] for joint in tree}
         self.bodies[WORLD], self.names[WORLD] = self.world, WORLD
@@ -229,10 +238,9 @@ class _Writer:
 
     def unused(self, wanted: str) -> str:
         """Return a name unlike all links and frames."""
-        while wanted in self.copies or wanted in self.robot.frames:
-            wanted += "'"
-        self.copies.add(wanted)
-        return wanted
+        name = unlike(wanted, self.copies, self.robot.frames, again=self.again)
+        self.copies.add(name)
+        return name
 
 
 def fitted(here: Place, there: Place, moves: Sequence[Move]) -> Place:

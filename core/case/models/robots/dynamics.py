@@ -10,15 +10,20 @@ from collections.abc import Mapping
 from ...io.document import decimal, usable
 from ..mjcf.elements import Element
 from .robot import Robot, Spring
-from .values import numbers_of, only_child
+from .values import require_children, value_of
 
 FRICTION = ("friction", "drake:rotor_inertia", "drake:gear_ratio")
 """Forces of joints without a place in a mechanism."""
+LAW = ("damping", "spring_stiffness", "spring_reference")
+"""Those that have one."""
+STRUT_LAW = ("stiffness", "damping", "free_length")
+"""What Drake's element between two points has of its own."""
 
 
 def add_urdf_damper(robot: Robot, joint: Element) -> None:
     """Add the damper of a joint of URDF."""
     for dynamics in joint.only("dynamics"):
+        dynamics.require_known((*LAW, *FRICTION), "URDF")
         if joint.attributes.get("type") in ("revolute", "continuous", "prismatic"):
             _add(robot, joint.attributes["name"], dynamics.attributes)
         else:
@@ -28,6 +33,7 @@ def add_urdf_damper(robot: Robot, joint: Element) -> None:
 def add_sdf_spring(robot: Robot, coordinate: str, axis: Element) -> None:
     """Add the spring and damper of an axis of SDF."""
     for dynamics in axis.only("dynamics"):
+        require_children(dynamics, (*LAW, *FRICTION), closed=True)
         _add(robot, coordinate, {child.tag: child.text for child in dynamics.children})
 
 
@@ -56,11 +62,9 @@ def strut_spring(element: Element) -> Spring:
     Raises:
         CaseError: a number is missing, or makes no sense.
     """
-    values: list[float] = []
-    for each in ("stiffness", "damping", "free_length"):
-        child = only_child(element, f"{element.tag}_{each}")
-        values += (0.0,) if child is None else numbers_of(child, (1,))
-    stiffness, damping, length = values
+    stiffness, damping, length = (
+        value_of(element, f"{element.tag}_{each}", 1)[0] for each in STRUT_LAW
+    )
     if min(stiffness, damping, length) < 0.0:
         raise element.fault("has a negative number, expected positive ones; correct it")
     return Spring(stiffness, damping, length)

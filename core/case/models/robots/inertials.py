@@ -8,9 +8,14 @@ from ..mjcf.elements import Element
 from ..mjcf.frames import HERE, Place
 from .robot import Inertial
 from .sdf_frames import read_pose
-from .values import numbers_of, only_child, roll_pitch_yaw
+from .values import numbers_of, only_child, require_children, roll_pitch_yaw
 
 ENTRIES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+POSE = ("xyz", "rpy")
+IN_INERTIAL = (
+    *("mass", "density", "pose", "inertia", "frame"),
+    *("auto_inertia_params", "fluid_added_mass"),
+)
 UNIT = (1.0, 1.0, 1.0, 0.0, 0.0, 0.0)
 """Inertia of a link of SDF unless given, of 1 kg [kg m^2]."""
 
@@ -20,6 +25,9 @@ def urdf_inertial(link: Element) -> Inertial | None:
     element = next(link.only("inertial"), None)
     if element is None:
         return None
+    require_children(element, ("mass", "inertia", "origin"), closed=True)
+    for child in element.children:
+        child.require_known({"mass": ("value",), "inertia": ENTRIES}.get(child.tag, POSE), "URDF")
     try:
         (mass,) = _child(element, "mass").numbers("value", (1,))
         matrix = only_child(element, "inertia")
@@ -41,6 +49,10 @@ def sdf_inertial(link: Element) -> Inertial | None:
     element = next(link.only("inertial"), None)
     if element is None:
         return None
+    element.require_known(("auto",), "SDF")
+    require_children(element, IN_INERTIAL, closed=True)
+    for child in element.only("inertia"):
+        require_children(child, ENTRIES, closed=True)
     try:
         if element.choice("auto", ("true", "false", "1", "0"), "false") in ("true", "1"):
             return Inertial()  # that of its collision shapes

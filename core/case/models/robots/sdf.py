@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from functools import partial
 
 from ....algebra import Vec3, X
 from ...io.document import shown
 from ..mjcf.elements import Element
 from ..mjcf.frames import HERE, Place
+from .drake import BALL, MIMIC, STRUT, add_ties, mimic_of
 from .dynamics import add_sdf_spring
 from .inertials import UNIT, sdf_inertial
 from .robot import Connection, Coupling, Inertial, Mimic, Move, Robot
-from .sdf_drake import add_ties, mimic_of
-from .sdf_frames import MODEL, Frames, Short, flag, text_of
+from .sdf_frames import MODEL, Frames, Short, endings, flag, text_of
+from .unread import Unread
 from .values import direction, numbers_of, only_child, require_children
 
 # Three for each body that other models may have.
@@ -29,13 +31,15 @@ IN_MODEL = (
 IN_LINK = (
     *("pose", "inertial", "visual", "collision", "sensor", "light", "gravity", "kinematic"),
     *("self_collide", "enable_wind", "velocity_decay", "must_be_base_link", "projector"),
-    *("audio_sink", "audio_source", "battery", "particle_emitter"),
+    *("audio_sink", "audio_source", "battery", "particle_emitter", "plugin", "frame"),
+    "contact",  # of Bullet
 )
 IN_JOINT = (
     *("parent", "child", "pose", "axis", "axis2", "physics", "sensor", "thread_pitch"),
-    *("screw_thread_pitch", "gearbox_ratio", "gearbox_reference_body"),
+    *("screw_thread_pitch", "gearbox_ratio", "gearbox_reference_body", "frame", MIMIC),
 )
 IN_AXIS = ("xyz", "limit", "dynamics", "mimic", "use_parent_model_frame", "initial_position")
+_READ = ("model", "world", "link", "joint", "frame", "pose", "static", BALL, STRUT)
 _COUNTED = ("visual", "collision", "sensor", "light", "plugin")
 GRAVITY = (0.0, 0.0, -9.8)
 """Gravity of a world unless given [m/s^2]."""
@@ -70,7 +74,7 @@ def read_sdf(root: Element) -> Robot:
             " take out those that are not looked at"
         )
     for full, framed in frames.links.items():
-        require_children(framed.element, IN_LINK)
+        require_children(framed.element, IN_LINK, closed=True)
         name = short(full)
         robot.links[name] = frames.place(framed.element, full)
         robot.elements[name] = framed.element
@@ -84,15 +88,24 @@ def read_sdf(root: Element) -> Robot:
         raise root.fault("has no link, expected a mechanism; give a model that moves")
     for full, framed in frames.models.items():
         require_children(framed.element, IN_MODEL)
-        for child in framed.element.only(*_COUNTED):
-            robot.count(child.tag)
+        for child in framed.element.children:
+            if child.tag in _COUNTED or (":" in child.tag and child.tag not in _READ):
+                robot.count(child.tag)
         frames.place(framed.element, full)
     _default_masses(robot)
     for world in root.only("world"):
         if (gravity := only_child(world, "gravity")) is not None:
             robot.gravity = numbers_of(gravity, (3,), GRAVITY)
-    _joints(robot, frames, short, _version(root))
-    add_ties(robot, frames, short)
+    robot.joints += joints_of(robot, frames, short, _version(root))
+    add_ties(
+        robot,
+        (
+            (element, partial(_link, frames, short, full))
+            for full, framed in frames.models.items()
+            for element in framed.element.children
+        ),
+    )
+    _require_apart(robot, frames, short)
     for full, framed in frames.found.items():
         if framed.element.tag == "frame":
             link = frames.link(framed.element, framed.attached)
@@ -122,13 +135,47 @@ def _version(root: Element) -> tuple[int, ...]:
         ) from None
 
 
-def _joints(robot: Robot, frames: Frames, short: Short, version: tuple[int, ...]) -> None:
+def _link(frames: Frames, short: Short, model: str, element: Element, name: str) -> str:
+    """Return the link of an element of Drake."""
+    link = frames.link(element, frames.within(element, model, name))
+    if not link:
+        raise element.fault("is the world, expected a link; fix a link to the world")
+    return short(link)
+
+
+def _require_apart(robot: Robot, frames: Frames, short: Short) -> None:
+    """Refuse elements that are not read and may join links."""
+    joints = {name: short(full) for full in frames.joints for name in endings(full)}
+    links = {name: short(full) for name, full in frames.named().items()}
+    followers = [each.joints for each in robot.mimics]
+    unread = Unread(links, joints, followers, f"a <joint> or <{BALL}>")
+    around = [("", each) for each in (robot.root, *robot.root.only("world"))]
+    around += [("", each.element) for each in frames.models.values()]
+    around += [(full, each.element) for full, each in frames.links.items()]
+    for link, element in around:
+        for child in element.children:
+            if child.tag not in _READ:
+                unread.require_apart(child, link)
+    for framed in frames.joints.values():
+        for child in framed.element.children:
+            if child.tag not in IN_JOINT and child.tag != MIMIC:
+                unread.require_apart(child)
+
+
+def joints_of(
+    robot: Robot, frames: Frames, short: Short, version: tuple[int, ...]
+) -> Iterator[Connection]:
+    """Yield the joints; add the world if one hangs there, and mimics, couplings and springs.
+
+    Raises:
+        CaseError: an unknown link or joint, or a value that makes no sense.
+    """
     world = "world"
     while world in robot.links:
         world += "'"
     for full, framed in frames.joints.items():
         element = framed.element
-        require_children(element, IN_JOINT)
+        require_children(element, IN_JOINT, closed=True)
         ends: list[str] = []
         for tag in ("parent", "child"):
             name = text_of(element, tag)
@@ -147,11 +194,11 @@ def _joints(robot: Robot, frames: Frames, short: Short, version: tuple[int, ...]
         place = frames.place(element, full)
         links = ends[0], ends[1]
         joint = _joint(robot, frames, full, short(full), links, place, version)
-        robot.joints.append(joint)
         _mimics(robot, frames, short, full, joint.moves)
         _springs(robot, element, joint.moves)
         if (mimic := mimic_of(frames, short, full, joint)) is not None:
             robot.mimics.append(mimic)
+        yield joint
 
 
 def _joint(
@@ -208,7 +255,8 @@ def _axis(frames: Frames, full: str, tag: str, place: Place, version: tuple[int,
     axis = only_child(framed.element, tag)
     if axis is None:
         raise framed.element.fault(f"<{tag}>: missing, expected an axis; add it")
-    require_children(axis, IN_AXIS)
+    axis.require_known((), "SDF")
+    require_children(axis, IN_AXIS, closed=True)
     xyz = only_child(axis, "xyz")
     numbers: Sequence[float] = (0.0, 0.0, 1.0)
     given = ""
@@ -242,6 +290,8 @@ def _mimics(robot: Robot, frames: Frames, short: Short, full: str, moves: Sequen
         mimic = None if axis is None else only_child(axis, "mimic")
         if mimic is None:
             continue
+        mimic.require_known(("joint", "axis"), "SDF")
+        require_children(mimic, ("multiplier", "offset", "reference"), closed=True)
         leader = mimic.attributes.get("joint", "")
         key = frames.within(mimic, framed.scope, leader)
         if key not in frames.joints:

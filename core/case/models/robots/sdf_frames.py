@@ -58,19 +58,23 @@ class Frames:
         if depth > DEEPEST // 10:
             raise around.fault("nests too deeply, expected few models in models; flatten the file")
         for element in around.only("link"):
+            element.require_known(("name",), "SDF")
             full = self._add(element, scope, scope)
             self.links[full] = self.found[full]
         for element in around.only("model"):
+            element.require_known(("name", "canonical_link"), "SDF")
             full = self._add(element, scope, scope)
             self.models[full] = self.found[full]
             if flag(only_child(element, "static")):
                 self.static.add(full)
             self.read(element, full, depth + 1)
         for element in around.only("joint"):
+            element.require_known(("name", "type"), "SDF")
             child = self.within(element, scope, text_of(element, "child"))
             full = self._add(element, scope, child, child)
             self.joints[full] = self.found[full]
         for element in around.only("frame"):
+            element.require_known(("name", "attached_to"), "SDF")
             base = element.attributes.get("attached_to", "")
             attached = self.within(element, scope, base) if base else scope
             self._add(element, scope, attached, attached)
@@ -84,6 +88,26 @@ class Frames:
             raise element.repeated_name(name, "them")
         self.found[full] = Framed(element, scope, default, attached)
         return full
+
+    def put(self, name: str, element: Element, place: Place, link: str) -> None:
+        """Take a frame of another format, at a place on a link."""
+        self.found[name] = Framed(element, "", "", link)
+        self._places[name] = place
+        if name == link:
+            self.links[name] = self.found[name]
+
+    def named(self) -> dict[str, str]:
+        """Return the links by the names of links and frames, with and without their models.
+
+        Raises:
+            CaseError: a frame is attached to none.
+        """
+        links = {WORLD: WORLD}
+        for full, framed in self.found.items():
+            if full not in self.models and full not in self.joints:
+                link = self.link(framed.element, full) or WORLD
+                links |= {name: link for name in endings(full) if name not in links}
+        return links
 
     def within(self, element: Element, scope: str, name: str) -> str:
         """Return the full name of a name in a scope; whether there is such a frame is asked later,
@@ -182,6 +206,12 @@ class Short:
 
     def __call__(self, full: str) -> str:
         return full.removeprefix(self.prefix)
+
+
+def endings(full: str) -> list[str]:
+    """Return a full name, and what it is called within its models."""
+    parts = full.split(SCOPE)
+    return [SCOPE.join(parts[k:]) for k in range(len(parts))]
 
 
 def joined(scope: str, name: str) -> str:

@@ -1,4 +1,5 @@
-"""URDF: a tree of links, and its loops: <constraint> elements, or a file beside it.
+"""URDF: a tree of links, and its loops: <constraint> elements, joints of SDF in <gazebo>, Drake's
+ball constraints, or a file beside it.
 
 Two forms of <constraint> are read, which are no part of URDF yet: the one proposed to urdfdom
 (github.com/ros/urdfdom/pull/264), with parent, child, parent_origin, child_origin and parent_axis,
@@ -8,7 +9,10 @@ predecessor, successor and an origin in each.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from ....algebra import IDENTITY, Vec3, X, vec
@@ -19,18 +23,34 @@ from ..mjcf.frames import HERE, Place
 from ..mjcf.tree import WORLD
 from .as_mjcf import fitted
 from .beside import read_beside
+from .drake import BALL, STRUT, add_ties
 from .dynamics import add_urdf_damper
 from .inertials import urdf_inertial
-from .robot import Connection, Kind, Loop, Mimic, Move, Robot
-from .values import direction, named, only_child, require_children, required, roll_pitch_yaw
+from .robot import Connection, Coupling, Kind, Loop, Mimic, Move, Robot
+from .sdf import joints_of
+from .sdf_frames import Frames, Short
+from .unread import Unread
+from .values import (
+    direction,
+    named,
+    only_child,
+    require_children,
+    required,
+    roll_pitch_yaw,
+    value_of,
+)
 
 # As for models of MuJoCo: what does not move is counted here too.
 MOST_LINKS = 2_000
-IN_ROBOT = ("link", "joint", "constraint", "material", "transmission", "gazebo")
+GAZEBO, DRAKE_JOINT, PITCH = "gazebo", "drake:joint", "drake:screw_thread_pitch"
+JOINTS = ("joint", DRAKE_JOINT)
+READ = ("link", *JOINTS, "constraint", BALL, STRUT)
+IN_ROBOT = (*READ, "material", "transmission", "gazebo")
 IN_LINK = ("inertial", "visual", "collision")
+IN_GAZEBO = ("joint", "frame")
 IN_JOINT = (
     *("origin", "parent", "child", "axis", "mimic", "limit"),
-    *("calibration", "dynamics", "safety_controller"),
+    *("calibration", "dynamics", "safety_controller", PITCH, "joint_properties"),
 )
 IN_CONSTRAINT = (
     *("parent", "child", "parent_origin", "child_origin", "parent_axis", "child_axis"),
@@ -41,6 +61,9 @@ TYPES = (
     *("spherical", "ball"),
 )
 """Types of joints; balls are no part of URDF, and several simulators read them."""
+DRAKE_TYPES = ("ball", "planar", "screw", "universal")
+# Of the axes of SDF in <gazebo>: those in the joint's own frame.
+SDF_VERSION = (1, 7)
 
 CLOSING: Mapping[str, Sequence[Kind]] = {
     "fixed": (),
@@ -69,7 +92,7 @@ def read_urdf(file: Path, root: Element) -> Robot:
             raise child.fault(
                 "is a macro, expected plain URDF; expand the file: xacro FILE > robot.urdf"
             )
-        if child.tag not in ("link", "joint", "constraint"):
+        if child.tag not in READ and not any(_joints_of_sdf(child)):
             robot.count(child.tag)
     require_children(root, IN_ROBOT)
     _links(robot)
@@ -81,12 +104,80 @@ def read_urdf(file: Path, root: Element) -> Robot:
     _mimics(robot, joints)
     for k, element in enumerate(root.only("constraint"), 1):
         robot.loops.append(_constraint(robot, element, f"constraint{k}"))
+    add_ties(robot, ((each, partial(_tied, robot)) for each in root.children))
+    frames = _gazebo(robot, joints)
     beside.add(robot)
+    _require_apart(robot, frames)
     for each in root.only("transmission"):
         for joint in each.only("joint"):
             if joint.attributes.get("name") in joints:
                 robot.actuated.append(joint.attributes["name"])
     return robot
+
+
+def _tied(robot: Robot, element: Element, name: str) -> str:
+    return named(element, "name", name, robot.links, "link")
+
+
+def _gazebo(robot: Robot, joints: Mapping[str, Element]) -> Frames:
+    """Add the joints of SDF in <gazebo>, which close loops; return all frames.
+
+    Raises:
+        CaseError: see `joints_of`; or they bring links, or move the base.
+    """
+    frames = Frames()
+    for name, element in robot.elements.items():
+        frames.put(name, element, robot.links[name], name)
+    for name, element in joints.items():
+        link = _link(robot, element, "child")
+        if name not in frames.found:
+            frames.put(name, element, robot.links[link], link)
+    for element in robot.root.only("frame"):  # of Drake
+        link, name = element.attributes.get("link", ""), element.attributes.get("name", "")
+        if link in robot.links and name and name not in frames.found:
+            frames.put(name, element, robot.links[link].then(_pose(element)), link)
+    for gazebo in robot.root.only(GAZEBO):
+        for element in gazebo.only("link", "model"):
+            raise element.fault("is of SDF, expected links of URDF; write it as <link>")
+        if any(_joints_of_sdf(gazebo)):
+            frames.read(gazebo, "")
+    still = {*robot.fixed}
+    for joint in joints_of(robot, frames, Short(frames), SDF_VERSION):
+        robot.loops.append(Loop(joint))
+    for full, framed in frames.joints.items():
+        base = frames.link(framed.element, framed.attached)
+        if base in still and framed.element.attributes.get("type") != "fixed":
+            raise framed.element.fault(
+                f"{full!r} moves {base!r}, the base, which stands still, expected a joint between"
+                " links that move; give the robot a link 'world' and this joint as one of URDF"
+            )
+    return frames
+
+
+def _joints_of_sdf(element: Element) -> Iterator[Element]:
+    """Yield the joints and frames of SDF in a <gazebo> of the whole robot."""
+    if element.tag == GAZEBO and "reference" not in element.attributes:
+        yield from element.only(*IN_GAZEBO)
+
+
+def _require_apart(robot: Robot, frames: Frames) -> None:
+    """Refuse elements that are not read and may join links."""
+    names = {move.name: move.name for joint in robot.joints for move in joint.moves}
+    names |= {joint.name: joint.name for joint in robot.joints}
+    followers = [each.joints for each in robot.mimics]
+    unread = Unread(frames.named(), names, followers, f"a <joint>, <constraint> or <{BALL}>")
+    for element in (robot.root, *robot.root.only("link")):
+        link = element.attributes["name"] if element.tag == "link" else ""
+        if link:
+            unread.require_apart(replace(element, children=[]), link)
+        for child in element.children:
+            if child.tag not in (*READ, *IN_LINK, GAZEBO):
+                unread.require_apart(child, link)
+    for gazebo in robot.root.only(GAZEBO):
+        read = [*_joints_of_sdf(gazebo)]
+        for child in gazebo.children:
+            if child not in read:
+                unread.require_apart(child, gazebo.attributes.get("reference", ""))
 
 
 def _links(robot: Robot) -> None:
@@ -100,13 +191,14 @@ def _links(robot: Robot) -> None:
                 " those that are not looked at"
             )
         robot.elements[name] = element
+        element.require_known(("name", "type"), "URDF", closed=False)
         require_children(element, IN_LINK)
         if (inertial := urdf_inertial(element)) is not None:
             robot.inertials[name] = inertial
         for child in element.children:
             if child.tag != "inertial":
                 robot.count(child.tag)
-    parents = [each for joint in robot.root.only("joint") for each in joint.only("parent")]
+    parents = [each for joint in robot.root.only(*JOINTS) for each in joint.only("parent")]
     if any(each.attributes.get("link") == WORLD for each in parents):
         robot.elements.setdefault(WORLD, robot.root)  # as in Drake, which has it without a link
     if not robot.elements:
@@ -117,11 +209,11 @@ def _joints(robot: Robot) -> dict[str, Element]:
     """Return the elements of the joints by name, each link with one joint above it at most."""
     found: dict[str, Element] = {}
     above: dict[str, str] = {}
-    for element in robot.root.only("joint"):
-        name = required(element, "name")
+    for element in robot.root.only(*JOINTS):
+        name = required(element, "name", ("type",))
         if name in found:
             raise element.repeated_name(name, "the joints")
-        require_children(element, IN_JOINT)
+        require_children(element, IN_JOINT, closed=True)
         child = _link(robot, element, "child")
         _link(robot, element, "parent")
         if child in above:
@@ -131,7 +223,7 @@ def _joints(robot: Robot) -> dict[str, Element]:
             )
         above[child], found[name] = name, element
         add_urdf_damper(robot, element)
-        for each in ("limit", "calibration", "safety_controller"):
+        for each in ("limit", "calibration", "safety_controller", "joint_properties"):
             if any(element.only(each)):
                 robot.count(f"{each} of joints")
     roots = [name for name in robot.elements if name not in above]
@@ -150,6 +242,7 @@ def _link(robot: Robot, element: Element, tag: str, *more: str) -> str:
     """Return the link named by a child element."""
     for each in (tag, *more):
         if (child := only_child(element, each)) is not None:
+            child.require_known(("link",), "URDF")
             return named(child, "link", required(child, "link"), robot.elements, "link")
     raise element.fault(f"<{tag}>: missing, expected a link; add it")
 
@@ -177,6 +270,10 @@ def _origin(element: Element | None) -> Place:
     if element is None:
         return HERE
     element.require_known(("xyz", "rpy"), "URDF")
+    return _pose(element)
+
+
+def _pose(element: Element) -> Place:
     at = vec(element.numbers("xyz", (3,), (0.0, 0.0, 0.0)))
     return Place(at, roll_pitch_yaw(element.numbers("rpy", (3,), (0.0, 0.0, 0.0))))
 
@@ -198,7 +295,11 @@ def _connection(robot: Robot, name: str, element: Element, other: str | None) ->
     """
     links = _link(robot, element, "parent"), _link(robot, element, "child")
     place = robot.links[links[1]]
-    kind = other or element.choice("type", TYPES, "")
+    kind = other or element.choice("type", DRAKE_TYPES if element.tag == DRAKE_JOINT else TYPES, "")
+    if kind == "screw":
+        (lead,) = value_of(element, PITCH, 1)
+        weights = {f"{name}.translation": 1.0, f"{name}.rotation": -lead / (2.0 * math.pi)}
+        robot.couplings.append(Coupling(f"{name}.thread", weights, element))
     if kind == "floating" and links[0] in robot.fixed:
         return Connection(name, links, (), element, free=True)
     return Connection(name, links, _moves(name, element, kind, place), element)
@@ -226,6 +327,11 @@ def _moves(name: str, element: Element, kind: str, place: Place) -> tuple[Move, 
             return slide(".slide1", f), slide(".slide2", g), hinge(".rotation", h)
         case "fixed":
             return ()
+        case "screw":
+            axis = _axis(element, "axis", place)
+            return slide(".translation", axis), hinge(".rotation", axis)
+        case "universal":  # of Drake: about x of the parent, then y of the child
+            return hinge(".1", place.direction(X)), hinge(".2", place.direction(_AXES["y"]))
         case _:  # of a file beside: a universal joint, by the letters of its axes
             return tuple(hinge(f"_{each}", place.direction(_AXES[each.lower()])) for each in kind)
 
@@ -247,7 +353,8 @@ def _mimics(robot: Robot, joints: Mapping[str, Element]) -> None:
 
 def _constraint(robot: Robot, element: Element, default: str) -> Loop:
     """Return the joint of a <constraint>."""
-    require_children(element, IN_CONSTRAINT)
+    element.require_known(("name", "type"), "URDF")
+    require_children(element, IN_CONSTRAINT, closed=True)
     name = element.attributes.get("name", default)
     kind = element.attributes.get("type", "").lower()
     if kind not in CLOSING:

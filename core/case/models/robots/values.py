@@ -6,13 +6,10 @@ import math
 from collections.abc import Collection, Sequence
 
 from ....algebra import Quat, Vec3, X, Y, Z
-from ....errors import similar, with_article
+from ....errors import remedy, similar, with_article
 from ...io.document import decimal, shown, usable
-from ..mjcf.elements import Element
+from ..mjcf.elements import ALIKE, Element
 from ..mjcf.frames import unit_vector
-
-# Two words are alike if a typing error makes one of the other.
-ALIKE = 0.75
 
 
 def roll_pitch_yaw(angles: Sequence[float]) -> Quat:
@@ -55,15 +52,38 @@ def numbers_of(
     return found
 
 
-def require_children(element: Element, known: Sequence[str]) -> None:
-    """Refuse a mistyped element, which would silently be left out; others are extensions.
+def value_of(element: Element, tag: str, count: int) -> tuple[float, ...]:
+    """Return the numbers of the child of a tag, in its text or its attribute; zeros without one.
 
     Raises:
-        CaseError: an element is almost one of the known ones.
+        CaseError: a wrong count, or an unusable number.
+    """
+    child = only_child(element, tag)
+    if child is not None and "value" in child.attributes:
+        return child.numbers("value", (count,))
+    return numbers_of(child, (count,), (0.0,) * count) if child else (0.0,) * count
+
+
+def require_children(element: Element, known: Sequence[str], *, closed: bool = False) -> None:
+    """Refuse a mistyped element, which would silently be left out.
+
+    Args:
+        closed: others are no extensions but unknown, unless they have a prefix.
+
+    Raises:
+        CaseError: an element is unknown, or almost one of the known ones.
     """
     for child in element.children:
-        if child.tag not in known and (meant := similar(child.tag, known, ALIKE)):
-            raise child.fault(f"unknown in <{element.tag}>; did you mean {meant!r}?")
+        if child.tag in known:
+            continue
+        prefix, colon, name = child.tag.rpartition(":")
+        alike = [
+            each.removeprefix(prefix + colon)
+            for each in known
+            if each.startswith(prefix + colon) and (colon or ":" not in each)
+        ]
+        if (closed and not colon) or similar(name, alike, ALIKE):
+            raise child.fault(f"unknown in <{element.tag}>; {remedy(name, alike)}")
 
 
 def only_child(element: Element, tag: str) -> Element | None:

@@ -1,45 +1,55 @@
-"""Elements of SDF that Drake reads beyond the format: ball constraints, mimics, spring-dampers.
+"""Elements that Drake reads beyond SDF and URDF: ball constraints, mimics, spring-dampers.
 
 `kincheck export --to sdf` closes its loops by them. Three ball constraints of two links hold them
-together as a whole.
+together as a whole. In SDF their values are texts, and in URDF attributes.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from typing import TypeAlias
 
 from ....algebra import Vec3, X, cross, vec
 from ....errors import CaseError
-from ..mjcf.elements import Element
+from ..mjcf.elements import Element, unlike
 from ..mjcf.frames import Place, of_axes
-from .dynamics import strut_spring
+from .dynamics import STRUT_LAW, strut_spring
 from .robot import Connection, Loop, Mimic, Move, Robot, Strut
-from .sdf_frames import Frames, Short, text_of
-from .values import numbers_of, only_child
+from .sdf_frames import Frames, Short
+from .values import only_child, require_children, value_of
 
-PREFIX = "drake:"
 BALL, MIMIC, STRUT = "drake:ball_constraint", "drake:mimic", "drake:linear_spring_damper"
 # Of the distance of two points, what lies on the line through both.
 ON_LINE = 1e-6
 
+LinkOf: TypeAlias = Callable[[Element, str], str]
+"""Name of the link that an element names."""
 
-def add_ties(robot: Robot, frames: Frames, short: Short) -> None:
-    """Add the ball constraints and spring-dampers of all models; other elements are counted.
+
+def add_ties(robot: Robot, elements: Iterable[tuple[Element, LinkOf]]) -> None:
+    """Add ball constraints and spring-dampers.
 
     Raises:
         CaseError: a link is unknown, or a point is not three numbers.
     """
     found: dict[tuple[str, str], list[tuple[Element, Vec3, Vec3]]] = {}
-    for full, framed in frames.models.items():
-        for element in framed.element.children:
-            if element.tag == BALL:
-                links, points = _ends(frames, short, element, full)
-                found.setdefault(links, []).append((element, *points))
-            elif element.tag == STRUT:
-                _add_strut(robot, frames, short, element, full)
-            elif element.tag.startswith(PREFIX):
-                robot.count(element.tag)
+    for element, link_of in elements:
+        if element.tag == BALL:
+            links, points = _ends(element, link_of)
+            found.setdefault(links, []).append((element, *points))
+        elif element.tag == STRUT:
+            _add_strut(robot, element, link_of)
+    taken, again = set[str](), Counter[str]()
+
+    def name_of(element: Element, links: Sequence[str]) -> str:
+        name = _name(element, links)
+        if "name" not in element.attributes:  # several may hold two links together
+            name = unlike(name, taken, again=again)
+        taken.add(name)
+        return name
+
     for links, ties in found.items():
         if links[0] == links[1]:
             raise ties[0][0].fault(
@@ -48,19 +58,19 @@ def add_ties(robot: Robot, frames: Frames, short: Short) -> None:
         here, there = (robot.links[link] for link in links)
         frame = _frame([each for _, each, _ in ties]), _frame([each for _, _, each in ties])
         if frame[0] is not None and frame[1] is not None:
-            whole = Connection(_name(ties[0][0], links), links, (), ties[0][0])
+            whole = Connection(name_of(ties[0][0], links), links, (), ties[0][0])
             robot.loops.append(Loop(whole, (here.then(frame[0]), there.then(frame[1]))))
             continue
         for element, first, second in ties:
             at = here.then(Place(first)), there.then(Place(second))
-            ball = Move("ball", _name(element, links), at[0].at, X)
+            ball = Move("ball", name_of(element, links), at[0].at, X)
             robot.loops.append(Loop(Connection(ball.name, links, (ball,), element), at))
 
 
-def _add_strut(robot: Robot, frames: Frames, short: Short, element: Element, model: str) -> None:
+def _add_strut(robot: Robot, element: Element, link_of: LinkOf) -> None:
     """Add a spring-damper of two points; one that makes no sense is counted."""
     try:
-        links, points = _ends(frames, short, element, model)
+        links, points = _ends(element, link_of)
         spring = strut_spring(element)
     except CaseError:
         robot.count(STRUT)
@@ -97,25 +107,23 @@ def mimic_of(frames: Frames, short: Short, full: str, joint: Connection) -> Mimi
     return Mimic(f"{joint.name}.mimic", (joint.name, short(leader)), (offset, factor), element)
 
 
-def _ends(
-    frames: Frames, short: Short, element: Element, model: str
-) -> tuple[tuple[str, str], tuple[Vec3, Vec3]]:
+def _ends(element: Element, link_of: LinkOf) -> tuple[tuple[str, str], tuple[Vec3, Vec3]]:
     """Return the links of an element between two points, and the points in them."""
     tag = element.tag
-    first, second = (_link(frames, short, element, model, f"{tag}_body_{side}") for side in "AB")
-    return (first, second), (_point(element, f"{tag}_p_AP"), _point(element, f"{tag}_p_BQ"))
-
-
-def _link(frames: Frames, short: Short, element: Element, model: str, tag: str) -> str:
-    link = frames.link(element, frames.within(element, model, text_of(element, tag)))
-    if not link:
-        raise element.fault(f"<{tag}>: is the world, expected a link; fix a link to the world")
-    return short(link)
+    parts = [*(f"{tag}_body_{side}" for side in "AB"), f"{tag}_p_AP", f"{tag}_p_BQ"]
+    require_children(element, (*parts, *(f"{tag}_{each}" for each in STRUT_LAW)), closed=True)
+    links: list[str] = []
+    for part in parts[:2]:
+        child = only_child(element, part)
+        name = child and (child.text or child.attributes.get("name", ""))
+        if child is None or not name:
+            raise element.fault(f"<{part}>: missing, expected a name; add it")
+        links.append(link_of(child, name))
+    return (links[0], links[1]), (_point(element, parts[2]), _point(element, parts[3]))
 
 
 def _point(element: Element, tag: str) -> Vec3:
-    child = only_child(element, tag)
-    return vec((0.0, 0.0, 0.0) if child is None else numbers_of(child, (3,), (0.0, 0.0, 0.0)))
+    return vec(value_of(element, tag, 3))
 
 
 def _frame(points: Sequence[Vec3]) -> Place | None:

@@ -1,0 +1,429 @@
+"""What joins links and is not read stops a model by name; extensions that join nothing do not."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from kincheck.core.case.io.reader_options import LEFT_OUT, Supplied
+from kincheck.core.case.models.files import load
+from kincheck.core.case.models.mjcf.attributes import require_known_attributes
+from kincheck.core.case.models.mjcf.elements import parse_xml
+from kincheck.core.errors import CaseError
+
+from ..support.model_poses import coordinate, solution
+
+EXACT = 1e-13
+DRIVE = Supplied(drive=("drive:-0.2:0.2:5",), hold_rest=True)
+HINGE = '<joint name="{}" type="continuous"><parent link="{}"/><child link="{}"/>{}</joint>'
+GATE = (
+    '<robot name="gate" xmlns:drake="http://drake.mit.edu"><link name="base"/><link name="swing"/>'
+    '<link name="strut"/><link name="follower"/>'
+    + HINGE.format("drive", "base", "swing", '<axis xyz="0 1 0"/>')
+    + HINGE.format("pin", "swing", "strut", '<origin xyz="0 0 0.25"/><axis xyz="0 1 0"/>')
+    + HINGE.format("pivot", "base", "follower", '<origin xyz="0.4 0 0"/><axis xyz="0 1 0"/>')
+    + "{}</robot>"
+)
+IN_SDF = """<sdf version="1.9" xmlns:drake="http://drake.mit.edu"><model name="gate">
+<link name="swing"/><link name="strut"><pose>0 0 0.25 0 0 0</pose></link>
+<link name="follower"><pose>0.4 0 0 0 0 0</pose></link>
+<joint name="drive" type="revolute"><parent>world</parent><child>swing</child>
+<axis><xyz>0 1 0</xyz></axis></joint>
+<joint name="pin" type="revolute"><parent>swing</parent><child>strut</child>
+<axis><xyz>0 1 0</xyz></axis></joint>
+<joint name="pivot" type="revolute"><parent>world</parent><child>follower</child>
+<axis><xyz>0 1 0</xyz></axis></joint>
+{}</model></sdf>"""
+
+
+def read(folder: Path, text: str, name: str = "gate.urdf", supplied: Supplied = DRIVE):
+    file = folder / name
+    file.write_text(text)
+    return load(file, supplied)
+
+
+def follower_angles() -> np.ndarray:
+    """The follower of the four-bar, by the circles of its coupler's end: a crank of 0.25 at the
+    origin, a coupler of (0.3, 0.2), and a follower at x = 0.4 whose end is at (-0.1, 0.45).
+    """
+    found = []
+    for angle in np.linspace(-0.2, 0.2, 5):
+        apart = np.array([0.4 - 0.25 * np.sin(angle), -0.25 * np.cos(angle)])
+        size, rod, arm = np.hypot(*apart), np.hypot(0.3, 0.2), np.hypot(0.1, 0.45)
+        along = (size**2 + arm**2 - rod**2) / (2.0 * size)
+        back = -apart / size
+        across = np.array([back[1], -back[0]])  # upwards of the line between both ends
+        if across[1] < 0.0:
+            across = -across
+        end = along * back + np.sqrt(arm**2 - along**2) * across
+        found.append(np.arctan2(end[0], end[1]) - np.arctan2(-0.1, 0.45))
+    return np.array(found)
+
+
+AT = "<pose>-0.1 0 0.45 0 0 0</pose>"
+ENDS = "<parent>strut</parent><child>follower</child>"
+BALL = (
+    "<drake:ball_constraint>"
+    '<drake:ball_constraint_body_A name="strut"/><drake:ball_constraint_body_B name="follower"/>'
+    '<drake:ball_constraint_p_AP value="0.3 0 0.2"/>'
+    '<drake:ball_constraint_p_BQ value="-0.1 0 0.45"/></drake:ball_constraint>'
+)
+LOOPS = {
+    "hinge": f'<gazebo><joint name="c" type="revolute">{ENDS}{AT}<axis><xyz>0 1 0</xyz></axis>'
+    "</joint></gazebo>",
+    "hinge, axis in another link": f'<gazebo><joint name="c" type="revolute">{ENDS}{AT}'
+    '<axis><xyz expressed_in="base">0 1 0</xyz></axis></joint></gazebo>',
+    "ball on a frame": '<gazebo><frame name="end" attached_to="follower">'
+    '<pose relative_to="pivot">-0.1 0 0.45 0 0 0</pose></frame>'
+    '<joint name="c" type="ball"><parent>strut</parent><child>end</child></joint></gazebo>',
+    "Drake's ball": BALL,
+    "Drake's balls on an axis": BALL
+    + BALL.replace('"0.3 0 0.2"', '"0.3 1 0.2"').replace('"-0.1 0 0.45"', '"-0.1 1 0.45"'),
+}
+
+
+@pytest.mark.parametrize("loop", LOOPS.values(), ids=LOOPS)
+def test_a_loop_of_gazebo_or_drake_is_closed(loop: str, tmp_path: Path):
+    case = read(tmp_path, GATE.format(loop))
+    found = solution(case)
+    assert found.solved.all()
+    turned = [coordinate(case.mechanism, found, case.mechanism.joint("pivot"), k) for k in range(5)]
+    expected = follower_angles()
+    assert turned == pytest.approx(expected, abs=EXACT)
+    assert expected[[0, -1]] == pytest.approx([-0.10101, 0.090703], abs=5e-6)
+
+
+TWO = "names the links 'strut' and 'follower', which it may join, and is not read, expected a"
+COUPLED = "couples the joints 'drive' and 'pivot', and is not read, expected <mimic>"
+JOINING = {
+    "attributes": ('<tie a="strut" b="follower"/>', TWO),
+    "children": ('<loop_joint><parent link="strut"/><child link="follower"/></loop_joint>', TWO),
+    "texts": ("<x><a>strut</a><b>follower</b></x>", TWO),
+    "a list": ('<tie links="strut, follower"/>', TWO),
+    "depth": ('<x><y><z><a name="strut"/><b name="follower"/></z></y></x>', TWO),
+    "prefix": ('<any:weld body1="strut" body2="follower"/>', TWO),
+    "plugin": (f'<gazebo><plugin name="p" filename="f">{ENDS}</plugin></gazebo>', TWO),
+    "reference": ('<gazebo reference="strut"><attach>follower</attach></gazebo>', TWO),
+    "joint of a reference": (
+        f'<gazebo reference="strut"><joint name="w" type="ball">{ENDS}</joint></gazebo>',
+        TWO,
+    ),
+    "frames": (
+        '<frame name="f" link="strut"/><frame name="g" link="follower"/><drake:linear_bushing_rpy>'
+        '<drake:bushing_frameA name="f"/><drake:bushing_frameC name="g"/>'
+        "</drake:linear_bushing_rpy>",
+        TWO,
+    ),
+    "the world": ('<close link="strut" to="world"/>', "names the links 'strut' and 'world'"),
+    "MuJoCo's": (
+        '<mujoco><equality><connect body1="strut" body2="follower"/></equality></mujoco>',
+        TWO,
+    ),
+    "a name alone": ('<joint_loop name="closing"/>', "may close a loop, and is not read"),
+    "mimic plugin": (
+        '<gazebo><plugin name="m" filename="libmimic_joint.so"><joint>drive</joint>'
+        "<mimicJoint>pivot</mimicJoint></plugin></gazebo>",
+        COUPLED,
+    ),
+    "mimic of ros2_control": (
+        '<ros2_control><joint name="drive"/><joint name="pivot"><param name="mimic">drive</param>'
+        "</joint></ros2_control>",
+        COUPLED,
+    ),
+    "one motor for two joints": (
+        '<transmission name="t"><joint name="drive"/><joint name="pivot"/><actuator name="m"/>'
+        "</transmission>",
+        "with fewer actuators than joints may couple 'drive' and 'pivot'",
+    ),
+    "another joint of Drake": (
+        '<link name="t"/><drake:joint name="q" type="curvilinear"><parent link="strut"/>'
+        '<child link="t"/></drake:joint>',
+        "found 'curvilinear', expected one of ball, planar, screw, universal",
+    ),
+    "a joint that moves the base": (
+        '<gazebo><joint name="w" type="revolute"><parent>world</parent><child>base</child><axis/>'
+        "</joint></gazebo>",
+        "'w' moves 'base', the base, which stands still",
+    ),
+    "a link of SDF": ('<gazebo><link name="z"/></gazebo>', "is of SDF, expected links of URDF"),
+}
+
+
+@pytest.mark.parametrize(("text", "said"), JOINING.values(), ids=JOINING)
+def test_what_joins_links_is_refused(text: str, said: str, tmp_path: Path):
+    with pytest.raises(CaseError) as caught:
+        read(tmp_path, GATE.format(text))
+    assert said in str(caught.value)
+    assert str(caught.value).startswith(f"{tmp_path / 'gate.urdf'}: line 1: <")
+
+
+JOINING_IN_LINKS = {
+    "element": '<link name="strut"><welded to="follower"/></link>',
+    "attribute": '<link name="strut" welded_to="follower"/>',
+}
+
+
+@pytest.mark.parametrize("link", JOINING_IN_LINKS.values(), ids=JOINING_IN_LINKS)
+def test_a_link_that_names_another_is_refused(link: str, tmp_path: Path):
+    with pytest.raises(CaseError, match=TWO):
+        read(tmp_path, GATE.format("").replace('<link name="strut"/>', link))
+
+
+APART = {
+    "looks and contacts": '<gazebo reference="strut"><material>Gazebo/Blue</material><mu1>1</mu1>'
+    "</gazebo>",
+    "plugins of one link each": '<gazebo><plugin name="x"><bodyName>strut</bodyName></plugin>'
+    '<plugin name="y"><bodyName>follower</bodyName></plugin></gazebo>',
+    "publishers": '<gazebo><plugin name="p" filename="libgazebo_ros_p3d.so">'
+    "<bodyName>strut</bodyName><frameName>base</frameName></plugin></gazebo>",
+    "motors": '<gazebo><plugin name="d" filename="libdrive.so"><leftJoint>drive</leftJoint>'
+    "<rightJoint>pivot</rightJoint></plugin></gazebo>",
+    "sensors": '<gazebo reference="strut"><sensor name="s"><frame>follower</frame></sensor>'
+    "</gazebo>",
+    "ros2_control": '<ros2_control name="s"><hardware><plugin>a/B</plugin></hardware>'
+    '<joint name="drive"/><joint name="pivot"/></ros2_control>',
+    "as many motors": '<transmission name="t"><joint name="drive"/><joint name="pivot"/>'
+    '<actuator name="m"/><actuator name="n"/></transmission>',
+    "collisions": '<drake:collision_filter_group name="g"><drake:member link="strut"/>'
+    '<drake:member link="follower"/></drake:collision_filter_group>'
+    '<disable_collisions link1="strut" link2="follower"/>',
+    "settings": '<mujoco><compiler meshdir="x"/></mujoco><drake:note/>',
+}
+
+
+@pytest.mark.parametrize("text", APART.values(), ids=APART)
+def test_what_joins_nothing_is_left_out(text: str, tmp_path: Path):
+    case = read(tmp_path, GATE.format(text))
+    assert case.source.split(LEFT_OUT)[1] not in ("", "nothing")
+
+
+def test_numbers_name_links_only_where_links_are_named(tmp_path: Path):
+    numbered = GATE.replace('"strut"', '"1"').replace('"follower"', '"2"')
+    read(tmp_path, numbered.format('<gazebo reference="1"><mu1>2</mu1></gazebo>'))
+    with pytest.raises(CaseError, match="names the links '1' and '2'"):
+        read(tmp_path, numbered.format("<tie><link>1</link><link>2</link></tie>"))
+
+
+def test_a_screw_of_drake_advances_by_its_pitch_in_a_turn(tmp_path: Path):
+    screw = (
+        '<link name="tip"/><drake:joint name="q" type="screw"><parent link="base"/>'
+        '<child link="tip"/><axis xyz="0 1 0"/><drake:screw_thread_pitch value="0.5"/>'
+        "</drake:joint>"
+    )
+    supplied = Supplied(drive=(f"q.rotation:0:{np.pi}:2",), hold_rest=True)
+    found = solution(read(tmp_path, GATE.format(screw), supplied=supplied)).bodies["tip"]
+    assert found.r[-1] == pytest.approx((0.0, 0.25, 0.0), abs=EXACT)
+
+
+def test_a_plugin_that_repeats_a_mimic_is_left_out(tmp_path: Path):
+    text = GATE.format(JOINING["mimic plugin"][0] + JOINING["mimic of ros2_control"][0])
+    case = read(
+        tmp_path, text.replace('<origin xyz="0.4', '<mimic joint="drive"/><origin xyz="0.4')
+    )
+    assert [coupler.name for coupler in case.mechanism.couplers] == ["pivot.mimic"]
+
+
+IN_SDF_JOINING = {
+    "plugin": '<plugin name="DetachableJoint"><parent_link>strut</parent_link>'
+    "<child_link>follower</child_link></plugin>",
+    "scoped": '<plugin name="p"><a>gate::strut</a><b>follower</b></plugin>',
+    "gripper": "<gripper><palm_link>strut</palm_link><gripper_link>follower</gripper_link>"
+    "</gripper>",
+    "joint of Drake": "<drake:joint><drake:parent>strut</drake:parent>"
+    "<drake:child>follower</drake:child></drake:joint>",
+    "mistyped": "<drake:ball_constrant><a>strut</a><b>follower</b></drake:ball_constrant>",
+    "unknown": '<loop a="strut" b="follower"/>',
+}
+
+
+@pytest.mark.parametrize("text", IN_SDF_JOINING.values(), ids=IN_SDF_JOINING)
+def test_an_element_of_sdf_that_joins_links_is_refused(text: str, tmp_path: Path):
+    with pytest.raises(CaseError, match=TWO):
+        read(tmp_path, IN_SDF.format(text), "gate.sdf")
+
+
+MISTYPED = {
+    "axis": ("<xyz>", "<xzy>", "unknown in <axis>; did you mean 'xyz'?"),
+    "frame of an axis": ("<xyz>", '<xyz expresed_in="x">', "did you mean 'expressed_in'"),
+    "pose": ("<pose>", '<pose relative="x">', "did you mean 'relative_to'?"),
+    "pose of a link": ("<pose>", "<pse>0</pse><pose>", "unknown in <link>; did you mean 'pose'"),
+    "joint": ("<parent>", "<offset>1</offset><parent>", "unknown in <joint>"),
+    "type": ('"drive" type', '"drive" tpe', "did you mean 'type'?"),
+    "mimic": ("<parent>", '<drake:mimc joint="x"/><parent>', "did you mean 'mimic'?"),
+    "model": ('name="gate"', 'name="gate" placement_frame="x"', "'placement_frame'"),
+    "mass": (
+        "<pose>",
+        "<inertial><mas>1</mas></inertial><pose>",
+        "unknown in <inertial>; did you mean 'mass'",
+    ),
+    "inertia": ("<pose>", "<inertial><inertia><ixxx/></inertia></inertial><pose>", "'ixx'"),
+    "damping": ("</xyz>", "</xyz><dynamics><dampin>1</dampin></dynamics>", "'damping'"),
+}
+
+
+@pytest.mark.parametrize(("old", "new", "said"), MISTYPED.values(), ids=MISTYPED)
+def test_mistyped_elements_of_sdf_are_refused(old: str, new: str, said: str, tmp_path: Path):
+    text = IN_SDF.format("").replace(old, new, 1)
+    if new == "<xzy>":
+        text = text.replace("</xyz>", "</xzy>", 1)
+    with pytest.raises(CaseError, match=r"line \d+: ") as caught:
+        read(tmp_path, text, "gate.sdf")
+    assert said in str(caught.value)
+
+
+MISTYPED_IN_URDF = {
+    "axis": ('<axis xyz="0 1 0"/>', '<axis xzy="0 1 0"/>', "did you mean 'xyz'?"),
+    "origin": ('<origin xyz="0 0', '<origin degrees="1" xyz="0 0', "'degrees'"),
+    "joint": ('<parent link="base"/>', '<parent link="base"/><pose/>', "unknown in <joint>"),
+    "parent": ('<parent link="base"/>', '<parent link="base" offset="1"/>', "'offset'"),
+    "type": ('"drive" type', '"drive" tpe', "did you mean 'type'?"),
+    "mass": (
+        '<link name="strut"/>',
+        '<link name="strut"><inertial><mass vaule="1"/></inertial></link>',
+        "did you mean 'value'?",
+    ),
+    "inertial": (
+        '<link name="strut"/>',
+        '<link name="strut"><inertial><com xyz="1 0 0"/></inertial></link>',
+        "unknown in <inertial>",
+    ),
+    "damping": (
+        '<parent link="base"/>',
+        '<parent link="base"/><dynamics damp="1"/>',
+        "did you mean 'damping'?",
+    ),
+    "leader": (
+        '<parent link="base"/>',
+        '<parent link="base"/><mimic joint="drve"/>',
+        "did you mean 'drive'?",
+    ),
+}
+
+
+@pytest.mark.parametrize(("old", "new", "said"), MISTYPED_IN_URDF.values(), ids=MISTYPED_IN_URDF)
+def test_mistyped_elements_of_urdf_are_refused(old: str, new: str, said: str, tmp_path: Path):
+    text = GATE.format("")
+    assert old in text
+    with pytest.raises(CaseError) as caught:
+        read(tmp_path, text.replace(old, new, 1))
+    assert said in str(caught.value)
+
+
+IN_MJCF = """<mujoco><option gravity="0 0 -1"/><default><geom density="1"/></default><worldbody>
+<body name="a"><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/><joint name="drive"/>
+<geom name="g" size="0.1"/><body name="b" pos="1 0 0"><joint name="pin"/>
+<geom size="0.1" pos="1 0 0"/></body></body></worldbody>
+<contact><exclude body1="a" body2="b"/></contact>
+<sensor><framepos objtype="body" objname="a" reftype="body" refname="b"/></sensor>{}</mujoco>"""
+MISTYPED_IN_MJCF = {
+    "option": ("gravity", "gravty", "did you mean 'gravity'?"),
+    "default": ("density", "desity", "did you mean 'density'?"),
+    "inertial": ("diaginertia", "diaginertial", "did you mean 'diaginertia'?"),
+    "geom": ('name="g" size', 'name="g" mas', "did you mean 'mass'?"),
+}
+
+
+def test_exclusions_and_sensors_join_nothing(tmp_path: Path):
+    case = read(tmp_path, IN_MJCF.format(""), "model.xml")
+    assert "contact: exclude (1), sensor: framepos (1)" in case.source
+    assert case.mechanism.gravity == (0.0, 0.0, -1.0)
+
+
+@pytest.mark.parametrize(("old", "new", "said"), MISTYPED_IN_MJCF.values(), ids=MISTYPED_IN_MJCF)
+def test_mistyped_attributes_of_mjcf_are_refused(old: str, new: str, said: str, tmp_path: Path):
+    text = IN_MJCF.format("").replace(old, new, 1)
+    with pytest.raises(CaseError, match="which MJCF does not have here") as caught:
+        read(tmp_path, text, "model.xml")
+    assert said in str(caught.value)
+
+
+def test_attributes_of_other_releases_are_left_out_where_they_move_nothing(tmp_path: Path):
+    read(tmp_path, IN_MJCF.format("").replace('name="g"', 'name="g" mystery="1"'), "model.xml")
+    with pytest.raises(CaseError, match="the attribute 'mystery', which MJCF does not have here"):
+        read(tmp_path, IN_MJCF.format("").replace('"drive"', '"drive" mystery="1"'), "model.xml")
+
+
+def test_all_attributes_of_mujoco_are_accepted(tmp_path: Path):
+    """Of its own schema: no attribute that is not read is taken for a mistyped one."""
+    mujoco = pytest.importorskip("mujoco")
+    path: list[str] = []
+    found: dict[str, list[str]] = {}
+    for line in mujoco.mj_printSchema(False, False).splitlines():
+        if head := re.match(r"( *)(?:\(world\))?([a-z]+) \(.\)(.*)", line):
+            path[len(head[1]) // 3 :] = [head[2]]
+            found["/".join(path)] = head[3].split()
+        elif path:
+            found["/".join(path)] += line.split()
+    tested = {
+        **{each: each.split("/")[-1:] for each in ("mujoco/body/geom", "mujoco/body/inertial")},
+        "mujoco/option": ["option"],
+        "mujoco/option/flag": ["option", "flag"],
+        "mujoco/default/geom": ["default", "geom"],
+        "mujoco/default/tendon": ["default", "tendon"],
+        "mujoco/tendon/spatial": ["tendon", "spatial"],
+        "mujoco/tendon/fixed": ["tendon", "fixed"],
+    }
+    for schema, tags in tested.items():
+        text = " ".join(f'{name}=""' for name in found[schema])
+        whole = f"<{tags[-1]} {text}/>"
+        for tag in reversed(tags[:-1]):
+            whole = f"<{tag}>{whole}</{tag}>"
+        if "body" in schema:
+            whole = f"<worldbody><body>{whole}</body></worldbody>"
+        require_known_attributes(parse_xml(tmp_path / "m.xml", f"<mujoco>{whole}</mujoco>"))
+    assert len(found["mujoco/body/geom"]) > 30
+
+
+@pytest.mark.parametrize("kind", ["flex", "flexvert", "flexstrain", "distance"])
+def test_other_equalities_are_refused(kind: str, tmp_path: Path):
+    text = IN_MJCF.format(f"<equality><{kind}/></equality>")
+    with pytest.raises(CaseError, match="cannot be read: there is no joint for it"):
+        read(tmp_path, text, "model.xml")
+
+
+def test_a_soft_body_between_bodies_is_refused(tmp_path: Path):
+    text = IN_MJCF.format('<deformable><flex name="f" body="a b"/></deformable>')
+    with pytest.raises(CaseError, match="holds the bodies a, b together as a soft one"):
+        read(tmp_path, text, "model.xml")
+
+
+JOINTS_OF_DRAKE = {
+    "ball": ("", 3),
+    "universal": ("", 2),
+    "planar": ('<axis xyz="0 1 0"/>', 3),
+    "screw": ('<axis xyz="0 0 1"/><drake:screw_thread_pitch value="0.5"/>', 1),
+}
+
+
+@pytest.mark.parametrize(
+    ("kind", "inside", "freedoms"), [(kind, *each) for kind, each in JOINTS_OF_DRAKE.items()]
+)
+def test_a_joint_of_drake_moves_as_drake_moves_it(kind, inside, freedoms, tmp_path: Path):
+    """Its freedoms, and the place of the tip when the last one moves."""
+    plants = pytest.importorskip("pydrake.multibody.plant", reason="drake is not installed")
+    parsing = pytest.importorskip("pydrake.multibody.parsing")
+    joint = (
+        '<link name="tip"/>'
+        f'<drake:joint name="q" type="{kind}"><parent link="base"/><child link="tip"/>'
+        f'<origin xyz="0.3 0 0.2" rpy="0.1 0.2 0.3"/>{inside}</drake:joint>'
+    )
+    case = read(tmp_path, GATE.format(joint))
+    between = {joint.name: joint for joint in case.mechanism.joints if joint.name.startswith("q")}
+    plant = plants.MultibodyPlant(1e-3)
+    parsing.Parser(plant).AddModels(str(tmp_path / "gate.urdf"))
+    plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("base"))
+    plant.Finalize()
+    assert plant.GetJointByName("q").num_positions() == freedoms
+    if kind == "ball":
+        assert between["q"].type == "fixed"  # held
+        return
+    moving = {"universal": "q.2", "planar": "q.rotation", "screw": "q.rotation"}[kind]
+    supplied = Supplied(drive=(f"{moving}:0:0.3:2",), hold_rest=True)
+    found = solution(load(tmp_path / "gate.urdf", supplied)).bodies["tip"]
+    context = plant.CreateDefaultContext()
+    positions = plant.GetPositions(context)
+    positions[plant.GetJointByName("q").position_start() + freedoms - 1] = 0.3
+    plant.SetPositions(context, positions)
+    pose = plant.GetFrameByName("tip").CalcPoseInWorld(context)
+    assert found.r[-1] == pytest.approx(pose.translation(), abs=EXACT)
+    assert np.abs(found.p[-1] @ pose.rotation().ToQuaternion().wxyz()) == pytest.approx(1.0)

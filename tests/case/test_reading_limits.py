@@ -1,0 +1,172 @@
+"""What takes too long to read is refused before it is read; by the work done, never by a clock."""
+
+import io
+import zipfile
+from collections import Counter
+from pathlib import Path
+
+import pytest
+from kincheck.core.case.io import workbook
+from kincheck.core.case.io.foreign import MOST_MEMBERS
+from kincheck.core.case.io.reader_options import Supplied
+from kincheck.core.case.io.reference_table import from_table
+from kincheck.core.case.models.files import load
+from kincheck.core.case.models.hardpoints.plain import MOST_LINES
+from kincheck.core.case.models.mjcf.elements import MOST_ELEMENTS, parse_xml
+from kincheck.core.case.models.mjcf.equalities import MOST_EQUALITIES
+from kincheck.core.errors import CaseError
+
+openpyxl = pytest.importorskip("openpyxl")
+HEAD = b'<worksheet xmlns="http://schemas.openxmlformats.org/spreadsheetml/2006/main"><sheetData>'
+END = b"</sheetData></worksheet>"
+SHEET, STYLES = "xl/worksheets/sheet1.xml", "xl/styles.xml"
+ONE = b'<row r="1"><c r="A1"><v>1</v></c></row>'
+
+
+def book(folder: Path, part: str, content: bytes, more: int = 0) -> Path:
+    """Return a workbook with another content of a part, and with more empty parts."""
+    made = openpyxl.Workbook()
+    made.active.append(["name", "x"])
+    made.save(plain := io.BytesIO())
+    file = folder / "table.xlsx"
+    with (
+        zipfile.ZipFile(plain) as old,
+        zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as new,
+    ):
+        for each in old.infolist():
+            new.writestr(each.filename, content if each.filename == part else old.read(each))
+        for k in range(more):
+            new.writestr(f"xl/{k}", b"")
+    return file
+
+
+def refused(file: Path) -> str:
+    with pytest.raises(CaseError) as caught:
+        from_table(file, None, "sheet")
+    return str(caught.value)
+
+
+TOO_MUCH = {
+    "a row of many cells": (
+        SHEET,
+        HEAD + b"<row>" + b"<c/>" * workbook.MOST_TAGS + b"</row>" + END,
+        f"tags in {SHEET}, expected {workbook.MOST_TAGS} at most",
+    ),
+    "many styles": (
+        STYLES,
+        b"<styleSheet>" + b"<xf/>" * workbook.MOST_TAGS_ELSEWHERE + b"</styleSheet>",
+        f"tags in {STYLES}, expected {workbook.MOST_TAGS_ELSEWHERE} at most",
+    ),
+    "a bomb": (
+        STYLES,
+        bytes(workbook.MOST_BYTES),
+        f"expected {workbook.MOST_BYTES} at most",
+    ),
+}
+
+
+@pytest.mark.parametrize(("part", "content", "said"), TOO_MUCH.values(), ids=TOO_MUCH)
+def test_a_workbook_of_too_much_is_not_opened(part, content, said, tmp_path, monkeypatch):
+    file = book(tmp_path, part, content)
+    assert file.stat().st_size < 1_000_000
+    monkeypatch.setattr(openpyxl, "load_workbook", lambda *_: pytest.fail("it is opened"))
+    assert said in refused(file)
+
+
+def test_an_archive_of_many_parts_is_not_opened(tmp_path, monkeypatch):
+    file = book(tmp_path, "", b"", MOST_MEMBERS)
+    monkeypatch.setattr(zipfile, "ZipFile", lambda *_: pytest.fail("it is opened"))
+    assert f"parts, expected {MOST_MEMBERS} at most" in refused(file)
+
+
+GAPS = {
+    "a row far below": (b'<row r="99999999999"><c r="A9"><v>1</v></c></row>', "rows, blank ones"),
+    "cells far on the right": (
+        b"".join(b'<row r="%d"><c r="XFD%d"/></row>' % (k, k) for k in range(2, 500)),
+        "cells, blank ones",
+    ),
+}
+
+
+@pytest.mark.parametrize(("rows", "said"), GAPS.values(), ids=GAPS)
+def test_blank_rows_and_cells_are_counted(rows, said, tmp_path, monkeypatch):
+    """openpyxl makes them up: a row for each number, and a cell for each column."""
+    read = Counter[str]()
+    sheet = openpyxl.worksheet._read_only.ReadOnlyWorksheet
+    own = sheet._cells_by_row
+
+    def counting(self, *args, **options):
+        for row in own(self, *args, **options):
+            read.update(rows=1, cells=len(row))
+            yield row
+
+    monkeypatch.setattr(sheet, "_cells_by_row", counting)
+    assert said in refused(book(tmp_path, SHEET, HEAD + ONE + rows + END))
+    assert read["rows"] <= workbook.MOST_ROWS + 1
+    assert read["cells"] <= workbook.MOST_CELLS + 16_384
+
+
+def test_a_gap_of_a_sheet_is_read(tmp_path):
+    last = f'<row r="{workbook.MOST_ROWS}"><c r="A1"><v>2</v></c></row>'.encode()
+    (sheet,) = workbook.read_sheets(book(tmp_path, SHEET, HEAD + ONE + last + END), None, 10)
+    assert [row for _, row in sheet.rows] == [[1.0], [2.0]]
+
+
+def test_a_table_of_many_columns_is_refused(tmp_path):
+    file = tmp_path / "table.csv"
+    file.write_text("a,b\n1" + "," * workbook.MOST_COLUMNS_OF_TEXT)
+    said = f"line 2: found more than {workbook.MOST_COLUMNS_OF_TEXT} columns"
+    assert said in refused(file)
+    with pytest.raises(CaseError, match=said):
+        load(file, Supplied(template="mcpherson"))
+
+
+def test_a_table_of_many_lines_is_no_suspension(tmp_path):
+    file = tmp_path / "table.dat"
+    file.write_text("a 1 2 3\n" * (MOST_LINES + 1))
+    with pytest.raises(CaseError, match=f"found {MOST_LINES + 1} lines"):
+        load(file)
+
+
+def test_elements_are_read_up_to_a_number(tmp_path):
+    """The first one beyond it is named; there is one on each line."""
+    text = "<a>\n" + "<b/>\n" * MOST_ELEMENTS + "</a>"
+    with pytest.raises(CaseError, match=f"line {MOST_ELEMENTS + 1}: <b>: found more than"):
+        parse_xml(tmp_path / "model.xml", text)
+    fewer = text.replace("<b/>\n", "", 1)
+    assert len(parse_xml(tmp_path / "model.xml", fewer).children) == MOST_ELEMENTS - 1
+
+
+BODIES = """<mujoco><worldbody><body name="a"><joint name="j"/></body><body name="b"><joint/></body>
+</worldbody>"""
+LINKS = """<robot name="r"><link name="a"/><link name="b"/>
+<joint name="j" type="continuous"><parent link="a"/><child link="b"/></joint>"""
+TIES = {
+    "equalities.xml": BODIES + "<equality>\n{}</equality></mujoco>",
+    "constraints.urdf": LINKS + "\n{}</robot>",
+}
+TIE = {
+    "equalities.xml": '<connect body1="a" body2="b" anchor="0 0 0"/>\n',
+    "constraints.urdf": '<constraint type="ball"><parent link="a"/><child link="b"/>'
+    "</constraint>\n",
+}
+
+
+@pytest.mark.parametrize("name", TIES)
+def test_closures_are_read_up_to_a_number(name: str, tmp_path: Path):
+    file = tmp_path / name
+    file.write_text(TIES[name].format(TIE[name] * (MOST_EQUALITIES + 1)))
+    with pytest.raises(CaseError, match=rf"line {MOST_EQUALITIES + 3}: .*found more than"):
+        load(file, Supplied(drive=("j:0:1",)))
+
+
+def test_springs_without_a_length_are_left_out(tmp_path: Path):
+    """A tendon between sites in one place has no direction."""
+    text = BODIES.replace("<joint/>", '<joint/><site name="t"/>').replace(
+        '<joint name="j"/>', '<joint name="j"/><site name="s"/>'
+    )
+    spring = '<tendon><spatial stiffness="1"><site site="s"/><site site="t"/></spatial></tendon>'
+    file = tmp_path / "model.xml"
+    file.write_text(f"{text}{spring}</mujoco>")
+    case = load(file, Supplied(drive=("j:0:1",), hold_rest=True))
+    assert "tendon: spatial (1)" in case.source
