@@ -103,4 +103,8 @@ def solver(options: argparse.Namespace, engines: Sequence[Engine]) -> tuple[Solv
         return on_cluster(options.scheduler, limits), {"scheduler": options.scheduler, **limited}
     wanted = limits if options.timeout or options.memory else None
     found, jobs = solver_for(engines, options.jobs, wanted)
+    if jobs:
+        from ..program.disk_cache import ready
+
+        ready()  # its note would not be seen from a worker
     return found, {"jobs": jobs, **(limited if jobs else {})}

@@ -236,14 +236,12 @@ def _ended(importing: subprocess.Popen[str]) -> str:
 
 def _cache_problem() -> str:
     """Return why compiled code cannot be cached; empty if it can."""
-    folder, remedy = (
-        disk_cache.folder(),
-        "every process compiles again: make it writable, or set XDG_CACHE_HOME to another folder",
-    )
+    folder, remedy = disk_cache.folder(), f"every process compiles again: {disk_cache.REMEDY}"
     if folder is None:
         return f"the user has no home directory; {remedy}"
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        if why := disk_cache.doubt(folder):
+            return f"{why}; {remedy}"
         with tempfile.TemporaryFile(dir=folder):
             return ""
     except OSError as error:
