@@ -195,7 +195,7 @@ def _imported(found: Sequence[Part], modules: Mapping[str, str]) -> list[Part]:
     """
     running = {
         part.name: subprocess.Popen(
-            [sys.executable, "-c", f"import {modules.get(part.name, part.name)}"],
+            [sys.executable, "-P", "-c", f"import {modules.get(part.name, part.name)}"],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
             text=True,

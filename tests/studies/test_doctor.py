@@ -130,6 +130,13 @@ def test_what_is_installed_and_broken_is_told_from_what_works(imported, said, mo
     assert found.remedy == "pip install --force-reinstall numpy"
 
 
+def test_doctor_runs_no_module_of_the_working_folder(monkeypatch, tmp_path):
+    (tmp_path / "msgspec.py").write_text("raise SystemExit('planted')")
+    monkeypatch.chdir(tmp_path)
+    part = installation.Part("msgspec", "1.0", "kincheck", True, "", "")
+    assert installation._imported([part], {}) == [part]
+
+
 def test_a_missing_system_library_is_named():
     part = installation.Part("pin", "4.1", "engine", False, "", "")
     broken = {"pin": "ctypes; ctypes.CDLL('libnothing.so.7')"}
