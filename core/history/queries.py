@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 
 import msgspec
 
-from ..harness.record import Deviations, Outcome
+from ..harness.record import Deviations, Outcome, Seconds
 from .schema import OUTCOME
 from .store import RunRow, Store
 
@@ -123,21 +123,16 @@ def _entries(store: Store, run: int) -> list[tuple[Pair, Entry]]:
                 (
                     (row[0], row[1], row[2]),
                     Entry(
-                        run, Outcome(row[3]), row[4], errors, own_seconds(row[6], row[7]), row[8]
+                        run,
+                        Outcome(row[3]),
+                        row[4],
+                        errors,
+                        Seconds(warm=row[6], waited=row[7]).own,
+                        row[8],
                     ),
                 )
             )
     return found
-
-
-def own_seconds(warm: float | None, waited: float | None) -> float | None:
-    """Return the seconds of a warm solve without waiting for the processor; None if they are
-    unknown.
-
-    In 25 equal runs on two processors with five busy processes, the ratio of two runs reaches 4.1
-    by the clock, and 1.9 without waiting.
-    """
-    return None if warm is None else warm - (waited or 0.0)
 
 
 def green(store: Store, *, before: int | None = None) -> list[RunRow]:
