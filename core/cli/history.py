@@ -166,16 +166,17 @@ def _cells(store: Store, row: RunRow) -> list[str]:
         f"SELECT {OUTCOME}, engine, version FROM records WHERE run_id = ? ORDER BY rowid", (row.id,)
     ).fetchall()
     counts = Counter(outcome for outcome, _, _ in found)
-    told = ", ".join(f"{counts[outcome]} {outcome.shown}" for outcome in Outcome if counts[outcome])
+    told = [f"{counts[outcome]} {outcome.shown}" for outcome in Outcome if counts[outcome]]
     missing = len(row.plan) - len(found)
     versions = {engine: version for _, engine, version in found if version}
     git: dict[str, Any] = row.circumstances.get("git") or {}
+    told += [f"{missing} missing"] if missing else []
     return [
         str(row.id),
         row.started[:16].replace("T", " "),
         row.status,
-        told + (f", {missing} missing" if missing else ""),
-        ", ".join(f"{engine} {version}" for engine, version in versions.items()),
+        ", ".join(told) or "–",
+        ", ".join(f"{engine} {version}" for engine, version in versions.items()) or "–",
         str(git.get("commit") or "–")[:10] + ("+" if git.get("changed") else ""),
         str(row.circumstances.get("host", "–")),
         row.command,

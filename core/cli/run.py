@@ -48,12 +48,14 @@ class _Plan:
         baseline: the native engine as the standard, if it is not among the engines.
         required, named: names of the engines that the run must contain.
         unread: messages of unreadable cases, by the given names; the other cases are run.
+        mistyped: names among these of which there is neither a case nor a file.
     """
 
     cases: Sequence[Case]
     engines: Sequence[Engine]
     baseline: Engine | None
     unread: dict[str, str]
+    mistyped: Sequence[str]
     required: Sequence[str]
     named: Sequence[str]
 
@@ -161,6 +163,7 @@ def _planned(options: argparse.Namespace, registry: Registry, to: Destinations) 
         engines,
         baseline,
         {visible(name): visible(message, also="\n") for name, message in unread.items()},
+        [name for name in unread if name not in registry.cases() and not Path(name).exists()],
         [each.name for each in registry.find_engines(options.require, [], options.mode)],
         [each.name for each in engines] if options.engine else [],
     )
@@ -204,8 +207,9 @@ def _solved(
     solver, settings = execution_options.solver(options, plan.engines)
     if plan.unread:
         settings["unread"] = plan.unread
+    settings["selection"] = history_options.selection(options)
     keeping, problems = history_options.keeping(
-        options, plan.cases, plan.engines, [*plan.unread], settings
+        options, plan.cases, plan.engines, [*plan.unread], settings, plan.mistyped
     )
     made = [*keeping.made] if keeping else []
     records: list[Record] = [*made]

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from ...errors import KincheckError
 from ...harness.record import Results
 from ...harness.results_file import read_results
-from ..queries import Pair, compared, green
+from ..queries import NIGHTS, Pair, compared, faultless, green
+from ..selection import alike, standing
 from ..store import RunRow, Store
 from .findings import RunName
 
@@ -25,12 +26,14 @@ class Subject:
     Attributes:
         number: number in the history; None for a run outside it.
         before: runs with smaller numbers are earlier; None if all runs are.
+        passed_by: numbers of later runs of something else, which do not change the judgement.
     """
 
     name: str
     number: int | None
     results: Results
     before: int | None
+    passed_by: Sequence[int] = ()
 
     @property
     def facts(self) -> dict[str, Any]:
@@ -46,8 +49,8 @@ class Subject:
 
 
 def find(name: str | None, store: Store | None) -> Subject:
-    """Return the run of a number or of a results.json; for None, the latest run of the history that
-    no process writes.
+    """Return the run of a number or of a results.json; for None, the run of the history's state,
+    see `standing`.
 
     A killed run counts, too: judging the run before it would hide the fault.
 
@@ -68,13 +71,15 @@ def find(name: str | None, store: Store | None) -> Subject:
                 f"report: run {row.id} is still running; report it when it has ended"
             )
         return _kept(store, row)
-    row = next((row for row in store.runs() if row.status != "running"), None)
+    rows = [row for row in store.runs() if row.status != "running"]
+    row = standing(rows, faultless(store, rows), NIGHTS)
     if row is None:
         raise KincheckError(
             f"history {store.path}: no run to report; `kincheck run --history {store.path}`"
             " records one"
         )
-    return _kept(store, row)
+    later = [each.id for each in reversed(rows) if each.id > row.id]
+    return replace(_kept(store, row), passed_by=later)
 
 
 def find_against(name: str, subject: Subject, store: Store | None) -> tuple[Subject | None, str]:
@@ -91,11 +96,15 @@ def find_against(name: str, subject: Subject, store: Store | None) -> tuple[Subj
         if name == LAST_GREEN:
             # otherwise a lost comparison would be reported once, and never again
             row = _most(
-                green(store, before=subject.before), lambda row: _compared(store, row, subject)
+                green(store, before=subject.before),
+                subject,
+                lambda row: _compared(store, row, subject),
             )
         else:
             row = _most(
-                _of_branch(store, branch, subject), lambda row: len(pairs_of(subject) & {*row.plan})
+                _of_branch(store, branch, subject),
+                subject,
+                lambda row: len(pairs_of(subject) & {*row.plan}),
             )
         if row is not None:
             with store.sparing():
@@ -198,8 +207,14 @@ def _compared(store: Store, row: RunRow, subject: Subject) -> int:
     return shared
 
 
-def _most(rows: list[RunRow], shared: Callable[[RunRow], int]) -> RunRow | None:
-    """Return the run with the most shared comparisons, the latest of several; None without any."""
+def _most(rows: list[RunRow], subject: Subject, shared: Callable[[RunRow], int]) -> RunRow | None:
+    """Return the run with the most shared comparisons, the latest of several; None without any.
+
+    Runs with the subject's options come first.
+    """
     amounts = {row.id: shared(row) for row in rows}
-    best = max(rows, key=lambda row: (amounts[row.id], row.id), default=None)
-    return best if best is not None and amounts[best.id] else None
+    return max(
+        (row for row in rows if amounts[row.id]),
+        key=lambda row: (alike(row.circumstances, subject.facts), amounts[row.id], row.id),
+        default=None,
+    )
