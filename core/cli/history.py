@@ -95,16 +95,13 @@ def _history(options: argparse.Namespace, registry: Registry) -> int:
     """List the runs, the latest first; for a case or an engine, list its errors and times over the
     runs, and their steps.
     """
-    from ..case.io.atomic_files import unwritable
+    from ..case.io.atomic_files import require_writable
     from ..history.queries import read
     from ..history.store import Store
 
     if options.history is None:
         raise KincheckError(f"history: no file is given; give --history FILE, or set {HISTORY}")
-    if problems := unwritable(
-        [("--plot", options.plot), ("--export", options.export)], options.history
-    ):
-        raise KincheckError("\n".join(problems))
+    require_writable([("--plot", options.plot), ("--export", options.export)], options.history)
     with Store(Path(options.history), writable=bool(options.remove)) as store:
         for run in options.remove:
             store.remove(run)

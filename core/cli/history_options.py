@@ -5,6 +5,7 @@ end. No result is lost if the history fails.
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -84,7 +85,7 @@ def _known(path: Path, facts: Mapping[str, Any]) -> bool:
     from ..history.selection import same
     from ..history.store import Store
 
-    if not path.exists():
+    if not os.path.exists(path):
         return False
     with Store(path, writable=False) as store:
         return any(same(row.circumstances, facts) for row in store.runs())

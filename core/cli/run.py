@@ -9,6 +9,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import partial
+from os.path import exists
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
@@ -163,7 +164,7 @@ def _planned(options: argparse.Namespace, registry: Registry, to: Destinations) 
         engines,
         baseline,
         {visible(name): visible(message, also="\n") for name, message in unread.items()},
-        [name for name in unread if name not in registry.cases() and not Path(name).exists()],
+        [name for name in unread if name not in registry.cases() and not exists(name)],
         [each.name for each in registry.find_engines(options.require, [], options.mode)],
         [each.name for each in engines] if options.engine else [],
     )

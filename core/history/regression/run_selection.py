@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from os.path import exists  # a name too long for a file is no error here
 from pathlib import Path
 from typing import Any
 
@@ -89,7 +90,7 @@ def find_against(name: str, subject: Subject, store: Store | None) -> tuple[Subj
     Raises:
         KincheckError: the named run does not exist, or is the subject itself.
     """
-    if name == LAST_GREEN or (name.endswith(BASELINE) and not Path(name).exists()):
+    if name == LAST_GREEN or (name.endswith(BASELINE) and not exists(name)):
         if store is None:
             return None, f"{name} needs a history, and none is given"
         branch = name.removesuffix(BASELINE)
@@ -136,7 +137,7 @@ def find_against(name: str, subject: Subject, store: Store | None) -> tuple[Subj
 
 
 def _in_file(file: Path, store: Store | None) -> Subject:
-    if not file.exists():
+    if not exists(file):
         known = f"a number of the history, a results.json, {LAST_GREEN} or BRANCH{BASELINE}"
         raise KincheckError(f"report: there is no run {str(file)!r}; give {known}")
     results = read_results(file)
