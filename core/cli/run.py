@@ -233,14 +233,8 @@ def _solved(
     }
     started, unread = datetime.now(UTC), [*plan.unread]
     try:
-        how: dict[str, Any] = {
-            "baseline": plan.baseline,
-            "solver": solver,
-            "made": made,
-            "unread": unread,
-            **about,
-        }
-        results = running.run(plan.cases, plan.engines, progress=keep, **how)
+        how: dict[str, Any] = {"baseline": plan.baseline, "solver": solver, "made": made, **about}
+        results = running.run(plan.cases, plan.engines, progress=keep, unread=unread, **how)
         # after a signal between the last record and this line, all records are kept below
         hold()
         return results, problems, keeping, None

@@ -122,7 +122,7 @@ def test_a_frozen_worker_costs_no_pair_and_no_more_than_its_limit(cluster):
 SCHEDULER = """
 from distributed import LocalCluster
 cluster = LocalCluster(
-    n_workers=1, processes=False, protocol="tcp://", dashboard_address=None, silence_logs=50
+    n_workers=1, processes=False, protocol="tcp://", dashboard_address=":0", silence_logs=50
 )
 print(cluster.scheduler_address, flush=True)
 input()

@@ -86,7 +86,7 @@ def test_a_cluster_that_goes_is_a_message(tmp_path, monkeypatch):
     monkeypatch.setattr(ours, "CONNECT", 1.0)
     case = crank()
     cluster = LocalCluster(
-        n_workers=1, processes=False, protocol="tcp://", dashboard_address=None, silence_logs=50
+        n_workers=1, processes=False, protocol="tcp://", dashboard_address=":0", silence_logs=50
     )
 
     def hear(progress):

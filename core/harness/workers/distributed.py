@@ -10,7 +10,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections import Counter
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Generator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from queue import Empty, SimpleQueue
@@ -139,7 +139,7 @@ class Tasks:
         self.threads = 1
         self._client, self._address, self._patience = client, address, patience
         self._name = f"kincheck-{uuid4().hex}"  # the scheduler treats equal names as one task
-        self._calls: dict[Any, tuple[int, Callable[..., Any], Sequence[Any]]] = {}
+        self._calls: dict[Any, tuple[int, Sequence[Any]]] = {}
         self._moved, self._left = Counter[int](), list[Any]()
         self._finished: SimpleQueue[Any] = SimpleQueue()
         self._given_up: list[tuple[int, Exception]] = []
@@ -149,26 +149,12 @@ class Tasks:
     def __len__(self) -> int:
         return len(self._calls) + len(self._given_up)
 
-    def submit(self, index: int, function: Callable[..., Any], *args: Any) -> None:
-        """Submit a task."""
-        self._submit(index, function, args, None)
-
-    def _submit(
-        self,
-        index: int,
-        function: Callable[..., Any],
-        args: Sequence[Any],
-        workers: Sequence[str] | None,
-    ) -> None:
-        task = self._client.submit(
-            function,
-            *args,
-            key=f"{self._name}-{index}-{self._moved[index]}",
-            pure=False,
-            workers=workers,
-            allow_other_workers=workers is not None,
-        )
-        self._calls[task] = index, function, args
+    def submit(self, index: int, call: Sequence[Any], workers: Sequence[str] | None = None) -> None:
+        """Submit a task: a function and its arguments; if possible to these workers."""
+        key = f"{self._name}-{index}-{self._moved[index]}"
+        among = {"workers": workers, "allow_other_workers": True} if workers else {}
+        task = self._client.submit(*call, key=key, pure=False, **among)
+        self._calls[task] = index, call
         task.add_done_callback(self._finished.put)
 
     def next(self) -> tuple[int, Any]:
@@ -195,7 +181,7 @@ class Tasks:
             except Exception as error:  # cancelled: the connection is gone
                 raise self._lost(error) from error
             else:
-                index, *_ = self._calls.pop(task)
+                index, _ = self._calls.pop(task)
                 task.release()
                 return index, answer
 
@@ -206,13 +192,13 @@ class Tasks:
         silent, live = self._workers()
         self._looked = monotonic()
         if silent:
-            held = self._asked("processing")
+            held = self._told("processing")
             keys = {key for worker in silent for key in held.get(worker, ())}
             self._move([task for task in self._calls if not live or task.key in keys], live)
 
     def _workers(self) -> tuple[list[str], list[str]]:
         """Return the silent workers and the others."""
-        found, now = self._asked("identity")["workers"], monotonic()
+        found, now = self._told("identity")["workers"], monotonic()
         for worker, facts in found.items():
             if self._heard.get(worker, (None,))[0] != facts["last_seen"]:
                 self._heard[worker] = facts["last_seen"], now
@@ -222,17 +208,17 @@ class Tasks:
 
     def _move(self, tasks: Sequence[Any], live: Sequence[str]) -> None:
         for task in tasks:
-            index, function, args = self._calls.pop(task)
+            index, call = self._calls.pop(task)
             # not cancelled: a silent worker with free threads would get further tasks
             self._left.append(task)
             self._moved[index] += 1
             if live and self._moved[index] < TRIES:
-                self._submit(index, function, args, live)
+                self.submit(index, call, live)
             else:
                 why = f"no answer within {self._patience:g} s: the cluster's worker was silent"
                 self._given_up.append((index, TimeoutError(why)))
 
-    def _asked(self, what: str) -> Any:
+    def _told(self, what: str) -> Any:
         try:
             if self._client.status != "running":  # a question would wait for a new connection
                 raise ConnectionError("the connection is closed")
@@ -258,7 +244,7 @@ def _gathered(tasks: Tasks, pairs: Sequence[Pair], limits: Limits) -> Attempts:
             yield index, Attempt(None, Failure(Outcome.ERROR, why))
             continue
         engine = f"{pair.engine.name} {pair.engine.mode}"
-        tasks.submit(index, solve_there, packed, engine, limits, VERSION)
+        tasks.submit(index, (solve_there, packed, engine, limits, VERSION))
     while tasks:
         index, found = tasks.next()
         if type(found).__name__ == "KilledWorker":

@@ -71,7 +71,7 @@ def on_cluster(address: str, silent: float = SILENT) -> Source:
                     # asked each time: workers may come and go
                     more = AHEAD * tasks.threads - len(tasks) - len(ready)
                     for late in islice(waiting, max(0, more)):
-                        tasks.submit(late, solve_there, packed, late, VERSION)
+                        tasks.submit(late, (solve_there, packed, late, VERSION))
                     number, found = tasks.next()
                     ready[number] = _answered(found, address)
                 yield ready.pop(index)
