@@ -26,18 +26,28 @@ def selection(options: argparse.Namespace) -> dict[str, Any]:
     """Return the task of a run, as `Results.run["selection"]`: cases, engines, and the given
     options of solution and judgement.
     """
-    from ..harness.provenance import plain
-
     run = ("joints", "joint_type", "mode", "reference", "require")
     parts = {
         "run": {name: getattr(options, name) for name in run} | {"tol": options.tol},
         "files": vars(supplied(options)),
         "curve": vars(curve_options(options)),
     }
-    given = {part: {name: x for name, x in each.items() if x} for part, each in parts.items()}
-    return plain(
-        {"cases": sorted({*options.case}), "engines": sorted({*options.engine}), "options": given}
-    )
+    return {
+        "cases": sorted({*_words(options.case)}),
+        "engines": sorted({*_words(options.engine)}),
+        "options": {
+            part: {name: _words(x) for name, x in each.items() if x} for part, each in parts.items()
+        },
+    }
+
+
+def _words(given: Any) -> Any:
+    """Return an option's value as plain data; file names may contain undecodable bytes."""
+    from ..harness.provenance import readable
+
+    if isinstance(given, list | tuple):
+        return [_words(each) for each in given]  # pyright: ignore
+    return given if isinstance(given, bool | float) else readable(str(given))
 
 
 def keeping(

@@ -92,6 +92,16 @@ def test_a_mistyped_case_is_not_in_the_history(run, report, capsys, tmp_path):
         assert [row.plan for row in store.runs()] == [[("crank", "native", "projection")]]
 
 
+def test_names_that_are_no_text_are_stored(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    run(*NIGHT, "--reference", "\udcff.csv")
+    (tmp_path / "\udcff.toml").write_text("no case")
+    assert run("\udcff.toml") == 2
+    with Store(tmp_path / "kept", writable=False) as store:
+        (row,) = store.runs()
+    assert row.circumstances["selection"]["cases"] == ["?.toml"]
+
+
 def test_a_mistyped_case_makes_no_history(run, tmp_path):
     assert run("crnk") == 2
     assert not (tmp_path / "kept").exists()
