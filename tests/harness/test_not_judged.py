@@ -54,6 +54,8 @@ def test_many_cases_are_named_by_the_first(kincheck_main, capsys, monkeypatch, t
     assert f"Not judged: {eight} and 192 more in native: {WHY}." in Path("cases.md").read_text()
     quoted = ", ".join(map(repr, [*cases][:8]))
     assert f"required engine 'unable': cases {quoted} and 192 more are unsupported: " in told.err
+    write_report(read_results(Path("all.json")), Path("page.html"))
+    assert f"on {eight} and 192 more" in Path("page.html").read_text("utf-8")
     titles = [title for title, _ in caveats(read_results(Path("all.json")))]
     assert max(map(len, titles)) < 250
 

@@ -192,13 +192,13 @@ class Tasks:
         silent, live = self._workers()
         self._looked = monotonic()
         if silent:
-            held = self._told("processing")
+            held = self._ask("processing")
             keys = {key for worker in silent for key in held.get(worker, ())}
             self._move([task for task in self._calls if not live or task.key in keys], live)
 
     def _workers(self) -> tuple[list[str], list[str]]:
         """Return the silent workers and the others."""
-        found, now = self._told("identity")["workers"], monotonic()
+        found, now = self._ask("identity")["workers"], monotonic()
         for worker, facts in found.items():
             if self._heard.get(worker, (None,))[0] != facts["last_seen"]:
                 self._heard[worker] = facts["last_seen"], now
@@ -218,7 +218,7 @@ class Tasks:
                 why = f"no answer within {self._patience:g} s: the cluster's worker was silent"
                 self._given_up.append((index, TimeoutError(why)))
 
-    def _told(self, what: str) -> Any:
+    def _ask(self, what: str) -> Any:
         try:
             if self._client.status != "running":  # a question would wait for a new connection
                 raise ConnectionError("the connection is closed")
