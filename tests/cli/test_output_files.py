@@ -84,6 +84,14 @@ def test_proofs_go_on_without_a_file(here, capsys):
     assert Path("out", "rssr.reference.json").is_file()
 
 
+def test_a_reader_of_the_old_file_keeps_it_whole(here):
+    Path("all.json").write_text("an earlier answer")
+    with Path("all.json").open() as old:
+        assert main(["trace", "five_bar", "--json", "all.json"]) == 0
+        assert old.read() == "an earlier answer"
+    assert json.loads(Path("all.json").read_text())["schema"] == "kincheck-trace/1"
+
+
 LIMITED = """
 import resource, sys
 from kincheck.core.cli.main import main

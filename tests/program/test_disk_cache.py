@@ -86,6 +86,10 @@ def opened(here):
     here.chmod(0o777)
 
 
+def opened_as_tmp(here):
+    here.chmod(0o1777)
+
+
 def opened_above(here):
     here.parent.chmod(0o777)
 
@@ -102,8 +106,11 @@ def linked_through_an_open_folder(here):
     os.environ["XDG_CACHE_HOME"] = str(here.parent / "open" / "on")
 
 
+SPOILT = opened, opened_as_tmp, opened_above, linked, linked_through_an_open_folder
+
+
 @posix
-@pytest.mark.parametrize("spoil", [opened, opened_above, linked, linked_through_an_open_folder])
+@pytest.mark.parametrize("spoil", SPOILT)
 def test_a_folder_others_can_replace_is_not_used(here, spoil, capsys):
     kept()
     disk_cache._usable.cache_clear()  # as another process
@@ -142,6 +149,8 @@ def test_entries_others_may_have_written_are_made_again(here):
     if os.geteuid() == 0:  # only root gives files away
         os.chown(entry, 12345, -1)
         assert found() is None
+        os.chown(entry, 0, -1)
+    assert found() == b"made again"
     entry.rename(here / "elsewhere")
     entry.symlink_to(here / "elsewhere")
     assert found() is None
