@@ -53,12 +53,14 @@ endif
 	$(BIN)/python -m compileall -q build
 	touch $@
 
-# Pin the newest versions that pyproject.toml allows: for developers, and for those who only run kincheck (Containerfile).
+# Pin the newest versions that pyproject.toml allows: for developers, for those who only run kincheck (Containerfile), and for the
+# release.
 LOCK := uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --upgrade
 lock: .venv/ready
 	$(LOCK) --extra dev pyproject.toml --output-file requirements.lock
 	$(LOCK) --extra engines --extra fast --extra proofs --extra yaml --extra parquet --constraint requirements.lock \
 		pyproject.toml --output-file requirements-runtime.lock
+	$(LOCK) --constraint requirements.lock --group release --output-file requirements-release.lock
 
 # What an installation without extras and with some takes on the disk [MB], for docs/pages/start/install.md.
 sizes:

@@ -133,7 +133,7 @@ def brief(text: str) -> str:
     return text if len(text) <= LONGEST_NAME else f"{text[: LONGEST_NAME - 6]} [...]"
 
 
-def shortened(texts: Sequence[str], most: int) -> str:
+def shortened(texts: Sequence[str], most: int, between: str = ", ") -> str:
     """Return the first `most` texts, and the number of further ones."""
     more = f" and {len(texts) - most} more" if len(texts) > most else ""
-    return ", ".join(texts[:most]) + more
+    return between.join(texts[:most]) + more

@@ -81,7 +81,7 @@ def cluster(monkeypatch):
     # for its workers too, which are spawned from here
     monkeypatch.syspath_prepend(str(Path(__file__).parent.parent))
     with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0", silence_logs=50
     ) as found:
         yield found
 

@@ -1,6 +1,7 @@
 """Files and packages: sizes, names, what is packaged, and what loads when."""
 
 import ast
+import re
 import subprocess
 import sys
 import tomllib
@@ -123,3 +124,17 @@ def test_importing_everything_loads_no_simulator_and_nothing_twice():
 
 def test_the_tests_load_nothing_twice():
     assert {"core", "adapters", "cases"} & set(sys.modules) == set()
+
+
+def test_release_and_image_take_pinned_content():
+    """Every installation is by hashes or without dependencies, and the image's base by a digest."""
+    release = (ROOT / ".github/workflows/release.yml").read_text("utf-8")
+    image = (ROOT / "Containerfile").read_text("utf-8")
+    installs = re.findall(r"pip install (.*)", release + image)
+    assert len(installs) == 5
+    assert [each for each in installs if not re.search("--require-hashes|--no-deps", each)] == []
+    assert set(re.findall(r"^FROM (\S+)", image, re.MULTILINE)) == {"${BASE}"}
+    assert re.search(r"^ARG BASE=\S+@sha256:[0-9a-f]{64}$", image, re.MULTILINE)
+    assert "build --no-isolation" in release  # else it would fetch setuptools itself
+    for lock in ROOT.glob("requirements*.lock"):
+        assert "--hash=sha256:" in lock.read_text("utf-8")

@@ -84,8 +84,8 @@ def _assemblies(options: argparse.Namespace, registry: Registry) -> int:
 
     Exit status: 0 assemblies are found, 1 none is found, 2 the tool could not do its work.
     """
-    from ..case.io.atomic_files import unwritable
-    from ..report.terminal import write_json
+    from ..case.io.atomic_files import require_writable
+    from ..report.terminal import with_json
     from ..studies.assemblies import survey, written
 
     if options.export is None and (found := given(options, ("number", "out"))):
@@ -93,19 +93,18 @@ def _assemblies(options: argparse.Namespace, registry: Registry) -> int:
             f"{found}: found without --export, which it belongs to; add"
             " --export FORMAT, or leave out"
         )
-    if problems := unwritable([("--json", options.json), ("--out", options.out)]):
-        raise KincheckError("\n".join(problems))
+    require_writable([("--json", options.json), ("--out", options.out)])
     if options.export is not None and options.export not in registry.writers:
         raise KincheckError(unknown("format", options.export, registry.writers))
     case = registry.find_case(options.case, import_options.supplied(options))
     import_options.tell_left_out([case])
     found = survey(case, options.at, samples=options.samples, seed=options.seed)
-    write_json(found.report(), options.json)
-    _print(found, options.json)
-    if options.export is not None:
-        number: int = options.number or 1
-        texts = written(found, registry.writer(options.export), number)
-        keep_texts(texts, f"{case.name}.{number}", options.out, options.json)
+    with with_json(found.report(), options.json):
+        _print(found, options.json)
+        if options.export is not None:
+            number: int = options.number or 1
+            texts = written(found, registry.writer(options.export), number)
+            keep_texts(texts, f"{case.name}.{number}", options.out, options.json)
     return Status.WITHIN if found.assemblies.found else Status.DEVIATES
 
 

@@ -207,7 +207,7 @@ def _with_one_thread(command: str, variables: Sequence[str]) -> int:
     """
     environment = {**os.environ, **dict.fromkeys(variables, "1")}
     return subprocess.run(
-        [sys.executable, "-c", _MAIN, *shlex.split(command)[1:]], env=environment, check=False
+        [sys.executable, "-P", "-c", _MAIN, *shlex.split(command)[1:]], env=environment, check=False
     ).returncode
 
 

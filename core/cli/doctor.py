@@ -38,16 +38,15 @@ def _doctor(options: argparse.Namespace, registry: Registry) -> int:
 
     Exit status: 0 the tool can do its work, 2 something essential is missing or broken.
     """
+    from ..case.io.atomic_files import require_writable
     from ..harness.standard import STANDARD
-    from ..report.terminal import page, write_json
+    from ..report.terminal import page, with_json
     from .installation import examine
 
+    require_writable([("--json", options.json)])
     found = examine(registry.case(SAMPLE), registry.engine(STANDARD), TOL, registry.engines)
-    write_json(found, options.json)
-    if options.quiet:
-        _print_verdict(found, page(options.json))
-    else:
-        _print(found, page(options.json))
+    with with_json(found, options.json):
+        (_print_verdict if options.quiet else _print)(found, page(options.json))
     return Status.WITHIN if found.able else Status.FAILED
 
 

@@ -13,6 +13,11 @@ if TYPE_CHECKING:
     from ..harness.engine import Engine
     from ..harness.execution import Solver
 
+SCHEDULER = (
+    "solve on the workers of this dask.distributed scheduler instead; it exchanges pickles: whoever"
+    " runs or reaches it runs code as you, here and on the workers"
+)
+
 
 def add_options(parser: argparse.ArgumentParser, positive: Callable[[str], float]) -> None:
     """Add the options to a command for pairs of case and engine."""
@@ -58,7 +63,7 @@ def add_options(parser: argparse.ArgumentParser, positive: Callable[[str], float
     group.add_argument(
         "--scheduler",
         metavar="ADDRESS",
-        help="solve on the workers of this dask.distributed scheduler instead",
+        help=SCHEDULER,
     )
 
 
@@ -86,10 +91,10 @@ def unreachable(options: argparse.Namespace) -> list[str]:
     from ..harness.workers.distributed import ClusterError, connected, loaded
 
     try:
-        connected(loaded(), options.scheduler).close()
+        with connected(loaded(), options.scheduler):
+            return []
     except ClusterError as error:
         return [str(error)]
-    return []
 
 
 def solver(options: argparse.Namespace, engines: Sequence[Engine]) -> tuple[Solver, dict[str, Any]]:
@@ -103,4 +108,8 @@ def solver(options: argparse.Namespace, engines: Sequence[Engine]) -> tuple[Solv
         return on_cluster(options.scheduler, limits), {"scheduler": options.scheduler, **limited}
     wanted = limits if options.timeout or options.memory else None
     found, jobs = solver_for(engines, options.jobs, wanted)
+    if jobs:
+        from ..program.disk_cache import ready
+
+        ready()  # its note would not be seen from a worker
     return found, {"jobs": jobs, **(limited if jobs else {})}

@@ -59,14 +59,16 @@ def _explain(options: argparse.Namespace, registry: Registry) -> int:
     Exit status: 0 it can be solved, 1 it contradicts itself or is not determined, 2 the tool could
     not do its work.
     """
-    from ..report.terminal import page, write_json
+    from ..case.io.atomic_files import require_writable
+    from ..report.terminal import page, with_json
     from ..studies.diagnosis import diagnose
     from ..studies.diagnosis.text import print_diagnosis
 
+    require_writable([("--json", options.json)])
     case = registry.find_case(options.case, import_options.supplied(options), driven=False)
     import_options.tell_left_out([case])
     found = diagnose(case, samples=options.samples, tol=options.tol)
-    write_json(found, options.json)
     how = {"quiet": options.quiet, "verbose": options.verbose}
-    print_diagnosis(found, page(options.json), **how)
+    with with_json(found, options.json):
+        print_diagnosis(found, page(options.json), **how)
     return Status.DEVIATES if found.findings else Status.WITHIN

@@ -85,7 +85,8 @@ def keep_texts(
         KincheckError: a file cannot be written, would overwrite the JSON, or exists and
             `out` is None.
     """
-    from ..case.io.atomic_files import unwritable, write
+    from ..case.io.atomic_files import require_writable
+    from ..case.io.atomic_files import written as written_file
 
     first = next(iter(texts))
     main: Path = out or Path(file_name(name) + first)
@@ -96,8 +97,12 @@ def keep_texts(
     for file in files:
         if out is None and file.exists():
             raise KincheckError(f"{file} exists already; give --out to overwrite a file")
-    if json and (problems := unwritable([("--json", json), *(("--out", file) for file in files)])):
-        raise KincheckError("\n".join(problems))
+    require_writable([("--json", json), *(("--out", file) for file in files)])
+    problems: list[str] = []
     for file, text in files.items():
-        write("--out", file, text.encode())
-        print(file, file=sys.stderr if json == "-" else sys.stdout)
+        failed = written_file(file, text.encode())
+        problems += failed
+        if not failed:
+            print(file, file=sys.stderr if json == "-" else sys.stdout)
+    if problems:
+        raise KincheckError("\n".join(problems))

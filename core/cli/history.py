@@ -95,16 +95,13 @@ def _history(options: argparse.Namespace, registry: Registry) -> int:
     """List the runs, the latest first; for a case or an engine, list its errors and times over the
     runs, and their steps.
     """
-    from ..case.io.atomic_files import unwritable
+    from ..case.io.atomic_files import require_writable
     from ..history.queries import read
     from ..history.store import Store
 
     if options.history is None:
         raise KincheckError(f"history: no file is given; give --history FILE, or set {HISTORY}")
-    if problems := unwritable(
-        [("--plot", options.plot), ("--export", options.export)], options.history
-    ):
-        raise KincheckError("\n".join(problems))
+    require_writable([("--plot", options.plot), ("--export", options.export)], options.history)
     with Store(Path(options.history), writable=bool(options.remove)) as store:
         for run in options.remove:
             store.remove(run)
@@ -166,16 +163,17 @@ def _cells(store: Store, row: RunRow) -> list[str]:
         f"SELECT {OUTCOME}, engine, version FROM records WHERE run_id = ? ORDER BY rowid", (row.id,)
     ).fetchall()
     counts = Counter(outcome for outcome, _, _ in found)
-    told = ", ".join(f"{counts[outcome]} {outcome.shown}" for outcome in Outcome if counts[outcome])
+    told = [f"{counts[outcome]} {outcome.shown}" for outcome in Outcome if counts[outcome]]
     missing = len(row.plan) - len(found)
     versions = {engine: version for _, engine, version in found if version}
     git: dict[str, Any] = row.circumstances.get("git") or {}
+    told += [f"{missing} missing"] if missing else []
     return [
         str(row.id),
         row.started[:16].replace("T", " "),
         row.status,
-        told + (f", {missing} missing" if missing else ""),
-        ", ".join(f"{engine} {version}" for engine, version in versions.items()),
+        ", ".join(told) or "–",
+        ", ".join(f"{engine} {version}" for engine, version in versions.items()) or "–",
         str(git.get("commit") or "–")[:10] + ("+" if git.get("changed") else ""),
         str(row.circumstances.get("host", "–")),
         row.command,

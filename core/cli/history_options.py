@@ -5,10 +5,15 @@ end. No result is lost if the history fails.
 from __future__ import annotations
 
 import argparse
+import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from ..errors import MOST_NAMED, shortened
+from .import_options import supplied
+from .run_options import curve_options
 
 if TYPE_CHECKING:
     from ..case.case import Case
@@ -17,14 +22,48 @@ if TYPE_CHECKING:
     from .destinations import Trends
 
 
+def selection(options: argparse.Namespace) -> dict[str, Any]:
+    """Return the task of a run, as `Results.run["selection"]`: cases, engines, and the given
+    options of solution and judgement.
+    """
+    run = ("joints", "joint_type", "mode", "reference", "require")
+    parts = {
+        "run": {name: getattr(options, name) for name in run} | {"tol": options.tol},
+        "files": vars(supplied(options)),
+        "curve": vars(curve_options(options)),
+    }
+    return {
+        "cases": sorted({*_words(options.case)}),
+        "engines": sorted({*_words(options.engine)}),
+        "options": {
+            part: {name: _words(x) for name, x in each.items() if x} for part, each in parts.items()
+        },
+    }
+
+
+def _words(given: Any) -> Any:
+    """Return an option's value as plain data; file names may contain undecodable bytes."""
+    from ..harness.provenance import readable
+
+    if isinstance(given, list | tuple):
+        return [_words(each) for each in given]  # pyright: ignore
+    return given if isinstance(given, bool | float) else readable(str(given))
+
+
 def keeping(
     options: argparse.Namespace,
     cases: Sequence[Case],
     engines: Sequence[Engine],
     unread: Sequence[str],
     settings: dict[str, Any],
+    mistyped: Sequence[str],
 ) -> tuple[Keeping | None, list[str]]:
-    """Return the run in its history, or None, and the reasons if the history cannot store it."""
+    """Return the run in its history, or None, and the reasons if the history does not store it.
+
+    Args:
+        mistyped: names of cases that do not exist: the run is only stored if an earlier one was
+            asked for the same, which then lacks them.
+    """
     if options.history is None:
         return None, []
     from ..history.run_recorder import keep
@@ -35,6 +74,9 @@ def keeping(
     code = [*options.joint_type, *(type(each).__module__ for each in engines)]
     about |= {"unread": unread, "resume": options.resume, "sources": sources(code)}
     try:
+        if mistyped and not _known(Path(options.history), settings):
+            names = shortened(mistyped, MOST_NAMED)
+            return None, [f"{names}: no such case; the run is not in the history"]
         found = keep(Path(options.history), cases, engines, **about)
     except HistoryError as error:
         return None, [f"{error}; the run is not in the history"]
@@ -48,6 +90,17 @@ def keeping(
     return found, []
 
 
+def _known(path: Path, facts: Mapping[str, Any]) -> bool:
+    """Return whether a history has a run that was asked for the same."""
+    from ..history.selection import same
+    from ..history.store import Store
+
+    if not os.path.exists(path):
+        return False
+    with Store(path, writable=False) as store:
+        return any(same(row.circumstances, facts) for row in store.runs())
+
+
 def past(keeping: Keeping, problems: list[str]) -> Trends:
     """Return the runs up to this one by case, for the report, and report unreadable parts."""
     from ..history.queries import NIGHTS, read
@@ -58,7 +111,7 @@ def past(keeping: Keeping, problems: list[str]) -> Trends:
         return None
     try:
         with Store(keeping.store.path, writable=False) as store:
-            found = trends(read(store, before=keeping.run + 1, last=NIGHTS))
+            found = trends(read(store, before=keeping.run + 1, last=NIGHTS, like=keeping.facts))
             problems += [each for each in store.damage if each not in problems]
     except HistoryError as error:
         problems.append(str(error))

@@ -36,11 +36,10 @@ def _import(options: argparse.Namespace, registry: Registry) -> int:
 
     Numbers are in SI units and keep all their digits.
     """
-    from ..case.io.atomic_files import to_standard_output, unwritable, write
+    from ..case.io.atomic_files import require_writable, to_standard_output, write
     from ..case.io.case_writer import case_text
 
-    if options.out and (problems := unwritable([("--out", options.out)])):
-        raise KincheckError("\n".join(problems))
+    require_writable([("--out", options.out)])
     import_options.return_cases(options)
     if len(options.case) != 1:
         raise KincheckError(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 from collections.abc import Iterable
 from dataclasses import fields
 from pathlib import Path
@@ -158,7 +159,7 @@ def return_cases(options: argparse.Namespace) -> None:
     in `run --hold knee hip model.xml` also the file.
     """
     for given in (options.hold, options.start):
-        files = [name for name in given if Path(name).is_file()]
+        files = [name for name in given if os.path.isfile(name)]
         options.case += files
         given[:] = [name for name in given if name not in files]
 

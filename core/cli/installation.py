@@ -195,7 +195,7 @@ def _imported(found: Sequence[Part], modules: Mapping[str, str]) -> list[Part]:
     """
     running = {
         part.name: subprocess.Popen(
-            [sys.executable, "-c", f"import {modules.get(part.name, part.name)}"],
+            [sys.executable, "-P", "-c", f"import {modules.get(part.name, part.name)}"],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
             text=True,
@@ -236,14 +236,12 @@ def _ended(importing: subprocess.Popen[str]) -> str:
 
 def _cache_problem() -> str:
     """Return why compiled code cannot be cached; empty if it can."""
-    folder, remedy = (
-        disk_cache.folder(),
-        "every process compiles again: make it writable, or set XDG_CACHE_HOME to another folder",
-    )
+    folder, remedy = disk_cache.folder(), f"every process compiles again: {disk_cache.REMEDY}"
     if folder is None:
         return f"the user has no home directory; {remedy}"
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        if why := disk_cache.doubt(folder):
+            return f"{why}; {remedy}"
         with tempfile.TemporaryFile(dir=folder):
             return ""
     except OSError as error:

@@ -81,7 +81,7 @@ def _prove(options: argparse.Namespace, registry: Registry) -> int:
     Exit status: 0 all samples are proved, 1 some are not (singular poses), 2 the tool could not
     do its work.
     """
-    from ..case.io.atomic_files import unwritable, write
+    from ..case.io.atomic_files import unwritable, written
     from ..harness.record import to_json
     from ..report.terminal import indented, page
     from ..studies.verified_reference import prove_case
@@ -98,9 +98,7 @@ def _prove(options: argparse.Namespace, registry: Registry) -> int:
             )
     names = [f"{file_name(case.name)}.reference.json" for case in cases]
     if options.out is not None:
-        problems += unwritable(
-            (case.name, options.out / name) for case, name in zip(cases, names, strict=True)
-        )
+        problems += unwritable(("--out", options.out / name) for name in names)
     if problems:
         raise KincheckError("\n".join(problems))
     complete = True
@@ -113,7 +111,9 @@ def _prove(options: argparse.Namespace, registry: Registry) -> int:
         if errors and not options.quiet:
             page(None).print(indented(_table(errors)))
         if options.out is not None:
-            write("--out", options.out / name, to_json(found))
+            problems += written(options.out / name, to_json(found))
+    if problems:
+        raise KincheckError("\n".join(problems))
     return Status.WITHIN if complete else Status.DEVIATES
 
 

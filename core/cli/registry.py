@@ -87,7 +87,7 @@ class Registry:
                     " leave it out"
                 )
             case = self.case(name)
-        elif Path(name).suffix in SUFFIXES or os.sep in name or Path(name).exists():
+        elif Path(name).suffix in SUFFIXES or os.sep in name or os.path.exists(name):
             case = load(Path(name), supplied)
         else:
             raise KincheckError(
@@ -110,7 +110,7 @@ class Registry:
         Raises:
             KincheckError: the pattern matches nothing.
         """
-        if not set(name) & set("*?[") or Path(name).exists():
+        if not set(name) & set("*?[") or os.path.exists(name):
             return [name]
         found = [each for each in self.cases() if fnmatchcase(each, name)] + sorted(glob(name))
         if not found:

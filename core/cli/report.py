@@ -34,8 +34,8 @@ def add(commands: Any) -> None:
         nargs="?",
         metavar="RUN",
         help=(
-            "number of a run in the history, or a results.json; default: the latest run that has"
-            " ended"
+            "number of a run in the history, or a results.json; default: the latest run, or an"
+            " earlier one of another selection that failed and was not green since"
         ),
     )
     report.add_argument(
@@ -53,7 +53,7 @@ def add(commands: Any) -> None:
         action="store_true",
         help=(
             "exit with status 1 also if a case or an engine is missing that is in the run compared"
-            " with, or in the last run of the same command; for nightly runs"
+            " with, or in the last run of the same selection; for nightly runs"
         ),
     )
     add_history(report, "history of the runs, their steps and their spread")
@@ -134,7 +134,7 @@ def _write(
     from ..report.trends import trends
 
     def page(path: Path) -> None:
-        past = trends(read(store, last=NIGHTS)) if store is not None else None
+        past = trends(read(store, last=NIGHTS, like=subject.facts)) if store is not None else None
         write_report(subject.results, path, history=past, changes=to_markup(found))
 
     contents: dict[str, Callable[[Path], object]] = {

@@ -9,6 +9,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import partial
+from os.path import exists
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
@@ -48,12 +49,14 @@ class _Plan:
         baseline: the native engine as the standard, if it is not among the engines.
         required, named: names of the engines that the run must contain.
         unread: messages of unreadable cases, by the given names; the other cases are run.
+        mistyped: names among these of which there is neither a case nor a file.
     """
 
     cases: Sequence[Case]
     engines: Sequence[Engine]
     baseline: Engine | None
     unread: dict[str, str]
+    mistyped: Sequence[str]
     required: Sequence[str]
     named: Sequence[str]
 
@@ -161,6 +164,7 @@ def _planned(options: argparse.Namespace, registry: Registry, to: Destinations) 
         engines,
         baseline,
         {visible(name): visible(message, also="\n") for name, message in unread.items()},
+        [name for name in unread if name not in registry.cases() and not exists(name)],
         [each.name for each in registry.find_engines(options.require, [], options.mode)],
         [each.name for each in engines] if options.engine else [],
     )
@@ -204,8 +208,9 @@ def _solved(
     solver, settings = execution_options.solver(options, plan.engines)
     if plan.unread:
         settings["unread"] = plan.unread
+    settings["selection"] = history_options.selection(options)
     keeping, problems = history_options.keeping(
-        options, plan.cases, plan.engines, [*plan.unread], settings
+        options, plan.cases, plan.engines, [*plan.unread], settings, plan.mistyped
     )
     made = [*keeping.made] if keeping else []
     records: list[Record] = [*made]
@@ -228,14 +233,8 @@ def _solved(
     }
     started, unread = datetime.now(UTC), [*plan.unread]
     try:
-        how: dict[str, Any] = {
-            "baseline": plan.baseline,
-            "solver": solver,
-            "made": made,
-            "unread": unread,
-            **about,
-        }
-        results = running.run(plan.cases, plan.engines, progress=keep, **how)
+        how: dict[str, Any] = {"baseline": plan.baseline, "solver": solver, "made": made, **about}
+        results = running.run(plan.cases, plan.engines, progress=keep, unread=unread, **how)
         # after a signal between the last record and this line, all records are kept below
         hold()
         return results, problems, keeping, None

@@ -97,7 +97,6 @@ def _stress(options: argparse.Namespace, registry: Registry) -> int:
     Exit status: 0 no sample is silently wrong or refused for a wrong reason, 1 some are, 2 the tool
     could not do its work, or an engine supports none of the samples.
     """
-    from ..case.io.atomic_files import write
     from ..harness.standard import STANDARD
     from ..report.sections import deliver
     from ..report.terminal import page, unheaded
@@ -136,23 +135,33 @@ def _stress(options: argparse.Namespace, registry: Registry) -> int:
         raise KincheckError("\n".join(problems))
     with delivery.json_only() if options.json == "-" else nullcontext():
         found = _run(
-            options, [known[name] for name in dict.fromkeys(options.family or known)], engines
+            options,
+            [known[name] for name in dict.fromkeys(options.family or known)],
+            engines,
+            problems,
         )
     made = report(found)
-    deliver(made, found, out=options.out, json=options.json)
-    if options.out is not None:
-        write("--out", options.out / FILES[2], markdown(made).encode())
-    if undone := [
+    problems += [
         *(f"family {name} was not finished: {why}" for name, why in found.unfinished.items()),
         *idle(found),
-    ]:
-        raise KincheckError("\n".join(undone))
+    ]
+    beside = {FILES[2]: markdown(made)}
+    deliver(made, found, out=options.out, json=options.json, beside=beside, problems=problems)
     bad = any(cell.samples[verdict] for cell in found.cells for verdict in BAD)
     return Status.DEVIATES if bad else Status.WITHIN
 
 
-def _run(options: argparse.Namespace, families: list[Family], engines: list[Engine]) -> Stress:
-    """Run the families; reduce and save bad examples."""
+def _run(
+    options: argparse.Namespace,
+    families: list[Family],
+    engines: list[Engine],
+    problems: list[str],
+) -> Stress:
+    """Run the families; reduce and save bad examples.
+
+    Args:
+        problems: receives the reasons of examples that cannot be written.
+    """
     from msgspec.structs import replace
 
     from ..report.meter import Meter
@@ -170,7 +179,8 @@ def _run(options: argparse.Namespace, families: list[Family], engines: list[Engi
             progress=meter,
         )
     if options.out is not None and examples:
-        found = replace(found, findings=[save(example, options.out) for example in examples])
+        saved = [save(example, options.out, problems) for example in examples]
+        found = replace(found, findings=saved)
     return found
 
 

@@ -87,7 +87,7 @@ def _sweep(options: argparse.Namespace, registry: Registry) -> int:
     with ExitStack() as stack:
         part = None if options.out is None else stack.enter_context(_part(options))
         stops: list[KeyboardInterrupt | KincheckError] = []
-        results = _solve(options, study, engine, share, part, stops)
+        results = _solve(options, study, engine, share, part, stops, problems)
         hold()
         problems += _deliver(options, results) + (part.problems if part is not None else [])
     for reason in stops:
@@ -159,6 +159,7 @@ def _solve(
     share: float,
     part: Part | None,
     stops: list[KeyboardInterrupt | KincheckError],
+    problems: list[str],
 ) -> SweepResults:
     from ..harness.resource_limits import default_jobs
     from ..report.meter import Meter
@@ -187,7 +188,7 @@ def _solve(
             if options.store is None
             else stack.enter_context(ParquetStore(options.store, study))
         )
-        return sweep_designs(
+        results = sweep_designs(
             study.case,
             study.variation,
             samples=options.samples,
@@ -205,6 +206,8 @@ def _solve(
             part=part,
             stopped=stops.append,
         )
+    problems += [] if store is None else store.problems
+    return results
 
 
 def _deliver(options: argparse.Namespace, results: SweepResults) -> list[str]:

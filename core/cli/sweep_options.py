@@ -7,6 +7,7 @@ from pathlib import Path
 
 from ..studies.variation.modes import Incomplete, Sampling
 from . import import_options
+from .execution_options import SCHEDULER
 from .option_types import positive, whole
 from .run_options import TOL
 from .verbosity import add_verbosity
@@ -100,7 +101,7 @@ def add_options(sweep: argparse.ArgumentParser) -> None:
     sweep.add_argument(
         "--scheduler",
         metavar="ADDRESS",
-        help="solve on the workers of this dask.distributed scheduler instead",
+        help=SCHEDULER,
     )
     sweep.add_argument(
         "--check",

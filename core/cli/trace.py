@@ -60,9 +60,9 @@ def _trace(options: argparse.Namespace, registry: Registry) -> int:
     straight on. Exit status: 0 the whole length was traced, or a closed curve; 1 the curve ends
     before; 2 the tool could not do its work.
     """
-    from ..case.io.atomic_files import unwritable
+    from ..case.io.atomic_files import require_writable
     from ..kinematics import trace
-    from ..report.terminal import write_json
+    from ..report.terminal import with_json
 
     case = registry.find_case(options.case, import_options.supplied(options))
     import_options.tell_left_out([case])
@@ -70,17 +70,16 @@ def _trace(options: argparse.Namespace, registry: Registry) -> int:
     driver = options.driver or (case.sweep.driver if case.sweep.driver in drivers else drivers[0])
     if driver not in drivers:
         raise KincheckError(unknown("driver", driver, drivers))
-    if problems := unwritable([("--json", options.json)]):
-        raise KincheckError("\n".join(problems))
+    require_writable([("--json", options.json)])
     curves = [trace(case.mechanism, driver, length=options.length)]
     if not curves[0].closed:
         curves.append(trace(case.mechanism, driver, length=options.length, direction=-1))
     design = case.mechanism.design_value(driver)
     unit = "rad" if case.mechanism.driver(driver).turns else "m"
-    write_json(_facts(case.name, curves, design, unit), options.json)
     out = sys.stderr if options.json == "-" else sys.stdout
-    for direction, curve in zip((1, -1), curves, strict=False):
-        print(*_lines(case.name, curve, direction, design, unit), sep="\n", file=out)
+    with with_json(_facts(case.name, curves, design, unit), options.json):
+        for direction, curve in zip((1, -1), curves, strict=False):
+            print(*_lines(case.name, curve, direction, design, unit), sep="\n", file=out)
     return Status.DEVIATES if any(curve.message for curve in curves) else Status.WITHIN
 
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
 from ..case.case import PER_TRAVEL, Truth
-from ..errors import number_of
+from ..errors import number_of, shortened
 from ..trajectory import PER_TIME, QUANTITIES
 from ..unit_text import unit_text
 from .record import Outcome, Record, Results
@@ -17,6 +17,9 @@ TRUTHS = {
     Truth.IN_HOUSE_ORACLE: "in-house oracle",
     Truth.CONSENSUS_ONLY: "consensus only",
 }
+
+NAMED = 8
+"""Most cases or outputs named in a message; a table, the page or the JSON has all."""
 
 UNMADE = "not run: the run ended before this pair"
 """Message of a planned pair without a record whose case can be read."""
@@ -78,7 +81,12 @@ def unsound(record: Record) -> str:
 def unread(run: Mapping[str, Any]) -> str:
     """Return the unreadable cases of a run, from its circumstances; empty if there are none."""
     names = run.get("unread", {})
-    return f"{unread_count(len(names))}: {', '.join(names)}" if names else ""
+    return f"{unread_count(len(names))}: {named([*names])}" if names else ""
+
+
+def named(names: Sequence[str], between: str = ", ") -> str:
+    """Return the names, or of many the first ones and the number of the others."""
+    return shortened(names, NAMED, between)
 
 
 def unread_count(count: int) -> str:

@@ -148,7 +148,8 @@ def git_state(folder: Path) -> dict[str, Any] | None:
     def git(*arguments: str) -> str | None:
         try:
             done = subprocess.run(
-                ["git", "-C", folder, *arguments],
+                # a repository's configuration may name programs for these
+                ["git", "-c", "core.fsmonitor=false", "-C", folder, *arguments],
                 capture_output=True,
                 text=True,
                 timeout=10,
@@ -165,11 +166,10 @@ def git_state(folder: Path) -> dict[str, Any] | None:
     changed = git("status", "--porcelain", "--untracked-files=no")
     if not commit:
         return None
-    edits = (
-        {"edits": hashlib.sha256((git("diff", "HEAD") or "").encode()).hexdigest()[:12]}
-        if changed
-        else {}
-    )
+    edits = dict[str, str]()
+    if changed:
+        diff = git("diff", "--no-ext-diff", "--no-textconv", "HEAD") or ""
+        edits["edits"] = hashlib.sha256(diff.encode()).hexdigest()[:12]
     return {
         "commit": commit,
         "branch": git("symbolic-ref", "--short", "HEAD"),

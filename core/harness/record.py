@@ -136,6 +136,15 @@ class Seconds(msgspec.Struct, frozen=True, kw_only=True):
     compare: float | None = None
     waited: float | None = None
 
+    @property
+    def own(self) -> float | None:
+        """The time of a warm solve without waiting for the processor; None if it is unknown.
+
+        In 25 equal runs on two processors with five busy processes, the ratio of two runs reaches
+        4.1 by the clock, and 1.9 without waiting.
+        """
+        return None if self.warm is None else self.warm - (self.waited or 0.0)
+
 
 class Record(RecordTable, msgspec.Struct, frozen=True, kw_only=True):
     """The result of one (case, engine) pair. An uncomputed number is null, never zero;
@@ -155,8 +164,8 @@ class Record(RecordTable, msgspec.Struct, frozen=True, kw_only=True):
         dof: degrees of freedom without drivers; the same in all engines.
         iterations: Newton iterations, sum over the solved samples.
         solved, samples: number of samples reached, and number of samples.
-        us_per_step: time of the warm solve per sample [us], including the forces of outputs; null
-            unless all samples were reached.
+        us_per_step: time of the warm solve per sample [us] without waiting for the processor,
+            including the forces of outputs; null unless all samples were reached.
         faults: what is wrong with an answer beside deviations: missing or contradicted samples,
             residual, balance of power, bodies, degrees of freedom; `message` repeats them. Empty in
             records of older versions.

@@ -259,7 +259,7 @@ def _answered(
         "dof": details.pop("dof", None),
         "iterations": answer.iterations if solved else None,
         "us_per_step": (
-            1e6 * seconds.warm / samples if solved == samples and seconds.warm is not None else None
+            1e6 * seconds.own / samples if solved == samples and seconds.own is not None else None
         ),
     }
     return _made(

@@ -76,6 +76,6 @@ def _require_whole(path: Path) -> None:
     if beside.is_file() and beside.stat().st_size:
         raise HistoryError(
             f"history {path}: its latest records are still in {beside.name}, and the folder is"
-            " read-only, so they cannot be merged; copy both files to a writable folder"
-            " be"
+            " read-only, so they cannot be merged; copy both files to a"
+            " writable folder"
         )

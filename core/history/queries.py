@@ -8,8 +8,9 @@ from typing import Any, TypeAlias
 
 import msgspec
 
-from ..harness.record import Deviations, Outcome
+from ..harness.record import Deviations, Outcome, Seconds
 from .schema import OUTCOME
+from .selection import Facts, alike
 from .store import RunRow, Store
 
 NIGHTS = 60
@@ -60,6 +61,7 @@ def read(
     last: int | None = None,
     cases: Sequence[str] = (),
     engines: Sequence[str] = (),
+    like: Facts | None = None,
 ) -> History:
     """Return the runs and entries of a history.
 
@@ -67,6 +69,7 @@ def read(
         before: only runs with smaller numbers.
         last: largest number of runs, the latest ones.
         cases, engines: only these; empty: all.
+        like: circumstances of a run; only runs that solve and judge alike.
 
     Raises:
         HistoryError: the file cannot be read.
@@ -74,7 +77,9 @@ def read(
     rows = [
         row
         for row in store.runs()
-        if row.status != "running" and (before is None or row.id < before)
+        if row.status != "running"
+        and (before is None or row.id < before)
+        and (like is None or alike(row.circumstances, like))
     ]
     if cases or engines:
         rows = [row for row in rows if any(_wanted(pair, cases, engines) for pair in row.plan)]
@@ -109,7 +114,7 @@ def _wanted(pair: Pair, cases: Sequence[str], engines: Sequence[str]) -> bool:
 def _entries(store: Store, run: int) -> list[tuple[Pair, Entry]]:
     columns = (
         f"case_name, engine, mode, {OUTCOME}, version, errors, warm_seconds, waited_seconds,"
-        " us_per_step, message, truth"
+        " CASE WHEN us_per_step IS NOT NULL THEN samples END, message, truth"
     )
     found: list[tuple[Pair, Entry]] = []
     # unused texts are checked, too: no part of a damaged run counts
@@ -119,25 +124,12 @@ def _entries(store: Store, run: int) -> list[tuple[Pair, Entry]]:
             f"SELECT {columns} FROM records WHERE run_id = ? ORDER BY rowid", (run,)
         ):
             errors = msgspec.json.decode(row[5], type=dict[str, Deviations])
-            found.append(
-                (
-                    (row[0], row[1], row[2]),
-                    Entry(
-                        run, Outcome(row[3]), row[4], errors, own_seconds(row[6], row[7]), row[8]
-                    ),
-                )
-            )
+            own, samples = Seconds(warm=row[6], waited=row[7]).own, row[8]
+            # runs of older versions keep a time per sample that includes waiting
+            per_step = 1e6 * own / samples if own is not None and samples else None
+            entry = Entry(run, Outcome(row[3]), row[4], errors, own, per_step)
+            found.append(((row[0], row[1], row[2]), entry))
     return found
-
-
-def own_seconds(warm: float | None, waited: float | None) -> float | None:
-    """Return the seconds of a warm solve without waiting for the processor; None if they are
-    unknown.
-
-    In 25 equal runs on two processors with five busy processes, the ratio of two runs reaches 4.1
-    by the clock, and 1.9 without waiting.
-    """
-    return None if warm is None else warm - (waited or 0.0)
 
 
 def green(store: Store, *, before: int | None = None) -> list[RunRow]:
@@ -146,6 +138,14 @@ def green(store: Store, *, before: int | None = None) -> list[RunRow]:
     Raises:
         HistoryError: the file cannot be read.
     """
+    good = faultless(store, store.runs())
+    return [
+        row for row in readable(store) if row.id in good and (before is None or row.id < before)
+    ]
+
+
+def faultless(store: Store, rows: Sequence[RunRow]) -> set[int]:
+    """Return the numbers of the green runs, by their outcomes alone: their records are not read."""
     bad = ", ".join(f"'{outcome}'" for outcome in Outcome if outcome.bad)
     query = (
         f"SELECT run_id, count(*) FROM records GROUP BY run_id HAVING sum(outcome IN ({bad})) = 0"
@@ -154,12 +154,9 @@ def green(store: Store, *, before: int | None = None) -> list[RunRow]:
     with store.explained("read"):
         good: dict[int, int] = dict(store.connection.execute(query).fetchall())
     # a finished run lacks the pairs of unreadable cases: its status was 2
-    whole = [
-        row
-        for row in readable(store)
-        if row.status == "finished" and good.get(row.id) == len(row.plan)
-    ]
-    return [row for row in whole if before is None or row.id < before]
+    return {
+        row.id for row in rows if row.status == "finished" and good.get(row.id) == len(row.plan)
+    }
 
 
 def compared(store: Store, run: int) -> dict[Pair, set[tuple[str, str]]]:

@@ -8,9 +8,10 @@ among the ready operations, all of one kind come first.
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -88,6 +89,22 @@ def bytecode(program: Program, slots: int, width: int) -> Bytecode:
         for at, k in left:
             words += (at, place[k])
     return Bytecode(np.array([*words, 0, 0], np.uint32), cells - slots)
+
+
+def packed(tables: Mapping[str, Bytecode]) -> bytes:
+    """Return tables by name as bytes."""
+    return msgspec.msgpack.encode(
+        {name: (each.cells, each.words.tobytes()) for name, each in tables.items()}
+    )
+
+
+def unpacked(whole: bytes) -> dict[str, Bytecode]:
+    """Return the tables of `packed`."""
+    tables = msgspec.msgpack.decode(whole, type=dict[str, tuple[int, bytes]])
+    return {
+        name: Bytecode(np.frombuffer(words, np.uint32), cells)
+        for name, (cells, words) in tables.items()
+    }
 
 
 _NUMBER, _HALVES = struct.Struct("<d"), struct.Struct("<II")

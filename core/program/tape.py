@@ -9,14 +9,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TypeAlias, cast
+from typing import TYPE_CHECKING, TypeAlias, cast
 
 import numpy as np
 
 from ..algebra import Scalar
 from ..trajectory import Array
 
-Node: TypeAlias = tuple[str, *tuple[float, ...]]
+if TYPE_CHECKING:
+    Node: TypeAlias = tuple[str, *tuple[float, ...]]
+else:  # as msgspec reads it from the cache
+    Node = tuple[str | int | float, ...]
 """An operation and its operands: node numbers; for "input" a slot, for "const" a value; see
 `LEAVES`.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ..case.case import Truth
-from ..harness.labels import engine_name, notes, product
+from ..harness.labels import engine_name, named, notes, product
 from ..harness.record import Outcome, Record, Results
 from .axis import SAMPLES
 
@@ -22,7 +22,7 @@ def caveats(results: Results) -> list[tuple[str, str]]:
         limits.append((title, text))
 
     def cases(holds: Callable[[Record], bool]) -> str:
-        return ", ".join(dict.fromkeys(record.case for record in records if holds(record)))
+        return named([*dict.fromkeys(record.case for record in records if holds(record))])
 
     add(
         "One description for all",
@@ -46,7 +46,7 @@ def caveats(results: Results) -> list[tuple[str, str]]:
         if pairs and outcome not in ANSWERED:
             add(
                 f"{outcome.shown.capitalize()}: {len(pairs)}",
-                f"There are no results for {'; '.join(pairs)}.",
+                f"There are no results for {named(pairs, '; ')}.",
             )
     for case, why in results.unread.items():
         add(f"Not read: {case}", f"{why}. There are no results for it.")
@@ -57,7 +57,7 @@ def caveats(results: Results) -> list[tuple[str, str]]:
     ]:
         add(
             f"Not run: {len(pairs)}",
-            f"The run ended before them. There are no results for {'; '.join(pairs)}.",
+            f"The run ended before them. There are no results for {named(pairs, '; ')}.",
         )
     for record in records:
         if (
@@ -71,7 +71,7 @@ def caveats(results: Results) -> list[tuple[str, str]]:
                 " results.",
             )
     for reason, pairs in _uncompared(results).items():
-        add(f"Not judged: {', '.join(pairs)}", reason)
+        add(f"Not judged: {named(pairs)}", reason)
     if len({record.mode for record in records if record.outcome in ANSWERED}) > 1:
         add(
             "Modes",

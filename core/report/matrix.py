@@ -11,7 +11,7 @@ from rich.cells import cell_len
 from rich.text import Text
 
 from ..case.io.escape import visible
-from ..harness.labels import against, motion_unit, notes, signs, suspects, unread
+from ..harness.labels import against, motion_unit, named, notes, signs, suspects, unread
 from ..harness.record import Outcome, Record, Results
 from ..trajectory import QUANTITIES
 from ..unit_text import with_unit
@@ -88,7 +88,7 @@ def to_markdown(results: Results) -> str:
     lines += [escaped(f"Note: {case}: {note}.") for case, note in notes(results.run)]
     lines += [escaped(f"Suspect: {case}: {why}.") for case, why in suspects(results)]
     lines += [
-        escaped(f"{outcome.shown.capitalize()}: {', '.join(cases)} in {engine}: {message}.")
+        escaped(f"{outcome.shown.capitalize()}: {named(cases)} in {engine}: {message}.")
         for (engine, outcome, message), cases in messages(results).items()
         if outcome is not Outcome.PASS
     ]

@@ -14,7 +14,7 @@ from typing import Any, cast
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from ..case.io.escape import file_name
-from ..harness.labels import against, engine_name, known, number, output_label
+from ..harness.labels import against, engine_name, known, named, number, output_label
 from ..unit_text import value_text, with_unit
 from .figures import Figure
 
@@ -59,6 +59,7 @@ def environment(*folders: Path) -> Environment:
         engine=engine_name,
         against=against,
         known=known,
+        named=named,
         file_name=file_name,
         parted=parted,
         value_text=value_text,

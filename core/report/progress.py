@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from ..case.io.escape import visible
+from ..errors import shortened
 from ..extras import how_to_install
 
 if TYPE_CHECKING:
@@ -40,22 +41,18 @@ def progress(records: list[Record], *, quiet: bool = False) -> Callable[[Record,
 
 def lacking(results: Results, required: Sequence[str], named: Sequence[str] = ()) -> list[str]:
     """Return messages on failures of required engines and on named engines that are missing."""
+    from ..harness.labels import NAMED
     from ..harness.record import Outcome
+    from .table import messages
 
-    lines = [
-        (
-            f"required engine {record.engine!r}: {record.message}"
-            + f"; {how_to_install(record.engine)}"
-            if record.outcome is Outcome.UNAVAILABLE
-            else (
-                f"required engine {record.engine!r}: case {record.case!r} is unsupported:"
-                f" {record.message}"
-            )
-        )
-        for record in results.records
-        if record.engine in required
-        and record.outcome in (Outcome.UNAVAILABLE, Outcome.UNSUPPORTED)
-    ]
+    lines: list[str] = []
+    for (engine, outcome, message), cases in messages(results).items():
+        if engine in required and outcome is Outcome.UNAVAILABLE:
+            lines.append(f"required engine {engine!r}: {message}; {how_to_install(engine)}")
+        elif engine in required and outcome is Outcome.UNSUPPORTED:
+            which = shortened([*map(repr, cases)], NAMED)
+            which = f"case {which} is" if len(cases) == 1 else f"cases {which} are"
+            lines.append(f"required engine {engine!r}: {which} unsupported: {message}")
     lines += [
         f"engine {record.engine!r} is requested, but missing: {record.message};"
         f" {how_to_install(record.engine)}"

@@ -144,6 +144,33 @@ def rows(findings: Iterable[Finding]) -> list[Row]:
     return [Row(", ".join(names), *said) for said, names in engines.items()]
 
 
+def passed_by_says(found: Regressions) -> str:
+    """Return the later runs that are not judged, as a sentence; empty without any."""
+    if not found.passed_by:
+        return ""
+    runs = "run" if len(found.passed_by) == 1 else "runs"
+    named = shortened([*map(str, found.passed_by)], NAMED)
+    return f"Not judged: {runs} {named}, of another selection; kincheck report RUN judges one."
+
+
+def step_lines(steps: Iterable[Step], *, over: bool) -> list[str]:
+    """Return the steps that stand, or those that came and went; cases with the same text share a
+    line.
+    """
+    alike: dict[tuple[str, str], list[str]] = {}
+    for step in steps:
+        if (step.repaired is not None) is over:
+            key = product(step.engine, step.mode), step_says(step)
+            alike.setdefault(key, []).append(step.case)
+    return [
+        f"{engine} on {shortened(cases, NAMED)}: {says}" for (engine, says), cases in alike.items()
+    ]
+
+
+STEPS = {False: "Steps in the history that still stand", True: "Steps that came and went"}
+"""Titles of the lists of `step_lines`."""
+
+
 def step_says(step: Step) -> str:
     """Return the text of a step, with its first run and the changes in that run."""
     name = f"{step.output} {step.quantity} error" if step.output else step.quantity

@@ -6,7 +6,7 @@ import msgspec
 
 from ..harness.record import Outcome
 from ..history.queries import NIGHTS, NOTHING, History, read
-from ..history.regression.change_points import OUTCOME, TIME, steps
+from ..history.regression.change_points import OUTCOME, TIME, lasting, steps
 from ..history.regression.circumstance_changes import changes, same_machine
 from ..history.regression.compare import compare, unmade
 from ..history.regression.findings import Finding, Kind, Regressions, Step
@@ -41,7 +41,8 @@ def regressions(
     """
     around = _around(subject, store)
     limit = slowest(_alike(subject, around, before=subject.before))
-    standing = steps(around, standing=True)
+    every = steps(around)
+    standing, over = lasting(every), [each for each in every if each.worse and each.repaired]
     found = unmade(subject)
     if against is not None:
         then = (
@@ -68,22 +69,25 @@ def regressions(
             if record.outcome is Outcome.UNJUDGED
         ],
         unread=[*subject.results.unread],
+        passed_by=[*subject.passed_by],
         time_limit=limit,
         missing_is_failure=missing_is_failure,
         findings=[_since(finding, standing) for finding in found],
         changes=changes(subject.facts, against.facts) if against else [],
-        steps=standing,
+        steps=standing + over,
         loose=loose(around, subject.facts.get("cases", {})),
     )
 
 
 def _around(subject: Subject, store: Store | None) -> History:
-    """Return the runs up to the subject, including the subject if the history has it."""
+    """Return the runs up to the subject that solve and judge as it, including the subject if the
+    history has it.
+    """
     if store is None:
         return NOTHING
     cases = list(dict.fromkeys(record.case for record in subject.results.records))
     before = subject.before if subject.number is None else subject.number + 1
-    return read(store, before=before, last=NIGHTS, cases=cases)
+    return read(store, before=before, last=NIGHTS, cases=cases, like=subject.facts)
 
 
 def _alike(subject: Subject, around: History, *, before: int | None) -> History:

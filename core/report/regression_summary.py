@@ -9,11 +9,19 @@ from collections.abc import Iterator
 from markupsafe import Markup
 
 from ..errors import number_of
-from ..harness.labels import product
-from ..history.regression.findings import WHY, Kind, Regressions, Step
+from ..history.regression.findings import WHY, Kind, Regressions
 from .markdown import escaped, row
 from .page_parts import environment
-from .regression_labels import LONGEST, headline, loose_says, pairs, rows, step_says
+from .regression_labels import (
+    LONGEST,
+    STEPS,
+    headline,
+    loose_says,
+    pairs,
+    passed_by_says,
+    rows,
+    step_lines,
+)
 
 
 def to_markdown(found: Regressions) -> str:
@@ -40,9 +48,9 @@ def to_markup(found: Regressions) -> Markup:
             found=found,
             groups=[group for group in groups if group[2]],
             steps=[
-                (product(step.engine, step.mode), step.case, step_says(step))
-                for step in found.steps
+                (over, title, step_lines(found.steps, over=over)) for over, title in STEPS.items()
             ],
+            passed_by=passed_by_says(found),
             loose=loose_says(found.loose),
             longest=LONGEST,
         )
@@ -55,6 +63,7 @@ def _lines(found: Regressions) -> Iterator[str]:
     elif found.against is not None:
         yield "Neither versions nor machine nor commit changed."
     yield ""
+    yield from [passed_by_says(found), ""] if found.passed_by else []
     for kind in Kind:
         group = rows(each for each in found.findings if each.kind is kind)
         if not group:
@@ -73,22 +82,21 @@ def _lines(found: Regressions) -> Iterator[str]:
         if len(group) > LONGEST:
             yield from (f"and {len(group) - LONGEST} more, all in the JSON.", "")
         yield from ["</details>", ""] if folded else []
-    if found.steps:
-        yield from ("**Steps in the history that still stand**", "")
-        yield from (f"- {escaped(_step(step))}" for step in found.steps[:LONGEST])
-        yield from (
-            [f"- and {len(found.steps) - LONGEST} more, all in the JSON"]
-            if len(found.steps) > LONGEST
-            else []
-        )
-        yield ""
+    for over, title in STEPS.items():
+        lines = step_lines(found.steps, over=over)
+        if lines:
+            yield from (
+                [f"<details><summary>{title} ({len(lines)})</summary>", ""]
+                if over
+                else [f"**{title}**", ""]
+            )
+            yield from (f"- {escaped(line)}" for line in lines[:LONGEST])
+            rest = len(lines) - LONGEST
+            yield from [f"- and {rest} more, all in the JSON"] if rest > 0 else []
+            yield from ["", "</details>", ""] if over else [""]
     if found.loose:
         lines = loose_says(found.loose)
         title = f"Tolerances that could be tightened ({number_of(len(lines), 'case')})"
         yield from (f"<details><summary>{title}</summary>", "")
         yield from (f"- {escaped(line)}" for line in lines)
         yield from ("", "</details>", "")
-
-
-def _step(step: Step) -> str:
-    return f"{product(step.engine, step.mode)} on {step.case}: {step_says(step)}"

@@ -8,10 +8,18 @@ from rich.console import Console
 from rich.text import Text
 
 from ..case.io.escape import visible
-from ..harness.labels import product
 from ..history.regression.findings import WHY, Kind, Regressions
 from . import terminal
-from .regression_labels import LONGEST, headline, loose_says, pairs, rows, step_says
+from .regression_labels import (
+    LONGEST,
+    STEPS,
+    headline,
+    loose_says,
+    pairs,
+    passed_by_says,
+    rows,
+    step_lines,
+)
 
 
 def print_regressions(found: Regressions, file: TextIO) -> None:
@@ -22,13 +30,12 @@ def print_regressions(found: Regressions, file: TextIO) -> None:
         _print_line(console, f"changed: {', '.join(map(str, found.changes))}")
     elif found.against is not None:
         _print_line(console, "neither versions nor machine nor commit changed")
+    if passed_by := passed_by_says(found):
+        _print_line(console, passed_by)
     for kind in Kind:
         _print_kind(console, found, kind)
-    steps = [
-        f"{product(each.engine, each.mode)} on {each.case}: {step_says(each)}"
-        for each in found.steps
-    ]
-    _print_list(console, "steps in the history that still stand", steps)
+    for over, title in STEPS.items():
+        _print_list(console, title.lower(), step_lines(found.steps, over=over))
     _print_list(console, "tolerances that could be tightened", loose_says(found.loose))
 
 

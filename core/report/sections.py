@@ -5,7 +5,7 @@ page.
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TextIO
@@ -62,23 +62,37 @@ class Report:
     sections: Sequence[Section]
 
 
-def deliver(report: Report, results: msgspec.Struct, *, out: Path | None, json: str | None) -> None:
+def deliver(
+    report: Report,
+    results: msgspec.Struct,
+    *,
+    out: Path | None,
+    json: str | None,
+    beside: Mapping[str, str] = {},
+    problems: Sequence[str] = (),
+) -> None:
     """Print the tables and write the requested files.
 
     Args:
-        out: folder for NAME.json and NAME.html.
+        out: folder for NAME.json, NAME.html and the files beside them.
         json: a file, or "-" for standard output, which then holds nothing else.
+        beside: further texts by file name.
+        problems: earlier problems, to raise with those of the files.
 
     Raises:
-        KincheckError: a file cannot be written.
+        KincheckError: a file cannot be written, or there are earlier problems.
     """
     contents = [(Path(json), to_json(results))] if json not in (None, "-") else []
     if out is not None:
         contents += [
             (out / f"{report.name}.json", to_json(results)),
             (out / f"{report.name}.html", page(report).encode()),
+            *((out / name, text.encode()) for name, text in beside.items()),
         ]
-    problems = write_all(contents)  # before printing, since the reader of the tables may end early
+    problems = [
+        *problems,
+        *write_all(contents),
+    ]  # before printing, since the reader of the tables may end early
     print_report(report, sys.stderr if json == "-" else sys.stdout)
     if json == "-":
         to_standard_output(to_json(results))

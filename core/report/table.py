@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.text import Text
 
 from ..case.io.escape import visible
-from ..harness.labels import against, motion_unit, notes, signs, suspects, unread, unsound
+from ..harness.labels import against, motion_unit, named, notes, signs, suspects, unread, unsound
 from ..harness.record import Deviation, Outcome, Record, Results
 from ..trajectory import QUANTITIES
 from ..unit_text import motion_word
@@ -75,7 +75,7 @@ def print_outputs(results: Results, file: TextIO) -> None:
         _print_below_titles(titled, heads, console)
     for record in results.records:
         for reason, outputs in _missing(record).items():
-            line = f"–: {record.case} · {record.engine}: {', '.join(outputs)}: {reason}"
+            line = f"–: {record.case} · {record.engine}: {named(outputs)}: {reason}"
             console.print(Text(visible(line)), soft_wrap=True)
     print_table(results, file)
 
@@ -197,9 +197,7 @@ def print_messages(results: Results, console: Console) -> None:
         console.print(Text(visible(f"suspect: {case}: {why}"), style="bold"), soft_wrap=True)
     for (engine, outcome, message), cases in messages(results).items():
         console.print(
-            Text(
-                visible(f"{outcome.shown}: {', '.join(cases)} · {engine}: {message}", also="\n\t")
-            ),
+            Text(visible(f"{outcome.shown}: {named(cases)} · {engine}: {message}", also="\n\t")),
             soft_wrap=True,
         )
     counts = Counter(record.outcome for record in results.records)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any, TextIO
 
@@ -14,6 +15,7 @@ from rich.padding import Padding
 from rich.text import Text
 
 from ..case.io.atomic_files import to_standard_output, write
+from ..errors import KincheckError
 from ..harness.record import to_json
 from .fitting_table import FittingTable
 
@@ -89,17 +91,25 @@ def indented(table: FittingTable) -> Padding:
     return Padding(table, (0, 0, 0, 2), expand=False)
 
 
-def write_json(found: msgspec.Struct | Mapping[str, Any], json: str | None) -> None:
-    """Write the answer as JSON to a file, or for "-" to standard output. Call this before printing:
+@contextmanager
+def with_json(found: msgspec.Struct | Mapping[str, Any], json: str | None) -> Generator[None]:
+    """Write the answer as JSON to a file, or for "-" to standard output, then print in the block:
     the reader of the tables may end early.
 
     Raises:
-        KincheckError: the file cannot be written.
+        KincheckError: the file cannot be written; after the block.
     """
-    if json == "-":
-        to_standard_output(to_json(found))
-    elif json is not None:
-        write("--json", Path(json), to_json(found))
+    problem: KincheckError | None = None
+    try:
+        if json == "-":
+            to_standard_output(to_json(found))
+        elif json is not None:
+            write("--json", Path(json), to_json(found))
+    except KincheckError as error:
+        problem = error
+    yield
+    if problem:
+        raise problem
 
 
 def listed(names: Sequence[str]) -> str:

@@ -6,6 +6,8 @@ import importlib
 import os
 import signal
 import socket
+import subprocess
+import sys
 from collections import Counter
 from importlib.util import find_spec
 
@@ -91,6 +93,62 @@ def test_pairs_are_solved_on_a_cluster_as_here_though_a_worker_is_lost_until_it_
             solver=on_cluster(cluster.scheduler_address, LIMITS),
             progress=close,
         )
+
+
+def test_a_frozen_worker_costs_no_pair_and_no_more_than_its_limit(cluster):
+    cases = [crank(f"c{k}") for k in range(8)]
+    workers = [nanny.pid for nanny in cluster.workers.values()]
+
+    def solved(frozen):
+        def freeze(record, done, total):
+            if done == 2:
+                os.kill(frozen, signal.SIGSTOP)
+
+        solver = on_cluster(cluster.scheduler_address, LIMITS, silent=4.0)
+        found = run(cases, [Slow("native", seconds=0.1)], tol=TOL, solver=solver, progress=freeze)
+        return Counter(record.outcome for record in found.records), found.records[-1].message
+
+    try:
+        assert solved(workers[0]) == ({Outcome.PASS: 8}, "")
+        outcomes, message = solved(workers[1])
+        assert outcomes[Outcome.PASS] >= 2
+        assert outcomes[Outcome.PASS] + outcomes[Outcome.TIMEOUT] == 8
+        assert message == "no answer within 4 s: the cluster's worker was silent"
+    finally:
+        for worker in workers:
+            os.kill(worker, signal.SIGCONT)
+
+
+SCHEDULER = """
+from distributed import LocalCluster
+cluster = LocalCluster(
+    n_workers=1, processes=False, protocol="tcp://", dashboard_address=":0", silence_logs=50
+)
+print(cluster.scheduler_address, flush=True)
+input()
+"""
+
+
+def test_a_lost_scheduler_is_one_message_and_no_traceback():
+    with subprocess.Popen(
+        [sys.executable, "-c", SCHEDULER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as scheduler:
+        address = scheduler.stdout.readline().strip()
+        command = [sys.executable, "-m", "kincheck", "run", "--engine", "native"]
+        with subprocess.Popen(
+            [*command, "--scheduler", address],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+        ) as running:
+            while not running.stderr.readline().startswith("[1/"):
+                assert running.poll() is None
+            scheduler.kill()
+            _, said = running.communicate()
+    *progress, message = said.splitlines()
+    assert running.returncode == 2
+    assert all(line.startswith(("[", "kincheck: ")) for line in progress)
+    assert message.startswith(f"kincheck: scheduler {address}: was lost (")
 
 
 def forbid_clients(monkeypatch):

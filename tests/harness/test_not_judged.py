@@ -4,12 +4,14 @@ words on every surface.
 
 import json
 import re
+from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
 from kincheck.core.case.case import Series
 from kincheck.core.harness.record import Outcome, to_json
+from kincheck.core.harness.results_file import read_results
 from kincheck.core.harness.run import run
 from kincheck.core.report import junit, matrix
 from kincheck.core.report.caveats import caveats
@@ -38,6 +40,24 @@ def test_the_outcome_is_neither_bad_nor_judged():
     assert not native.outcome.judged
     assert not native.validated
     assert json.loads(to_json(unjudged()))["records"][0]["outcome"] == "unjudged"
+
+
+def test_many_cases_are_named_by_the_first(kincheck_main, capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    cases = {f"c{k:03}": crank(f"c{k:03}", reference=False) for k in range(200)}
+    engines = [RIGHT, UNABLE]
+    files = ("--markdown", "cases.md", "--json", "all.json")
+    assert kincheck_main("run", "--require", "unable", *files, engines=engines, cases=cases) == 2
+    told = capsys.readouterr()
+    eight = ", ".join([*cases][:8])
+    assert f"not judged: {eight} and 192 more · native: {WHY}\n" in told.out
+    assert f"Not judged: {eight} and 192 more in native: {WHY}." in Path("cases.md").read_text()
+    quoted = ", ".join(map(repr, [*cases][:8]))
+    assert f"required engine 'unable': cases {quoted} and 192 more are unsupported: " in told.err
+    write_report(read_results(Path("all.json")), Path("page.html"))
+    assert f"on {eight} and 192 more" in Path("page.html").read_text("utf-8")
+    titles = [title for title, _ in caveats(read_results(Path("all.json")))]
+    assert max(map(len, titles)) < 250
 
 
 def test_every_surface_has_the_same_words(tmp_path, kincheck_main, capsys):

@@ -30,14 +30,14 @@ def timed(monkeypatch, build, *solves, waits=()):
     waiting = chain.from_iterable((0.0, length) for length in (*waits, *[0.0] * (20 - len(waits))))
     monkeypatch.setattr(execution, "waited", accumulate(waiting).__next__)
     engine = Fake()
-    return engine, record_of(engine).seconds
+    return engine, record_of(engine)
 
 
 def test_times_are_of_warm_solves_and_the_answer_is_the_timed_one():
     engine = Fake()
     record = record_of(engine)
     assert engine.solves == 6  # one cold, five warm: they take no time
-    assert record.us_per_step == pytest.approx(1e6 * record.seconds.warm / SAMPLES)
+    assert record.us_per_step == pytest.approx(1e6 * record.seconds.own / SAMPLES)
     assert record.seconds.build is not None
     stale = Fake()
     stale.answer = lambda case: (
@@ -47,27 +47,30 @@ def test_times_are_of_warm_solves_and_the_answer_is_the_timed_one():
 
 
 def test_an_interruption_moves_no_time(monkeypatch):
-    engine, seconds = timed(monkeypatch, 0.5, 0.25, 0.001, 0.009, 0.002, 0.002, 0.002)
+    engine, record = timed(monkeypatch, 0.5, 0.25, 0.001, 0.009, 0.002, 0.002, 0.002)
     assert engine.solves == 6
+    seconds = record.seconds
     assert (seconds.build, seconds.first) == (0.5, 0.25)
     assert seconds.warm == pytest.approx(0.002)
 
 
 def test_what_others_take_is_told(monkeypatch):
-    _, seconds = timed(monkeypatch, 0.5, *[0.003] * 6, waits=[0.002] * 6)
-    assert seconds.warm == pytest.approx(0.003)
-    assert seconds.waited == pytest.approx(0.002)
+    _, record = timed(monkeypatch, 0.5, *[0.003] * 6, waits=[0.002] * 6)
+    assert record.seconds.warm == pytest.approx(0.003)
+    assert record.seconds.waited == pytest.approx(0.002)
+    assert record.us_per_step == pytest.approx(1000.0 / SAMPLES)
 
 
 @pytest.mark.parametrize("solves", [(0.25, 0.001), (0.001, 0.25), (0.001, 0.7), (0.7, 0.001)])
 def test_the_compiler_is_in_no_time(solves, monkeypatch):
     """It has come to work in one of the warm solves."""
-    _, seconds = timed(monkeypatch, 0.1, 0.002, *solves, *[0.001] * 4)
-    assert seconds.warm == pytest.approx(0.001)
+    _, record = timed(monkeypatch, 0.1, 0.002, *solves, *[0.001] * 4)
+    assert record.seconds.warm == pytest.approx(0.001)
 
 
 @pytest.mark.parametrize("first", [10.0, 30.0])
 def test_slow_engines_are_solved_twice(first, monkeypatch):
-    engine, seconds = timed(monkeypatch, 10.0, first, 10.0)
+    engine, record = timed(monkeypatch, 10.0, first, 10.0)
     assert engine.solves == 2
+    seconds = record.seconds
     assert (seconds.build, seconds.first, seconds.warm) == (10.0, first, 10.0)

@@ -168,6 +168,12 @@ def test_the_state_of_a_repository(tmp_path):
     assert git_state(tmp_path)["edits"] == edits
     (tmp_path / "case.toml").write_text("c")
     assert git_state(tmp_path)["edits"] != edits
+    # programs that a repository's configuration names are not started
+    (tmp_path / ".gitattributes").write_text("* diff=own")
+    for option in ("core.fsmonitor", "diff.external", "diff.own.textconv"):
+        git("config", option, f"touch {tmp_path}/started #")
+    git_state(tmp_path)
+    assert not (tmp_path / "started").exists()
 
 
 def test_calibration_is_a_time():

@@ -165,7 +165,8 @@ def test_the_present_bad_stretch_has_its_own_first_run_and_an_earlier_one_its_re
     said = capsys.readouterr().out
     assert " · since run 25 |" in said
     assert "ms a sweep since run 25 (" in said
-    assert "since run 9" not in said
+    assert "steps that came and went" in said.lower()
+    assert "since run 9 (2026-11-09 03:00), repaired in run 17; after run 8: " in said
     assert (
         main.main(
             [

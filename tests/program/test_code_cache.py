@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import fields, replace
 from gc import collect
+from hashlib import sha256
+from pathlib import Path
+from pickle import dumps
 
 import numpy as np
 import pytest
@@ -13,7 +16,8 @@ from kincheck.core.kinematics.compiled import program_cache
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.continuation.sweep import sweep
-from kincheck.core.mechanism.motions import Path, Ramp
+from kincheck.core.mechanism import motions
+from kincheck.core.mechanism.motions import Ramp
 from kincheck.core.program.llvm import jit
 from kincheck.core.program.llvm.jit import LlvmCode
 
@@ -30,7 +34,7 @@ def test_code_in_use_stays_after_clearing_the_caches(tmp_path, monkeypatch):
     assert model._code.interpreted
 
     def positions():
-        return sweep(model, Path({driver: Ramp(1.0)}, path), 1e-12).points[point].position
+        return sweep(model, motions.Path({driver: Ramp(1.0)}, path), 1e-12).points[point].position
 
     expected = positions()
     clear_caches()
@@ -58,7 +62,7 @@ def test_cached_code_is_used_and_a_damaged_entry_is_rebuilt(tmp_path, monkeypatc
         model = compile_model(mechanism, Request((driver,), (point,)))
         if often and model._code.interpreted:
             model._code.count(10**9)
-        return sweep(model, Path({driver: Ramp(1.0)}, wanted), 1e-12).points[point].position
+        return sweep(model, motions.Path({driver: Ramp(1.0)}, wanted), 1e-12).points[point].position
 
     fresh = positions()
     interpreted = {*(tmp_path / "kincheck").iterdir()}
@@ -86,6 +90,34 @@ def test_cached_code_is_used_and_a_damaged_entry_is_rebuilt(tmp_path, monkeypatc
                 code.unlink()
             np.testing.assert_array_equal(positions(often=True), fresh)
             assert entry.read_bytes() == kept
+
+
+class Planted:
+    """Code of another user that a pickle runs."""
+
+    def __init__(self, mark):
+        self.mark = mark
+
+    def __reduce__(self):
+        return Path.touch, (self.mark,)
+
+
+def test_planted_entries_are_not_run(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+
+    def positions():
+        clear_caches()  # as another process
+        model = compile_model(CRANK, Request(("turn",), ("tip",)))
+        model._code.count(10**9)
+        path = motions.Path({"turn": Ramp(1.0)}, np.linspace(0.0, 1.0, 5))
+        return sweep(model, path, 1e-12).points["tip"].position
+
+    fresh, mark = positions(), tmp_path / "planted"
+    for entry in (tmp_path / "kincheck").iterdir():
+        for planted in (dumps(Planted(mark)), b"", b"\x80", entry.read_bytes()[32:-1]):
+            entry.write_bytes(sha256(entry.name.encode() + planted).digest() + planted)
+            np.testing.assert_array_equal(positions(), fresh)
+    assert not mark.exists()
 
 
 def test_what_was_traced_is_not_taken_for_anything_else(tmp_path, monkeypatch):

@@ -1,8 +1,10 @@
-"""What is kept on disk between processes: found again where it is whole, and no more than there is
-room for.
+"""What is kept on disk between processes: found again where it is whole and the user's own, and no
+more than there is room for.
 """
 
 import os
+from hashlib import sha256
+from pathlib import Path
 
 import pytest
 from kincheck.core.program import disk_cache
@@ -20,10 +22,18 @@ def fail():
     raise AssertionError("made again")
 
 
+def kept(make=lambda: b"made"):
+    return disk_cache.kept(b"asked", make, bytes)
+
+
+def found():
+    return disk_cache.find(b"asked", bytes)
+
+
 def test_what_was_made_is_found(here):
     assert disk_cache.size() == 0
-    assert disk_cache.kept(b"asked", lambda: b"made") == b"made"
-    assert disk_cache.kept(b"asked", fail) == b"made"
+    assert kept() == b"made"
+    assert kept(fail) == b"made"
     assert disk_cache.size() == disk_cache.DIGEST + len(b"made")
 
 
@@ -33,17 +43,17 @@ def test_what_was_made_is_found(here):
     ids=["short", "turned", "empty"],
 )
 def test_what_is_not_whole_is_made_again(here, spoil):
-    disk_cache.kept(b"asked", lambda: b"made")
+    kept()
     (entry,) = here.iterdir()
     entry.write_bytes(spoil(entry.read_bytes()))
-    assert disk_cache.find(b"asked") is None
-    assert disk_cache.kept(b"asked", lambda: b"made") == b"made"
-    assert disk_cache.find(b"asked") == b"made"
+    assert found() is None
+    assert kept() == b"made"
+    assert found() == b"made"
 
 
 def test_what_was_not_used_for_longest_goes(here, monkeypatch):
     monkeypatch.setattr(disk_cache, "MOST", 1000)
-    here.mkdir()
+    here.mkdir(mode=0o700)
     (here / "a folder").mkdir()
     for days, name in enumerate(["yesterday", "before", "long ago", "read since"], 1):
         (here / name).write_bytes(bytes(300))
@@ -51,11 +61,115 @@ def test_what_was_not_used_for_longest_goes(here, monkeypatch):
         os.utime(here / name, (entry.st_atime - days * DAY, entry.st_mtime - days * DAY))
     read = (here / "read since").stat()
     os.utime(here / "read since", (read.st_atime + 4 * DAY, read.st_mtime))
-    disk_cache.kept(b"asked", lambda: bytes(200))
-    assert disk_cache.find(b"asked") == bytes(200)
+    kept(lambda: bytes(200))
+    assert found() == bytes(200)
     assert {each.name for each in here.iterdir() if len(each.name) < 20} == {
         "a folder",
         "yesterday",
         "read since",
     }
     assert disk_cache.size() <= 1000
+
+
+posix = pytest.mark.skipif(os.name == "nt", reason="Windows has no owners and modes of this kind")
+
+
+@posix
+def test_folder_and_entries_are_closed_to_others(here):
+    here.mkdir(mode=0o755)  # as older versions made it
+    kept()
+    (entry,) = here.iterdir()
+    assert [path.stat().st_mode & 0o777 for path in (here, entry)] == [0o700, 0o600]
+
+
+def opened(here):
+    here.chmod(0o777)
+
+
+def opened_as_tmp(here):
+    here.chmod(0o1777)
+
+
+def opened_above(here):
+    here.parent.chmod(0o777)
+
+
+def linked(here):
+    here.rename(here.with_name("elsewhere"))
+    here.symlink_to("elsewhere")
+
+
+def linked_through_an_open_folder(here):
+    (here.parent / "open").mkdir()
+    (here.parent / "open").chmod(0o777)
+    (here.parent / "open" / "on").symlink_to(here.parent)
+    os.environ["XDG_CACHE_HOME"] = str(here.parent / "open" / "on")
+
+
+SPOILT = opened, opened_as_tmp, opened_above, linked, linked_through_an_open_folder
+
+
+@posix
+@pytest.mark.parametrize("spoil", SPOILT)
+def test_a_folder_others_can_replace_is_not_used(here, spoil, capsys):
+    kept()
+    disk_cache._usable.cache_clear()  # as another process
+    spoil(here)
+    assert kept(lambda: b"made again") == b"made again"
+    assert found() is None
+    (note,) = capsys.readouterr().err.splitlines()
+    assert note.startswith("kincheck: note: compiled code is not kept: ")
+    assert disk_cache.REMEDY in note
+
+
+@posix
+def test_a_folder_of_another_user_is_not_used(here, monkeypatch, capsys):
+    kept()
+    disk_cache._usable.cache_clear()
+    monkeypatch.setattr(os, "geteuid", lambda: os.getuid() + 1)  # as with sudo and the user's HOME
+    assert kept(lambda: b"made again") == b"made again"
+    assert "belongs to another user" in capsys.readouterr().err
+
+
+@posix
+def test_a_cache_below_a_sticky_folder_is_used(here):
+    here.parent.chmod(0o1777)
+    kept()
+    assert kept(fail) == b"made"
+
+
+@posix
+def test_entries_others_may_have_written_are_made_again(here):
+    kept()
+    (entry,) = here.iterdir()
+    entry.chmod(0o666)
+    assert found() is None
+    assert kept(lambda: b"made again") == b"made again"
+    assert entry.stat().st_mode & 0o777 == 0o600
+    if os.geteuid() == 0:  # only root gives files away
+        os.chown(entry, 12345, -1)
+        assert found() is None
+        os.chown(entry, 0, -1)
+    assert found() == b"made again"
+    entry.rename(here / "elsewhere")
+    entry.symlink_to(here / "elsewhere")
+    assert found() is None
+
+
+def test_an_entry_that_cannot_be_read_is_made_again(here):
+    kept()
+    (entry,) = here.iterdir()
+    entry.write_bytes(sha256(entry.name.encode() + b"forged").digest() + b"forged")
+    assert disk_cache.kept(b"asked", lambda: b"7", int) == 7
+    assert found() == b"7"
+
+
+@pytest.mark.parametrize("home", ["", "relative"])
+def test_no_cache_is_kept_in_the_working_folder(home, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_CACHE_HOME", "cache")
+    monkeypatch.setenv("HOME", home)
+    monkeypatch.setattr(Path, "home", lambda: Path(home))  # Windows asks another variable
+    assert kept() == b"made"
+    assert disk_cache.folder() is None
+    assert not [*tmp_path.iterdir()]

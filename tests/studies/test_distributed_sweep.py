@@ -60,6 +60,24 @@ def test_a_sweep_is_the_same_on_a_cluster_as_here_though_a_worker_is_lost(cluste
     assert timeless(there) == timeless(sweep_designs(case, variation, **common))
 
 
+def test_chunks_of_a_frozen_worker_are_solved_by_another(cluster, tmp_path):
+    case = crank()
+    variation = vary(tmp_path, case, tip={"at": "tip", "sigma": 1})
+    frozen = next(iter(cluster.workers.values())).pid
+
+    def freeze(progress):
+        if progress.done == 1024:
+            os.kill(frozen, signal.SIGSTOP)
+
+    source = on_cluster(cluster.scheduler_address, silent=4.0)
+    common = {"samples": 6_000, "seed": 5}
+    try:
+        there = sweep_designs(case, variation, source=source, progress=freeze, **common)
+    finally:
+        os.kill(frozen, signal.SIGCONT)
+    assert timeless(there) == timeless(sweep_designs(case, variation, **common))
+
+
 def test_a_cluster_that_goes_is_a_message(tmp_path, monkeypatch):
     """Its scheduler and worker are threads: processes that go are in the test above."""
     from distributed import LocalCluster  # takes most of a second, which reading the tests saves
@@ -68,7 +86,7 @@ def test_a_cluster_that_goes_is_a_message(tmp_path, monkeypatch):
     monkeypatch.setattr(ours, "CONNECT", 1.0)
     case = crank()
     cluster = LocalCluster(
-        n_workers=1, processes=False, protocol="tcp://", dashboard_address=None, silence_logs=50
+        n_workers=1, processes=False, protocol="tcp://", dashboard_address=":0", silence_logs=50
     )
 
     def hear(progress):

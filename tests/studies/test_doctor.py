@@ -130,6 +130,13 @@ def test_what_is_installed_and_broken_is_told_from_what_works(imported, said, mo
     assert found.remedy == "pip install --force-reinstall numpy"
 
 
+def test_doctor_runs_no_module_of_the_working_folder(monkeypatch, tmp_path):
+    (tmp_path / "msgspec.py").write_text("raise SystemExit('planted')")
+    monkeypatch.chdir(tmp_path)
+    part = installation.Part("msgspec", "1.0", "kincheck", True, "", "")
+    assert installation._imported([part], {}) == [part]
+
+
 def test_a_missing_system_library_is_named():
     part = installation.Part("pin", "4.1", "engine", False, "", "")
     broken = {"pin": "ctypes; ctypes.CDLL('libnothing.so.7')"}
@@ -151,6 +158,15 @@ def test_a_cache_that_cannot_be_written_is_said(without_imports, monkeypatch, tm
     assert "XDG_CACHE_HOME" in out
 
 
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no modes of this kind")
+def test_doctor_names_a_cache_others_can_write(without_imports, monkeypatch, tmp_path, capsys):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    (tmp_path / "kincheck").mkdir()
+    (tmp_path / "kincheck").chmod(0o777)
+    assert main(["doctor"]) == 0
+    assert f"other users can write in {tmp_path / 'kincheck'}; every" in capsys.readouterr().out
+
+
 def test_a_user_without_a_home_solves_and_keeps_nothing(without_imports, monkeypatch, capsys):
     """As in a container that is run as a user whom it does not know."""
     monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
@@ -159,8 +175,8 @@ def test_a_user_without_a_home_solves_and_keeps_nothing(without_imports, monkeyp
     out = capsys.readouterr().out
     assert "nowhere" in out
     assert "the user has no home directory; every process compiles again" in out
-    assert disk_cache.kept(b"said", lambda: b"made") == b"made"
-    assert disk_cache.find(b"said") is None
+    assert disk_cache.kept(b"said", lambda: b"made", bytes) == b"made"
+    assert disk_cache.find(b"said", bytes) is None
     assert not disk_cache.known(b"said")
 
 

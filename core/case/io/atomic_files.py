@@ -54,20 +54,22 @@ def write(option: str, path: Path, content: Content) -> Any:
 
 
 def _put(path: Path, content: Content) -> Any:
-    with _whole(path) as part:
+    with whole(path) as part:
         return part.write_bytes(content) if isinstance(content, bytes) else content(part)
 
 
 @contextmanager
-def _whole(path: Path) -> Generator[Path]:
-    """Yield a temporary path, and rename it to the file at the end.
+def whole(path: Path) -> Generator[Path]:
+    """Yield a temporary path, and rename it to the file at the end, unless an error ends the block.
 
     An earlier file stays until then, and also if the write fails.
+
+    Raises:
+        OSError: the file cannot be written.
     """
-    # follow links; an unnamed pipe resolves to no file
-    there, file = path.exists(), path.resolve()
+    there, file = _behind_links(path)
     # a pipe, a device, or a file in a read-only folder: write to it directly
-    if there and not (path.is_file() and os.access(file.parent, os.W_OK)):
+    if there and not (file.is_file() and os.access(file.parent, os.W_OK)):
         yield path
         return
     part = file.with_name(f".{uuid4().hex}.part")  # another run may be writing the same file
@@ -80,6 +82,25 @@ def _whole(path: Path) -> Generator[Path]:
         part.unlink(missing_ok=True)
 
 
+def _behind_links(path: Path) -> tuple[bool, Path]:
+    """Return whether a file exists, and its path without links; an unnamed pipe has none.
+
+    Raises:
+        OSError: no file can have the path: its links go round, its name is too long, ...
+    """
+    try:
+        path.stat()
+        return True, Path(os.path.realpath(path))
+    except FileNotFoundError:
+        return False, Path(os.path.realpath(path))
+
+
+def require_writable(files: Iterable[Named], history: Path | None = None) -> None:
+    """Raise KincheckError for files of options that cannot be written; see `unwritable`."""
+    if problems := unwritable(files, history):
+        raise KincheckError("\n".join(problems))
+
+
 def unwritable(files: Iterable[Named], history: Path | None = None) -> list[str]:
     """Return messages about unwritable files of options, and files named by several options.
 
@@ -87,7 +108,7 @@ def unwritable(files: Iterable[Named], history: Path | None = None) -> list[str]
         history: file of the history; no option may name it.
     """
     found = list[str]()
-    seen = {} if history is None else {history.resolve(): "--history"}
+    seen = {} if history is None else {os.path.realpath(history): "--history"}
     for option, name in files:
         if name in (None, "-"):
             continue
@@ -96,14 +117,10 @@ def unwritable(files: Iterable[Named], history: Path | None = None) -> list[str]
             found.append(
                 f"{option} -: standard output takes the document of --json alone; give a file"
             )
-        elif (
-            path.is_dir()
-            or not path.parent.is_dir()
-            or not os.access(path if path.exists() else path.parent, os.W_OK)
-        ):
+        elif (why := _obstacle(path)) is not None:
             found.append(
-                f"{option} {path}: cannot be written; give a file in a folder that exists and is"
-                " writable"
+                f"{option} {path}: cannot be written{why}; give a file in a folder that exists and"
+                " is writable"
             )
         elif _is_standard_output(path):
             found.append(
@@ -112,11 +129,21 @@ def unwritable(files: Iterable[Named], history: Path | None = None) -> list[str]
             )
         elif path.exists() and not path.is_file():
             continue  # several options may write to one pipe or device
-        elif (other := seen.setdefault(path.resolve(), option)) != option:
+        elif (other := seen.setdefault(os.path.realpath(path), option)) != option:
             found.append(
                 f"{option} {path}: found the file of {other}, expected one of its own; give another"
             )
     return found
+
+
+def _obstacle(path: Path) -> str | None:
+    """Return None if a file can be written, else the reason in brackets, if it is not plain."""
+    try:
+        there, file = _behind_links(path)
+    except OSError as error:
+        return f" ({error.strerror})"
+    able = not file.is_dir() if there else file.parent.is_dir()
+    return None if able and os.access(path if there else file.parent, os.W_OK) else ""
 
 
 def _is_standard_output(path: Path) -> bool:

@@ -55,20 +55,25 @@ def steps(history: History, *, standing: bool = False) -> list[Step]:
     """Return the steps of all pairs, the latest first.
 
     Args:
-        standing: return only the last step for the worse of each series, unless a later run has
-            repaired it.
+        standing: return only those of `lasting`.
     """
     found: list[Step] = []
     for pair, entries in history.pairs.items():
-        by_quantity: list[list[Step]] = [
-            _outcomes(pair, entries, history),
-            _times(pair, entries, history),
-        ]
-        by_quantity += [_errors(pair, entries, history, motion) for motion in QUANTITIES]
-        for each in by_quantity:
-            lasting = {step.output: step for step in each if step.worse and step.repaired is None}
-            found += lasting.values() if standing else each
-    return sorted(found, key=lambda step: -step.first)
+        found += _outcomes(pair, entries, history)
+        found += _times(pair, entries, history)
+        for motion in QUANTITIES:
+            found += _errors(pair, entries, history, motion)
+    found.sort(key=lambda step: -step.first)
+    return lasting(found) if standing else found
+
+
+def lasting(found: Sequence[Step]) -> list[Step]:
+    """Return the last step for the worse of each series, unless a later run has repaired it."""
+    last: dict[tuple[str | None, ...], Step] = {}
+    for step in found:  # the latest first
+        if step.worse and step.repaired is None:
+            last.setdefault((step.case, step.engine, step.mode, step.quantity, step.output), step)
+    return [*last.values()]
 
 
 def _outcomes(pair: Pair, entries: Sequence[Entry], history: History) -> list[Step]:

@@ -195,6 +195,8 @@ class Regressions(msgspec.Struct, frozen=True, kw_only=True):
         failing: case, engine and mode of all pairs that failed or broke, new or not.
         unjudged: case, engine and mode of all solved pairs without a comparison, new or not.
         unread: requested cases that cannot be read; their pairs are findings, as lost.
+        passed_by: numbers of later runs of something else, which are not judged.
+        steps: first the standing ones, then the repaired ones (`Step.repaired`).
         time_limit: the smallest ratio of times that is reported as slower.
         missing_is_failure: whether a pair of an earlier run, missing in this one, is a regression.
     """
@@ -207,6 +209,7 @@ class Regressions(msgspec.Struct, frozen=True, kw_only=True):
     failing: list[tuple[str, str, str]]
     unjudged: list[tuple[str, str, str]] = []
     unread: list[str] = []
+    passed_by: list[int] = []
     time_limit: float
     missing_is_failure: bool = False
     findings: list[Finding]

@@ -1,4 +1,4 @@
-"""Pairs of the last run of the same command that a run lacks: a case or an engine left out in
+"""Missing pairs of the last run of the same selection: a case or an engine left out in
 silence.
 """
 
@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from ..selection import same
 from ..store import RunRow, Store
 from .findings import Finding, Kind
 from .run_selection import Subject, pairs_of
@@ -17,7 +18,7 @@ def missing(
     """Yield the missing pairs, whatever run is compared with: the last run may have more pairs than
     the last green one.
 
-    A run of another command has another task and does not count.
+    A run of another selection has another task and does not count.
 
     Args:
         findings: the findings on the subject so far.
@@ -40,14 +41,14 @@ def missing(
 
 
 def _last(subject: Subject, store: Store) -> RunRow | None:
-    """Return the last earlier finished run of the subject's command."""
-    query = "SELECT id FROM runs WHERE command = ? AND (? IS NULL OR id < ?) ORDER BY id DESC"
-    with store.explained("read"):
-        numbers = store.connection.execute(
-            query, (subject.facts.get("command"), subject.before, subject.before)
-        ).fetchall()
-    for (number,) in numbers:
-        with store.sparing():  # a damaged run is skipped, and named at the end
-            if (row := store.run(number)).status != "running":
-                return row
-    return None
+    """Return the last earlier run of the subject's selection."""
+    return next(
+        (
+            row
+            for row in store.runs()
+            if row.status != "running"
+            and (subject.before is None or row.id < subject.before)
+            and same(row.circumstances, subject.facts)
+        ),
+        None,
+    )

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from os.path import exists  # a name too long for a file is no error here
 from pathlib import Path
 from typing import Any
 
 from ...errors import KincheckError
 from ...harness.record import Results
 from ...harness.results_file import read_results
-from ..queries import Pair, compared, green
+from ..queries import NIGHTS, Pair, compared, faultless, green
+from ..selection import alike, standing
 from ..store import RunRow, Store
 from .findings import RunName
 
@@ -25,12 +27,14 @@ class Subject:
     Attributes:
         number: number in the history; None for a run outside it.
         before: runs with smaller numbers are earlier; None if all runs are.
+        passed_by: numbers of later runs of something else, which do not change the judgement.
     """
 
     name: str
     number: int | None
     results: Results
     before: int | None
+    passed_by: Sequence[int] = ()
 
     @property
     def facts(self) -> dict[str, Any]:
@@ -46,8 +50,8 @@ class Subject:
 
 
 def find(name: str | None, store: Store | None) -> Subject:
-    """Return the run of a number or of a results.json; for None, the latest run of the history that
-    no process writes.
+    """Return the run of a number or of a results.json; for None, the run of the history's state,
+    see `standing`.
 
     A killed run counts, too: judging the run before it would hide the fault.
 
@@ -68,13 +72,15 @@ def find(name: str | None, store: Store | None) -> Subject:
                 f"report: run {row.id} is still running; report it when it has ended"
             )
         return _kept(store, row)
-    row = next((row for row in store.runs() if row.status != "running"), None)
+    rows = [row for row in store.runs() if row.status != "running"]
+    row = standing(rows, faultless(store, rows), NIGHTS)
     if row is None:
         raise KincheckError(
             f"history {store.path}: no run to report; `kincheck run --history {store.path}`"
             " records one"
         )
-    return _kept(store, row)
+    later = [each.id for each in reversed(rows) if each.id > row.id]
+    return replace(_kept(store, row), passed_by=later)
 
 
 def find_against(name: str, subject: Subject, store: Store | None) -> tuple[Subject | None, str]:
@@ -84,18 +90,22 @@ def find_against(name: str, subject: Subject, store: Store | None) -> tuple[Subj
     Raises:
         KincheckError: the named run does not exist, or is the subject itself.
     """
-    if name == LAST_GREEN or (name.endswith(BASELINE) and not Path(name).exists()):
+    if name == LAST_GREEN or (name.endswith(BASELINE) and not exists(name)):
         if store is None:
             return None, f"{name} needs a history, and none is given"
         branch = name.removesuffix(BASELINE)
         if name == LAST_GREEN:
             # otherwise a lost comparison would be reported once, and never again
             row = _most(
-                green(store, before=subject.before), lambda row: _compared(store, row, subject)
+                green(store, before=subject.before),
+                subject,
+                lambda row: _compared(store, row, subject),
             )
         else:
             row = _most(
-                _of_branch(store, branch, subject), lambda row: len(pairs_of(subject) & {*row.plan})
+                _of_branch(store, branch, subject),
+                subject,
+                lambda row: len(pairs_of(subject) & {*row.plan}),
             )
         if row is not None:
             with store.sparing():
@@ -127,7 +137,7 @@ def find_against(name: str, subject: Subject, store: Store | None) -> tuple[Subj
 
 
 def _in_file(file: Path, store: Store | None) -> Subject:
-    if not file.exists():
+    if not exists(file):
         known = f"a number of the history, a results.json, {LAST_GREEN} or BRANCH{BASELINE}"
         raise KincheckError(f"report: there is no run {str(file)!r}; give {known}")
     results = read_results(file)
@@ -198,8 +208,14 @@ def _compared(store: Store, row: RunRow, subject: Subject) -> int:
     return shared
 
 
-def _most(rows: list[RunRow], shared: Callable[[RunRow], int]) -> RunRow | None:
-    """Return the run with the most shared comparisons, the latest of several; None without any."""
+def _most(rows: list[RunRow], subject: Subject, shared: Callable[[RunRow], int]) -> RunRow | None:
+    """Return the run with the most shared comparisons, the latest of several; None without any.
+
+    Runs with the subject's options come first.
+    """
     amounts = {row.id: shared(row) for row in rows}
-    best = max(rows, key=lambda row: (amounts[row.id], row.id), default=None)
-    return best if best is not None and amounts[best.id] else None
+    return max(
+        (row for row in rows if amounts[row.id]),
+        key=lambda row: (alike(row.circumstances, subject.facts), amounts[row.id], row.id),
+        default=None,
+    )

@@ -8,7 +8,7 @@ from typing import Any
 
 from ...harness.labels import number
 from ...harness.record import Record
-from ..queries import Entry, History, calibration, own_seconds
+from ..queries import Entry, History, calibration
 from .findings import Finding, Kind, finding_of
 from .run_selection import Subject
 from .thresholds import ENOUGH, TIME_FLOOR
@@ -25,9 +25,7 @@ def usual_times(
     """
     latest = [entry for entry in entries if entry.seconds][-ENOUGH:]
     if len(latest) < ENOUGH:
-        seconds = (
-            own_seconds(record.seconds.warm, record.seconds.waited) if record.seconds else None
-        )
+        seconds = record.seconds.own if record.seconds else None
         loop = calibration(before.facts)
         return seconds if same else None, seconds / loop if seconds is not None and loop else None
     times = [(entry.seconds or 0.0, calibration(history.runs[entry.run])) for entry in latest]
@@ -44,7 +42,7 @@ def slower(
 
     One of the two alone may be due to the machine.
     """
-    seconds = own_seconds(now.seconds.warm, now.seconds.waited) if now.seconds else None
+    seconds = now.seconds.own if now.seconds else None
     if seconds is None:
         return
     by_clock, by_loop = usual

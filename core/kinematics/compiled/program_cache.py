@@ -8,11 +8,16 @@ anywhere.
 from __future__ import annotations
 
 import hashlib
+import os
 import pickle
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
 
 from ...mechanism.mechanism import Mechanism
 from ...program import ITERATIONS, NODES, Plan, groups_behind
@@ -77,10 +82,20 @@ def traced(mechanism: Mechanism, request: Request, section: Section | None = Non
     if section or request.varied or not (is_builtin(mechanism) and compiled):
         return _trace(mechanism, request, section, lanes)
     content = _source() + pickle.dumps((mechanism, request, lanes))
-    found: Tracing = pickle.loads(
-        kept(content, lambda: pickle.dumps(_trace(mechanism, request, None, lanes)))
-    )
-    return found
+    return kept(content, lambda: _packed(_trace(mechanism, request, None, lanes)), _unpacked)
+
+
+def _packed(tracing: Tracing) -> bytes:
+    return msgspec.msgpack.encode(tracing, enc_hook=_plain)
+
+
+def _unpacked(whole: bytes) -> Tracing:
+    return msgspec.msgpack.decode(whole, type=Tracing, dec_hook=lambda kind, ends: kind(*ends))
+
+
+def _plain(value: slice | np.generic) -> Any:
+    """Return a range of rows as its ends, and a number of numpy as a number."""
+    return (value.start, value.stop) if isinstance(value, slice) else value.item()
 
 
 def is_builtin(mechanism: Mechanism) -> bool:
@@ -93,18 +108,30 @@ def is_builtin(mechanism: Mechanism) -> bool:
 def _source() -> bytes:
     """Return a digest of the source files of tracing."""
     digest = hashlib.sha256()
-    for file in source_files():
-        digest.update(file.read_bytes())
+    for name in source_files():
+        with open(name, "rb", buffering=0) as file:
+            digest.update(file.read())
     return digest.digest()
 
 
-def source_files() -> list[Path]:
+def source_files() -> list[str]:
     """Return the files of every folder imported by tracing; a test compares them."""
-    folders = [
-        CORE / name for name in ("primitives", "joints", "mechanism", "program", "kinematics")
-    ]
-    nested = [file for folder in folders for file in folder.rglob("*.py")]
-    return sorted([*CORE.glob("*.py"), *nested])
+    # a new process reads them all: pathlib would take twice as long
+    folders = ("primitives", "joints", "mechanism", "program", "kinematics")
+    nested = [name for folder in folders for name in _modules(os.path.join(CORE, folder))]
+    return sorted([*(each.path for each in os.scandir(CORE) if _is_module(each)), *nested])
+
+
+def _modules(folder: str) -> Iterator[str]:
+    for each in os.scandir(folder):
+        if _is_module(each):
+            yield each.path
+        elif each.is_dir():
+            yield from _modules(each.path)
+
+
+def _is_module(entry: os.DirEntry[str]) -> bool:
+    return entry.name.endswith(".py")
 
 
 def _trace(mechanism: Mechanism, request: Request, section: Section | None, lanes: int) -> Tracing:

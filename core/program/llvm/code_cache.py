@@ -6,10 +6,11 @@ from __future__ import annotations
 
 import ctypes
 import inspect
-import pickle
 from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any
+
+import msgspec
 
 from .. import disk_cache
 from . import compiler, elf_loader
@@ -30,7 +31,7 @@ class Code:
 
     def __init__(self, code: bytes, signatures: Mapping[str, int]) -> None:
         self.address = (
-            elf_loader.placed(elf_loader.Image(*pickle.loads(code)))
+            elf_loader.placed(msgspec.msgpack.decode(code, type=elf_loader.Image))
             if elf_loader.possible()
             else compiler.loaded(code)
         )
@@ -50,13 +51,14 @@ def load(
     content: str, text: Callable[[], str], signatures: Mapping[str, int] | None = None
 ) -> Code:
     """Return the cached code of a content; compile the text if there is none."""
-    return Code(disk_cache.kept(cache_key(content), lambda: _made(text())), signatures or {})
+    return disk_cache.kept(
+        cache_key(content), lambda: _made(text()), lambda code: Code(code, signatures or {})
+    )
 
 
 def find(content: str) -> Code | None:
     """Return the cached code of a content, or None."""
-    code = disk_cache.find(cache_key(content))
-    return None if code is None else Code(code, {})
+    return disk_cache.find(cache_key(content), lambda code: Code(code, {}))
 
 
 def cache_key(content: str) -> bytes:
@@ -74,4 +76,4 @@ def _sources() -> str:
 
 def _made(text: str) -> bytes:
     file = compiler.emitted(text)
-    return pickle.dumps(tuple(elf_loader.joined(file))) if elf_loader.possible() else file
+    return msgspec.msgpack.encode(elf_loader.joined(file)) if elf_loader.possible() else file

@@ -63,7 +63,10 @@ def processor() -> Processor:
     An emulator that hides instructions of the processor (valgrind) needs a separate cache.
     """
     known = _described()
-    description = _ask_llvm() if known is None else kept(known, _ask_llvm)
+    return _read(_ask_llvm()) if known is None else kept(known, _ask_llvm, _read)
+
+
+def _read(description: bytes) -> Processor:
     return Processor(*description.decode().split("\n"))
 
 

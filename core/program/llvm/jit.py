@@ -5,7 +5,6 @@ compiled.
 from __future__ import annotations
 
 import hashlib
-import pickle
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -121,14 +120,13 @@ class LlvmCode:
         slots = len(self.plan.slots)
 
         def made() -> bytes:
-            return pickle.dumps(
-                {
-                    name: bytecode.bytecode(each, slots, self.width)
-                    for name, each in self.plan.programs.items()
-                }
-            )
+            tables = {
+                name: bytecode.bytecode(each, slots, self.width)
+                for name, each in self.plan.programs.items()
+            }
+            return bytecode.packed(tables)
 
-        return pickle.loads(disk_cache.kept(self._of_tables, made))
+        return disk_cache.kept(self._of_tables, made, bytecode.unpacked)
 
     @property
     def _of_tables(self) -> bytes:

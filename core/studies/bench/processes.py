@@ -135,7 +135,7 @@ def _once(kind: _Kind, cache: Path) -> None:
         environment["XDG_CACHE_HOME"] = str(cache)
     begin = perf_counter()
     done = subprocess.run(
-        [sys.executable, "-c", kind.code, *kind.arguments],
+        [sys.executable, "-P", "-c", kind.code, *kind.arguments],
         input=kind.given,
         capture_output=True,
         env=environment,

@@ -9,7 +9,7 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from ...case.case import MARKER, Case
-from ...case.io.atomic_files import write
+from ...case.io.atomic_files import written
 from ...case.io.case_writer import case_text
 from ...case.io.coordinates import with_all_coordinates
 from ...errors import KincheckError
@@ -46,11 +46,11 @@ def judge_as(specimen: Specimen, case: Case, engine: Engine) -> Judgement:
     return judged(specimen, case, specimen.truth(case) if specimen.truth else None, answer)
 
 
-def save(example: Example, folder: Path) -> Finding:
+def save(example: Example, folder: Path, problems: list[str]) -> Finding:
     """Reduce an example and write it as a case file; return the finding with the name of the file.
 
-    Raises:
-        KincheckError: the file cannot be written.
+    Args:
+        problems: receives the reason if the file cannot be written.
     """
     specimen, engine, finding = example.specimen, example.engine, example.finding
 
@@ -90,5 +90,5 @@ def save(example: Example, folder: Path) -> Finding:
         *words,
         *finding.message.splitlines(),
     ]
-    write("--out", folder / name, case_text(case, comments).encode())
+    problems += written(folder / name, case_text(case, comments).encode())
     return replace(finding, file=name, reduced=words)

@@ -7,14 +7,12 @@ import pickle
 from collections import OrderedDict, deque
 from collections.abc import Callable, Generator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from itertools import islice
 from threading import Lock
 from typing import Any, TypeAlias
-from uuid import uuid4
 
-from ...errors import KincheckError
 from ...harness.execution import error_text
-from ...harness.workers.distributed import ClusterError, connected, loaded
+from ...harness.workers.distributed import SILENT, ClusterError, Tasks, connected, loaded
 from ...harness.workers.messages import pack
 from ...version import VERSION
 from .chunk import Chunk
@@ -50,10 +48,13 @@ def on_threads(ready: Ready, jobs: int) -> Source:
     return solve
 
 
-def on_cluster(address: str) -> Source:
+def on_cluster(address: str, silent: float = SILENT) -> Source:
     """Return the source on the workers of a dask.distributed scheduler.
 
-    If a worker is lost, other workers repeat its tasks.
+    If a worker is lost or silent, other workers repeat its tasks.
+
+    Args:
+        silent: longest time without a heartbeat of a worker [s].
 
     Raises:
         ClusterError: dask.distributed is not installed, the scheduler does not answer or
@@ -61,45 +62,35 @@ def on_cluster(address: str) -> Source:
     """
 
     def solve(study: Study, first: int = 0) -> Chunks:
-        distributed = loaded()
-        packed = pack(study)
-        # the scheduler takes tasks with equal names for one task
-        name = f"kincheck-sweep-{uuid4().hex}"
-        with connected(distributed, address) as client, _explained(distributed, address):
-            waiting = deque[Any]()
+        packed, ready = pack(study), dict[int, Chunk]()
+        with connected(loaded(), address) as client:
+            tasks = Tasks(client, address, silent)
+            waiting = iter(range(first, study.chunks))
             for index in range(first, study.chunks):
-                task: Any = client.submit(
-                    solve_there, packed, index, VERSION, key=f"{name}-{index}", pure=False
-                )
-                waiting.append(task)
-                # asked each time: workers may come and go
-                if len(waiting) >= AHEAD * max(1, sum(client.nthreads().values())):
-                    yield waiting.popleft().result()
-            while waiting:
-                yield waiting.popleft().result()
+                while index not in ready:
+                    # asked each time: workers may come and go
+                    more = AHEAD * tasks.threads - len(tasks) - len(ready)
+                    for late in islice(waiting, max(0, more)):
+                        tasks.submit(late, (solve_there, packed, late, VERSION))
+                    number, found = tasks.next()
+                    ready[number] = _answered(found, address)
+                yield ready.pop(index)
 
     return solve
 
 
-@contextmanager
-def _explained(distributed: Any, address: str) -> Generator[None]:
-    """Turn errors of a cluster into errors with an explanation."""
-    try:
-        yield
-    except KincheckError:
-        raise
-    except distributed.scheduler.KilledWorker as error:
-        raise ClusterError(
-            f"scheduler {address}: every worker that had some chunks was lost: {error_text(error)}"
-        ) from error
-    except (OSError, distributed.CancelledError, TimeoutError) as error:
-        raise ClusterError(
-            f"scheduler {address}: was lost ({error_text(error)}); sweep again when it is back"
-        ) from error
-    except Exception as error:
-        raise ClusterError(
-            f"scheduler {address}: a worker cannot solve: {error_text(error)}"
-        ) from error
+def _answered(found: Chunk | Exception, address: str) -> Chunk:
+    """Return a chunk; raise an exception in its place with an explanation."""
+    if isinstance(found, Chunk):
+        return found
+    if isinstance(found, ClusterError):
+        raise found
+    why = error_text(found)
+    if type(found).__name__ == "KilledWorker":
+        why = f"every worker that had some chunks was lost: {why}"
+    elif not isinstance(found, TimeoutError):
+        why = f"a worker cannot solve: {why}"
+    raise ClusterError(f"scheduler {address}: {why}") from found
 
 
 _ready: OrderedDict[bytes, Ready] = OrderedDict()

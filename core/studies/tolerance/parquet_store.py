@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Generator
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
 
+from ...case.io.atomic_files import whole
 from ...errors import KincheckError
 from ...extras import library
 from ..variation.variation import Coordinate
@@ -23,7 +26,10 @@ class ParquetStore:
     samples, NaN if missing. If a coordinate has the name of an output, such as W.x, its column is
     W.x.offset. The file's metadata has the key "kincheck": case, seed, mode, units, signs and the
     driver's values, as JSON. In the file of a stopped sweep, the key "kincheck.partial" gives the
-    numbers of stored and of all variants.
+    numbers of stored and of all variants. An earlier file stays until the end.
+
+    Attributes:
+        problems: write errors; the study goes on without the file.
 
     Raises:
         KincheckError: pyarrow is not installed, or the file cannot be written.
@@ -50,8 +56,9 @@ class ParquetStore:
             "driver": {name: values.tolist() for name, values in study.case.sweep.moved.items()},
         }
         self._schema = arrow.schema(fields, metadata={"kincheck": json.dumps(about)})
+        self.path, self.problems, self._whole = path, list[str](), whole(path)
         try:
-            self._writer = parquet.ParquetWriter(path, self._schema)
+            self._writer = parquet.ParquetWriter(self._whole.__enter__(), self._schema)
         except OSError as error:
             raise KincheckError(
                 f"--store {path}: cannot be written ({error.strerror or error}); give a file"
@@ -71,10 +78,17 @@ class ParquetStore:
             self._writer.add_key_value_metadata(
                 {"kincheck.partial": f"{self._first} of {self._samples} variants"}
             )
-        self._writer.close()
+        with self._tried():
+            self._writer.close()
+        if error is None and self.problems:
+            error = KincheckError(self.problems[0])  # leaves an earlier file as it is
+        with self._tried():
+            self._whole.__exit__(None if error is None else type(error), error, trace)
 
     def write(self, chunk: Chunk) -> None:
         """Write a chunk; see `Store`."""
+        if self.problems:
+            return
         assert chunk.values is not None
         assert chunk.offsets is not None
         arrow = self._arrow
@@ -83,13 +97,19 @@ class ParquetStore:
         for values in chunk.values:
             flat = arrow.array(np.ascontiguousarray(values.T).ravel())
             columns.append(arrow.FixedSizeListArray.from_arrays(flat, values.shape[0]))
-        try:
+        with self._tried():
             self._writer.write_table(arrow.table(columns, schema=self._schema))
-        except OSError as error:
-            raise KincheckError(
-                f"--store: cannot be written ({error}); free some room, or give a file elsewhere"
-            ) from error
         self._first += chunk.count
+
+    @contextmanager
+    def _tried(self) -> Generator[None]:
+        try:
+            yield
+        except OSError as error:
+            self.problems += [
+                f"--store {self.path}: cannot be written ({error}); free some room, or give a file"
+                " elsewhere"
+            ] * (not self.problems)
 
 
 def _offset_columns(study: Study) -> dict[str, Coordinate]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
+from os.path import isfile
 from pathlib import Path
 
 from ....algebra import ZERO, vec
@@ -84,7 +85,7 @@ class Expansion:
                 if file in self.taken
                 else f"found more than {MOST_INCLUDES} includes, expected fewer; {WRITE_OUT}"
             )
-        if not file.is_file():
+        if not isfile(file):
             raise element.fault(f"file: found {shown(name)}, but there is no such file; check it")
         self.taken.add(file)
         text = read_text(file, LARGEST_FILE - self.bytes, "take out what is not the mechanism")

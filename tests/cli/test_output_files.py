@@ -1,0 +1,159 @@
+"""Files of every option of every command: written whole or not, or refused in one message."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from kincheck.core.cli.main import main
+
+VARY = {
+    "schema": "kincheck-vary/1",
+    "mode": "monte_carlo",
+    "units": {"length": "m"},
+    "hardpoints": {"ball": {"at": "joints.ball.point", "sigma": 1e-4}},
+}
+SWEEP = ("sweep", "mcpherson_strut", "--vary", "vary.json", "--samples", "8")
+OPTIONS = [
+    *(
+        (("run", "five_bar", "--engine", "native"), option)
+        for option in ("--json", "--csv", "--junit", "--markdown")
+    ),
+    *((("report", "--history", "kept"), option) for option in ("--json", "--junit", "--markdown")),
+    (("history", "--history", "kept"), "--plot"),
+    (("history", "--history", "kept"), "--export"),
+    *((SWEEP, option) for option in ("--json", "--store")),
+    (("trace", "five_bar"), "--json"),
+    (("explain", "five_bar"), "--json"),
+    (("assemblies", "five_bar"), "--json"),
+    (("assemblies", "five_bar", "--export", "mjcf"), "--out"),
+    (("doctor",), "--json"),
+    (("export", "five_bar", "--to", "mjcf"), "--out"),
+    (("import", "model.toml"), "--out"),
+    (("stress", "--family", "arms", "--samples", "1"), "--json"),
+    (("bench", "formulation"), "--json"),
+]
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """A folder with a link to itself, a link into no folder, and a table of what varies."""
+    monkeypatch.chdir(tmp_path)
+    Path("loop.csv").symlink_to("loop.csv")
+    Path("gone.csv").symlink_to("no/such/file.csv")
+    Path("vary.json").write_text(json.dumps(VARY))
+    return tmp_path
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows lets few users make links")
+@pytest.mark.parametrize("name", ["loop.csv", "gone.csv", f"{'x' * 300}.csv"], ids=lambda x: x[:4])
+@pytest.mark.parametrize(("command", "option"), OPTIONS, ids=lambda x: "".join(x[:1]))
+def test_a_file_that_cannot_be_is_one_message(here, capsys, command, option, name):
+    assert main([*command, option, name]) == 2
+    captured = capsys.readouterr()
+    (message,) = captured.err.splitlines()
+    assert message.startswith(f"kincheck: {option} {name}: cannot be written")
+    assert captured.out == ""
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        (("trace", "five_bar"), "five_bar: left first growing"),
+        (("explain", "five_bar"), "five_bar: "),
+        (("assemblies", "five_bar"), "assemblies from"),
+    ],
+)
+def test_a_full_disk_costs_no_answer(capsys, command, said):
+    assert main([*command, "--json", "/dev/full"]) == 2
+    captured = capsys.readouterr()
+    assert said in captured.out
+    assert captured.err.startswith("kincheck: --json /dev/full: cannot be written (No space left")
+
+
+def test_proofs_go_on_without_a_file(here, capsys):
+    Path("out").mkdir()
+    Path("out", "five_bar.reference.json").symlink_to("/dev/full")
+    assert main(["reference", "five_bar", "rssr", "--digits", "17", "--out", "out", "-q"]) == 2
+    captured = capsys.readouterr()
+    assert len(captured.out.splitlines()) == 2
+    assert captured.err.count("cannot be written") == 1
+    assert Path("out", "rssr.reference.json").is_file()
+
+
+def test_a_reader_of_the_old_file_keeps_it_whole(here):
+    Path("all.json").write_text("an earlier answer")
+    with Path("all.json").open() as old:
+        assert main(["trace", "five_bar", "--json", "all.json"]) == 0
+        assert old.read() == "an earlier answer"
+    assert json.loads(Path("all.json").read_text())["schema"] == "kincheck-trace/1"
+
+
+LIMITED = """
+import resource, sys
+from kincheck.core.cli.main import main
+resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000))
+sys.exit(main())
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no limit of file sizes")
+def test_a_full_disk_leaves_the_stored_values_as_they_were(here):
+    pytest.importorskip("pyarrow.parquet")
+    Path("all.parquet").write_bytes(b"an earlier study")
+    ran = subprocess.run(
+        [sys.executable, "-c", LIMITED, *SWEEP[:-1], "400", "--store", "all.parquet"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert ran.returncode == 2
+    assert "400 variants of mcpherson_strut, all solved" in ran.stdout
+    assert ran.stderr.splitlines()[-1].startswith(
+        "kincheck: --store all.parquet: cannot be written"
+    )
+    assert "Traceback" not in ran.stderr
+    assert Path("all.parquet").read_bytes() == b"an earlier study"
+    assert not [*here.glob("*.part")]
+
+
+KILLED = """
+import os, signal, sys
+from kincheck.core.cli.main import main
+from kincheck.core.studies.tolerance.parquet_store import ParquetStore
+
+write = ParquetStore.write
+
+
+def once(store, chunk):
+    write(store, chunk)
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+ParquetStore.write = once
+sys.exit(main())
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
+def test_a_killed_study_leaves_the_stored_values_as_they_were(here):
+    pytest.importorskip("pyarrow.parquet")
+    Path("all.parquet").write_bytes(b"an earlier study")
+    ran = subprocess.run(
+        [sys.executable, "-c", KILLED, *SWEEP, "--store", "all.parquet"],
+        capture_output=True,
+        check=False,
+    )
+    assert ran.returncode == -9
+    assert Path("all.parquet").read_bytes() == b"an earlier study"
+
+
+def test_names_too_long_for_a_file_are_names_of_nothing(here, capsys):
+    name = "x" * 300
+    Path("model.xml").write_text(f'<mujoco><include file="{name}"/></mujoco>')
+    for command in (["run", name], ["explain", name], ["report", name], ["run", "model.xml"]):
+        assert main(command) == 2
+        assert "there is no" in capsys.readouterr().err

@@ -1,0 +1,153 @@
+"""What a report judges: the latest run of the same selection, red until the same thing is green."""
+
+import pytest
+from kincheck.core.harness.record import Outcome
+from kincheck.core.harness.results_file import read_results
+from kincheck.core.history.store import Store
+
+from ..support.fakes import Fake, crank, off
+from ..support.nights import changed, keep, records, reported, worse
+
+RIGHT = Fake("native")
+WRONG = Fake("native", answer=off("position", lambda p: p + 1.0))
+NIGHT, OTHER = ("crank",), ("crank_two",)
+
+
+@pytest.fixture
+def run(kincheck_main, tmp_path):
+    """A run of these cases with these options, right or wrong, in a history."""
+
+    def run(*argv, right=True, **how):
+        argv = ("run", *argv, "--history", str(tmp_path / "kept"))
+        return kincheck_main(*argv, engines=[RIGHT if right else WRONG], **how)
+
+    return run
+
+
+@pytest.fixture
+def report(kincheck_main, tmp_path, capsys):
+    """The status of a report, and what it says."""
+
+    def report():
+        capsys.readouterr()
+        status = kincheck_main("report", "--history", str(tmp_path / "kept"))
+        return status, capsys.readouterr().out
+
+    return report
+
+
+@pytest.mark.parametrize("nights", [1, 3])
+def test_another_selection_turns_no_night_green(run, report, nights):
+    for _ in range(nights - 1):
+        run(*NIGHT)
+    run(*NIGHT, right=False)
+    run(*OTHER)
+    status, said = report()
+    assert status == 1
+    assert said.startswith(f"## run {nights}")
+    assert f"Not judged: run {nights + 1}, of another selection" in said
+    run(*NIGHT)
+    assert report()[0] == 0
+
+
+def test_another_selection_turns_no_night_red(run, report):
+    run(*NIGHT)
+    run(*OTHER, right=False)
+    assert report()[0] == 0
+    run(*OTHER, right=False)  # a second time: it is run every night, too
+    assert report()[0] == 1
+    run(*NIGHT)
+    assert report()[0] == 1
+    run(*OTHER)
+    assert report()[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("again", "status"),
+    [
+        ((*NIGHT, "--tol", "1e-6"), 1),
+        ((*NIGHT, "--engine", "native", "--junit", "junit.xml", "--quiet"), 0),
+        ((*OTHER, *NIGHT), 0),
+        ((*OTHER, *NIGHT, "--tol", "1e-6"), 1),
+        ((), 0),
+    ],
+    ids=["tolerance", "places", "more", "more and tolerance", "all"],
+)
+def test_a_night_is_repaired_by_the_same_thing(run, report, monkeypatch, tmp_path, again, status):
+    monkeypatch.chdir(tmp_path)
+    run(*NIGHT)
+    run(*NIGHT, right=False)
+    run(*again)
+    assert report()[0] == status
+
+
+def test_a_mistyped_case_is_not_in_the_history(run, report, capsys, tmp_path):
+    run(*NIGHT)
+    for mistyped in (("crnk",), (*NIGHT, "crnk", "--out", str(tmp_path / "out")), ("crnk*",)):
+        assert run(*mistyped) == 2
+        assert "no such case; the run is not in the history" in capsys.readouterr().err
+    assert len(read_results(tmp_path / "out" / "results.json").records) == 1
+    assert report()[0] == 0
+    with Store(tmp_path / "kept", writable=False) as store:
+        assert [row.plan for row in store.runs()] == [[("crank", "native", "projection")]]
+
+
+def test_names_that_are_no_text_are_stored(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    run(*NIGHT, "--reference", "\udcff.csv")
+    (tmp_path / "\udcff.toml").write_text("no case")
+    assert run("\udcff.toml") == 2
+    with Store(tmp_path / "kept", writable=False) as store:
+        (row,) = store.runs()
+    assert row.circumstances["selection"]["cases"] == ["?.toml"]
+
+
+def test_a_mistyped_case_makes_no_history(run, tmp_path):
+    assert run("crnk") == 2
+    assert not (tmp_path / "kept").exists()
+
+
+def test_a_night_without_one_of_its_cases_is_red(run, report):
+    run(*NIGHT, *OTHER)
+    assert run(*NIGHT, *OTHER, cases={"crank": crank()}) == 2
+    status, said = report()
+    assert status == 1
+    assert said.startswith("## run 2 against run 1 (last green): 1 case could not be read")
+
+
+def test_runs_of_older_versions_are_repaired_by_all_their_pairs(path):
+    keep(path, records()[:2])
+    keep(path, changed(records(), outcome=Outcome.FAIL)[:2])
+    keep(path, records()[2:], command="kincheck run second")
+    assert reported(path).run.number == 2
+    keep(path, records(), selection={"cases": [], "engines": [], "options": {}})
+    assert reported(path).run.number == 4
+
+
+def test_runs_with_other_options_are_no_measure(path):
+    night = {"cases": ["first"], "engines": [], "options": {"run": {"tol": 1e-12}}}
+    coarse = night | {"options": {"run": {"tol": 1e-3}}}
+    for selection in (night, night, night, coarse, night):
+        errors = worse(100.0) if selection is coarse else {}
+        keep(path, changed(records(), **errors), selection=selection)
+    found = reported(path)
+    assert (found.against.number, found.findings, found.steps) == (3, [], [])
+
+
+def test_a_red_run_counts_for_sixty_runs(path):
+    keep(path, changed(records(), outcome=Outcome.FAIL), command="kincheck run once")
+    for _ in range(59):
+        keep(path, records()[:2])
+    assert reported(path).run.number == 1
+    keep(path, records()[:2])
+    assert reported(path).run.number == 61
+
+
+def test_a_run_without_records_has_an_outcome_in_the_table(path, kincheck_main, capsys):
+    keep(path, [])
+    with Store(path) as store:
+        facts = {"started": "2026-11-02T03:00", "command": "kincheck run"}
+        store.begin_run("none", [("a", "b", "projection")], facts)
+    assert kincheck_main("history", "--history", str(path)) == 0
+    found = [line.split()[4:6] for line in capsys.readouterr().out.splitlines()[1:]]
+    assert found == [["1", "missing"], ["–", "–"]]
