@@ -76,8 +76,10 @@ def start_notes(mechanism: Mechanism, request: Request, path: Path, tol: float) 
 def _large(mechanism: Mechanism, request: Request) -> Callable[[Path], Solver] | None:
     """Return a solver by components or by a sparse system; None if one program is better."""
     # few mechanisms are so large: the others need not wait for the import
-    from .by_components.block_solver import Cascade
-    from .by_components.sweep import CascadeSweep
+    from .blocks.cascade import Cascade
+    from .blocks.component_lanes import ComponentLanes
+    from .blocks.lanes import Lanes
+    from .blocks.sweep import BlockSweep
     from .structure.components import components
     from .structure.driver_count import require_driven
 
@@ -88,22 +90,20 @@ def _large(mechanism: Mechanism, request: Request) -> Callable[[Path], Solver] |
         require_driven(mechanism)  # which names what can still move
         raise
     if parts and max(len(part.bodies) for part in parts) <= ONE_PROGRAM:
-        cascade = Cascade(mechanism, request, parts)
-
-        def along(path: Path) -> Solver:
-            return CascadeSweep(cascade, path).solve
-
-        again = keep_last(1)(along)
-        return lambda path: (again if path.is_builtin else along)(path)
-    if len(mechanism.moving) <= IRREDUCIBLE:
+        lanes: Lanes = ComponentLanes(Cascade(mechanism, request, parts))
+    elif len(mechanism.moving) <= IRREDUCIBLE:
         return None
-    from .sparse.sparse_model import SparseModel
-    from .sparse.sweep import solve_sparse
+    else:
+        from .blocks.sparse_lanes import SparseLanes
+        from .sparse.sparse_equations import SparseEquations
 
-    model = SparseModel(mechanism, compiled=request.compiled)
-    return lambda path: partial(
-        solve_sparse, model, path, request.points, request.bodies, request.order
-    )
+        lanes = SparseLanes(SparseEquations(mechanism, compiled=request.compiled), request)
+
+    def along(path: Path) -> Solver:
+        return BlockSweep(lanes, path).solve
+
+    again = keep_last(1)(along)
+    return lambda path: (again if path.is_builtin else along)(path)
 
 
 # One only, and of its paths the last: they fill much of the memory. A thread solves it in place.

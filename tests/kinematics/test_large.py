@@ -21,8 +21,8 @@ from kincheck.core import (
     solve,
     solve_designs,
 )
+from kincheck.core.kinematics.blocks import sparse_lanes
 from kincheck.core.kinematics.formulation.parameters import placed
-from kincheck.core.kinematics.sparse import sweep
 from kincheck.core.studies.bench.ring import ring
 
 Z = (0.0, 0.0, 1.0)
@@ -211,8 +211,8 @@ def test_uncertainty_that_is_no_number_is_refused(monkeypatch):
     """Wherever it stands: Python's own maximum passes over what is no number."""
     mechanism, begin = stretched(0.5, 1.5, 0.3)
     values = [(2.0 - begin) * (1.0 - 1e-7)]
-    for found in ((0.0, np.nan, 0.0), (np.inf, 0.0, 0.0)):
-        monkeypatch.setattr(sweep, "uncertain", lambda *at, found=found: found)
+    for found in (np.nan, np.inf):
+        monkeypatch.setattr(sparse_lanes, "error_bound", lambda *at, found=found: found)
         assert not solve(mechanism, "push", values).solved.any()
-    monkeypatch.setattr(sweep, "uncertain", lambda *at: (0.0, 0.0, 0.0))
+    monkeypatch.setattr(sparse_lanes, "error_bound", lambda *at: 0.0)
     assert solve(mechanism, "push", values).solved.all()

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from kincheck.core import Revolute, Spherical, solve, solve_designs
 from kincheck.core.caches import clear_caches
-from kincheck.core.kinematics.by_components import block_solver
-from kincheck.core.kinematics.by_components import sweep as cascade_sweep
+from kincheck.core.kinematics.blocks import cascade
+from kincheck.core.kinematics.blocks import sweep as block_sweep
 from kincheck.core.kinematics.compiled import compiled_model, samples
 from kincheck.core.kinematics.continuation import side_follower, walk
 from kincheck.core.kinematics.solver_selection import prepare
-from kincheck.core.kinematics.sparse import sparse_model as sparse
+from kincheck.core.kinematics.sparse import sparse_equations as sparse
 from kincheck.core.mechanism.motions import Absolute, Motion, Path, Ramp, Sine, Table
 from kincheck.core.studies.bench.size import circle
 
@@ -70,9 +70,9 @@ def test_threads_share_it():
 @pytest.fixture
 def swept(monkeypatch):
     """What was made of paths through components."""
-    sweeps, make = [], cascade_sweep.CascadeSweep.__init__
+    sweeps, make = [], block_sweep.BlockSweep.__init__
     monkeypatch.setattr(
-        cascade_sweep.CascadeSweep,
+        block_sweep.BlockSweep,
         "__init__",
         lambda self, *given: (sweeps.append(self), make(self, *given))[1],
     )
@@ -121,9 +121,9 @@ def test_large_mechanisms_with_joints_of_a_users_own_too(monkeypatch):
     class Hinge(Revolute):
         type = "hinge_of_mine"
 
-    made, make = [], block_solver.Cascade.__init__
+    made, make = [], cascade.Cascade.__init__
     monkeypatch.setattr(
-        block_solver.Cascade,
+        cascade.Cascade,
         "__init__",
         lambda self, *given: (made.append(self), make(self, *given))[1],
     )
@@ -230,8 +230,8 @@ def test_of_very_many_samples_nothing_is_kept(bound, monkeypatch):
 @pytest.mark.parametrize(
     ("large", "kind"),
     [
-        (chain(12), (block_solver.Cascade, "__init__")),
-        (circle(21).mechanism, (sparse.SparseModel, "__init__")),
+        (chain(12), (cascade.Cascade, "__init__")),
+        (circle(21).mechanism, (sparse.SparseEquations, "__init__")),
     ],
 )
 def test_of_large_mechanisms_the_last_is_kept(large, kind, monkeypatch):
