@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 from kincheck import cases
 from kincheck.core import solve
-from kincheck.core.kinematics import Method
+from kincheck.core.kinematics import Method, NativeSolver
+from kincheck.core.kinematics.compiled.compiled_model import recent_model
+from kincheck.core.kinematics.compiled.request import Request
+from kincheck.core.kinematics.compiled.samples import Route
+from kincheck.core.kinematics.continuation.singular_samples import scrutinise
+from kincheck.core.kinematics.continuation.walk import march
 from kincheck.core.mechanism.motions import Path, Ramp
 from kincheck.core.studies.bench.ring import ring, tip
 
@@ -88,3 +93,33 @@ def test_components_refuse_no_wrong_rates():
     expected = np.column_stack([-np.sin(LEAN - turn), -np.cos(LEAN - turn), 0.0 * turn])
     off = np.abs(found.points["end"].acceleration - expected).max(axis=1)
     assert (off[found.solved] <= 1e-9).all()
+
+
+def test_scrutiny_of_a_route_is_remembered():
+    """A route that is solved again gives the same digits, findings and details, and its owner may
+    change them.
+    """
+    mechanism, _ = torus(2, 2)
+    path = Path({"turn": Ramp(1.0)}, np.linspace(-0.5, 0.5, 32))
+    solver = NativeSolver(method=Method.ONE_PROGRAM).prepare(mechanism, path, ("tip",))
+    first, second = solver(1e-12), solver(1e-12)
+    assert first.details["retried_samples"] > 0
+    assert first.details == second.details
+    for label in ("position", "velocity", "acceleration"):
+        np.testing.assert_array_equal(
+            getattr(first.points["tip"], label), getattr(second.points["tip"], label)
+        )
+    second.details["notes"].clear()
+    second.details["singular_poses"].clear()
+    assert solver(1e-12).details == first.details
+
+
+def test_scrutiny_of_other_poses_is_not_taken():
+    mechanism, _ = torus(2, 2)
+    path = Path({"turn": Ramp(1.0)}, np.linspace(-0.5, 0.5, 32))
+    route = Route(recent_model(mechanism, Request(("turn",), ("tip",))), path)
+    findings = [scrutinise(route, march(route, 1e-12), 1e-12) for _ in range(2)]
+    assert findings[0] is findings[1]
+    other = march(route, 1e-12)
+    other.kept[route.model.rows["position tip"].start, 3] += 1e-6
+    assert scrutinise(route, other, 1e-12) is not findings[0]
