@@ -89,7 +89,7 @@ def test_links_in_line_have_one_verdict(count):
 def test_components_refuse_no_wrong_rates():
     """Two millionths of a radian from a singular pose, rates were wrong in silence."""
     turn = LEAN + np.pi / 2.0 - np.array([1e-1, 1e-5, 2e-6])
-    found = solve(chain(12), "turn", turn)
+    found = solve(chain(21), "turn", turn)
     expected = np.column_stack([-np.sin(LEAN - turn), -np.cos(LEAN - turn), 0.0 * turn])
     off = np.abs(found.points["end"].acceleration - expected).max(axis=1)
     assert (off[found.solved] <= 1e-9).all()

@@ -25,7 +25,7 @@ from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.compiled.samples import Route
 from kincheck.core.kinematics.continuation.sweep import follow
 from kincheck.core.kinematics.formulation.constraints import frames
-from kincheck.core.kinematics.solver_selection import IRREDUCIBLE
+from kincheck.core.kinematics.solver_selection import ONE_PROGRAM
 from kincheck.core.kinematics.sparse.sparse_equations import SparseEquations
 from kincheck.core.kinematics.structure.components import components
 from kincheck.core.mechanism.motions import Path, Ramp, Sine
@@ -184,7 +184,7 @@ def test_every_crank_of_a_ring_turns_as_the_first(cranks):
     found = solve(ring(cranks), "turn", turn)
     assert found.solved.all(), found.message
     assert found.residual <= 1e-15
-    assert ("factor_entries" in found.details) == (2 * cranks - 1 > IRREDUCIBLE)
+    assert ("factor_entries" in found.details) == (2 * cranks - 1 > ONE_PROGRAM)
     s, c, o = np.sin(LEAN - turn), np.cos(LEAN - turn), 0.0 * turn
     for k in range(cranks):
         motion = found.points[f"tip{k}"]

@@ -21,32 +21,38 @@ from ..compiled.request import (
     RATE_T,
     SIGMA,
     TIME,
+    slots_of,
 )
 from ..compiled.solution import Columns
 from ..continuation.singular_crossing import SOUND, Numbers
 from ..formulation.acceptance_criteria import AMPLIFIED, doubtful
 from ..sparse.sparse_equations import SparseEquations, error_bound
 from .cascade import Cascade
-from .lanes import MARGINS, WORST, Anchor, Lanes
+from .lanes import CLOSURES, MARGINS, SIGMAS, WORST, Anchor, Indices, Lanes
 
 # Samples at once: all are predicted from one pose, and the farther they are from it the more
 # iterations they take, and the more are tried in vain; and what a large chain takes its time for is
 # memory: with 24 one of 200 loops takes up to 1.6 times as long. With 8 one of 16 loops takes 1.3
 # times as long.
 LANES = 16
+# Numbers of all components that stay in the second-level cache beside their programs; of more, half
+# as many samples are taken at once: a chain of 1,000 loops takes 0.7 times as long.
+CACHED = 500_000
 BODY = ("r", "p", "rdot", "omega", "rddot", "omega_t")
 STILL = 0.0, 0.0, 0.0
 
 
 class ComponentLanes(Lanes):
     """A cascade bound to lanes: the world, and calls for its components in order, one for
-    neighbours of one type. Each lane is attempted alone.
+    neighbours of one type. Each lane is attempted alone. Their number suits the cascade's size,
+    unless it is given.
 
     Attributes:
         world: all solved quantities, shape (rows, room); see `Cascade`.
     """
 
-    def __init__(self, cascade: Cascade, lanes: int = LANES) -> None:
+    def __init__(self, cascade: Cascade, lanes: int = 0) -> None:
+        lanes = lanes or (LANES if cascade.rows * LANES <= CACHED else LANES // 2)
         self.cascade, self.many = cascade, lanes
         self.mechanism, self.request = cascade.mechanism, cascade.request
         self.unit, self.details = cascade.unit, cascade.details
@@ -99,7 +105,7 @@ class ComponentLanes(Lanes):
         self._columns, self._rows, self._still = self._outputs()
         self.design = self.anchor(0.0)
 
-    def _outputs(self) -> tuple[list[int], list[int], Array]:
+    def _outputs(self) -> tuple[Indices, Indices, Array]:
         """Return the columns of moving outputs with their rows of the world, and a column of the
         outputs at rest.
         """
@@ -130,14 +136,13 @@ class ComponentLanes(Lanes):
             at_rest = {"r": body.origin, "p": body.euler_parameters}
             for label in BODY[: 2 * (request.order + 1)]:
                 add(f"{label} {name}", part, f"{label} {own}", at_rest.get(label, STILL))
-        return columns, rows, still
+        return np.array(columns, np.intp), np.array(rows, np.intp), still
 
     def accept_by(self, limits: Mapping[str, float]) -> None:
         """See `Lanes`."""
         self._tol = limits["tolerance"]
         for kind, fixed in zip(self.cascade.kinds, self._fixed, strict=True):
-            for name, value in limits.items():
-                fixed[:, kind.column[name]] = value
+            fixed[:, [kind.column[name] for name in limits]] = [*limits.values()]
 
     def depart(self, time: float, path: Path) -> PoseFailure | None:
         """See `Lanes`. The rates of the path where the mechanism stands are those of a sample."""
@@ -149,8 +154,7 @@ class ComponentLanes(Lanes):
 
     def anchor(self, time: float) -> Anchor:
         """See `Lanes`: values of `Plan.fixed`, by component type."""
-        fixed = [fixed.copy() for fixed in self._fixed]
-        return Anchor(time, fixed, Numbers(self._numbers(), self._numbers(rates=True)))
+        return Anchor(time, [fixed.copy() for fixed in self._fixed], self._numbers)
 
     def restore(self, anchor: Anchor) -> None:
         """See `Lanes`."""
@@ -189,10 +193,11 @@ class ComponentLanes(Lanes):
         """See `Lanes`: the tests tell of doubt, by estimates; whether there is reason for it, the
         equations of the whole mechanism do.
         """
-        closure, sigma = (self.worst[WORST.index(name), :count] for name in ("closure", SIGMA))
-        found = doubtful(sigma, closure, self._tol)
+        closure, sigma = (self.worst[row, :count] for row in (CLOSURES, SIGMAS))
         off = dict[int, float]()
-        for k in np.flatnonzero(found).tolist():
+        if not doubtful(float(sigma.min()), float(closure.max()), self._tol):
+            return off
+        for k in np.flatnonzero(doubtful(sigma, closure, self._tol)).tolist():
             model, times = self._whole, np.array([self._times[k]])
             drives = model.drives(path, times)
             error = error_bound(model, model.rows, self._state(k), drives, self.request.order)
@@ -235,21 +240,17 @@ class ComponentLanes(Lanes):
             found.append(self.world[first : kind.base + size * len(kind.members) : size])
         return np.concatenate(found)
 
-    def _numbers(self, *, rates: bool = False) -> Array:
-        """Return the states of all components before the lanes, or their rates and the rates of
-        those, shape (numbers,).
+    def _numbers(self, pose: Sequence[Array]) -> Numbers:
+        """Return the states of all components of an anchor, and their rates with the rates of
+        those.
         """
-        found: list[Array] = []
-        for kind, fixed in zip(self.cascade.kinds, self._fixed, strict=True):
-            names, slots = (
-                (RATE, RATE_T) if rates else kind.model.state,
-                list(kind.model.plan.fixed),
-            )
-            columns = [
-                slots.index(slot) for name in names for slot in kind.model.vectors[FROM + name]
-            ]
-            found.append(fixed[:, columns].ravel())
-        return np.concatenate(found)
+        found: tuple[list[Array], list[Array]] = ([], [])
+        for kind, fixed in zip(self.cascade.kinds, pose, strict=True):
+            place, model = {slot: k for k, slot in enumerate(kind.model.plan.fixed)}, kind.model
+            for each, names in zip(found, (model.state, (RATE, RATE_T)), strict=True):
+                slots = slots_of(model.vectors, (FROM + name for name in names))
+                each.append(fixed[:, [place[slot] for slot in slots]].ravel())
+        return Numbers(*map(np.concatenate, found))
 
     @property
     def sound(self) -> bool:
@@ -295,7 +296,7 @@ class ComponentLanes(Lanes):
         )
 
 
-def _carried(plan: Plan) -> list[tuple[list[int], list[int]]]:
+def _carried(plan: Plan) -> list[tuple[Indices, Indices]]:
     """Return the carried columns of kept, sampled and fixed values, and their targets among the
     fixed ones.
     """
@@ -307,4 +308,4 @@ def _carried(plan: Plan) -> list[tuple[list[int], list[int]]]:
         k = next(k for k, each in enumerate(column) if source in each)
         found[k][0].append(column[k][source])
         found[k][1].append(column[-1][target])
-    return found
+    return [(np.array(a, np.intp), np.array(b, np.intp)) for a, b in found]

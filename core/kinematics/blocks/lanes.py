@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...failures import PoseFailure
 from ...mechanism.mechanism import Mechanism
@@ -21,7 +22,9 @@ from ..formulation.acceptance_criteria import EPSILON, WORSE
 
 WORST = (*LARGEST_OF_PARTS, *SMALLEST_OF_PARTS)
 """Tests of which the worst of all blocks is known."""
-MARGINS = WORST.index(MARGIN)
+CLOSURES, SIGMAS, MARGINS = (WORST.index(name) for name in ("closure", SIGMA, MARGIN))
+"""Rows of those."""
+Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,16 +34,20 @@ class Anchor:
     Attributes:
         time: of the pose [s].
         pose: of all blocks, as the lanes keep it.
-        numbers: of all blocks.
         motions: the wanted motions there, shape (columns,); none if they were not taken along.
         error: a bound of its error by its tests [units].
     """
 
     time: float
     pose: Any
-    numbers: Numbers
+    _numbers: Callable[[Any], Numbers]
     motions: Array = field(default_factory=lambda: np.empty(0))
     error: float = 0.0
+
+    @property
+    def numbers(self) -> Numbers:
+        """The numbers of all blocks."""
+        return self._numbers(self.pose)
 
 
 class Lanes(ABC):
@@ -96,7 +103,7 @@ class Lanes(ABC):
 
     def taken(self, time: float) -> Anchor:
         """Return the pose that was carried from the first lane, with its motions."""
-        closure, sigma = (float(self.worst[WORST.index(name), 0]) for name in ("closure", SIGMA))
+        closure, sigma = (float(self.worst[row, 0]) for row in (CLOSURES, SIGMAS))
         error = self.worse * max(closure, EPSILON) / sigma
         return replace(self.anchor(time), motions=self.motions(1)[:, 0], error=error)
 

@@ -83,6 +83,10 @@ class _Reached:
     neighbours: bool
 
 
+def _numbers(here: Stand) -> Numbers:
+    return Numbers(here.state, np.concatenate([here.rates, here.accelerations]))
+
+
 class SparseLanes(Lanes):
     """A sparse system bound to lanes.
 
@@ -129,9 +133,7 @@ class SparseLanes(Lanes):
 
     def anchor(self, time: float) -> Anchor:
         """See `Lanes`: the pose."""
-        here = self.here
-        numbers = Numbers(here.state, np.concatenate([here.rates, here.accelerations]))
-        return Anchor(time, here, numbers)
+        return Anchor(time, self.here, _numbers)
 
     def restore(self, anchor: Anchor) -> None:
         """See `Lanes`."""

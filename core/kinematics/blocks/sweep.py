@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...errors import number_of
 from ...failures import FailureKind, PoseFailure
@@ -23,7 +22,6 @@ from ..compiled.solution import Columns, solution
 from ..continuation.singular_crossing import (
     EIGHT,
     NEARLY,
-    Reach,
     around,
     cross,
     interpolated,
@@ -33,7 +31,7 @@ from ..continuation.singular_crossing import (
 from ..continuation.singularity import CONTINUED, listed
 from ..continuation.step_halving import Walk, longest, part_of_step
 from ..formulation.acceptance_criteria import AMPLIFIED
-from .lanes import WORST, Anchor, Lanes
+from .lanes import WORST, Anchor, Indices, Lanes
 
 # Halvings of a step to a pose beside a singular one, and how many parts it is gone in at most; over
 # the singular pose there are fewer.
@@ -41,7 +39,6 @@ HALVED, MOST, FEW = 8, 64, 4
 # Samples that are interpolated at most: a fine sweep has some tens of them beside a singular pose.
 BRIDGED = 64
 
-Indices = NDArray[np.intp]
 Keep = Callable[[Indices], None]
 """Takes samples, by their number outwards, from as many lanes."""
 
@@ -50,10 +47,10 @@ class BlockWalk(Walk):
     """The walk over samples of a path, from the pose before the lanes.
 
     Args:
-        samples: numbers of the samples, in their order.
+        samples: numbers of the samples, in their order: all up or all down.
         times: of all samples [s].
         given: tables of all samples, see `Lanes.sampled`.
-        time: of that pose [s].
+        start: that pose.
         tol: largest accepted residual.
         watch: look for sound poses all the way, not only where a step fails.
 
@@ -71,14 +68,14 @@ class BlockWalk(Walk):
         path: Path,
         keep: Keep,
         *,
-        time: float,
+        start: Anchor,
         tol: float,
         watch: bool = False,
     ) -> None:
         self.watch = watch
         self.lanes, self.samples, self.times, self.given = lanes, samples, times, given
-        self.path, self.keep, self.time, self.tol = path, keep, time, tol
-        self.sound = lanes.anchor(time)
+        self.path, self.keep, self.tol = path, keep, tol
+        self.time, self.sound = start.time, start
 
     def run(self) -> tuple[int, PoseFailure | None]:
         """Follow all samples; see `advance`."""
@@ -89,7 +86,11 @@ class BlockWalk(Walk):
         lanes, ahead = self.lanes, self.samples[at : min(at + self.lanes.many, stop)]
         if self.watch and lanes.sound:
             self.sound = lanes.anchor(self.time)
-        good = lanes.attempt_at([each[:, ahead] for each in self.given], neighbours=True) > 0.0
+        first, last = int(ahead[0]), int(ahead[-1])
+        step = 1 if last >= first else -1
+        end = last + step
+        run = slice(first, end if end >= 0 else None, step)
+        good = lanes.attempt_at([each[:, run] for each in self.given], neighbours=True) > 0.0
         accepted = len(ahead) if good.all() else int(good.argmin())
         if not accepted:
             if lanes.sound and not self.watch:
@@ -198,7 +199,7 @@ class BlockSweep:
             assert departure is not None
             lanes.restore(departure)
             lanes.accept(tol)
-            self._follow(side, self.start.time, self._keep(side, found), tol, found)
+            self._follow(side, departure, self._keep(side, found), tol, found)
         if departure and len(found.refused) <= BRIDGED:
             self._interpolate_refused(departure, found, tol)
         found.take_away(self.path, tol)
@@ -227,7 +228,7 @@ class BlockSweep:
                 lanes.accept(tol)
                 ahead = _Side(side.path, side.order, side.times[: at + 1], side.given)
                 came = self._follow(
-                    ahead, self.start.time, _nothing, tol, _Results(*_NOTHING), watch=True
+                    ahead, departure, _nothing, tol, _Results(*_NOTHING), watch=True
                 )
                 if came is not None and self._interpolate(side, at, *came, found, tol):
                     del found.refused[int(side.order[at])]
@@ -288,7 +289,7 @@ class BlockSweep:
             times = np.array([0.0, 1.0])
             lanes.depart(0.0, way)
             side = _Side(way, np.arange(2), times, lanes.sampled(times, way))
-            self._follow(side, 0.0, _nothing, CLOSED, found)
+            self._follow(side, lanes.anchor(0.0), _nothing, CLOSED, found)
             if found.messages:
                 found.messages[:] = [f"on the way to {begin.name}: {found.messages[0]}"]
                 return None, found
@@ -303,7 +304,7 @@ class BlockSweep:
     def _follow(
         self,
         side: _Side,
-        here: float,
+        start: Anchor,
         keep: Keep,
         tol: float,
         found: _Results,
@@ -325,14 +326,14 @@ class BlockSweep:
             list[int](),
         )
 
-        def walk(samples: Indices, time: float) -> BlockWalk:
+        def walk(samples: Indices, start: Anchor) -> BlockWalk:
             return BlockWalk(
-                lanes, samples, times, side.given, path, keep, time=time, tol=tol, watch=watch
+                lanes, samples, times, side.given, path, keep, start=start, tol=tol, watch=watch
             )
 
         came: tuple[Anchor, Anchor | None] | None = None
         while len(left):
-            ahead = walk(left, here)
+            ahead = walk(left, start)
             count, failure = ahead.run()
             left = left[count:]
             if failure is None:
@@ -354,17 +355,17 @@ class BlockSweep:
             found.notes.append(
                 f"crosses a singular pose near {path.where(ahead.time)}; {CONTINUED}"
             )
-            here = beyond[-1].time
-            beside = left[np.abs(times[left] - ahead.time) <= abs(here - ahead.time)]
+            start = beyond[-1]
+            beside = left[np.abs(times[left] - ahead.time) <= abs(start.time - ahead.time)]
             left = left[len(beside) :]
-            lanes.restore(beyond[-1])
-            reached, _ = walk(beside[::-1], here).run()
+            lanes.restore(start)
+            reached, _ = walk(beside[::-1], start).run()
             for each in beside[: len(beside) - reached].tolist()[:BRIDGED]:
                 if not self._interpolate(side, each, ahead.sound, None, found, tol):
                     refused.append(each)
-            lanes.restore(beyond[-1])
+            lanes.restore(start)
             lanes.accept(tol)
-            came = beyond[-1], None
+            came = start, None
         if refused:
             found.failures.append(FailureKind.UNCERTAIN)
             places = listed([path.where(float(times[k])) for k in refused])
@@ -374,7 +375,7 @@ class BlockSweep:
             )
         return came
 
-    def _reach(self, path: Path, tol: float) -> Reach[Anchor]:
+    def _reach(self, path: Path, tol: float) -> Callable[[Anchor, float, bool], Anchor | None]:
         """Return what goes from a pose to a time of a path, see `cross`."""
         lanes = self._lanes
 

@@ -36,19 +36,19 @@ class OutputMotions:
         """Return the motions at solved poses, by their states, rates and accelerations, shape
         (numbers, poses) each; shape (columns, poses).
         """
-        order, poses = self._order, at[0].shape[1]
-        of_points = self._points.motions(self._points.moving(at))[: order + 1]
+        order, poses, points = self._order, at[0].shape[1], self._points
+        of_points = _side_by_side(
+            points.motions(points.moving(at))[: order + 1] if points.count else (),
+            (poses, points.count),
+        )
+        if not self._bodies.count:  # nearly always: they take as long as the points
+            return of_points
         moving = self._bodies.moving(at)
         r, *rates = self._bodies.motions(moving)
         p, *turning = motion_of_frame(quat(self._frame), *moving)
         pairs = [each for pair in zip(rates, turning, strict=True) for each in pair]
         of_bodies = [r, p, *pairs[: 2 * order]]
-        return np.vstack(
-            [
-                _side_by_side(of_points, (poses, self._points.count)),
-                _side_by_side(of_bodies, (poses, self._bodies.count)),
-            ]
-        )
+        return np.vstack([of_points, _side_by_side(of_bodies, (poses, self._bodies.count))])
 
 
 class _Places:
@@ -89,6 +89,8 @@ class _Places:
 def _side_by_side(found: Sequence[Vec3 | Quat], shape: tuple[int, int]) -> Array:
     """Return components of vectors, of each place side by side, shape (columns, poses)."""
     components = [np.broadcast_to(component, shape) for each in found for component in each]
+    if not components:
+        return np.empty((0, shape[0]))
     return np.stack(components, axis=-1).reshape(shape[0], -1).T
 
 
