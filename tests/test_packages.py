@@ -12,7 +12,7 @@ from kincheck.core import kinematics
 from .support.sources import DOOR, PACKAGE, PAGES, ROOT, SOURCES, TESTS, folder_of, tree
 from .test_source_rules import SIMULATORS
 
-LONGEST = 300
+LONGEST = 600
 WIDEST = 100
 LARGEST_SHARE = 0.25
 

@@ -212,7 +212,9 @@ def test_uncertainty_that_is_no_number_is_refused(monkeypatch):
     mechanism, begin = stretched(0.5, 1.5, 0.3)
     values = [(2.0 - begin) * (1.0 - 1e-7)]
     for found in (np.nan, np.inf):
-        monkeypatch.setattr(sparse_lanes, "error_bound", lambda *at, found=found: found)
+        bounds = lambda poses, state, *_, found=found: np.full(state.shape[1], found)  # noqa: E731
+        monkeypatch.setattr(sparse_lanes, "error_bounds", bounds)
         assert not solve(mechanism, "push", values).solved.any()
-    monkeypatch.setattr(sparse_lanes, "error_bound", lambda *at: 0.0)
+    bounds = lambda poses, state, *_: np.zeros(state.shape[1])  # noqa: E731
+    monkeypatch.setattr(sparse_lanes, "error_bounds", bounds)
     assert solve(mechanism, "push", values).solved.all()

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from kincheck.core.kinematics.blocks.sparse_lanes import SparseLanes
 from kincheck.core.kinematics.compiled.request import Request
-from kincheck.core.kinematics.sparse.poses import FixedOrder
+from kincheck.core.kinematics.sparse.poses import ChosenPivots, FixedOrder, error_bounds
 from kincheck.core.kinematics.sparse.sparse_equations import SparseEquations
 from kincheck.core.studies.bench.ring import ring
 
@@ -61,18 +61,19 @@ def reached(lanes, *times):
     return len(good) if good.all() else int(good.argmin())
 
 
-def test_order_with_large_factors_is_renewed():
-    """An order made where the matrix is another one: its factors are not believed there."""
-    model = SparseEquations(ring(13))
-    there = np.array([1.5])
-    lanes = SparseLanes(model, Request(("turn",), ()))
-    lanes.accept(1e-12)
-    lanes.depart(0.0, turning(0.0))
-    ordered = FixedOrder(model, model.rows)
-    drives = np.repeat(model.drives(turning(0.01), np.array([0.01])), ordered.width, axis=1)
-    state = np.repeat(lanes.here.state[:, None], ordered.width, axis=1)
-    assert ordered.solve(state, drives, 1e-12, 1).believed.all()
-    assert there.size
+def test_bounds_agree_in_both_orders():
+    """Errors that residuals leave, by a fixed order and by chosen pivots, of more poses than are
+    solved at once.
+    """
+    lanes = lanes_of(ring(13))
+    model, here = lanes.model, lanes.here
+    ways = FixedOrder(model, here.rows), ChosenPivots(model, here.rows)
+    state = np.repeat(here.state[:, None], 11, axis=1)
+    drives = np.repeat(here.drives[:, None], 11, axis=1)
+    fixed, chosen = (error_bounds(way, state, drives, model.scale, 2) for way in ways)
+    assert fixed.shape == (11,)
+    assert (chosen > 0.0).all()
+    assert (np.abs(np.log10(fixed / chosen)) < 1.0).all()
 
 
 @pytest.mark.parametrize("compiled", [False, True])

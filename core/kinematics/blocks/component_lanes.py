@@ -26,7 +26,8 @@ from ..compiled.request import (
 from ..compiled.solution import Columns
 from ..continuation.singular_crossing import SOUND, Numbers
 from ..formulation.acceptance_criteria import AMPLIFIED, doubtful
-from ..sparse.sparse_equations import SparseEquations, error_bound
+from ..sparse.poses import ChosenPivots, error_bounds
+from ..sparse.sparse_equations import SparseEquations
 from .cascade import Cascade
 from .lanes import CLOSURES, MARGINS, SIGMAS, WORST, Anchor, Indices, Lanes
 
@@ -194,28 +195,29 @@ class ComponentLanes(Lanes):
         equations of the whole mechanism do.
         """
         closure, sigma = (self.worst[row, :count] for row in (CLOSURES, SIGMAS))
-        off = dict[int, float]()
         if not doubtful(float(sigma.min()), float(closure.max()), self._tol):
-            return off
-        for k in np.flatnonzero(doubtful(sigma, closure, self._tol)).tolist():
-            model, times = self._whole, np.array([self._times[k]])
-            drives = model.drives(path, times)
-            error = error_bound(model, model.rows, self._state(k), drives, self.request.order)
-            if not error <= AMPLIFIED * self._tol:  # or it is no number
-                off[k] = error
-        return off
+            return {}
+        at, model = np.flatnonzero(doubtful(sigma, closure, self._tol)), self._whole
+        state = np.stack([self._state(k) for k in at.tolist()], axis=1)
+        errors = error_bounds(
+            ChosenPivots(model, model.rows),
+            state,
+            model.drives(path, self._times[at]),
+            model.scale,
+            self.request.order,
+        )
+        limit, found = AMPLIFIED * self._tol, zip(at.tolist(), errors.tolist(), strict=True)
+        return {k: error for k, error in found if not error <= limit}  # or it is no number
 
     @cached_property
     def _whole(self) -> SparseEquations:
         return SparseEquations(self.mechanism, compiled=self.request.compiled)
 
     def _state(self, lane: int) -> Array:
-        """Return the state of a lane as the equations of the whole mechanism have it, shape
-        (numbers, 1).
-        """
+        """Return the state of a lane as the equations of the whole mechanism have it."""
         model, cascade = self._whole, self.cascade
         places, scale = model.elements.numbering, cascade.unit / model.unit
-        found = np.zeros((places.state, 1))
+        found = np.zeros(places.state)
         for k, part in enumerate(cascade.parts):
             kind, member = cascade.place[k]
             for name in kind.model.state:
@@ -229,7 +231,7 @@ class ComponentLanes(Lanes):
                     of_body = places.places(7, (part.bodies[int(own[1:])],), ())
                     at = of_body[:3] if what == "u" else of_body[3:]
                 length = what == "u" or name.endswith(".translation")
-                found[at, 0] = values * (scale if length else 1.0)
+                found[at] = values * (scale if length else 1.0)
         return found
 
     def each(self, name: str) -> Array:

@@ -38,14 +38,13 @@ from ..formulation.margins import (
     slope_between,
 )
 from ..sparse.output_motions import OutputMotions
-from ..sparse.poses import ChosenPivots, FixedOrder, Poses, Solved
+from ..sparse.poses import ChosenPivots, FixedOrder, Poses, Solved, error_bounds
 from ..sparse.sparse_equations import (
     POSES,
     Rows,
     SparseEquations,
     Stand,
     distance,
-    error_bound,
 )
 from ..structure.sparse_lu import SingularError
 from .lanes import MARGINS, WORST, Anchor, Lanes
@@ -367,11 +366,14 @@ class SparseLanes(Lanes):
         found, limit, off = self._found.poses, AMPLIFIED * self._limits.tol, dict[int, float]()
         least = np.minimum(found.pivot, found.sigmas.min(axis=1, initial=np.inf))[:count]
         doubtful = WORSE_BY_PIVOTS * np.maximum(found.closure[:count], EPSILON) > limit * least**2
-        for k in np.flatnonzero(doubtful).tolist():
-            state, drives = found.state[:, [k]], self._found.drives[:, [k]]
-            error = error_bound(self.model, self.here.rows, state, drives, self.request.order)
-            if not error <= limit:  # or it is no number
-                off[k] = error
+        rows, at = self.here.rows, np.flatnonzero(doubtful)
+        # what a fixed order leaves uncertain may be the order
+        for poses in (self._ordered.get(rows), ChosenPivots(self.model, rows)):
+            if poses is not None and at.size:
+                drives, order = self._found.drives[:, at], self.request.order
+                errors = error_bounds(poses, found.state[:, at], drives, self.model.scale, order)
+                beyond = ~(errors <= limit)  # or it is no number
+                at, off = at[beyond], dict(zip(at[beyond].tolist(), errors[beyond], strict=True))
         return off
 
     def failure(self, tol: float) -> PoseFailure:

@@ -84,6 +84,7 @@ class BlockWalk(Walk):
     def follow(self, at: int, stop: int, parts: int) -> int:
         """Follow as many samples at once as there are lanes, up to the first failure."""
         lanes, ahead = self.lanes, self.samples[at : min(at + self.lanes.many, stop)]
+        self._parts = parts
         if self.watch and lanes.sound:
             self.sound = lanes.anchor(self.time)
         first, last = int(ahead[0]), int(ahead[-1])
@@ -105,10 +106,23 @@ class BlockWalk(Walk):
         return at + accepted
 
     def follow_part(self, at: int) -> PoseFailure | None:
-        """Follow the longest accepted part."""
+        """Follow equal parts of a step that fails, as neighbours, and else the longest accepted
+        part.
+        """
+        lanes, wanted = self.lanes, float(self.times[self.samples[at]])
+        if not self._parts:
+            many = lanes.many - 1  # the last part is left: a sample ends an iteration of its own
+            parts = np.arange(1.0, many + 1.0) / lanes.many
+            times: Array = self.time + (wanted - self.time) * parts
+            good = lanes.attempt_at(lanes.sampled(times, self.path), neighbours=True) > 0.0
+            accepted = many if good.all() else int(good.argmin())
+            if accepted:
+                lanes.carry(accepted - 1)
+                self.time = float(times[accepted - 1])
+                return None
         reached = part_of_step(
             self.time,
-            float(self.times[self.samples[at]]),
+            wanted,
             lambda times: self.lanes.attempt(times, self.path),
             self.lanes.many,
         )

@@ -7,16 +7,19 @@ code only, and not where the factors grow in that order.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from functools import partial
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...trajectory import Array
 from ..compiled.request import MAX_ITERATIONS
+from ..formulation.acceptance_criteria import EPSILON
 from ..structure.sparse_lu import PIVOT_THRESHOLD, Factors, SingularError
-from .sparse_equations import POSES, Rows, SparseEquations
+from .sparse_equations import POSES, Rows, SparseEquations, distance
 from .tables import SparseTables
 
 # An iteration with old factors costs half of one with new ones, or less; it is worth it where it
@@ -59,6 +62,18 @@ class Solved:
     believed: NDArray[np.bool_]
 
 
+class Motion(NamedTuple):
+    """Residuals, rates and accelerations at several poses, and solutions by their factors, of
+    tables of shape (unknowns, poses).
+    """
+
+    residual: Array
+    rates: Array
+    accelerations: Array
+    solve: Callable[[Array], Array]
+    solve_transposed: Callable[[Array], Array]
+
+
 class Poses(Protocol):
     """A way to solve several poses at once."""
 
@@ -73,6 +88,10 @@ class Poses(Protocol):
 
     def solve(self, state: Array, drives: Array, tol: float, count: int) -> Solved:
         """Solve from predicted states, shape (numbers, width); the first `count` are wanted."""
+        ...
+
+    def motion(self, state: Array, drives: Array) -> Motion:
+        """Return the motion at states, shape (numbers, width); NaN where it is singular."""
         ...
 
 
@@ -113,6 +132,21 @@ class ChosenPivots:
             sigmas,
             believed,
         )
+
+    def motion(self, state: Array, drives: Array) -> Motion:
+        """See `Poses`."""
+        model, rows = self._model, self._rows
+        model.evaluate(state, drives)
+        residual = model.residuals(rows)
+        factors = [self._factors(k) for k in range(POSES)]
+
+        def solved(name: str, b: Array) -> Array:
+            nothing = np.full(len(b), np.nan)
+            found = [getattr(x, name)(b[:, k]) if x else nothing for k, x in enumerate(factors)]
+            return np.stack(found, axis=1)
+
+        solve, transposed = (partial(solved, name) for name in ("solve", "solve_transposed"))
+        return Motion(residual, *model.motion(rows, factors), solve, transposed)
 
     def _factors(self, k: int) -> Factors | None:
         try:
@@ -200,6 +234,15 @@ class FixedOrder:
             (tables.growth <= GROWTH)[:count],
         )
 
+    def motion(self, state: Array, drives: Array) -> Motion:
+        """See `Poses`."""
+        tables = self._tables
+        tables["state"][:], tables["drives"][:] = state, drives
+        residual = self._evaluated()
+        tables.motion()
+        rates, accelerations = tables["rates"].copy(), tables["accelerations"].copy()
+        return Motion(residual, rates, accelerations, tables.solve, tables.solve_transposed)
+
     def _iterated(self, tol: float) -> tuple[Array, int, NDArray[np.bool_]]:
         """Newton's iteration from the state there is: residuals, how many iterations, and of which
         lanes it ended.
@@ -219,3 +262,45 @@ class FixedOrder:
     def _evaluated(self) -> Array:
         self._tables.evaluate()
         return np.abs(self._tables["phi"].take(self._rows.kept, axis=0)).max(axis=0)
+
+
+# Steps of inverse iteration: each divides what is left of other directions by the square of how
+# much better they are determined.
+STEPS = 3
+
+
+def error_bounds(poses: Poses, state: Array, drives: Array, scale: Array, order: int) -> Array:
+    """Return bounds of the errors of poses [of the mechanism's size] and of their rates and
+    accelerations [of their own], as far as the order wants them; NaN at singular poses.
+
+    Each pose is displaced as far as its residuals allow, in the direction least determined by the
+    rows. The smallest singular value alone would put all samples of a large ring in doubt, although
+    they are known well.
+
+    Args:
+        state, drives: shape (numbers, n), for any number of poses.
+        scale: see `distance`.
+    """
+    n, found = state.shape[1], list[Array]()
+    for first in range(0, n, poses.width):
+        some = np.minimum(first + np.arange(poses.width), n - 1)
+        found.append(_error_bounds(poses, state[:, some], drives[:, some], scale, order))
+    return np.concatenate(found)[:n]
+
+
+def _error_bounds(poses: Poses, state: Array, drives: Array, scale: Array, order: int) -> Array:
+    with np.errstate(all="ignore"):  # what overflows is no number
+        here = poses.motion(state, drives)
+        left = np.ones(here.rates.shape)
+        for _ in range(STEPS):
+            left = here.solve_transposed(here.solve(left / np.abs(left).max(axis=0)))
+        step = here.solve(np.maximum(here.residual, EPSILON) * np.sign(left))
+        moved = poses.moved(state, step)
+        there = poses.motion(moved, drives)
+        speed, acceleration = (np.abs(each).max(axis=0) for each in here[1:3])
+        sizes = speed, np.maximum(acceleration, speed**2)
+        off = [
+            np.abs(a - b).max(axis=0) / np.where(size == 0.0, 1.0, size)
+            for a, b, size in zip(there[1:3], here[1:3], sizes, strict=True)
+        ]
+        return np.max([distance(moved - state, scale), *off][: order + 1], axis=0)

@@ -23,7 +23,6 @@ from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path
 from ...trajectory import Array
 from ..compiled.compiled_model import CLOSED
-from ..formulation.acceptance_criteria import EPSILON
 from ..formulation.constraints import constraints, measured
 from ..formulation.driver_inputs import drive_numbers
 from ..structure.degrees_of_freedom import counted
@@ -321,49 +320,6 @@ class SparseEquations:
             "program": self.elements.sizes,
             "factor_entries": self._entries,
         }
-
-
-# Steps of inverse iteration: each divides what is left of other directions by the square of how
-# much better they are determined.
-STEPS = 3
-
-
-def error_bound(
-    model: SparseEquations, rows: Rows, state: Array, drives: Array, order: int
-) -> float:
-    """Return a bound of the errors of a pose [of the mechanism's size] and of its rates and
-    accelerations [of their own], as far as the order wants them.
-
-    The pose is displaced as far as its residuals allow, in the direction least determined by the
-    rows. The smallest singular value alone would put all samples of a large ring in doubt, although
-    they are known well.
-
-    Args:
-        state, drives: shape (numbers, 1).
-    """
-    left = np.ones(len(rows.kept))
-    try:
-        with np.errstate(all="ignore"):  # what overflows is no number
-            model.evaluate(state, drives)
-            residual = max(float(model.residuals(rows)[0]), EPSILON)
-            factors = model.factor(rows, 0)
-            here = model.motion(rows, [factors])
-            for _ in range(STEPS):
-                left = factors.solve_transposed(factors.solve(left / np.abs(left).max()))
-            step = factors.solve(residual * np.sign(left))[:, None]
-            moved = model.moved(_repeated(state), _repeated(step))
-            model.evaluate(moved, drives)
-            there = model.motion(rows, [model.factor(rows, 0)])
-    except SingularError:  # singular to rounding, here or there
-        return math.inf
-    speed, acceleration = (float(np.abs(each[:, 0]).max(initial=0.0)) for each in here)
-    sizes = speed, max(acceleration, speed**2)
-    off = [
-        float(np.abs(a[:, 0] - b[:, 0]).max()) / (size or 1.0)
-        for a, b, size in zip(there, here, sizes, strict=True)
-    ]
-    pose = float(distance(moved[:, :1] - state, model.scale)[0])
-    return float(np.max([pose, *off][: order + 1]))
 
 
 def _repeated(table: Array) -> Array:
