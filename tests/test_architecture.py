@@ -55,13 +55,13 @@ IMPORTS = {
         ". primitives program joints mechanism kinematics/formulation kinematics/forces "
         "kinematics/structure kinematics/compiled kinematics/continuation"
     ),
-    "kinematics/by_components": (
-        ". program mechanism kinematics/formulation kinematics/structure "
-        "kinematics/compiled kinematics/continuation"
-    ),
     "kinematics/sparse": (
         ". primitives program program/llvm mechanism kinematics/formulation "
-        "kinematics/structure kinematics/compiled kinematics/continuation"
+        "kinematics/structure kinematics/compiled"
+    ),
+    "kinematics/blocks": (
+        ". program mechanism kinematics/formulation kinematics/structure "
+        "kinematics/compiled kinematics/continuation kinematics/sparse"
     ),
     "kinematics/diagnosis": (
         ". primitives mechanism kinematics/formulation kinematics/structure "
@@ -70,7 +70,7 @@ IMPORTS = {
     "kinematics": (
         ". primitives program joints mechanism kinematics/formulation kinematics/forces "
         "kinematics/structure kinematics/compiled kinematics/assembly "
-        "kinematics/continuation kinematics/verified kinematics/by_components "
+        "kinematics/continuation kinematics/verified kinematics/blocks "
         "kinematics/sparse kinematics/diagnosis"
     ),
     "case/models/hardpoints/templates": "joints mechanism",
@@ -181,7 +181,7 @@ OFFENDERS = [
         "core/kinematics/formulation/new.py",
         "from ..structure.components import Section",
     ),
-    ("core/kinematics/sparse/new.py", "from .. import by_components"),
+    ("core/kinematics/sparse/new.py", "from .. import blocks"),
     ("core/harness/run.py", "from ... import adapters"),
     ("core/kincheck/new.py", "from kincheck.adapters import engine"),
     ("core/kincheck/new.py", "from kincheck.core.program import Tape"),

@@ -91,7 +91,7 @@ OFFENDERS = [
     (past_the_door, "core/case/new.py", "from ..kinematics.solver_selection import prepare"),
     (past_the_door, "core/case/io/new.py", "from ...kinematics import compiled"),
     (past_the_door, "core/cli/new.py", "def f():\n    from ..kinematics.one_design import solve"),
-    (past_the_door, "core/kincheck/new.py", "import kincheck.core.kinematics.sparse.sweep"),
+    (past_the_door, "core/kincheck/new.py", "import kincheck.core.kinematics.blocks.sweep"),
     (past_the_door, "adapters/new.py", "from ..core.kinematics.compiled.request import Request"),
     (simulators_at_import, "adapters/new.py", "import mujoco"),
     (simulators_at_import, "adapters/new.py", "class A:\n    from mujoco.viewer import launch"),

@@ -34,9 +34,9 @@ The folders:
     structure        degrees of freedom, redundant rows, components, sparse factors
     compiled         one mechanism as compiled programs: request, programs, model, samples
     continuation     the walk along a path, step halving, singular poses, curves by arc length
-    by_components    large mechanisms, component by component
+    blocks           large mechanisms as lists of blocks: components, or one sparse system
     forces           the equations of forces, and the forces of a solved motion
-    sparse           large mechanisms without small components, as a sparse system
+    sparse           the equations of large mechanisms as a sparse system
     assembly         closed poses from estimates and random starts
     diagnosis        rank, conditioning and screws at a pose
     verified         samples enclosed in balls by Krawczyk's test

@@ -30,7 +30,7 @@ from .continuation.side_follower import FINER, ROOM
 from .continuation.walk import march
 from .formulation.acceptance_criteria import doubtful
 from .formulation.parameters import every_place, placed
-from .solver_selection import IRREDUCIBLE, prepare
+from .solver_selection import ONE_PROGRAM, prepare
 from .structure.driver_count import require_driven
 
 # Steps of the straight way from the design to a start away from it: a sixteenth of it is a step
@@ -124,7 +124,7 @@ def solve_variants(route: Route, geometry: Array, tol: float) -> Variants:
         if not doubted.any():
             continue
         # what is known of sigma here is an estimate, which is far too small then
-        if len(model.frame.moving) > IRREDUCIBLE:
+        if len(model.frame.moving) > ONE_PROGRAM:
             kept[:, :, k], solved[:, k], messages[k] = _by_itself(route, geometry[:, k], tol)
             continue
         kept[:, doubted, k], solved[doubted, k] = np.nan, False

@@ -27,7 +27,7 @@ from .design_batch import Variants, solve_variants, variant_of
 from .force_solver import motion_only
 from .forces.reactions import forces_of
 from .forces.wanted import WantedForces
-from .solver_selection import IRREDUCIBLE, follower, prepare
+from .solver_selection import ONE_PROGRAM, follower, prepare
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +123,7 @@ class DesignForces:
         names = {*self._wanted.joints, *self._wanted.drivers, *self._wanted.elements}
         request = replace(model.request, forces=self._wanted)
         each = [variant_of(model, numbers) for numbers in geometry.T]
-        if len(model.frame.moving) > IRREDUCIBLE:  # as their motion, by themselves
+        if len(model.frame.moving) > ONE_PROGRAM:  # as their motion, by themselves
             plain = replace(request, varied=())
             return [_known(prepare(mechanism, plain, path)(tol).forces) for mechanism in each]
         if self._bodies is None:

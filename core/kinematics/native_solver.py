@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from functools import partial
 
 from ..errors import SolveError
 from ..mechanism.mechanism import Mechanism
@@ -93,16 +92,18 @@ class NativeSolver:
 
     def _large(self, mechanism: Mechanism, request: Request, path: Path) -> Solver:
         # few mechanisms are so large: the others need not wait for the import
-        if self.method is Method.BY_COMPONENTS:
-            from .by_components.block_solver import Cascade
-            from .by_components.sweep import CascadeSweep
+        from .blocks.cascade import Cascade
+        from .blocks.component_lanes import ComponentLanes
+        from .blocks.sparse_lanes import SparseLanes
+        from .blocks.sweep import BlockSweep
+        from .sparse.sparse_equations import SparseEquations
 
-            return CascadeSweep(Cascade(mechanism, request), path).solve
-        from .sparse.sparse_model import SparseModel
-        from .sparse.sweep import solve_sparse
-
-        model = SparseModel(mechanism, compiled=self.compiled)
-        return partial(solve_sparse, model, path, request.points, request.bodies, request.order)
+        lanes = (
+            ComponentLanes(Cascade(mechanism, request))
+            if self.method is Method.BY_COMPONENTS
+            else SparseLanes(SparseEquations(mechanism, compiled=self.compiled), request)
+        )
+        return BlockSweep(lanes, path).solve
 
     def prepare_designs(
         self,

@@ -1,15 +1,14 @@
-"""Choice of the solver by the size of a mechanism: one program, component by component, or one
-sparse system.
+"""Choice of the blocks by the size of a mechanism: one program, components one after the other, or
+one sparse system.
 
-The solutions are the same to round-off. One program costs least for each sample, and most to trace:
-its size grows faster than the mechanism. Components share programs, so a chain of thousands is made
-ready in seconds. An indivisible mechanism too large for one program is a sparse system. Measured on
-chains of four-bars, one program against components, both interpreted: 17 bodies 3 and 13 us a
-sample; 33 bodies 7 and 23 us, made ready in 0.5 and 0.1 s; 65 bodies 15 and 57 us, 1.6 and 0.2 s.
-Compiled, 33 bodies take 3 and 8 us, after 6 s and 0.1. On rings of loops, one program against a
-sparse system: 31 bodies 21 and 180 us, made ready in 1.3 and 0.04 s; 39 bodies 42 and 275 us, 2.2
-and 0.06 s. Near singular poses one program knows sigma; a sparse system knows only pivots, and
-refuses more of the solvable samples.
+The solutions and verdicts are the same to round-off. One program costs least for each sample, and
+most to trace and compile: its size grows faster than the mechanism. Components share programs, so a
+chain of thousands is made ready in seconds. An indivisible mechanism too large for one program is a
+sparse system. Measured on chains of four-bars, one program (first interpreted, and compiled if it
+runs often) against components: 21 bodies 2.3 (0.5) and 3.1 us a sample, made ready in 0.1 and 0.3
+s; 41 bodies 4.4 (0.9) and 3.8 us, in 0.3 and 0.3 s. On rings of loops, one program against a sparse
+system: 31 bodies 21 and 70 us, made ready in 0.6 and 0.04 s; 39 bodies 42 and 85 us, in 0.8 and
+0.06 s.
 """
 
 from __future__ import annotations
@@ -30,12 +29,12 @@ from .compiled.samples import recent_route
 from .force_solver import Solver, by_motion, by_program, motion_only
 from .formulation.constraints import Style, frames
 
-# Up to as many bodies one program is made ready in a third of a second.
-ONE_PROGRAM = 20
-# An irreducible mechanism is worth two seconds, once: as one program it is six times as fast as a
-# sparse system. Larger rings are so near to singular that the estimate of sigma leaves all their
-# samples in doubt.
-IRREDUCIBLE = 40
+# Moving bodies up to which one program is made ready in a second, and as fast as components before
+# it is compiled. Larger rings are so near to singular that the estimate of sigma by one program
+# leaves all their samples in doubt.
+ONE_PROGRAM = 40
+# Bodies of a component up to which one program for it is better than a sparse system for all.
+COMPONENT = 20
 
 
 def prepare(mechanism: Mechanism, request: Request, path: Path) -> Solver:
@@ -51,8 +50,7 @@ def prepare(mechanism: Mechanism, request: Request, path: Path) -> Solver:
     if len(mechanism.moving) > ONE_PROGRAM and request.style is Style.NATIVE:
         known = is_builtin(mechanism) and path.is_builtin
         make = (_recent_large if known else _large)(mechanism, motion_only(mechanism, request))
-        if make:
-            return by_motion(mechanism, request, path, make(path), prepare)
+        return by_motion(mechanism, request, path, make(path), prepare)
     return by_program(
         mechanism, request, path, lambda each: recent_route(mechanism, each, path), prepare
     )
@@ -73,11 +71,13 @@ def start_notes(mechanism: Mechanism, request: Request, path: Path, tol: float) 
     return [*prepare(mechanism, replace(request, varied=()), path)(tol).details.get("notes", ())]
 
 
-def _large(mechanism: Mechanism, request: Request) -> Callable[[Path], Solver] | None:
-    """Return a solver by components or by a sparse system; None if one program is better."""
+def _large(mechanism: Mechanism, request: Request) -> Callable[[Path], Solver]:
+    """Return a solver by components or by a sparse system."""
     # few mechanisms are so large: the others need not wait for the import
-    from .by_components.block_solver import Cascade
-    from .by_components.sweep import CascadeSweep
+    from .blocks.cascade import Cascade
+    from .blocks.component_lanes import ComponentLanes
+    from .blocks.lanes import Lanes
+    from .blocks.sweep import BlockSweep
     from .structure.components import components
     from .structure.driver_count import require_driven
 
@@ -87,23 +87,19 @@ def _large(mechanism: Mechanism, request: Request) -> Callable[[Path], Solver] |
     except SolveError:
         require_driven(mechanism)  # which names what can still move
         raise
-    if parts and max(len(part.bodies) for part in parts) <= ONE_PROGRAM:
-        cascade = Cascade(mechanism, request, parts)
+    if parts and max(len(part.bodies) for part in parts) <= COMPONENT:
+        lanes: Lanes = ComponentLanes(Cascade(mechanism, request, parts))
+    else:
+        from .blocks.sparse_lanes import SparseLanes
+        from .sparse.sparse_equations import SparseEquations
 
-        def along(path: Path) -> Solver:
-            return CascadeSweep(cascade, path).solve
+        lanes = SparseLanes(SparseEquations(mechanism, compiled=request.compiled), request)
 
-        again = keep_last(1)(along)
-        return lambda path: (again if path.is_builtin else along)(path)
-    if len(mechanism.moving) <= IRREDUCIBLE:
-        return None
-    from .sparse.sparse_model import SparseModel
-    from .sparse.sweep import solve_sparse
+    def along(path: Path) -> Solver:
+        return BlockSweep(lanes, path).solve
 
-    model = SparseModel(mechanism, compiled=request.compiled)
-    return lambda path: partial(
-        solve_sparse, model, path, request.points, request.bodies, request.order
-    )
+    again = keep_last(1)(along)
+    return lambda path: (again if path.is_builtin else along)(path)
 
 
 # One only, and of its paths the last: they fill much of the memory. A thread solves it in place.

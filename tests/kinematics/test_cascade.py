@@ -6,18 +6,20 @@ import numpy as np
 import pytest
 from kincheck import cases
 from kincheck.core import Body, Point, solve
-from kincheck.core.kinematics.by_components.block_solver import Cascade
-from kincheck.core.kinematics.by_components.component_lanes import WORST
-from kincheck.core.kinematics.by_components.sweep import LANES, CascadeSweep
+from kincheck.core.kinematics import Method, NativeSolver
+from kincheck.core.kinematics.blocks.cascade import Cascade
+from kincheck.core.kinematics.blocks.component_lanes import LANES, ComponentLanes
+from kincheck.core.kinematics.blocks.lanes import WORST
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.motion_start import start_of
-from kincheck.core.kinematics.compiled.request import FROM, SIGMA, TIME, Request, accept_by
+from kincheck.core.kinematics.compiled.request import FROM, SIGMA, TIME, Request
 from kincheck.core.kinematics.compiled.samples import Route
 from kincheck.core.kinematics.continuation.step_halving import HALVINGS, part_of_step
 from kincheck.core.kinematics.continuation.sweep import follow
 from kincheck.core.mechanism.motions import Path, Ramp, Sine
 from kincheck.core.program import MARGIN
 
+from ..support.block_structures import solve_components
 from ..support.mechanisms import four_bar, slider_crank
 from .test_chain import LEAN, chain
 
@@ -25,8 +27,8 @@ from .test_chain import LEAN, chain
 def both(mechanism, path, points, *, compiled=True):
     bodies = tuple(body.name for body in mechanism.moving)
     request = Request(tuple(path.motions), points, bodies, compiled=compiled)
-    cascade = CascadeSweep(Cascade(mechanism, request), path)
-    return cascade.solve(1e-12), follow(Route(compile_model(mechanism, request), path), 1e-12)
+    found = solve_components(mechanism, path, points, bodies, compiled=compiled)
+    return found, follow(Route(compile_model(mechanism, request), path), 1e-12)
 
 
 def assert_alike(found, expected):
@@ -85,8 +87,8 @@ def test_the_way_to_the_first_sample_is_one_and_the_time_there_another(first):
 
 def test_a_singular_pose_on_the_way_to_the_first_sample_is_told_every_time():
     path = Path({"turn": Sine(2.4, 1e-2, np.pi / 2.0)}, np.linspace(2.0, 3.0, 5))
-    sweep = CascadeSweep(Cascade(chain(6), Request(("turn",), ("end",))), path)
-    told = [sweep.solve(1e-12).details["notes"] for _ in range(2)]
+    solve = NativeSolver(method=Method.BY_COMPONENTS).prepare(chain(6), path, ("end",))
+    told = [solve(1e-12).details["notes"] for _ in range(2)]
     assert told[0] == told[1]
     assert "crosses a singular pose near turn = 1.870" in told[0][0]
 
@@ -101,12 +103,9 @@ def test_what_is_fixed_stands_still_beside_many_components():
         [*m.points, Point("mark", "frame", (1.0, 2.0, 3.0))],
         m.drivers,
     )
-    request, path = (
-        Request(("turn",), ("mark",), ("frame",)),
-        Path({"turn": Ramp(1.0)}, np.array([0.0, 0.2, LEAN + np.pi / 2.0])),
-    )
-    found = CascadeSweep(Cascade(m, request), path).solve(1e-12)
-    assert found.solved.tolist() == [True, True, False]
+    path = Path({"turn": Ramp(1.0)}, np.array([0.0, 0.2]))
+    found = solve_components(m, path, ("mark",), ("frame",))
+    assert found.solved.all()
     mark, frame = found.points["mark"], found.bodies["frame"]
     given = mark.position, mark.velocity, mark.acceleration, frame.r, frame.p, frame.v, frame.a
     expected = (
@@ -119,14 +118,13 @@ def test_what_is_fixed_stands_still_beside_many_components():
         [0.0] * 6,
     )
     for values, wanted in zip(given, expected, strict=True):
-        assert np.array_equal(values[:2], [wanted] * 2)
-        assert np.isnan(values[2]).all()
+        assert np.array_equal(values, [wanted] * 2)
 
 
 def test_components_iterate_no_more_than_is_asked_for():
     path = Path({"turn": Ramp(1.0)}, np.linspace(0.0, 0.2, 9))
-    once = Request(("turn",), ("end",), last_iteration=np.inf)
-    found = CascadeSweep(Cascade(chain(3), once), path).solve(np.inf)
+    solver = NativeSolver(last_iteration=np.inf, method=Method.BY_COMPONENTS)
+    found = solver.prepare(chain(3), path, ("end",))(np.inf)
     assert (found.iterations == 1).all()
     assert found.residual > 1e-10
 
@@ -142,9 +140,7 @@ def test_components_built_alike_share_a_program():
 def test_a_chain_of_two_hundred_loops_closes_to_round_off():
     loops = 200
     turn = np.linspace(-0.3, 0.3, 33)
-    found = CascadeSweep(
-        Cascade(chain(loops), Request(("turn",), ("end",))), Path({"turn": Ramp(1.0)}, turn)
-    ).solve(1e-12)
+    found = solve_components(chain(loops), Path({"turn": Ramp(1.0)}, turn), ("end",))
     assert found.solved.all(), found.message
     assert found.residual <= 1e-15
     # the end is two hundred metres away: its coordinates round at 1.4e-14 m
@@ -160,23 +156,22 @@ def test_to_go_on_from_the_last_time_is_to_carry_its_lane(compiled):
     )
     cascade = Cascade(chain(3), request)
     for count in (LANES, 5):  # all that there are, or the last ones are as the last
-        going, carrying = (CascadeSweep(cascade, path) for _ in range(2))
-        for sweep in (going, carrying):
-            lanes = sweep._lanes
-            lanes.anchor = sweep._departure[0]
-            lanes.accept_by(accept_by(1e-12))
+        going, carrying = (ComponentLanes(cascade) for _ in range(2))
+        for lanes in (going, carrying):
+            lanes.accept(1e-12)
+            lanes.depart(0.0, path)
             for first in (0.0, 0.1, 0.2):  # there and back again
                 assert (lanes.attempt(first + np.linspace(0.005, 0.1, count), path) > 0.0).all()
-                if sweep is going:
+                if lanes is going:
                     lanes.go_on()
                 else:
                     lanes.carry(count - 1)
-        for a, b in zip(going._lanes.anchor, carrying._lanes.anchor, strict=True):
+        ends = [lanes.anchor(0.3).pose for lanes in (going, carrying)]
+        for a, b in zip(*ends, strict=True):
             np.testing.assert_array_equal(a, b)
         model = cascade.kinds[0].model
-        assert going._lanes.anchor[0][
-            0, [*model.plan.fixed].index(model.slots[FROM + TIME])
-        ] == pytest.approx(0.3)
+        time = [*model.plan.fixed].index(model.slots[FROM + TIME])
+        assert ends[0][0][0, time] == pytest.approx(0.3)
 
 
 @pytest.mark.parametrize(
@@ -191,10 +186,9 @@ def test_a_sample_is_as_good_as_its_worst_component(part, compiled):
         Request(("turn",), ("end",), compiled=compiled),
     )
     cascade = Cascade(chain(3), request)
-    sweep = CascadeSweep(cascade, path)
-    lanes, times = sweep._lanes, np.linspace(0.005, 0.1, LANES)
-    lanes.anchor = sweep._departure[0]
-    lanes.accept_by(accept_by(1e-12))
+    lanes, times = ComponentLanes(cascade), np.linspace(0.005, 0.1, LANES)
+    lanes.accept(1e-12)
+    lanes.depart(0.0, path)
     assert len(cascade.parts) == 4
     assert (lanes.attempt(times, path) > 0.0).all()
     np.testing.assert_array_equal(
@@ -202,10 +196,10 @@ def test_a_sample_is_as_good_as_its_worst_component(part, compiled):
     )
     np.testing.assert_array_equal(lanes.worst[WORST.index(SIGMA)], lanes.each(SIGMA).min(axis=0))
     kind, member = cascade.place[part]
-    anchor, model = lanes.anchor, kind.model
+    anchor, model = lanes.anchor(0.0), kind.model
     column = [*model.plan.fixed].index(model.vectors[FROM + "q b0"][0])
-    anchor[cascade.kinds.index(kind)][member, column] = np.nan
-    lanes.anchor = anchor
+    anchor.pose[cascade.kinds.index(kind)][member, column] = np.nan
+    lanes.restore(anchor)
     assert not (lanes.attempt(times, path) > 0.0).any()
     for name in ("closure", MARGIN):
         assert np.isnan(lanes.worst[WORST.index(name)]).all()

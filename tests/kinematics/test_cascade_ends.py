@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from kincheck.core import Body, Gear, JointAngle, Mechanism, Point, Revolute, SolveError
 from kincheck.core.case.io.case_file import load_case
-from kincheck.core.kinematics.by_components.block_solver import Cascade
-from kincheck.core.kinematics.by_components.sweep import CascadeSweep
+from kincheck.core.kinematics import Method, NativeSolver
+from kincheck.core.kinematics.blocks.cascade import Cascade
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.mechanism.motions import Path, Ramp
 
+from ..support.block_structures import solve_components
 from ..support.mechanisms import mcpherson
 from .test_cascade import assert_alike, both
 from .test_chain import LEAN, chain
@@ -19,17 +20,16 @@ from .test_chain import LEAN, chain
 def test_an_end_of_the_travel_is_told_with_the_component():
     mechanism = mcpherson()
     values = np.linspace(0.0, 0.4, 41)
-    sweep = CascadeSweep(
-        Cascade(mechanism, Request(("stroke",), ("wheel",))), Path({"stroke": Ramp(1.0)}, values)
-    )
-    found = sweep.solve(1e-12)
+    path = Path({"stroke": Ramp(1.0)}, values)
+    solve = NativeSolver(method=Method.BY_COMPONENTS).prepare(mechanism, path, ("wheel",))
+    found = solve(1e-12)
     assert (found.solved == (values < 0.29337)).all()  # formulation section 10
     assert np.isnan(found.points["wheel"].position[~found.solved]).all()
     assert "cannot be followed beyond stroke = 0.293" in found.message
     assert "knuckle" in found.message
     assert "; last reachable sample at stroke = 0.29; shorten the sweep" in found.message
     assert np.array_equal(
-        sweep.solve(1e-12).points["wheel"].position, found.points["wheel"].position, equal_nan=True
+        solve(1e-12).points["wheel"].position, found.points["wheel"].position, equal_nan=True
     )
 
 
@@ -72,9 +72,8 @@ def test_the_component_that_ends_a_motion_is_the_one_that_is_singular():
         [Point("end", carrier, (start, 0.0, 0.0))],
         [JointAngle("turn", "turn")],
     )
-    cascade = Cascade(mechanism, Request(("turn",), ("end",)))
     for values in (np.linspace(0.0, 6.0, 31), [0.0, 3.0], [0.1, 2.0, 4.0]):
-        found = CascadeSweep(cascade, Path({"turn": Ramp(1.0)}, np.array(values))).solve(1e-12)
+        found = solve_components(mechanism, Path({"turn": Ramp(1.0)}, np.array(values)), ("end",))
         assert not found.solved.all()
         assert "the component of rod1, rocker1: there is a singular pose ahead" in found.message
 
@@ -100,9 +99,7 @@ def test_what_it_cannot_take_apart_is_refused():
 def test_a_chain_passes_the_pose_where_all_its_links_are_in_line():
     """Every loop may fold there; that the motion goes on is said."""
     loops, turn = 20, np.linspace(-0.1, 2.4, 26)
-    found = CascadeSweep(
-        Cascade(chain(loops), Request(("turn",), ("end",))), Path({"turn": Ramp(1.0)}, turn)
-    ).solve(1e-12)
+    found = solve_components(chain(loops), Path({"turn": Ramp(1.0)}, turn), ("end",))
     assert found.solved.all(), found.message
     expected = np.column_stack([loops + np.sin(LEAN - turn), np.cos(LEAN - turn), 0.0 * turn])
     # every loop adds its rounding, over the sine of how far its links are from in line
@@ -112,19 +109,21 @@ def test_a_chain_passes_the_pose_where_all_its_links_are_in_line():
     assert "crosses a singular pose near turn = 1.870" in note
 
 
-def test_a_sample_where_the_links_are_in_line_is_refused():
+def test_sample_with_links_in_line_is_interpolated():
     turn = np.array([0.0, 1.8, LEAN + np.pi / 2.0, 1.9, 2.4])
-    found = CascadeSweep(
-        Cascade(chain(3), Request(("turn",), ("end",))), Path({"turn": Ramp(1.0)}, turn)
-    ).solve(1e-12)
-    assert found.solved.tolist() == [True, True, False, True, True]
-    assert "refused at turn = 1.87079633: so near a singular pose" in found.message
-    alone = CascadeSweep(
-        Cascade(chain(3), Request(("turn",), ("end",))), Path({"turn": Ramp(1.0)}, turn[2:3])
-    ).solve(1e-12)
-    assert not alone.solved.any()
+    for values in (turn, turn[2:3]):
+        found = solve_components(chain(3), Path({"turn": Ramp(1.0)}, values), ("end",))
+        assert found.solved.all(), found.message
+        assert any("interpolated there" in note for note in found.details["notes"])
+        expected = np.column_stack([3.0 + np.sin(LEAN - values), np.cos(LEAN - values), 0 * values])
+        assert np.abs(found.points["end"].position - expected).max() <= 1e-12
+
+
+def test_sweep_without_samples_has_no_numbers():
+    found = solve_components(mcpherson(), Path({"stroke": Ramp(1.0)}, np.array([0.4])), ("wheel",))
+    assert not found.solved.any()
     # nothing was found, which is not zero
-    assert np.isnan([alone.residual, alone.details["smallest_singular_value"]]).all()
+    assert np.isnan([found.residual, found.details["smallest_singular_value"]]).all()
 
 
 @pytest.mark.parametrize("name", ["kite", "four_bar_in_one_step"])

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from kincheck.core import Revolute, Spherical, solve, solve_designs
 from kincheck.core.caches import clear_caches
-from kincheck.core.kinematics.by_components import block_solver
-from kincheck.core.kinematics.by_components import sweep as cascade_sweep
+from kincheck.core.kinematics.blocks import cascade
+from kincheck.core.kinematics.blocks import sweep as block_sweep
 from kincheck.core.kinematics.compiled import compiled_model, samples
 from kincheck.core.kinematics.continuation import side_follower, walk
 from kincheck.core.kinematics.solver_selection import prepare
-from kincheck.core.kinematics.sparse import sparse_model as sparse
+from kincheck.core.kinematics.sparse import sparse_equations as sparse
 from kincheck.core.mechanism.motions import Absolute, Motion, Path, Ramp, Sine, Table
 from kincheck.core.studies.bench.size import circle
 
@@ -70,9 +70,9 @@ def test_threads_share_it():
 @pytest.fixture
 def swept(monkeypatch):
     """What was made of paths through components."""
-    sweeps, make = [], cascade_sweep.CascadeSweep.__init__
+    sweeps, make = [], block_sweep.BlockSweep.__init__
     monkeypatch.setattr(
-        cascade_sweep.CascadeSweep,
+        block_sweep.BlockSweep,
         "__init__",
         lambda self, *given: (sweeps.append(self), make(self, *given))[1],
     )
@@ -83,7 +83,7 @@ def test_of_a_chain_the_last_path_is_kept(swept):
     turn, half = np.linspace(-0.1, 0.2, 9), np.linspace(-0.1, 0.05, 9)
     found = []
     for values, number in ((turn, 1), (turn, 1), (half, 2), (turn, 3)):
-        found.append(solve(chain(12), "turn", values).points["end"].acceleration)
+        found.append(solve(chain(21), "turn", values).points["end"].acceleration)
         assert len(swept) == number
     for each in (found[1], found[3]):
         np.testing.assert_array_equal(each, found[0])
@@ -93,7 +93,7 @@ def test_threads_take_turns_at_a_chain_and_each_keeps_its_own(swept):
     turn = np.linspace(-0.1, 0.2, 9)
     with ThreadPoolExecutor(1) as one, ThreadPoolExecutor(1) as other:
         found = [
-            pool.submit(solve, chain(12), "turn", turn).result()
+            pool.submit(solve, chain(21), "turn", turn).result()
             for pool in (one, other, one, other)
         ]
     assert len(swept) == 2
@@ -111,7 +111,7 @@ def test_large_mechanisms_follow_motions_of_a_users_own_anew(swept):
 
     request, times = samples.Request(("turn",), ("end",)), np.linspace(0.0, 0.1, 5)
     for number in (1, 2):
-        assert prepare(chain(12), request, Path({"turn": Mine()}, times))(1e-12).solved.all()
+        assert prepare(chain(21), request, Path({"turn": Mine()}, times))(1e-12).solved.all()
         assert len(swept) == number
 
 
@@ -121,13 +121,13 @@ def test_large_mechanisms_with_joints_of_a_users_own_too(monkeypatch):
     class Hinge(Revolute):
         type = "hinge_of_mine"
 
-    made, make = [], block_solver.Cascade.__init__
+    made, make = [], cascade.Cascade.__init__
     monkeypatch.setattr(
-        block_solver.Cascade,
+        cascade.Cascade,
         "__init__",
         lambda self, *given: (made.append(self), make(self, *given))[1],
     )
-    mechanism = chain(12)
+    mechanism = chain(21)
     joints = [
         Hinge(j.name, j.i, j.j, j.point, j.axis) if type(j) is Revolute else j
         for j in mechanism.joints
@@ -230,8 +230,8 @@ def test_of_very_many_samples_nothing_is_kept(bound, monkeypatch):
 @pytest.mark.parametrize(
     ("large", "kind"),
     [
-        (chain(12), (block_solver.Cascade, "__init__")),
-        (circle(21).mechanism, (sparse.SparseModel, "__init__")),
+        (chain(21), (cascade.Cascade, "__init__")),
+        (circle(22).mechanism, (sparse.SparseEquations, "__init__")),
     ],
 )
 def test_of_large_mechanisms_the_last_is_kept(large, kind, monkeypatch):

@@ -1,5 +1,5 @@
-"""Samples of a sparse system solved together: what they are one by one, and never what cannot be
-believed.
+"""Samples of a sparse system solved together, in an order of elimination found once: what they are
+by pivots chosen for each, and never what cannot be believed.
 """
 
 from __future__ import annotations
@@ -8,18 +8,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kincheck.core.kinematics.sparse import batched_newton as module
-from kincheck.core.kinematics.sparse.batched_newton import Batch
-from kincheck.core.kinematics.sparse.sparse_model import SparseModel
-from kincheck.core.kinematics.sparse.step_state import Stand
-from kincheck.core.kinematics.sparse.sweep import solve_sparse
-from kincheck.core.kinematics.sparse.tables import SparseTables
-from kincheck.core.kinematics.structure import sparse_lu
+from kincheck.core.kinematics.blocks.sparse_lanes import SparseLanes
+from kincheck.core.kinematics.compiled.request import Request
+from kincheck.core.kinematics.sparse.poses import ChosenPivots, FixedOrder, error_bounds
+from kincheck.core.kinematics.sparse.sparse_equations import SparseEquations
 from kincheck.core.studies.bench.ring import ring
 
+from ..support.block_structures import solve_sparse
 from ..support.mechanisms import four_bar
 from .test_cascade import assert_alike
-from .test_chain import chain
+from .test_chain import LEAN, chain
 from .test_corners import loop
 from .test_sparse import CRANK, WAYS, turning
 
@@ -27,149 +25,98 @@ pytest.importorskip("llvmlite", reason="llvmlite is not installed")
 POINTS = tuple(point.name for point in ring(9).points)
 
 
-@pytest.fixture
-def alone(monkeypatch):
-    """The samples that were reached one by one."""
-    found, reach = list[float](), SparseModel.reach
-
-    def counted(self: SparseModel, here: Stand, time: float, drives, tol: float) -> Stand:
-        found.append(time)
-        return reach(self, here, time, drives, tol)
-
-    monkeypatch.setattr(SparseModel, "reach", counted)
-    return found
-
-
-def one_by_one(mechanism, path, points=POINTS):
-    return solve_sparse(SparseModel(mechanism, compiled=False), path, points)
-
-
 @pytest.mark.parametrize("count", [4, 9, 65])
-def test_a_smooth_sweep_needs_no_sample_alone(count, alone):
-    model, path = (
-        SparseModel(ring(20)),
-        turning(*np.linspace(-0.4, 0.4, count)) if count > 4 else turning(0.0, 0.05, 0.1, 0.15),
+def test_fixed_order_agrees_with_chosen_pivots(count):
+    path = turning(*np.linspace(-0.4, 0.4, count))
+    assert_alike(
+        solve_sparse(ring(20), path, POINTS), solve_sparse(ring(20), path, POINTS, compiled=False)
     )
-    found = solve_sparse(model, path, POINTS)
-    assert not alone
-    assert_alike(found, one_by_one(ring(20), path))
 
 
 def test_samples_after_the_first_eight_take_one_iteration():
-    found = solve_sparse(SparseModel(ring(12)), turning(*np.linspace(0.0, 0.8, 33)))
+    found = solve_sparse(ring(12), turning(*np.linspace(0.0, 0.8, 33)))
     assert (found.iterations[16:] == 1).all()  # none of the group that the eighth is in
 
 
 def test_samples_in_any_order_at_any_distance_and_twice():
     times = np.random.default_rng(3).uniform(-0.9, 0.9, 40)
-    times = np.concatenate([times, times[:3], [0.0, 0.0]])
+    path = turning(*np.concatenate([times, times[:3], [0.0, 0.0]]))
     assert_alike(
-        solve_sparse(SparseModel(ring(9)), turning(*times), POINTS),
-        one_by_one(ring(9), turning(*times)),
+        solve_sparse(ring(9), path, POINTS), solve_sparse(ring(9), path, POINTS, compiled=False)
     )
 
 
-def test_samples_that_come_twice_are_solved_together_too(alone):
-    solve_sparse(SparseModel(ring(9)), turning(*np.repeat(np.linspace(0.0, 0.4, 20), 2)))
-    assert not alone
+def lanes_of(mechanism, *, compiled=True, tol=1e-12):
+    """A mechanism as a sparse system at the beginning of a turn."""
+    found = SparseLanes(SparseEquations(mechanism, compiled=compiled), Request(("turn",), ()))
+    found.accept(tol)
+    found.depart(0.0, turning(0.0))
+    return found
 
 
-def test_few_samples_are_not_worth_making_it_ready():
-    model = SparseModel(ring(9))
-    solve_sparse(model, turning(0.1, 0.2, 0.3))
-    assert "together" not in vars(model)
-    solve_sparse(model, turning(0.1, 0.2, 0.3, 0.4))
-    assert "together" in vars(model)
+def reached(lanes, *times):
+    """How many neighbours are accepted, from the first one on."""
+    table = lanes.sampled(np.array(times), turning(*times))
+    good = lanes.attempt_at(table, neighbours=True) > 0.0
+    return len(good) if good.all() else int(good.argmin())
 
 
-def test_an_order_that_serves_no_longer_is_renewed(monkeypatch, alone):
-    # rows are exchanged, and not kept for as long as they may
-    monkeypatch.setattr(sparse_lu, "PIVOT_THRESHOLD", 1.0)
-    ordered, order = list[float](), Batch.order
-    monkeypatch.setattr(
-        Batch, "order", lambda self, model: order(self, model) or ordered.append(self._sign[0])
-    )
-    monkeypatch.setattr(module, "GROWTH", 1.5)
-    path = turning(*np.linspace(0.0, 1.5, 100))
-    found = solve_sparse(SparseModel(ring(13)), path, POINTS)
-    assert {*ordered} == {-1.0, 1.0}
-    assert len(alone) < 35
-    assert_alike(found, one_by_one(ring(13), path))
+def test_bounds_agree_in_both_orders():
+    """Errors that residuals leave, by a fixed order and by chosen pivots, of more poses than are
+    solved at once.
+    """
+    lanes = lanes_of(ring(13))
+    model, here = lanes.model, lanes.here
+    ways = FixedOrder(model, here.rows), ChosenPivots(model, here.rows)
+    state = np.repeat(here.state[:, None], 11, axis=1)
+    drives = np.repeat(here.drives[:, None], 11, axis=1)
+    fixed, chosen = (error_bounds(way, state, drives, model.scale, 2) for way in ways)
+    assert fixed.shape == (11,)
+    assert (chosen > 0.0).all()
+    assert (np.abs(np.log10(fixed / chosen)) < 1.0).all()
 
 
-def stood(model: SparseModel, turn: float = 0.0) -> Stand:
-    return model.moving(model.design, turn, model.drives(turning(turn), np.array([turn]))[:, 0])
+@pytest.mark.parametrize("compiled", [False, True])
+def test_what_cannot_be_believed_is_refused(compiled):
+    lanes, times = lanes_of(four_bar(), compiled=compiled), (0.01, 0.02, 0.03, 0.04)
+    start = lanes.anchor(0.0)
+    here = start.pose
 
+    def reached_from(pose, *other):
+        lanes.restore(replace(start, pose=pose))
+        return reached(lanes, *(other or times))
 
-def reached(model: SparseModel, here: Stand, times, tol: float = 1e-12) -> int:
-    found = np.array(times)
-    assert model.together is not None
-    return len(model.together.reach([here], found, model.drives(turning(*times), found), tol))
-
-
-def test_what_cannot_be_believed_is_refused():
-    model = SparseModel(four_bar())
-    here, times = stood(model), [0.01, 0.02, 0.03]
-    assert reached(model, here, times) == 3
-    assert reached(model, replace(here, orientation=bytes(len(here.orientation))), times) == 0
+    assert reached_from(here) == 4
+    assert reached_from(replace(here, orientation=bytes(len(here.orientation)))) == 0
     # as if it were next to singular
-    assert reached(model, replace(here, largest_pivot=1e12), times) == 0
-    assert reached(model, here, times, tol=-1.0) == 0
+    assert reached_from(replace(here, largest_pivot=1e12)) == 0
     # further than can be told from another motion
-    assert reached(model, here, [0.01, 0.02, 1.2, 1.21]) == 2
-    assert reached(model, here, [0.01, float("nan"), 0.03]) == 1
+    assert reached_from(here, 0.01, 0.02, 1.2, 1.21) == 2
+    assert reached_from(here, 0.01, float("nan"), 0.03, 0.04) == 1
     # the way is not what the rates say
-    assert reached(model, replace(here, rates=2.0 * here.rates), times) == 0
-    assert reached(model, here, times) == 3
-
-
-def test_a_step_that_is_longer_than_can_be_told_from_another_is_refused():
-    model = SparseModel(CRANK)
-    assert reached(model, stood(model), [1.03]) == 1
-    # half of it is more than 0.5 in Euler parameters
-    assert reached(model, stood(model), [1.06]) == 0
-
-
-def changed(monkeypatch, quantity: str, change) -> None:
-    """All poses have other numbers than they have."""
-    get = SparseTables.__getitem__
-
-    def got(self: SparseTables, name: str):
-        return change(get(self, name)) if name == quantity else get(self, name)
-
-    monkeypatch.setattr(SparseTables, "__getitem__", got)
-
-
-def test_rows_that_contradict_the_others_are_refused(monkeypatch):
-    model = SparseModel(four_bar())
-    here = stood(model)
-    assert len(model.dropped)
-
-    def contradicting(phi):
-        found = phi.copy()
-        found[model.dropped[0], 1] = 1e-6
-        return found
-
-    changed(monkeypatch, "phi", contradicting)
-    assert reached(model, here, [0.01, 0.02, 0.03]) == 1
-
-
-def test_another_branch_is_refused(monkeypatch):
-    model = SparseModel(four_bar())
-    here = stood(model)
-    assert reached(model, here, [0.01, 0.02, 0.03]) == 3
-    changed(monkeypatch, "branch", np.negative)
-    assert reached(model, here, [0.01, 0.02, 0.03]) == 0
+    assert reached_from(replace(here, rates=2.0 * here.rates)) == 0
+    lanes.accept(-1.0)
+    assert reached_from(here) == 0
+    lanes.accept(1e-12)
+    assert reached_from(here) == 4
 
 
 @WAYS
-def test_a_singular_pose_is_not_stepped_over(compiled):
-    found = solve_sparse(
-        SparseModel(chain(3), compiled=compiled), turning(*np.linspace(0.0, 2.4, 7)), ["end"]
-    )
-    assert found.solved.tolist() == [True] * 5 + [False] * 2
-    assert "cannot be followed beyond turn = 1.8707" in found.message
-    assert "there is a singular pose ahead" in found.message
+def test_step_too_long_to_tell_is_refused(compiled):
+    assert reached(lanes_of(CRANK, compiled=compiled), 1.03) == 1
+    # half of it is more than 0.5 in Euler parameters
+    assert reached(lanes_of(CRANK, compiled=compiled), 1.06) == 0
+
+
+@WAYS
+def test_singular_pose_of_many_loops_is_told(compiled):
+    turn = np.linspace(0.0, 2.4, 7)
+    found = solve_sparse(chain(3), turning(*turn), ["end"], compiled=compiled)
+    assert found.solved.all(), found.message
+    (note,) = found.details["notes"]
+    assert "crosses a singular pose near turn = 1.870" in note
+    expected = np.column_stack([3.0 + np.sin(LEAN - turn), np.cos(LEAN - turn), 0.0 * turn])
+    assert np.abs(found.points["end"].position - expected).max() <= 1e-13
 
 
 @pytest.mark.parametrize(
@@ -187,9 +134,8 @@ def test_a_gap_is_the_end_also_of_two_loops_at_once(short, count, loops, compile
     """Their determinants change their signs together, and that of the whole keeps it."""
     turn = np.linspace(0.0, 2.0, count)
     found = solve_sparse(
-        SparseModel(
-            loop(np.pi - 1.0, 0.0, rod=1.2 - short, rocker=0.8, loops=loops), compiled=compiled
-        ),
+        loop(np.pi - 1.0, 0.0, rod=1.2 - short, rocker=0.8, loops=loops),
         turning(*turn),
+        compiled=compiled,
     )
     assert (found.solved == (turn < 1.0 - np.pi + 2.0 * np.arcsin(1.0 - 0.5 * short))).all()

@@ -18,13 +18,12 @@ from kincheck.core import (
 )
 from kincheck.core.kinematics.sparse import row_selection
 from kincheck.core.kinematics.sparse.determinant_signs import Blocks
-from kincheck.core.kinematics.sparse.elements import Elements
-from kincheck.core.kinematics.sparse.row_selection import Jacobian
-from kincheck.core.kinematics.sparse.sparse_model import SparseModel
-from kincheck.core.kinematics.sparse.sweep import solve_sparse
-from kincheck.core.kinematics.structure.sparse_lu import Factors
+from kincheck.core.kinematics.sparse.sparse_equations import SparseEquations
+from kincheck.core.kinematics.structure.sparse_lu import Order
 from kincheck.core.mechanism.motions import Path, Ramp
 from kincheck.core.studies.bench.ring import LEAN, pivot, ring
+
+from ..support.block_structures import solve_sparse
 
 X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 CRANKS = 5
@@ -106,7 +105,7 @@ def test_rows_chosen_anew_are_counted():
 def test_several_samples_at_once_give_what_one_after_the_other_gives(compiled):
     mechanism = four_bar(KITE, -1.1, "hinges")
     path = Path({"turn": Ramp(1.0)}, np.linspace(0.0, 1.6, 41))
-    found = solve_sparse(SparseModel(mechanism, compiled=compiled), path, ["meet"])
+    found = solve_sparse(mechanism, path, ["meet"], compiled=compiled)
     assert found.solved.all(), found.message
     pin, meet = pin_meeting(*KITE, path.times - 1.1)
     point = found.points["meet"]
@@ -162,14 +161,23 @@ FINE = np.concatenate([np.linspace(0.0, -0.5, 9), np.arange(-0.5014, -0.601, -5e
 """Samples close to each other only where the motion ends."""
 
 
-# where the rod's arms are in line with it: the parallelogram may go on as another, and what is
-# nearly one turns back
+@pytest.mark.parametrize(
+    ("turn", "ends"), [(COARSE, "distance"), (MIDDLE, "hinges"), (FINE, "distance")]
+)
+def test_parallelogram_in_line_goes_on(ends, turn):
+    """Where the rod's arms are in line with it the parallelogram may go on as another."""
+    found = swept(inside(0.0, ends), turn, order=0)
+    assert found.solved.all(), found.message
+    assert "crosses a singular pose near turn = -0.5707" in found.details["notes"][0]
+    at = pivot(2, CRANKS)
+    tip = np.column_stack([at + np.sin(LEAN - turn), np.cos(LEAN - turn), 0.0 * turn])
+    assert np.abs(found.points["tip2"].position - tip).max() <= 1e-12
+
+
+# where the rod's arms are in line with it, what is nearly a parallelogram turns back
 @pytest.mark.parametrize(
     ("turn", "ends", "off", "end"),
     [
-        (COARSE, "distance", 0.0, 0.5708),
-        (MIDDLE, "hinges", 0.0, 0.5708),
-        (FINE, "distance", 0.0, 0.5708),
         (COARSE, "hinges", 1e-6, 0.57053),
         (MIDDLE, "distance", 1e-6, 0.57053),
         (FINE, "hinges", 1e-6, 0.57053),
@@ -206,10 +214,12 @@ def test_sigmas_of_blocks():
         u, s, v = np.linalg.svd(matrix[np.ix_(inside, inside)])
         s[-1] *= near
         matrix[np.ix_(inside, inside)] = (u * s) @ v
-        factors = Factors(i, j, matrix[i, j], n)
-        largest, *small = Blocks(i, j, n).sigmas(
-            matrix[i, j, None], factors.solve, factors.solve_transposed
-        )[0]
+        factors = Order(i, j, matrix[i, j], n).factor(matrix[i, j])
+        solve, transposed = (
+            lambda b, of=of: of(b[:, 0])[:, None]
+            for of in (factors.solve, factors.solve_transposed)
+        )
+        largest, *small = Blocks(i, j, n).sigmas(matrix[i, j, None], solve, transposed)[0]
         others = [np.flatnonzero(block == k) for k in (0, 3, 1)]
         assert small == pytest.approx(
             [np.linalg.svd(matrix[np.ix_(at, at)], compute_uv=False)[-1] for at in others], rel=1e-9
@@ -233,25 +243,24 @@ def chain_of_hinges(loops):
     return Mechanism("chain", bodies, [*pivots, *pins], (), [JointAngle("turn", "pivot0")])
 
 
-def dense(model: SparseModel, elements: Elements):
-    found = np.zeros((len(elements.phi), elements.numbering.unknowns))
-    found[elements.rows, elements.columns] = elements.entries
-    return found[model.kept], found
+def dense(model: SparseEquations):
+    jacobian = model.jacobian()
+    found = np.zeros(jacobian.shape)
+    found[jacobian.rows, jacobian.columns] = jacobian.values
+    return found[model.rows.kept], found
 
 
 def test_rows_that_are_kept_are_well_conditioned(monkeypatch):
     """Of a chain of loops rows were left out at one end: the smallest singular value was nothing,
     that of all rows is not.
     """
-    model = SparseModel(chain_of_hinges(30), compiled=False)
-    kept, whole = (
-        np.linalg.svd(each, compute_uv=False)[-1] for each in dense(model, model.elements)
-    )
+    model = SparseEquations(chain_of_hinges(30), compiled=False)
+    kept, whole = (np.linalg.svd(each, compute_uv=False)[-1] for each in dense(model))
     assert kept > 0.2 * whole
-    assert len(model.dropped) == 90
+    assert len(model.rows.dropped) == 90
     monkeypatch.setattr(row_selection, "TOGETHER", 0)
-    assert not Jacobian.of(model.elements).well_chosen
-    other = SparseModel(chain_of_hinges(30), compiled=False)
-    assert np.linalg.svd(dense(other, other.elements)[0], compute_uv=False)[-1] < 1e-6 * whole
-    found = solve_sparse(other, Path({"turn": Ramp(1.0)}, np.linspace(0.0, 0.5, 9)))
+    assert not model.jacobian().well_chosen
+    other = SparseEquations(chain_of_hinges(30), compiled=False)
+    assert np.linalg.svd(dense(other)[0], compute_uv=False)[-1] < 1e-6 * whole
+    found = solve_sparse(chain_of_hinges(30), Path({"turn": Ramp(1.0)}, np.linspace(0.0, 0.5, 9)))
     assert found.solved.all(), found.message

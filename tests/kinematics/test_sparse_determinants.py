@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from kincheck.core.kinematics.sparse.determinant_signs import Blocks
-from kincheck.core.kinematics.structure.sparse_lu import Factors
+from kincheck.core.kinematics.structure.sparse_lu import Order
 
 
 @pytest.mark.parametrize("n", [6, 40])
@@ -13,13 +13,12 @@ def test_the_sign_of_the_determinant(n):
     rows, columns = np.nonzero(
         (rng.random((n, n)) < 3.0 / n) | np.eye(n, k=1, dtype=bool) | np.eye(n, k=1 - n, dtype=bool)
     )
-    factors = Factors(rows, columns, rng.normal(size=len(rows)), n)
+    order = Order(rows, columns, rng.normal(size=len(rows)), n)
     products: set[float] = set()
     signs: set[float] = set()
     for _ in range(50):
         values = rng.normal(size=len(rows))
-        factors.update(values)
-        factors.factor()
+        factors = order.factor(values)
         dense = np.zeros((n, n))
         dense[rows, columns] = values
         sign = np.linalg.slogdet(dense)[0]

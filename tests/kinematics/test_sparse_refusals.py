@@ -13,25 +13,27 @@ from kincheck.core import (
     SolveError,
     Spherical,
 )
-from kincheck.core.kinematics.sparse.sparse_equations import PoseError
-from kincheck.core.kinematics.sparse.sparse_model import SparseModel
-from kincheck.core.kinematics.sparse.sweep import solve_sparse
+from kincheck.core.kinematics.blocks.sparse_lanes import SparseLanes
+from kincheck.core.kinematics.compiled.request import Request
+from kincheck.core.kinematics.sparse.sparse_equations import SparseEquations
 from kincheck.core.mechanism.motions import Path, Ramp
 
+from ..support.block_structures import solve_sparse
 from ..support.mechanisms import four_bar, mcpherson, slider_crank
 from .test_chain import chain
 from .test_sparse import CRANK, X, turning
 
 
 def test_a_wrong_branch_is_no_solution():
-    model = SparseModel(CRANK, compiled=False)
-    here = model.moving(model.design, 0.0, model.drives(turning(0.0), np.zeros(1))[:, 0])
+    lanes = SparseLanes(SparseEquations(CRANK, compiled=False), Request(("turn",), ()))
+    lanes.accept(1e-12)
+    lanes.depart(0.0, turning(0.0))
     # half a turn about x: the axes are parallel, but opposite
     over = np.array([0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0])
-    with pytest.raises(PoseError, match="wrong branch"):
-        model.reach(
-            replace(here, state=over), 0.0, model.drives(turning(0.0), np.zeros(1))[:, 0], 1e-12
-        )
+    here = lanes.anchor(0.0)
+    lanes.restore(replace(here, pose=replace(here.pose, state=over)))
+    assert not lanes.attempt(np.zeros(1), turning(0.0))[0] > 0.0
+    assert "wrong branch" in str(lanes.failure(1e-12))
 
 
 def test_redundant_rows_that_contradict_are_told():
@@ -51,9 +53,8 @@ def test_redundant_rows_that_contradict_are_told():
 
 def test_an_end_of_the_travel_is_told_and_the_other_side_goes_on():
     values = np.linspace(-0.04, 0.4, 23)
-    model = SparseModel(mcpherson())
     found = solve_sparse(
-        model, Path({"stroke": Ramp(1.0)}, values), ["wheel"], ["knuckle"], order=1
+        mcpherson(), Path({"stroke": Ramp(1.0)}, values), ["wheel"], ["knuckle"], order=1
     )
     assert (found.solved == (values < 0.29337)).all()  # formulation section 10
     assert np.isnan(found.points["wheel"].position[~found.solved]).all()
@@ -62,7 +63,7 @@ def test_an_end_of_the_travel_is_told_and_the_other_side_goes_on():
     assert 0.0 < found.details["smallest_pivot"] < 1e-2
     assert found.points["wheel"].acceleration is None
     assert found.bodies["knuckle"].a is None
-    far = solve_sparse(model, Path({"stroke": Ramp(1.0)}, np.array([0.4, 0.5])))
+    far = solve_sparse(mcpherson(), Path({"stroke": Ramp(1.0)}, np.array([0.4, 0.5])))
     assert "no sample reached on this side" in far.message
     assert not far.solved.any()
     assert np.isnan([far.residual, far.details["redundant_residual"]]).all()
@@ -80,19 +81,19 @@ def test_what_cannot_be_solved_is_refused_by_name():
             r"1 degree of freedom .* but 0 drivers; what can still move is most of all 'crank0', "
         ),
     ):
-        SparseModel(without_driver(whole), compiled=False)
+        SparseEquations(without_driver(whole), compiled=False)
     second = JointAngle("second", "pivot20")
     with pytest.raises(
         SolveError, match=r"1 degree of freedom .* but 2 drivers; not independent are .*'second'"
     ):
-        SparseModel(
+        SparseEquations(
             Mechanism("two", whole.bodies, whole.joints, (), [*whole.drivers, second]),
             compiled=False,
         )
     stretched = slider_crank()
     push = [PointCoordinate("push", "end", X)]
     with pytest.raises(SolveError, match=r"driven by 'push' it does not move .*dead centre"):
-        SparseModel(
+        SparseEquations(
             Mechanism("stuck", stretched.bodies, stretched.joints, stretched.points, push),
             compiled=False,
         )
@@ -101,9 +102,9 @@ def test_what_cannot_be_solved_is_refused_by_name():
         joint.changed(length=3.0) if isinstance(joint, Distance) else joint for joint in m.joints
     ]
     with pytest.raises(SolveError, match="does not close at the design position: residual"):
-        SparseModel(Mechanism("apart", m.bodies, joints, m.points, m.drivers), compiled=False)
+        SparseEquations(Mechanism("apart", m.bodies, joints, m.points, m.drivers), compiled=False)
     with pytest.raises(SolveError, match="no body can move"):
-        SparseModel(Mechanism("still", [Body("wall", fixed=True)], []), compiled=False)
+        SparseEquations(Mechanism("still", [Body("wall", fixed=True)], []), compiled=False)
 
 
 def test_a_rod_that_spins_freely_is_named():
@@ -114,7 +115,7 @@ def test_a_rod_that_spins_freely_is_named():
     ]
     joints = [*(joint for joint in mechanism.joints if not isinstance(joint, Distance)), *rod]
     with pytest.raises(SolveError, match=r"but 1 driver; 'rod' can turn; .*use distance"):
-        SparseModel(
+        SparseEquations(
             Mechanism(
                 "spinning",
                 [*mechanism.bodies, Body("rod")],

@@ -13,14 +13,12 @@ from kincheck.core import (
 )
 from kincheck.core import solve_designs as designs
 from kincheck.core.case.io.model_writer import way_to
-from kincheck.core.kinematics.by_components.block_solver import Cascade
-from kincheck.core.kinematics.by_components.sweep import CascadeSweep
-from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.mechanism.motions import Path, Ramp, Sine
 from kincheck.core.studies.tolerance.sweep import sweep_designs
 from kincheck.core.studies.variation.variation_file import read_variation
 from kincheck.core.studies.verified_reference import prove_case
 
+from ..support.block_structures import solve_components
 from .test_chain import chain
 from .test_start import RADIUS, TIMES, arm, case_of, circling, phases_of, six
 
@@ -28,7 +26,7 @@ from .test_start import RADIUS, TIMES, arm, case_of, circling, phases_of, six
 def test_components_start_alike():
     for phase in (math.pi, six(math.pi)):
         path = Path({"turn": Sine(-1.2, 0.2, phase)}, TIMES)
-        found = CascadeSweep(Cascade(chain(3), Request(("turn",), ("end",))), path).solve(1e-12)
+        found = solve_components(chain(3), path, ("end",))
         expected = 3.0 + np.sin(0.3 - path.motions["turn"].at(TIMES)[0])
         assert found.solved.all(), found.message
         assert found.points["end"].position[:, 0] == pytest.approx(expected, abs=1e-12)

@@ -133,7 +133,7 @@ def with_an_arm(loops):
     )
 
 
-@pytest.mark.parametrize("loops", [1, 12], ids=["one program", "components"])
+@pytest.mark.parametrize("loops", [1, 21], ids=["one program", "components"])
 def test_numbers_that_may_change_are_read_at_each_call(loops):
     mechanism, turn, rate, numbers = (
         with_an_arm(loops),

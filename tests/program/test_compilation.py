@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from kincheck.core import solve, solve_designs
 from kincheck.core.caches import clear_caches
-from kincheck.core.kinematics.by_components.block_solver import Cascade
-from kincheck.core.kinematics.by_components.sweep import CascadeSweep
+from kincheck.core.kinematics.blocks.cascade import Cascade
+from kincheck.core.kinematics.blocks.component_lanes import ComponentLanes
+from kincheck.core.kinematics.blocks.sweep import BlockSweep
 from kincheck.core.kinematics.compiled import compiled_model as models
 from kincheck.core.kinematics.compiled.compiled_model import Model, compile_model
 from kincheck.core.kinematics.compiled.request import Request
@@ -107,7 +108,8 @@ def test_many_components_compile_their_programs():
     mechanism = chain(15)
     parts = components(mechanism, frames(mechanism))
     cascade = Cascade(mechanism, Request(("turn",), ()), parts)
-    solver = CascadeSweep(cascade, Path({"turn": Ramp(1.0)}, np.linspace(-0.5, 0.5, 65)))
+    path = Path({"turn": Ramp(1.0)}, np.linspace(-0.5, 0.5, 65))
+    solver = BlockSweep(ComponentLanes(cascade), path)
     assert all(kind.model._code.interpreted for kind in cascade.kinds)
     solver.solve(1e-12)
     assert not any(kind.model._code.interpreted for kind in cascade.kinds if len(kind.members) > 1)

@@ -158,11 +158,6 @@ class Route:
         """Cache for each thread."""
         return ThreadCache()
 
-    @cached_property
-    def settled(self) -> set[float]:
-        """Tolerances at which other rows do not improve the samples: not to be tried again."""
-        return set()
-
     def sampled(self, times: Array) -> Array:
         """Return the given values at the times, shape (sampled, n)."""
         return self.model.samples(times, self.path.drive(self.model.request.drivers, times))

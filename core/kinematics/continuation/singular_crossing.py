@@ -6,18 +6,21 @@ it, followed from before to beyond, give it by Lagrange's formula. If they belon
 motions, or the motion turns back, the formula does not hold or there are no eight. If the motion
 turns a corner too narrow for these poses, or has a gap as narrow, the last followed pose before the
 singular one does not lie on the polynomial.
+
+`bridge` passes a pose of one program and interpolates samples there. `cross` passes a pose of any
+solver that can go from a pose to a time: without an interpolation it is enough to see one curve.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
 from ...mechanism.motions import Path
 from ...trajectory import QUANTITIES, Array
-from ..compiled.compiled_model import Model
 from ..compiled.dense_equations import system_of
 from ..compiled.request import FROM, ORIENTATION, RATE, SIGMA, TIME
 from ..compiled.sample_rows import TESTS
@@ -37,6 +40,17 @@ PLACES = np.array([-4.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0])
 EIGHT = np.array([-1.0, 8.0, -28.0, 56.0, 56.0, -28.0, 8.0, -1.0]) / 70.0
 SIX = np.array([0.0, 1.0, -6.0, 15.0, 15.0, -6.0, 1.0, 0.0]) / 20.0
 COVERED = 30.0
+# A smallest singular value above this part of its largest is sound enough to look over a singular
+# pose from.
+SOUND = 0.1
+# Nothing is interpolated by `cross`: it is enough to see that there is one curve, and other
+# assemblies are farther off.
+SMOOTH = 1e-7
+# The last pose before is followed to where rounding leaves rates uncertain by a hundredth: itself
+# by this.
+NEARLY = 1e-7
+# Number of the first of the eight that is beyond.
+BEYOND = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +67,91 @@ class Bridge:
     kept: Array
     off: float
     beyond: Array
+
+
+class Numbers(NamedTuple):
+    """A pose as numbers: its state, and the rates of it with their rates."""
+
+    state: Array
+    rates: Array
+
+
+class Followed(Protocol):
+    """A pose of a motion that goes on from it."""
+
+    @property
+    def time(self) -> float:
+        """The time of the pose on its path [s]."""
+        ...
+
+    @property
+    def numbers(self) -> Numbers:
+        """The numbers of the pose."""
+        ...
+
+
+AnyPose = TypeVar("AnyPose", bound=Followed)
+
+
+Reach = Callable[[AnyPose, float, bool], AnyPose | None]
+"""Goes from a pose to a time, over a singular pose if that is true; None if it is out of reach."""
+
+
+def cross(
+    sound: AnyPose, near: AnyPose, aim: float, reach: Reach[AnyPose]
+) -> Sequence[AnyPose] | None:
+    """Return eight poses around a singular pose, or None if the motion is not known to go on: they
+    and the last one before it are on one smooth curve.
+
+    Args:
+        sound: the last pose far from singular.
+        near: the last pose before the singular one.
+        aim: time of a sample out of reach from there.
+    """
+    for poses in around(sound, near.time, aim - near.time, reach):
+        state, rates = numbers_of(poses)
+        off = [
+            float(np.abs(x @ (EIGHT - SIX)).max() / max(1.0, np.abs(x).max()))
+            for x in (state, rates)
+        ]
+        if max(off) <= SMOOTH and on_curve(state, near.numbers.state, NEARLY):
+            return poses
+    return None
+
+
+def around(
+    sound: AnyPose, time: float, way: float, reach: Reach[AnyPose]
+) -> Iterator[Sequence[AnyPose]]:
+    """Yield eight poses around a time, at different distances, for a motion in the direction of a
+    way.
+    """
+    speed = float(np.abs(sound.numbers.rates).max(initial=0.0))
+    for node in NODES if speed > 0.0 else ():
+        here: AnyPose | None = sound
+        found: list[AnyPose] = []
+        for k, each in enumerate((time + np.copysign(node / speed, way) * PLACES).tolist()):
+            here = reach(here, each, k == BEYOND)
+            if here is None:
+                break
+            found.append(here)
+        if len(found) == len(PLACES):
+            yield found
+
+
+def numbers_of(poses: Sequence[Followed]) -> Numbers:
+    """Return the numbers of poses, shape (numbers, poses)."""
+    state, rates = (
+        np.stack(each, axis=1) for each in zip(*(pose.numbers for pose in poses), strict=True)
+    )
+    return Numbers(state, rates)
+
+
+def on_curve(eight: Array, near: Array, error: float) -> bool:
+    """Return whether a state, known to an error, is on the polynomial through eight others at the
+    middle time.
+    """
+    known = COVERED * np.abs(eight @ (EIGHT - SIX)) + error
+    return bool((np.abs(eight @ EIGHT - near) <= known).all())
 
 
 def onward(route: Route, lane: Array, times: Array) -> Route:
@@ -89,11 +188,7 @@ def bridge(
         whole, lanes = found
         closure, sigma = (whole[model.rows[name].start] for name in ("closure", SIGMA))
         own = WORSE * float((np.maximum(closure, EPSILON) / sigma).max())
-        differences = np.abs(whole @ (EIGHT - SIX))
-        scales = _scales(model, whole, speed, rates=rates)
-        off = max(
-            [own, *(COVERED * float(differences[rows].max()) / scale for rows, scale in scales)]
-        )
+        off = max(own, interpolated(model.rows, whole, model.frame.unit, speed, rates=rates))
         if off <= AMPLIFIED * tol and (near is None or _on_curve(route, lanes, near)):
             kept = whole @ EIGHT
             tests = slice(model.rows[TESTS[0]].start, None)
@@ -123,22 +218,25 @@ def _on_curve(route: Route, lanes: Array, near: Array) -> bool:
     """
     system, time = system_of(route.model), near[[route.model.slots[FROM + TIME]]]
     solved = solve_closely(system, system.state(near[:, None]), route.sampled(time))
-    eight = system.state(lanes)
-    off, known = np.abs(eight @ EIGHT - solved.state[:, 0]), COVERED * np.abs(eight @ (EIGHT - SIX))
-    return bool((off <= known + WORSE * solved.error[0, 0]).all())
+    return on_curve(system.state(lanes), solved.state[:, 0], WORSE * float(solved.error[0, 0]))
 
 
-def _scales(
-    model: Model, kept: Array, speed: float, *, rates: bool
-) -> Iterator[tuple[slice, float]]:
-    """Return the rows of every motion and the scales of their errors: the mechanism's size, and for
-    rates their own size.
+def interpolated(
+    rows: Mapping[str, slice], whole: Array, unit: float, speed: float, *, rates: bool = True
+) -> float:
+    """Return a bound of the errors of motions interpolated between eight poses: of positions by the
+    mechanism's size, of rates by their own.
+
+    Args:
+        rows: of every motion; tests are left out.
+        whole: the motions at the poses, shape (rows, 8).
+        unit: the mechanism's size [m].
+        speed: largest rate of the unknowns.
+        rates: whether they are wanted.
     """
-    for name, rows in model.rows.items():
+    differences, off = np.abs(whole @ (EIGHT - SIX)), 0.0
+    for name, at in rows.items():
         label = name.split(" ")[0]
-        if label in TESTS:
-            continue
-        length = model.frame.unit if label in (*QUANTITIES, "r", "rdot", "rddot") else 1.0
         order = (
             1
             if label in ("velocity", "rdot", "omega")
@@ -146,7 +244,9 @@ def _scales(
             if label in ("acceleration", "rddot", "omega_t")
             else 0
         )
-        if order and not rates:
+        if label in TESTS or (order and not rates):
             continue
-        own = float(np.abs(kept[rows]).max()) if order else 0.0
-        yield rows, max(own, length * speed**order)
+        length = unit if label in (*QUANTITIES, "r", "rdot", "rddot") else 1.0
+        own = float(np.abs(whole[at]).max()) if order else 0.0
+        off = max(off, COVERED * float(differences[at].max()) / max(own, length * speed**order))
+    return off

@@ -62,10 +62,10 @@ class Findings:
         if self.renewed:
             found["rows_chosen_anew"] = self.renewed
         if self.poses:
-            found["singular_poses"] = self.poses
+            found["singular_poses"] = [*self.poses]
         if self.uncertain:
             found["uncertain_samples"] = sorted(self.uncertain)
-        return found | ({"notes": self.notes} if self.notes else {})
+        return found | ({"notes": [*self.notes]} if self.notes else {})
 
     def add_pose(
         self,

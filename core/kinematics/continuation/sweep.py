@@ -51,7 +51,7 @@ def _follow(route: Route, tol: float) -> Trajectory:
     findings: Mapping[str, Any] = {}
     if not math.isfinite(tol):  # nothing is asked of the samples
         message = "; ".join(found.messages)
-    elif found.ends or (tol not in route.settled and in_question(sigma, closure, tol, largest)):
+    elif found.ends or in_question(sigma, closure, tol, largest):
         from .singular_samples import scrutinise  # rarely needed
 
         scrutiny = scrutinise(route, found, tol)

@@ -20,6 +20,7 @@ class Blocks:
     All but the largest are assumed to be small: they are made dense.
 
     Attributes:
+        count: number of sigmas.
         rows, columns: one for those of the largest block, zero for all others, shape (n, 1).
         start: a vector without a preferred direction, shape (n, 1).
     """
@@ -54,6 +55,7 @@ class Blocks:
         place = np.empty(n, np.intp)
         place[order] = np.arange(n) - np.searchsorted(block[order], block[order])
         inside = block[rows] == block[row_of[columns]]
+        self.count = len(sizes) - (not well_chosen)
         self._groups: list[tuple[int, Indices, Indices]] = []
         for size in np.unique(sizes[sizes > 0]).tolist():
             number = np.where(sizes == size, np.cumsum(sizes == size) - 1, -1)

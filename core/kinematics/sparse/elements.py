@@ -20,18 +20,21 @@ from ...program.llvm.executor import LlvmExecutor
 from ...program.llvm.jit import LlvmCode
 from ...trajectory import Array
 from ..formulation.constraints import Constraint, Relation
+from ..structure.sparse_lu import Indices
 from .element_types import HOW, QUANTITIES, WHERE, ElementType, Member, Numbering
 
 
 class Elements:
-    """All constraints. Their values are in arrays overwritten by the next evaluation.
+    """All constraints at several poses. Their values are in arrays overwritten by the next
+    evaluation.
 
     Attributes:
+        poses: how many are evaluated at once.
         numbering: of states and rates.
         owners: for every row its joint or driver, and its primitive.
-        phi, nu, gamma: shape (rows,), in the order of the constraints.
-        branch: all branch tests, shape (tests,).
-        entries: of the Jacobian, shape (entries,); each place occurs once.
+        phi, nu, gamma: shape (rows, poses), in the order of the constraints.
+        branch: all branch tests, shape (tests, poses).
+        entries: of the Jacobian, shape (entries, poses); each place occurs once.
         rows, columns: of the entries, shape (entries,).
         results, parts: all of these, one after the other, and the place of each.
         drivers: their number.
@@ -44,10 +47,12 @@ class Elements:
         constraints: Sequence[Constraint | Relation],
         bodies: Sequence[str],
         drivers: int,
+        poses: int,
         *,
         compiled: bool,
     ) -> None:
-        members, self.drivers = list[Member](), drivers
+        members, self.poses, self.drivers = list[Member](), poses, drivers
+        self.compiled = compiled and available()
         self.owners: list[tuple[str, str]] = []
         for k, c in enumerate(constraints, drivers - len(constraints)):  # the drivers come last
             members.append(Member(c, len(self.owners), k if k >= 0 else None))
@@ -61,10 +66,7 @@ class Elements:
         kinds: dict[Any, list[Member]] = {}
         for member in members:
             kinds.setdefault(member.kind(self.numbering.bodies), []).append(member)
-        self.kinds, self.compiled = (
-            [ElementType(each, self.numbering) for each in kinds.values()],
-            compiled and available(),
-        )
+        self.kinds = [ElementType(each, self.numbering) for each in kinds.values()]
         self.rows, self.columns = (
             np.concatenate([getattr(kind, name).ravel() for kind in self.kinds])
             for name in ("rows", "columns")
@@ -75,21 +77,19 @@ class Elements:
         }
         ends = np.cumsum(list(sizes.values()))
         # one array, so that each kind writes once
-        self.results = np.zeros(ends[-1])
+        self.results = np.zeros((ends[-1], poses))
         self.phi, self.nu, self.gamma, self.branch, self.entries = np.split(self.results, ends[:-1])
         starts: dict[str, int] = dict(zip(QUANTITIES, [0, *ends[:-1].tolist()], strict=True))
         self.parts = {
             name: slice(starts[name], starts[name] + size) for name, size in sizes.items()
         }
         self.starts: list[Mapping[str, int]] = []
+        self._bound: list[_Bound] = []
         for kind in self.kinds:
             self.starts.append(dict(starts))
+            self._bound.append(_Bound(kind, self.results, starts, compiled=self.compiled))
             for name in ("branch", "entries"):
                 starts[name] += kind.size(name)
-        self._bound = [
-            _Bound(kind, self.results, at, compiled=self.compiled)
-            for kind, at in zip(self.kinds, self.starts, strict=True)
-        ]
 
     @property
     def sizes(self) -> dict[str, dict[str, int]]:
@@ -100,21 +100,22 @@ class Elements:
         """Update phi, nu, branch and entries.
 
         Args:
-            state: see `Numbering`.
-            drives: c, c_t, c_tt, cos c/2 and sin c/2 of every driver, shape (drivers * 5,).
+            state: see `Numbering`, shape (numbers, poses).
+            drives: c, c_t, c_tt, cos c/2 and sin c/2 of every driver, shape (drivers * 5, poses).
         """
-        given = np.concatenate([state, drives])
+        given = np.concatenate([state, drives]).ravel()
         for kind in self._bound:
             kind.run(WHERE, given)
 
     def accelerate(self, rates: Array) -> None:
-        """Update gamma at the rates, for the last evaluated pose."""
+        """Update gamma at the rates, shape (unknowns, poses), for the last evaluated poses."""
+        given = np.ascontiguousarray(rates).ravel()
         for kind in self._bound:
-            kind.run(HOW, rates)
+            kind.run(HOW, given)
 
 
 class _Bound:
-    """The constraints of a kind as lanes."""
+    """The constraints of a kind as lanes, at several poses."""
 
     def __init__(
         self, kind: ElementType, results: Array, starts: Mapping[str, int], *, compiled: bool
@@ -122,7 +123,8 @@ class _Bound:
         """Write the constants into an array with a start for every quantity, and prepare to write
         the rest.
         """
-        self._results, lanes = results, kind.lanes
+        poses: int = results.shape[1]
+        self._results, lanes = results.reshape(-1), kind.lanes * poses
         self._executor: Executor = (
             LlvmExecutor(LlvmCode(kind.plan), lanes)
             if compiled
@@ -130,20 +132,21 @@ class _Bound:
         )
         for rows, value in kind.constants(starts):
             results[rows] = value
+
+        def bound(slots: range, places: Indices) -> tuple[Array, Indices]:
+            """Return slots of all lanes in memory, and the place of each in a table of poses."""
+            at = (poses * places[..., None] + np.arange(poses)).reshape(-1, lanes)
+            return self._executor.window(slots), self._executor.arranged(at).copy()
+
         # gathered and scattered by one call each: of some hundred bodies it is the calls that take
         # the time
-        inputs = {name: (kind.inputs[name], read) for name, read in kind.read.items()}
-        outputs = {name: (kind.outputs[name], rows) for name, rows in kind.places(starts).items()}
-        self._taken, self._written = (
-            {
-                name: (self._executor.window(slots), self._executor.arranged(at).copy())
-                for name, (slots, at) in each.items()
-            }
-            for each in (inputs, outputs)
-        )
+        self._taken = {name: bound(kind.inputs[name], read) for name, read in kind.read.items()}
+        self._written = {
+            name: bound(kind.outputs[name], rows) for name, rows in kind.places(starts).items()
+        }
         if kind.geometry:
             slots = range(kind.geometry_at, kind.geometry_at + len(kind.geometry))
-            self._executor.put(slots, np.array(kind.geometry))
+            self._executor.put(slots, np.repeat(np.array(kind.geometry), poses, axis=1))
 
     def run(self, name: str, given: Array) -> None:
         """Run a program over numbers of the whole mechanism, and write its results."""

@@ -14,7 +14,6 @@ from ..compiled.solution import Columns
 from ..formulation.body_kinematics import motion_of_frame, motion_of_point
 from ..formulation.formulation import Acceleration
 from .sparse_equations import SparseEquations
-from .step_state import Stand
 
 
 class OutputMotions:
@@ -33,21 +32,23 @@ class OutputMotions:
         self._bodies = _Places(model, origins)
         self._frame = _columns([m.body(name).euler_parameters for name in request.bodies], 4)
 
-    def motions(self, at: Sequence[Stand]) -> Array:
-        """Return the motions at solved poses, shape (stands, columns)."""
-        order = self._order
-        of_points = self._points.motions(self._points.moving(at))[: order + 1]
+    def motions(self, *at: Array) -> Array:
+        """Return the motions at solved poses, by their states, rates and accelerations, shape
+        (numbers, poses) each; shape (columns, poses).
+        """
+        order, poses, points = self._order, at[0].shape[1], self._points
+        of_points = _side_by_side(
+            points.motions(points.moving(at))[: order + 1] if points.count else (),
+            (poses, points.count),
+        )
+        if not self._bodies.count:  # nearly always: they take as long as the points
+            return of_points
         moving = self._bodies.moving(at)
         r, *rates = self._bodies.motions(moving)
         p, *turning = motion_of_frame(quat(self._frame), *moving)
         pairs = [each for pair in zip(rates, turning, strict=True) for each in pair]
         of_bodies = [r, p, *pairs[: 2 * order]]
-        return np.hstack(
-            [
-                _side_by_side(of_points, (len(at), self._points.count)),
-                _side_by_side(of_bodies, (len(at), self._bodies.count)),
-            ]
-        )
+        return np.vstack([of_points, _side_by_side(of_bodies, (poses, self._bodies.count))])
 
 
 class _Places:
@@ -63,18 +64,14 @@ class _Places:
         self._position = _columns([position for _, position in places], 3)
         self._arm = _columns([tuple(model.frame.arm(*place)) for place in places], 3)
 
-    def moving(self, at: Sequence[Stand]) -> tuple[Pose, Twist, Acceleration]:
-        """Return poses, rates and accelerations of the bodies, each component of shape (stands,
+    def moving(self, at: Sequence[Array]) -> tuple[Pose, Twist, Acceleration]:
+        """Return poses, rates and accelerations of the bodies, each component of shape (poses,
         places).
         """
-        n, found = self._moving, list[Array]()
-        for rows, each in (
-            (7, [k.state for k in at]),
-            (6, [k.rates for k in at]),
-            (6, [k.accelerations for k in at]),
-        ):
-            whole = np.zeros((rows, len(at), n + 1))
-            whole[:, :, :n] = np.array(each)[:, : rows * n].reshape(len(at), rows, n).swapaxes(0, 1)
+        n, poses, found = self._moving, at[0].shape[1], list[Array]()
+        for rows, each in zip((7, 6, 6), at, strict=True):
+            whole = np.zeros((rows, poses, n + 1))
+            whole[:, :, :n] = each[: rows * n].reshape(rows, n, poses).swapaxes(1, 2)
             found.append(whole)
         found[0][3, :, n] = 1.0
         poses, rates, accelerations = (each[:, :, self._body] for each in found)
@@ -90,9 +87,11 @@ class _Places:
 
 
 def _side_by_side(found: Sequence[Vec3 | Quat], shape: tuple[int, int]) -> Array:
-    """Return components of vectors, of each place side by side, shape (stands, columns)."""
+    """Return components of vectors, of each place side by side, shape (columns, poses)."""
     components = [np.broadcast_to(component, shape) for each in found for component in each]
-    return np.stack(components, axis=-1).reshape(shape[0], -1)
+    if not components:
+        return np.empty((0, shape[0]))
+    return np.stack(components, axis=-1).reshape(shape[0], -1).T
 
 
 def _columns(rows: Sequence[Sequence[float]], count: int) -> Array:

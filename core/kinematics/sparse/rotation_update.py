@@ -1,4 +1,4 @@
-"""Turn many bodies at once: lanes as bodies."""
+"""Turn many bodies at once, at several poses: lanes are bodies."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ class Turn:
         )
 
     def __call__(self, q: Array, rotation: Array) -> Array:
-        """Euler parameters after rotations [rad], of length one; shapes (4 * bodies,) and (3 *
-        bodies,), component by component.
+        """Euler parameters after rotations [rad], of length one; shapes (4 * bodies, poses) and (3
+        * bodies, poses), component by component.
         """
         self._executor.put(BY, np.concatenate([q, rotation]).reshape(len(BY), -1))
         self._executor.run("turned")
-        return self._executor.get(TO).ravel()
+        return self._executor.get(TO).reshape(q.shape)

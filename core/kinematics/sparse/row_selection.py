@@ -25,7 +25,6 @@ import numpy as np
 
 from ...trajectory import Array
 from ..structure.sparse_lu import NARROW, Indices
-from .elements import Elements
 
 # Added to the squared length, one, of every row. A repeated row keeps this times the number of rows
 # it repeats, well below the pivots of independent ones, and far above round-off.
@@ -47,12 +46,6 @@ class Jacobian:
     columns: Indices
     values: Array
     shape: tuple[int, int]
-
-    @staticmethod
-    def of(elements: Elements) -> Jacobian:
-        """As last evaluated."""
-        shape = len(elements.phi), elements.numbering.unknowns
-        return Jacobian(elements.rows, elements.columns, elements.entries.copy(), shape)
 
     def among(self, kept: Indices) -> Indices:
         """Return the row of each entry in the order of the kept rows; -1 for rows left out."""

@@ -11,6 +11,7 @@ matrices, whose diagonals have no meaning: it took 1.6 s.
 from __future__ import annotations
 
 import importlib
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,28 +27,26 @@ NARROW = {"relax": 4, "panel_size": 4}
 PIVOT_THRESHOLD = 0.1
 
 
+class SingularError(ArithmeticError):
+    """The matrix cannot be factored."""
+
+
 class Ordered(NamedTuple):
     """A pattern in an order of elimination.
 
     Attributes:
-        rows, columns: of the entries, in that order.
-        entries: their indices among the original entries.
+        rows, columns: of the entries.
         row, column: position of every original row and column.
     """
 
     rows: Indices
     columns: Indices
-    entries: Indices
     row: Indices
     column: Indices
 
 
-class SingularError(ArithmeticError):
-    """The matrix cannot be factored."""
-
-
-class Factors:
-    """A square matrix and its factors, which are outdated from an update to the next factorisation.
+class Order:
+    """A square pattern in an order of elimination, found at some values.
 
     Raises:
         SingularError: the matrix is singular at the values given.
@@ -59,16 +58,14 @@ class Factors:
         first = self._factored(
             sparse.csc_matrix((values, (rows, columns)), shape=(n, n)), permc_spec="COLAMD"
         )
-        self._row: Indices = first.perm_r
-        self._column: Indices = first.perm_c
+        self.row: Indices = first.perm_r
+        self.column: Indices = first.perm_c
         numbered = sparse.csc_matrix(
-            (np.arange(len(values)) + 1.0, (self._row[rows], self._column[columns])), shape=(n, n)
+            (np.arange(len(values)) + 1.0, (self.row[rows], self.column[columns])), shape=(n, n)
         )
         numbered.sort_indices()
-        self._order: Indices = numbered.data.astype(np.intp) - 1
-        self._matrix = numbered
-        self.update(values)
-        self.factor()
+        self._entries: Indices = numbered.data.astype(np.intp) - 1
+        self._matrix, self._rows, self._columns = numbered, rows, columns
 
     def _factored(self, matrix: Any, **options: Any) -> Any:
         try:
@@ -79,32 +76,45 @@ class Factors:
                 raise SingularError("exactly singular") from error
             raise
 
-    @property
-    def ordered(self) -> Ordered:
-        """The entries in the order of the last factorisation."""
-        factors, by_place = self._factors, self._matrix.tocoo()
-        rows, columns = factors.perm_r[by_place.row], factors.perm_c[by_place.col]
-        return Ordered(
-            rows, columns, self._order, factors.perm_r[self._row], factors.perm_c[self._column]
-        )
+    def places(self, factors: Factors) -> Ordered:
+        """Return the pattern in the order of factors, with the rows that they exchanged."""
+        row, column = factors.row[self.row], factors.column[self.column]
+        return Ordered(row[self._rows], column[self._columns], row, column)
 
-    def update(self, values: Array) -> None:
-        """Set the matrix to other values, in the original order; the factors stay."""
-        self._matrix.data[:] = values[self._order]
+    def factor(self, values: Array) -> Factors:
+        """Return the factors of a matrix, its entries in the original order.
 
-    def factor(self) -> None:
-        """Factor the current matrix. Raises SingularError."""
-        self._factors = self._factored(self._matrix, permc_spec="NATURAL")
-
-    @property
-    def signed_pivot(self) -> float:
-        """The smallest pivot, with the sign of the determinant or always its opposite.
-
-        The cost is half a factorisation. The smallest singular value, by a step of inverse
-        iteration with these factors, is a better measure for a small matrix, but useless for a
-        large one: for a regular chain of 60 planar loops it is 1e-23, because redundant rows are
-        left out at one end.
+        Raises:
+            SingularError: the matrix is singular.
         """
+        self._matrix.data[:] = values[self._entries]
+        return Factors(self._factored(self._matrix, permc_spec="NATURAL"), self.row, self.column)
+
+
+class Factors:
+    """The factors of a square matrix.
+
+    Args:
+        factors: as SuperLU has them.
+        row, column: place of every original row and column in the order of elimination.
+    """
+
+    def __init__(self, factors: Any, row: Indices, column: Indices) -> None:
+        self._factors, self._row, self._column = factors, row, column
+
+    @property
+    def row(self) -> Indices:
+        """Places of the rows after exchanges."""
+        return self._factors.perm_r
+
+    @property
+    def column(self) -> Indices:
+        """Places of the columns."""
+        return self._factors.perm_c
+
+    @cached_property
+    def signed_pivot(self) -> float:
+        """The smallest pivot, with the sign of the determinant or always its opposite."""
         diagonal = self._factors.U.diagonal()
         odd = np.count_nonzero(diagonal < 0.0) + len(diagonal) - _cycles(self._factors.perm_r)
         smallest = float(np.abs(diagonal).min())
@@ -121,13 +131,13 @@ class Factors:
         return self._factors.nnz
 
     def solve(self, b: Array) -> Array:
-        """Solve for a right-hand side; outdated factors give an approximation."""
+        """Solve for a right-hand side."""
         placed = np.empty_like(b)
         placed[self._row] = b
         return self._factors.solve(placed)[self._column]
 
     def solve_transposed(self, b: Array) -> Array:
-        """Solve with the transposed matrix; several right-hand sides are columns."""
+        """Solve with the transposed matrix."""
         placed = np.empty_like(b)
         placed[self._column] = b
         return self._factors.solve(placed, "T")[self._row]

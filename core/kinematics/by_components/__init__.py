@@ -1,1 +1,0 @@
-"""Large mechanisms whose components can be solved one after the other."""

@@ -1,0 +1,125 @@
+"""Verdicts and digits do not depend on the blocks that a mechanism is solved by."""
+
+import numpy as np
+import pytest
+from kincheck import cases
+from kincheck.core import solve
+from kincheck.core.kinematics import Method, NativeSolver
+from kincheck.core.kinematics.compiled.compiled_model import recent_model
+from kincheck.core.kinematics.compiled.request import Request
+from kincheck.core.kinematics.compiled.samples import Route
+from kincheck.core.kinematics.continuation.singular_samples import scrutinise
+from kincheck.core.kinematics.continuation.walk import march
+from kincheck.core.mechanism.motions import Path, Ramp
+from kincheck.core.studies.bench.ring import ring, tip
+
+from ..support.block_structures import LEAN, solve_as, torus
+from .test_chain import chain
+from .test_sparse_choice import inside
+
+METHODS = Method.ONE_PROGRAM, Method.BY_COMPONENTS, Method.SPARSE
+
+
+def in_every_way(mechanism, turn, points, driver="turn"):
+    path = Path({driver: Ramp(1.0)}, np.asarray(turn))
+    return [solve_as(method, mechanism, path, points) for method in METHODS]
+
+
+@pytest.mark.parametrize(
+    ("rows", "columns", "crossed"), [(2, 2, 2), (2, 3, 1), (3, 3, 3)], ids=["2x2", "2x3", "3x3"]
+)
+def test_torus_has_one_verdict(rows, columns, crossed):
+    """Singular values vanish in pairs and in threes: neither pivots nor signs of determinants show
+    it, estimates of singular values do.
+    """
+    mechanism, at = torus(rows, columns)
+    turn = np.linspace(-0.5, 0.5, 32)
+    s, c, o = np.sin(LEAN - turn), np.cos(LEAN - turn), 0.0 * turn
+    for found in in_every_way(mechanism, turn, ("tip",)):
+        assert found.solved.all(), found.message
+        notes = found.details["notes"]
+        assert sum("crosses a singular pose" in note for note in notes) >= crossed
+        motion = found.points["tip"]
+        assert np.abs(motion.position - np.column_stack([at[0] + s, at[1] + c, o])).max() <= 3e-14
+        # what is interpolated is allowed 1e-9
+        assert np.abs(motion.velocity - np.column_stack([-c, s, o])).max() <= 1e-11
+        assert np.abs(motion.acceleration - np.column_stack([-s, -c, o])).max() <= 1e-9
+
+
+@pytest.mark.parametrize("cranks", [5, 9])
+def test_ring_has_one_verdict(cranks):
+    turn = np.linspace(-0.8, 0.8, 25)
+    expected = np.array([tip(cranks // 2, cranks, each) for each in turn])
+    for found in in_every_way(ring(cranks), turn, (f"tip{cranks // 2}",)):
+        assert found.solved.all(), found.message
+        assert "notes" not in found.details
+        assert np.abs(found.points[f"tip{cranks // 2}"].position - expected).max() <= 1e-13
+
+
+def test_bennett_loop_has_one_verdict():
+    """Three redundant rows of spatial hinges; the chosen ones are poor along half a turn."""
+    case = cases.load("bennett")
+    path = case.sweep.path
+    first, *others = [solve_as(method, case.mechanism, path, case.points) for method in METHODS]
+    assert first.solved.all()
+    for found in others:
+        assert found.solved.all(), found.message
+        for name, motion in first.points.items():
+            assert np.abs(found.points[name].position - motion.position).max() <= 1e-11
+
+
+@pytest.mark.parametrize("ends", ["distance", "hinges"])
+@pytest.mark.parametrize(("off", "reached"), [(0.0, 9), (1e-6, 5), (1e-4, 5)])
+def test_parallelogram_in_a_ring_has_one_verdict(off, reached, ends):
+    turn = np.linspace(0.0, -1.1, 9)
+    for found in in_every_way(inside(off, ends), turn, ()):
+        assert found.solved.sum() == reached
+
+
+@pytest.mark.parametrize("count", [3, 9, 65])
+def test_links_in_line_have_one_verdict(count):
+    """The middle sample is where all links are in line: what is known on both sides gives it."""
+    turn = LEAN + np.pi / 2.0 + np.linspace(-0.5, 0.5, count)
+    expected = np.column_stack([3.0 + np.sin(LEAN - turn), np.cos(LEAN - turn), 0.0 * turn])
+    for found in in_every_way(chain(3), turn, ("end",)):
+        assert found.solved.all(), found.message
+        assert np.abs(found.points["end"].position - expected).max() <= 1e-11
+
+
+def test_components_refuse_no_wrong_rates():
+    """Two millionths of a radian from a singular pose, rates were wrong in silence."""
+    turn = LEAN + np.pi / 2.0 - np.array([1e-1, 1e-5, 2e-6])
+    found = solve(chain(21), "turn", turn)
+    expected = np.column_stack([-np.sin(LEAN - turn), -np.cos(LEAN - turn), 0.0 * turn])
+    off = np.abs(found.points["end"].acceleration - expected).max(axis=1)
+    assert (off[found.solved] <= 1e-9).all()
+
+
+def test_scrutiny_of_a_route_is_remembered():
+    """A route that is solved again gives the same digits, findings and details, and its owner may
+    change them.
+    """
+    mechanism, _ = torus(2, 2)
+    path = Path({"turn": Ramp(1.0)}, np.linspace(-0.5, 0.5, 32))
+    solver = NativeSolver(method=Method.ONE_PROGRAM).prepare(mechanism, path, ("tip",))
+    first, second = solver(1e-12), solver(1e-12)
+    assert first.details["retried_samples"] > 0
+    assert first.details == second.details
+    for label in ("position", "velocity", "acceleration"):
+        np.testing.assert_array_equal(
+            getattr(first.points["tip"], label), getattr(second.points["tip"], label)
+        )
+    second.details["notes"].clear()
+    second.details["singular_poses"].clear()
+    assert solver(1e-12).details == first.details
+
+
+def test_scrutiny_of_other_poses_is_not_taken():
+    mechanism, _ = torus(2, 2)
+    path = Path({"turn": Ramp(1.0)}, np.linspace(-0.5, 0.5, 32))
+    route = Route(recent_model(mechanism, Request(("turn",), ("tip",))), path)
+    findings = [scrutinise(route, march(route, 1e-12), 1e-12) for _ in range(2)]
+    assert findings[0] is findings[1]
+    other = march(route, 1e-12)
+    other.kept[route.model.rows["position tip"].start, 3] += 1e-6
+    assert scrutinise(route, other, 1e-12) is not findings[0]
