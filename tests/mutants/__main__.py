@@ -141,17 +141,19 @@ def judge(mutant: Mutant, sandbox: Sandbox, entered: Entered, rest: bool) -> dic
 
 
 def _run(mutant: Mutant, sandbox: Sandbox, tests: Sequence[str], entered: Entered) -> Run:
-    """Run tests with the change; what fails without it too, on a busy machine, is no finding."""
-    seconds = sum(map(entered.seconds, tests))
+    """Run tests with the change. A test that fails finds it if it fails again, and passes without:
+    others fail because the machine is busy.
+    """
+    limit = STARTS + SLOWER * sum(map(entered.seconds, tests))
     while tests:
         with sandbox.changed(mutant):
-            run = sandbox.run(tests, STARTS + SLOWER * seconds)
+            run = sandbox.run(tests, limit)
             if run.outcome == "unknown":  # names of tests come from the changed code
-                run = sandbox.run(_files(tests), STARTS + SLOWER * seconds)
-        if (
-            not run.failing
-            or sandbox.run(run.failing, STARTS + SLOWER * seconds).outcome == "passed"
-        ):
+                run = sandbox.run(_files(tests), limit)
+            if not run.failing:
+                return run
+            again = sandbox.run(run.failing, limit).outcome != "passed"
+        if again and sandbox.run(run.failing, limit).outcome == "passed":
             return run
         tests = [test for test in tests if test not in run.failing]
     return Run("passed", (), "")
