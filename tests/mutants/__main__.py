@@ -50,7 +50,7 @@ def main(argv: Sequence[str]) -> int:
     parser.add_argument("count", nargs="?", type=int, default=100)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--list", type=Path, help="file of results (default .mutants/SEED.json)")
-    parser.add_argument("--related", action="store_true", help="leave out the rest of the suite")
+    parser.add_argument("--quick", action="store_true", help="a minute's choice of related tests")
     parser.add_argument("--again", action="store_true", help="judge those of the list again")
     parser.add_argument("--only", metavar="ID", nargs="+", help="judge these of the list again")
     parser.add_argument("--survivors", action="store_true", help="print them and end")
@@ -73,12 +73,13 @@ def main(argv: Sequence[str]) -> int:
     again = options.again or options.only
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # so that the copy goes
     with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
+        Path(folder).chmod(0o755)  # some tests are another user for a while
         sandbox = Sandbox(Path(folder), sources)
         entered = Entered.read(KEPT / "entered.json")
         entered.renew(sandbox)
         for number, mutant in enumerate(chosen, 1):
             if again or mutant.id not in found:
-                found[mutant.id] = judge(mutant, sandbox, entered, not options.related)
+                found[mutant.id] = judge(mutant, sandbox, entered, options.quick)
                 file.write_text(json.dumps(found, indent=1), encoding="utf-8")
             result = found[mutant.id]
             print(
@@ -114,7 +115,7 @@ def sample(sites: Mapping[str, Sequence[Sequence[Mutant]]], count: int, seed: in
     return chosen
 
 
-def judge(mutant: Mutant, sandbox: Sandbox, entered: Entered, rest: bool) -> dict[str, Any]:
+def judge(mutant: Mutant, sandbox: Sandbox, entered: Entered, quick: bool) -> dict[str, Any]:
     """Run the tests of a mutant until one fails."""
     started = time.monotonic()
     end, by = "survived", ""
@@ -122,7 +123,7 @@ def judge(mutant: Mutant, sandbox: Sandbox, entered: Entered, rest: bool) -> dic
         end, by = "harmless", reason
     else:
         stages = [*entered.stages(mutant)]
-        for tests in stages if rest else stages[:-1]:
+        for tests in stages[:1] if quick else stages:
             run = _run(mutant, sandbox, tests, entered)
             if run.outcome != "passed":
                 end = "timeout" if run.outcome == "timeout" else "killed"

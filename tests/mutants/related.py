@@ -4,6 +4,7 @@ import hashlib
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import zip_longest
 from pathlib import Path
 
 from ..support.sources import ROOT, SOURCES, TESTS, imported, module_of, tree
@@ -12,6 +13,8 @@ from .sites import Mutant
 
 AT_ONCE = 8
 """Test files that are run at once."""
+FIRST_LOOK = 60.0
+"""Seconds of the first tests of a mutant that no test finds."""
 LIMIT = 7200.0
 """Seconds in which they end, on a busy machine."""
 
@@ -91,7 +94,9 @@ class Entered:
                 print(f"fails without a change, and judges nothing: {test}")
 
     def stages(self, mutant: Mutant) -> Iterator[list[str]]:
-        """Yield the tests of a mutant, those first that most likely see it, each test once."""
+        """Yield the tests of a mutant, those first that most likely see it, each test once: some
+        that enter the function, the others, those in the same files, and the rest.
+        """
         function = mutant.function
         if function:
             first = self._entering(lambda name: name == f"{_inside(mutant.path)} {function}")
@@ -103,10 +108,24 @@ class Entered:
         if not function:
             second += self._entering(lambda name: name.split()[0] in users)
         judged = set(self.failing)
-        for stage in (first, second, [*self.tests]):
+        for stage in (self._some(first), first, second, [*self.tests]):
             tests = [test for test in dict.fromkeys(stage) if test not in judged]
             judged.update(tests)
             yield sorted(tests, key=self.seconds)
+
+    def _some(self, tests: Sequence[str]) -> list[str]:
+        """Return the short ones of every file in turn, within the time of a first look."""
+        by_file: dict[str, list[str]] = {}
+        for test in sorted(tests, key=self.seconds):
+            by_file.setdefault(file_of(test), []).append(test)
+        turns = (test for turn in zip_longest(*by_file.values()) for test in turn if test)
+        some, seconds = list[str](), 0.0
+        for test in turns:
+            seconds += self.seconds(test)
+            if some and seconds > FIRST_LOOK:
+                break
+            some.append(test)
+        return some
 
     def _entering(self, chosen) -> list[str]:
         mask = sum(1 << k for k, name in enumerate(self.functions) if chosen(name))

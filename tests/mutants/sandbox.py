@@ -175,6 +175,5 @@ class Sandbox:
 
 
 def _bound() -> None:
-    """Of the process of tests: other work on the machine goes first, memory is bounded."""
-    os.nice(10)
+    """Bound the memory of the process of tests, before they need that of the machine."""
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))

@@ -9,7 +9,7 @@ from kincheck.core.harness.record import Deviations, Results, Seconds, to_json
 from kincheck.core.report.table import print_outputs
 
 from ..support.made_up import ACCOUNT, GRID, results, series
-from ..support.printed import assert_printed, assert_row, blocks, cells_of
+from ..support.printed import Terminal, assert_printed, assert_row, blocks, cells_of, coloured
 from .page import report
 
 MOTIONS = ("position", "velocity", "acceleration")
@@ -33,7 +33,9 @@ def shown(tmp_path, monkeypatch):
             position=msgspec.structs.replace(
                 found.position, max_abs=2.46e-10, worst_step=7, tolerance=3e-9, within=True
             ),
-            velocity=msgspec.structs.replace(found.velocity, max_abs=1234.5, worst_step=9),
+            velocity=msgspec.structs.replace(
+                found.velocity, max_abs=1234.5, worst_step=9, within=False
+            ),
         ),
         "load": Deviations(
             position=msgspec.structs.replace(found.position, max_abs=0.125, worst_step=3),
@@ -197,3 +199,23 @@ def test_errors_are_on_the_terminal_as_json_has_them(shown):
         assert (outcome, errors) == (record["outcome"], expected)
         us = record["us_per_step"]
         assert time == ("–" if us is None else f"{us:.0f}" if us > 999.5 else f"{us:.3g}")
+
+
+def test_what_is_off_is_red_on_a_terminal(shown, monkeypatch):
+    found, _, _ = shown
+    results = msgspec.convert(found, Results)
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "200")
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    screen = Terminal()
+    print_outputs(results, screen)
+    off = [
+        f"{each['max_abs']:.1e} of {each['tolerance']:.0e}"
+        for record in answered(found)
+        for _, _, each in deviations_of(record)
+        if not each["within"]
+    ]
+    assert coloured(screen.getvalue()) == {
+        "red": [*off, "fail", "6.0e-09", "1.2e+03"],
+        "green": ["pass"],
+    }

@@ -1,5 +1,6 @@
-"""Printed numbers against the numbers they stand for."""
+"""Printed numbers against the numbers they stand for, and colours of a terminal."""
 
+import io
 import math
 import re
 from collections.abc import Sequence
@@ -42,3 +43,18 @@ def cells_of(block: str, heads: Sequence[str]) -> list[str]:
     found = re.fullmatch(" ".join(f"{re.escape(head)} (.+)" for head in heads), block)
     assert found, f"{block}: expected {', '.join(heads)}"
     return [*found.groups()]
+
+
+class Terminal(io.StringIO):
+    """A terminal, by its own word."""
+
+    def isatty(self):
+        return True
+
+
+def coloured(text: str) -> dict[str, list[str]]:
+    """Return what a terminal shows in red and in green, in its order."""
+    return {
+        colour: [each.strip() for each in re.findall(rf"\x1b\[{code}m(.*?)\x1b\[0m", text)]
+        for colour, code in (("red", "1;31"), ("green", "32"))
+    }
