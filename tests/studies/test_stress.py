@@ -35,8 +35,10 @@ def test_a_small_loop_hides_no_corner_of_the_large_one():
 
 @pytest.mark.parametrize("name", FAMILIES)
 def test_specimens_are_made_again_and_can_be_saved(name, tmp_path):
-    """The same numbers for the same seed; and a case file says all of them."""
-    for number in range(2):
+    """The same numbers for the same seed, every kind of each family among them; a case file says
+    all of them.
+    """
+    for number in range(12):
         one, again = (
             FAMILIES[name].specimen(np.random.default_rng([4, number]), 6) for _ in range(2)
         )
@@ -47,6 +49,7 @@ def test_specimens_are_made_again_and_can_be_saved(name, tmp_path):
             assert one.truth is None
             continue
         assert case.mechanism == again.describe().mechanism
+        assert np.ptp(case.sweep.path.values(case.sweep.path.times), axis=1).max() > 0.0
         file = tmp_path / f"{number}.toml"
         file.write_text(case_text(case, ["a comment"]), encoding="utf-8")
         read = load_case(file)
