@@ -33,18 +33,34 @@ def shown(tmp_path_factory):
     return study(tmp_path_factory.mktemp("study"), "monte_carlo", samples=SAMPLES, jobs=JOBS)
 
 
-def study(folder, mode, **options):
-    case = load("mcpherson_strut")
+def variation(folder, mode):
     file = folder / "vary.json"
     file.write_text(
         json.dumps({**HEAD, "mode": mode, "hardpoints": VARIED, "limits": LIMITS}), "utf-8"
     )
-    results = sweep_designs(case, read_variation(file, case), **options)
+    return read_variation(file, load("mcpherson_strut"))
+
+
+def study(folder, mode, **options):
+    results = sweep_designs(load("mcpherson_strut"), variation(folder, mode), **options)
     text = io.StringIO()
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("COLUMNS", "60")
         print_sweep(results, text)
     return json.loads(to_json(results)), text.getvalue(), Page(page(results))
+
+
+def test_study_as_data_and_in_a_sentence_is_that_of_json(tmp_path):
+    case = load("mcpherson_strut")
+    results = sweep_designs(case, variation(tmp_path, "one_at_a_time"))
+    found, data = json.loads(to_json(results)), results.dataset()
+    assert results.summary() == "mcpherson_strut, one_at_a_time, 11 variants, 2 outputs"
+    assert [*data.coords["stroke"].values] == found["driver"]["stroke"]
+    for name, each in found["outputs"].items():
+        curves = dict(zip(data.coords["band"].values, data.variables[name].values.T, strict=True))
+        assert {band: values.tolist() for band, values in curves.items()} == {
+            band: each[band] for band in ("nominal", "mean", "min", "max", "standard_deviation")
+        }
 
 
 def effect(gradient):
