@@ -6,7 +6,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 UV := $(shell command -v uv 2>/dev/null)
 
-.PHONY: run test docs lock sizes fuzz clean
+.PHONY: run test docs lock sizes house mutants fuzz clean
 
 run: .venv/ready
 	$(BIN)/kincheck run mcpherson_strut --out report
@@ -68,9 +68,19 @@ sizes:
 		folder=$$(mktemp -d) && $(PYTHON) -m venv $$folder && $$folder/bin/python -m pip install --quiet ".$$extras" \
 		&& echo "kincheck$$extras $$(du -sm $$folder | cut -f1) MB"; rm -rf $$folder; done
 
+# Tokens, files and functions of each room, against the budgets in tests/house.toml.
+house: .venv/ready
+	$(BIN)/python -m tests.house
+
+# Share of small mistakes that the tests find, by room: make mutants N=200 SEED=5
+N ?= 100
+SEED ?= 1
+mutants: .venv/ready
+	$(BIN)/python -m tests.mutants $(N) --seed $(SEED)
+
 # An hour on each reader.
 fuzz: .venv/ready
 	for reader in casefile hardpoints mjcf reference results sdf urdf; do nice $(BIN)/python -m tests.fuzz $$reader --seconds 3600 || exit 1; done
 
 clean:
-	rm -rf .venv build report site *.egg-info
+	rm -rf .venv build report site .mutants *.egg-info

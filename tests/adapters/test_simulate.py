@@ -203,6 +203,33 @@ def test_jointed_moves_as_the_mechanism_does():
         assert np.abs(motion.acceleration - there.points[name].acceleration).max() <= 1e-11
 
 
+@pytest.mark.parametrize("along", [(1.0, 0.0, 0.0), (0.6, 0.8, 0.0), (0.0, 0.0, 1.0)])
+def test_jointed_rod_of_a_crank_turns_all_round(along):
+    """Its cross hinges about the crank's axis, since any other lies along the rod once a turn; but
+    about another where the rod lies along that axis.
+    """
+    pin, rod = np.array((0.2, 0.0, 0.0)), np.array(along)
+    mechanism = Mechanism(
+        "crank and block",
+        [Body("crank"), Body("block")],
+        [
+            Revolute("pivot", "ground", "crank", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+            Distance("rod", "crank", "block", (tuple(pin), tuple(pin + rod))),
+            Translational("rail", "ground", "block", tuple(pin + rod), along),
+        ],
+        [Point("end", "block", tuple(pin + rod))],
+        [JointAngle("turn", "pivot")],
+    )
+    turns = np.linspace(0.0, 2.0 * np.pi, 73)
+    here, there = (
+        solve(each, "turn", turns).points["end"] for each in (mechanism, jointed(mechanism))
+    )
+    assert np.abs(there.position - here.position).max() <= 1e-14
+    first, second = jointed(mechanism).joint("rod: cross").axes
+    assert abs(first[2]) == (along[2] != 1.0)
+    np.testing.assert_allclose([np.dot(first, second), np.dot(second, rod)], 0.0, atol=1e-15)
+
+
 def slide(values, motion=None):
     """A block on a rail, driven along it."""
     rail = Translational("rail", "ground", "block", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0))

@@ -15,10 +15,10 @@ from kincheck.core import (
     JointAngle,
     Mechanism,
     Point,
-    Polynomial,
     Revolute,
 )
 from kincheck.core.case.case import Case, Output, Sweep, Truth
+from kincheck.core.case.joint_probe import probes
 from kincheck.core.cli import main
 from kincheck.core.harness.record import Outcome, from_json
 from kincheck.core.mechanism.motions import Sine
@@ -58,30 +58,37 @@ def gears():
     return Case("gears", "made up", Truth.CONSENSUS_ONLY, mechanism, sweep, (output,))
 
 
-def bent(case):
-    """Return the case with a polynomial in place of its gear."""
-    coupler = Polynomial("cam", ("b", "a"), coefficients=(0.0, 1.0, 0.2))
-    return replace(case, mechanism=replace(case.mechanism, couplers=[coupler]))
-
-
 def test_what_a_solver_cannot_express_is_named():
     case = gears()
-    assert "mesh" in adapters.engine("pinocchio", "simulate").unsupported(case)
     uneven = replace(case, sweep=Sweep("turn", np.array([0.0, 0.1, 0.3])))
     assert "equidistant" in adapters.engine("exudyn", "simulate").unsupported(uneven)
     # two turns and more of the second gear
     assert record(case, simulation("exudyn-static")).outcome is Outcome.PASS
 
 
-@pytest.mark.parametrize("name", ["pinocchio", "exudyn", "drake", "dart", "simbody"])
-def test_polynomial_couplers_are_refused_by_name(name):
-    assert "cam" in adapters.engine(name, "simulate").unsupported(bent(gears()))
+COUPLED = "constant_velocity gear polynomial rack_pinion screw"
+EXUDYN = "constant_velocity polynomial revolute_spherical"
+REFUSED = {
+    **dict.fromkeys(("mujoco", "mujoco-default", "mujoco-projecting"), ""),
+    **dict.fromkeys(("pinocchio", "dart"), COUPLED),
+    **dict.fromkeys(("exudyn", "exudyn-alpha", "exudyn-static", "exudyn-static-modified"), EXUDYN),
+    **dict.fromkeys(("drake", "simbody"), "polynomial"),
+}
+"""Joint and coupler types that simulators refuse; all others they simulate."""
+
+
+@pytest.mark.parametrize("name", adapters.SIMULATIONS)
+def test_joints_of_simulators_are_those_of_the_table(name):
+    engine = adapters.engine(name, "simulate")
+    found = {case.name: engine.unsupported(case) for case in probes()}
+    refused = {kind: message for kind, message in found.items() if message is not None}
+    assert " ".join(sorted(refused)) == REFUSED[name]
+    assert all(f"'tested' ({kind})" in message for kind, message in refused.items())
 
 
 def test_steps_refuse_what_their_simulator_has_no_constraint_of():
-    case, drake, dart = gears(), *(adapters.engine(n, "simulate") for n in ("drake", "dart"))
-    assert "'mesh' (gear): the steps of DART have no constraint" in dart.unsupported(case)
-    uneven = replace(case, sweep=Sweep("turn", np.array([0.0, 0.1, 0.3])))
+    drake, dart = (adapters.engine(n, "simulate") for n in ("drake", "dart"))
+    uneven = replace(gears(), sweep=Sweep("turn", np.array([0.0, 0.1, 0.3])))
     assert "equidistant" in drake.unsupported(uneven)
     joints = [
         replace(joint, length=joint.rod_length + 1e-3) if isinstance(joint, Distance) else joint

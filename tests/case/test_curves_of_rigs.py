@@ -65,6 +65,14 @@ FORMS = {
         "head": "No,Load (N),stroke [mm],camber_left [deg],toe_in [deg],camber_right [deg],ok",
         "form": "1,x,{0},{2},{1},,True",
     },
+    "an exact name before a similar one": {
+        "head": "Travel [mm],toe_in [deg],toe [deg],camber_angle [deg],camber [deg]",
+        "form": "{0},9,{1},9,{2}",
+    },
+    "an exact name after a similar one": {
+        "head": "Travel [mm],toe [deg],toe_in [deg],camber [deg],camber_angle [deg]",
+        "form": "{0},{1},9,{2},9",
+    },
     "blanks": {"head": "travel [mm]  toe (deg)  camber (deg)", "form": "{}   {} {}"},
     "decimal points and semicolons": {"head": "travel;toe;camber\nmm;deg;°", "form": "{};{};{}"},
 }
@@ -82,7 +90,9 @@ def test_a_curve_is_judged(tmp_path, car, kind):
     assert record.evidence.units["stroke"] == "mm"
     assert record.evidence.units["toe"].startswith(("deg", "°"))
     assert record.evidence.signs == "iso8855 (assumed: the file names none)"
-    assert any("left out" in note for note in notes) == (kind == "further columns")
+    assert any("left out" in note for note in notes) == (
+        kind == "further columns" or "exact" in kind
+    )
 
 
 def test_what_the_user_states(tmp_path, car):

@@ -142,8 +142,14 @@ def test_what_a_case_file_cannot_hold_is_refused(tmp_path: Path):
     case = load(file, Supplied(drive=("hinge:0:1:5",)))
     with pytest.raises(CaseError, match=r"found 201 characters, expected 1 to 200.*; rename it"):
         case_text(case)
-    source = case_text(replace(crank(tmp_path, EVEN), source=20_000 * "s"))
-    assert "ss [...]" in source
+    out = tmp_path / "out.toml"
+    for length in (10_000, 10_001, 20_000):
+        out.write_text(case_text(replace(crank(tmp_path, EVEN), source=length * "s")))
+        cut = length * "s" if length == 10_000 else f"{9_994 * 's'} [...]"
+        assert load_case(out).source == cut
+    out.write_text(out.read_text().replace("ss [...]", "sss [...]"))
+    with pytest.raises(CaseError, match="found a text of 10001 characters, expected 10000 at most"):
+        load_case(out)
 
 
 def test_the_command_writes_a_file_that_runs(tmp_path: Path, capsys: pytest.CaptureFixture[str]):

@@ -188,6 +188,15 @@ def test_stand_ins_are_no_masses(tmp_path, writer):
     assert "with the masses" not in case.source
 
 
+@pytest.mark.parametrize(("key", "mass"), [("mass", 2e-6), ("ixx", 1e-6)])
+def test_small_masses_unlike_a_stand_in_count(tmp_path, key, mass):
+    text = written(load(kincheck.cases.FOLDER / "five_bar.toml"), sdf.write)[".sdf"]
+    file = tmp_path / "model.sdf"
+    file.write_text(text.replace(f"<{key}>1e-06", f"<{key}>2e-06", 1))
+    case = load(file, Supplied(drive=("left_pivot:0:0.1:3",), hold_rest=True))
+    assert [body.mass for body in case.mechanism.bodies if body.mass] == [mass]
+
+
 def test_inertia_is_in_global_axes_at_design(tmp_path):
     """A bar along x in a body turned by 90 degrees about z lies along y."""
     text = (

@@ -140,3 +140,19 @@ def test_entities_are_refused(tmp_path: Path):
     file = robot(tmp_path, '<!DOCTYPE r [<!ENTITY a "b">]>' + FOUR_BAR)
     with pytest.raises(CaseError, match="found <!DOCTYPE>, expected none"):
         load(file, DRIVE)
+
+
+MOVING = """<robot name="r"><link name="base"/><link name="{name}"/><link name="tip"/>
+<joint name="turn" type="{kind}"><parent link="base"/><child link="{name}"/>{limit}</joint>
+<joint name="end" type="revolute"><parent link="{name}"/><child link="tip"/>{limit}</joint></robot>
+"""
+LIMIT = '<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/>'
+
+
+@pytest.mark.parametrize("kind", ["revolute", "prismatic"])
+@pytest.mark.parametrize("name", ["ground", "world"])
+def test_moving_link_named_as_the_world_is_refused(name: str, kind: str, tmp_path: Path):
+    """It is not taken for the world, which would fix it in silence."""
+    file = robot(tmp_path, MOVING.format(name=name, kind=kind, limit=LIMIT))
+    with pytest.raises(CaseError, match=f"found '{name}'.*rename"):
+        load(file, DRIVE)

@@ -70,6 +70,8 @@ def test_quiet_and_verbose(kincheck_main, capsys):
         (["--engine", "native", "run"], "it belongs to kincheck run"),
         (["bench", "--rounds", "3"], "'--rounds'; it belongs to kincheck bench engines"),
         (["sweep", "--sample", "1e3", "--vari", "f"], "kincheck sweep: error: "),
+        (["run", "--mode", "projecton"], "projection, simulate; did you mean 'projection'?\n"),
+        (["run", "--mode", "dream"], "'dream' is none of projection, simulate\n"),
         (["sweep", "--varry", "f"], "no option '--varry'; did you mean '--vary'?"),
         (["explain", "rssr", "bennett"], "kincheck explain: error: too many arguments: bennett"),
         (["export", "rssr", "--at", "nan"], "'nan' is not a number"),

@@ -12,6 +12,7 @@ from kincheck.core.case.suspension import camber_of_front_view
 from kincheck.core.harness.record import Outcome, from_json, to_json
 from kincheck.core.harness.run import run
 from kincheck.core.harness.slips import FACTORS, Held, slips
+from kincheck.core.mechanism.motions import Ramp
 from kincheck.core.report.junit import to_junit
 from kincheck.core.report.matrix import to_markdown
 from kincheck.core.report.report import headline, write_report
@@ -74,6 +75,21 @@ def test_a_slip_is_named_with_how_well_it_explains(words):
     assert f"at sample {found.sample} " in found.message
     assert "suspect the reference, the output's component or a sign" in found.message
     assert from_json(to_json(results)) == results
+
+
+@pytest.mark.parametrize(
+    ("driver", "unit", "written"),
+    [("angle", "deg", "angle = 28.64788976 deg"), ("angle", "rad", "angle = 0.5 rad")]
+    + [("time", "deg", "time = 0.5 s")],
+)
+def test_a_suspected_sample_is_told_in_the_unit_of_its_file(driver, unit, written):
+    bump = np.where(np.arange(9) == 6, 0.01, 0.0)
+    case = with_reference(lambda name, x, _: Series(x.position + bump, x.velocity, x.acceleration))
+    sweep = replace(case.sweep, driver=driver)
+    if driver == "time":
+        sweep = replace(sweep, rate=1.0, motions={"angle": Ramp(2.0)})
+    suspects = run([replace(case, sweep=sweep, angle_unit=unit)], ENGINES, tol=1e-12).suspects
+    assert f"at sample 6 ({written}) of output" in suspects["crank"].message
 
 
 def test_reversed_samples_are_told_from_another_sign_by_the_derivatives():

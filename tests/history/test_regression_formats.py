@@ -10,8 +10,10 @@ from kincheck.core.history.store import Store
 from kincheck.core.report.regression_junit import to_regression_junit
 from kincheck.core.report.regression_labels import headline, rows
 from kincheck.core.report.regression_summary import to_markdown
+from kincheck.core.report.regression_text import print_regressions
 
 from ..support.nights import changed, keep, nights, records, reported, times, worse
+from ..support.printed import Terminal, coloured
 
 
 def test_the_command_writes_every_format(path, tmp_path, capsys):
@@ -85,7 +87,7 @@ def test_markdown_takes_foreign_text_as_text_and_folds_what_is_alike(path):
 
 def test_a_terminal_shows_tables_without_marks(path, capsys, monkeypatch):
     nights(path, 6)
-    keep(path, changed(records(), **worse(20.0), message="<script> | *x*"))
+    keep(path, changed(records(), **worse(20.0), message="<script> | *x*")[:-1])
     monkeypatch.setattr("sys.stdout.isatty", lambda: True)
     monkeypatch.setenv("TERM", "dumb")  # no colours
     monkeypatch.setenv("COLUMNS", "200")
@@ -95,6 +97,13 @@ def test_a_terminal_shows_tables_without_marks(path, capsys, monkeypatch):
         assert mark not in shown
     found = reported(path)
     assert shown.startswith(headline(found))
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    print_regressions(found, screen := Terminal())
+    kinds = dict.fromkeys(each.kind for each in found.findings)
+    red = [kind for kind in kinds if found.fails(kind)]
+    assert len(red) == 1 < len(kinds)
+    assert [line.split(" (")[0] for line in coloured(screen.getvalue())["red"]] == red
     for row in rows(found.findings):
         assert row.engine in shown
         assert row.where in shown

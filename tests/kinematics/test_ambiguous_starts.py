@@ -8,7 +8,8 @@ import pytest
 from kincheck.core import (
     JointAngle,
 )
-from kincheck.core.mechanism.motions import Ramp, Sine
+from kincheck.core.kinematics.compiled.motion_start import start_of
+from kincheck.core.mechanism.motions import Path, Ramp, Sine
 
 from .test_start import TIMES, WAYS, arm, by_style, case_of, circling, phases_of
 
@@ -30,6 +31,17 @@ def test_two_ways_to_different_turns_are_never_chosen_in_silence(solved):
     assert shorter.points["r"].position == pytest.approx(
         found.points["r"].position[4::4], abs=1e-12
     )
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_two_samples_at_the_design_are_ambiguous(sign):
+    """The nearer one to time zero is the start, before it or after."""
+    mechanism = replace(arm(30.0), drivers=[JointAngle("u", "h"), JointAngle("v", "k")])
+    waves = {name: Sine(0.5, 0.5, -0.5 * math.pi * sign) for name in "uv"}
+    times = sign * np.array([0.5, 0.8, 1.5])
+    start = start_of(mechanism, Path(waves, np.sort(times)))
+    assert (start.time, start.ambiguous) == (times[0], True)
+    assert start.other.time == times[2]
 
 
 def test_two_ways_to_one_motion_are_one():

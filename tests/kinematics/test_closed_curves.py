@@ -132,6 +132,8 @@ def test_a_branch_point_beside_the_beginning(past, direction):
     assert curve.closed
     turned = sorted(event.value % np.pi for event in curve.events)
     assert turned == pytest.approx([past % np.pi] * 2, abs=1e-8)
+    on_curve = np.interp([abs(event.arc) for event in curve.events], abs(curve.arc), curve.values)
+    assert [event.value for event in curve.events] == pytest.approx(on_curve, abs=1e-3)
     assert {event.kind for event in curve.events} == {"branch point"}
 
 

@@ -22,7 +22,7 @@ from kincheck.core import (
     solve,
 )
 from kincheck.core.caches import clear_caches
-from kincheck.core.joints import Gear, Joint, RackPinion, Screw
+from kincheck.core.joints import Gear, Joint, PerpendicularAxes, RackPinion, Screw, Universal
 from kincheck.core.mechanism.loads import TorsionSpringDamper
 from kincheck.core.mechanism.motions import Ramp, Table
 from kincheck.core.studies.joint_check.specimens import specimens
@@ -157,6 +157,15 @@ WRONG = {
     "a rod of one point": (
         lambda: Distance("a", "b", "c", ((1, 0, 0), (1, 0, 0)), 2.0),
         "the points coincide at design",
+    ),
+    "oblique axes": (
+        lambda: PerpendicularAxes("a", "b", "c", ((1, 0, 0), (0.02, 1, 0))),
+        "joint 'a' (perpendicular_axes): the axes are not perpendicular, the cosine of their angle"
+        " is 0.02",
+    ),
+    "an oblique cross": (
+        lambda: Universal("a", "b", "c", (0, 0, 0), ((1, 0, 0), (-0.02, 1, 0))),
+        "joint 'a' (universal): the axes are not perpendicular, the cosine of their angle is -0.02",
     ),
     "no lead": (
         lambda: Screw("a", "b", "c", (0, 0, 0), (0, 0, 1), None),

@@ -13,10 +13,12 @@ import pytest
 from kincheck.core.harness.record import Results
 from kincheck.core.report.report import write_report
 
+HEADINGS = ("h2", "h3", "summary")
+
 
 class Page(HTMLParser):
-    """What the tests read off a page: its text outside scripts and styles, its scripts, its
-    tags.
+    """What the tests read off a page: its text outside scripts and styles, its scripts, its tags,
+    and the rows of its tables, each by the heading above.
     """
 
     def __init__(self, text: str) -> None:
@@ -25,6 +27,9 @@ class Page(HTMLParser):
         self.scripts: dict[str, str] = {}
         self.names: list[str] = []
         self.text = ""
+        self.tables: list[tuple[str, list[list[str]]]] = []
+        self.heading = ""
+        self.place = ""
         self.feed(text)
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
@@ -33,12 +38,35 @@ class Page(HTMLParser):
         if tag == "script":
             self.names.append(dict(attrs).get("id") or f"script {len(self.names)}")
             self.scripts[self.names[-1]] = ""
+        elif tag in HEADINGS:
+            self.heading, self.place = "", "heading"
+        elif tag == "table":
+            self.tables.append((" ".join(self.heading.split()), []))
+        elif tag == "tr":
+            self.tables[-1][1].append([])
+        elif tag in ("td", "th"):
+            self.tables[-1][1][-1].append("")
+            self.place = "cell"
+
+    def handle_endtag(self, tag: str) -> None:
+        if tag in (*HEADINGS, "td", "th"):
+            self.place = ""
 
     def handle_data(self, data: str) -> None:
         if self.cdata_elem == "script":
             self.scripts[self.names[-1]] += data
         elif self.cdata_elem is None:
             self.text += data
+            if self.place == "heading":
+                self.heading += data
+            elif self.place == "cell":
+                self.tables[-1][1][-1][-1] += data
+
+    def rows(self, heading: str) -> list[list[str]]:
+        """Return the rows of the tables below a heading, without their heads."""
+        found = [rows[1:] for above, rows in self.tables if above.startswith(heading)]
+        assert found, f"no table below {heading}"
+        return [row for rows in found for row in rows]
 
     @property
     def data(self) -> Any:

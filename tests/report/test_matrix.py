@@ -2,7 +2,6 @@
 the documentation.
 """
 
-import io
 import re
 from pathlib import Path
 
@@ -16,6 +15,7 @@ from kincheck.core.report.matrix import print_matrix
 
 from ..support.fakes import Fake, crank, off, raising
 from ..support.made_up import GRID, record
+from ..support.printed import Terminal
 
 ENGINES_PAGE = Path(__file__).parents[2] / "docs" / "pages" / "reference" / "engines.md"
 BUILT_IN = [
@@ -88,13 +88,6 @@ def test_joints_are_run_instead_of_the_built_in_cases_and_printed_as_a_matrix(ru
     lines = [line.split() for line in printed.splitlines()]
     assert lines[0] == ["case", "native", "other"]
     assert [line[0] for line in lines[1 : len(found) + 1]] == found
-
-
-class Terminal(io.StringIO):
-    """A terminal, by its own word."""
-
-    def isatty(self):
-        return True
 
 
 def test_in_a_narrow_terminal_every_error_is_whole_and_engines_follow_in_further_tables(

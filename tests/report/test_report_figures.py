@@ -8,7 +8,8 @@ from pathlib import Path
 
 import msgspec
 import pytest
-from kincheck.core.harness.record import Deviation, Deviations, Outcome, Results
+from kincheck.core.harness.labels import number
+from kincheck.core.harness.record import Deviation, Deviations, Outcome, Record, Results
 from kincheck.core.report.axis import SAMPLES
 from kincheck.core.report.figure_data import Past
 from kincheck.core.report.figures import SYMBOLS
@@ -45,10 +46,35 @@ def test_an_angle_lies_on_the_horizontal_axis_in_degrees(tmp_path: Path) -> None
     )
 
 
+def in_unit(found: Record, unit: str) -> Record:
+    outputs = {
+        name: msgspec.structs.replace(each, unit=unit) for name, each in found.outputs.items()
+    }
+    return msgspec.structs.replace(found, outputs=outputs)
+
+
+@pytest.mark.parametrize("unit", ["m", "rad", "N"])
 @pytest.mark.parametrize("motion", ["position", "velocity"])
-def test_error_figures_hold_the_distances_from_the_reference(tmp_path: Path, motion: str) -> None:
-    run = results()
+def test_error_figures_hold_the_distances_from_the_reference(
+    tmp_path: Path, motion: str, unit: str
+) -> None:
+    made = results()
+    run = Results(
+        run=made.run,
+        records=[in_unit(record, unit) for record in made.records],
+        references=made.references,
+    )
     page = report(run, tmp_path)
+    word = "value" if (motion, unit) == ("position", "N") else motion
+    of = unit if motion == "position" else f"{unit}/s"
+    axis = page.data["figures"][f"case-0-0-{motion}"]["layout"]["yaxis"]
+    assert axis["title"]["text"] == f"{word} difference [{of}]"
+    (title,) = (
+        tag["aria-label"] for _, tag in page.tags if tag.get("data-figure") == f"case-0-0-{motion}"
+    )
+    assert title == f"{word} difference of half-track change against wheel travel, log axis"
+    worst = getattr(run.records[1].errors["half_track_change"], motion)
+    assert f"Worst {number(worst.max_abs)} {of}: one, sample {worst.worst_step} (" in page.text
     for each in run.records[:2]:
         [curve] = traces(page, f"case-0-0-{motion}", each.engine, "lines+markers")
         deviation: Deviation = getattr(each.errors["half_track_change"], motion)

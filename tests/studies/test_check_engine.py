@@ -2,21 +2,26 @@
 outside enter by module and class, or by an entry point.
 """
 
+from dataclasses import replace
 from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import kincheck
 import kincheck.adapters
 import kincheck.cases
+import numpy as np
 import pytest
 from kincheck.core.case.joint_probe import probe
 from kincheck.core.cli import engine_loading, main
 from kincheck.core.harness.execution import here
+from kincheck.core.harness.run import run
 from kincheck.core.joints import Gear, Planar, Screw
 from kincheck.core.studies.engine_check import check_engine as checking
 from kincheck.core.studies.engine_check import force_cases
+from kincheck.core.studies.engine_check.rates import rates
 from kincheck.core.studies.findings import Verdict
 
+from ..support.fakes import Fake, crank
 from ..support.faulty_engine import Odd, Shy, Sound
 
 ROOT = Path(__file__).parents[2]
@@ -163,3 +168,12 @@ def test_the_entry_point_group_is_asked_for(monkeypatch):
     assert engine_loading.offered(["native"]) == ("own",)
     assert asked == ["kincheck.engines"]
     engine_loading.entry_points.cache_clear()
+
+
+@pytest.mark.parametrize(("samples", "compared"), [(21, False), (22, True)])
+def test_rates_of_short_sweeps_are_not_compared(samples, compared):
+    """Three times as many steps as a difference has weights."""
+    case = crank(reference=False)
+    case = replace(case, sweep=replace(case.sweep, values=np.linspace(-1.0, 1.0, samples)))
+    solved = [(case, record) for record in run([case], [Fake()], tol=1e-12).records]
+    assert {each.verdict for each in rates(solved)} == {Verdict.PASS if compared else Verdict.SKIP}

@@ -11,6 +11,7 @@ from kincheck.core.case.io.case_writer import case_text
 from kincheck.core.errors import KincheckError, SolveError
 from kincheck.core.harness.execution import Answer, Pair
 from kincheck.core.studies.stress.families import Family
+from kincheck.core.studies.stress.report import report
 from kincheck.core.studies.stress.reproducers import judge as judge_file
 from kincheck.core.studies.stress.run import specimen, specimens, stress
 from kincheck.core.studies.stress.solving import interpreted, once
@@ -35,8 +36,10 @@ def test_a_small_loop_hides_no_corner_of_the_large_one():
 
 @pytest.mark.parametrize("name", FAMILIES)
 def test_specimens_are_made_again_and_can_be_saved(name, tmp_path):
-    """The same numbers for the same seed; and a case file says all of them."""
-    for number in range(2):
+    """The same numbers for the same seed, every kind of each family among them; a case file says
+    all of them.
+    """
+    for number in range(12):
         one, again = (
             FAMILIES[name].specimen(np.random.default_rng([4, number]), 6) for _ in range(2)
         )
@@ -47,6 +50,7 @@ def test_specimens_are_made_again_and_can_be_saved(name, tmp_path):
             assert one.truth is None
             continue
         assert case.mechanism == again.describe().mechanism
+        assert np.ptp(case.sweep.path.values(case.sweep.path.times), axis=1).max() > 0.0
         file = tmp_path / f"{number}.toml"
         file.write_text(case_text(case, ["a comment"]), encoding="utf-8")
         read = load_case(file)
@@ -73,13 +77,29 @@ def test_no_family_is_silently_wrong_in_the_native_engine():
     }
     assert sum(sum(cell.samples.values()) for cell in found.cells) > 144
     assert all(proof.proved == proof.tried and proof.worst < 1e-2 for proof in found.proofs)
+    tables = {section.title: section.rows for section in report(found).sections}
+    assert tables["Proof of the truth at random samples"] == [
+        [each.family, str(each.tried), str(each.proved), f"{each.worst:.1e}", ""]
+        for each in found.proofs
+    ]
 
 
 def test_contradictions_of_rounding_only_are_accepted():
-    found, _ = stress([FAMILIES["redundant"]], [NATIVE], samples=16, seed=0)
+    found, _ = stress([FAMILIES["redundant"]], [NATIVE], samples=160, seed=0)
     accepted = [each for each in found.acceptances if each.accepted]
     assert accepted
     assert all(each.tilt < 1e-8 for each in accepted)
+    refused = min((each.tilt for each in found.acceptances if not each.accepted), default=None)
+    last = max(accepted, key=lambda each: each.tilt)
+    tables = {section.title: section.rows for section in report(found).sections}
+    assert tables["Contradictory hinges"] == [
+        [
+            last.engine,
+            f"{last.tilt:.1e} rad",
+            "never" if refused is None else f"{refused:.1e} rad",
+            f"{last.told:.1e} of {last.unavoidable:.1e} m" if last.unavoidable else "no residual",
+        ]
+    ]
 
 
 def test_errors_do_not_grow_over_a_thousand_turns():

@@ -15,7 +15,7 @@ from kincheck.core.errors import KincheckError
 from kincheck.core.joints import Spherical
 from kincheck.core.mechanism.mechanism import Point
 from kincheck.core.studies.stress.families.base import as_case
-from kincheck.core.studies.stress.families.degenerate import WRONG
+from kincheck.core.studies.stress.families.degenerate import SOUND, WRONG
 from kincheck.core.studies.stress.families.dimensions import crank_rocker
 from kincheck.core.studies.stress.families.pairs import beside, beside_motion
 from kincheck.core.studies.stress.families.planar import (
@@ -295,3 +295,8 @@ def failures(make):
 @pytest.mark.parametrize(("make", "reasons"), WRONG, ids=[make.__name__ for make, _ in WRONG])
 def test_what_is_no_mechanism_is_refused_by_its_reason(make, reasons):
     assert reasons.intersection(failures(make))
+
+
+@pytest.mark.parametrize("make", SOUND, ids=lambda make: make.__name__)
+def test_unusual_but_sound_mechanisms_are_solved(make):
+    assert failures(make) == ()

@@ -30,6 +30,10 @@ FAULTS = [
         ),
     ),
     (
+        {"tip": {"at": "", "sigma": 1.0}},
+        "hardpoints.tip.at: found '', expected a text that is not empty",
+    ),
+    (
         {"tip": {"at": "tip", "sigma": -1.0}},
         "hardpoints.tip.sigma: found -1.0, expected a number that is not negative, or three",
     ),
