@@ -1,4 +1,4 @@
-"""A case within the digits of its file: without rows that are redundant but for these digits."""
+"""A case within the digits of its file: without rows redundant but for these digits."""
 
 from __future__ import annotations
 

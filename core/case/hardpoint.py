@@ -1,4 +1,4 @@
-"""A hardpoint of a case: a row of a table, and what follows it."""
+"""A hardpoint of a case: a row of a table, and the places that follow it."""
 
 from __future__ import annotations
 

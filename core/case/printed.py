@@ -1,4 +1,4 @@
-"""Digits of numbers as they are printed, and the rounding that they stand for."""
+"""Digits of numbers as they are printed, and the rounding behind them."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class Printed:
 
     @property
     def as_set(self) -> bool:
-        """Whether the numbers have so few digits that somebody may have set them."""
+        """Whether the numbers have few digits: somebody may have set them."""
         return self.significant < FEWEST_OF_DRIVER
 
     def half(self, values: Array) -> Array:

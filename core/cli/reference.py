@@ -98,7 +98,9 @@ def _prove(options: argparse.Namespace, registry: Registry) -> int:
             )
     names = [f"{file_name(case.name)}.reference.json" for case in cases]
     if options.out is not None:
-        problems += unwritable(("--out", options.out / name) for name in names)
+        problems += unwritable(
+            (case.name, options.out / name) for case, name in zip(cases, names, strict=True)
+        )
     if problems:
         raise KincheckError("\n".join(problems))
     complete = True

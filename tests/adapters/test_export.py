@@ -129,7 +129,7 @@ def test_export_writes_what_the_writer_writes(to, endings, tmp_path, monkeypatch
         (["--to", "mjcf", "--at", "nan"], "'nan' is not a number"),
         (
             ["--to", "mjcf", "--out", "nowhere/strut.xml"],
-            "cannot be written (No such file or directory)",
+            "--out nowhere/strut.xml: cannot be written; give a file in a folder that exists",
         ),
     ],
 )

@@ -118,7 +118,7 @@ def test_a_gough_platform_has_several():
     assert all(closes(mechanism, each) for each in found.found)
     assert found.spurious == 0
     assert found.once > 4
-    assert found.missing.startswith("The list is not known to be complete: ")
+    assert found.missing.startswith("The list may be incomplete: ")
 
 
 def counted(*starts):
@@ -149,7 +149,7 @@ def test_estimates_are_right_for_many_classes():
 def test_a_list_found_often_is_not_called_complete():
     found = counted(98, 102)
     assert (found.once, found.estimated, found.unlisted) == (0, 2.0, 0.0)
-    assert "fewer than 1 of 66 starts that close lead can be missing" in found.missing
+    assert "one that fewer than 1 of 66 starts reach can be missing" in found.missing
     assert counted().missing == ""
 
 

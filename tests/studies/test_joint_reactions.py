@@ -70,7 +70,8 @@ def test_sound_joints_pass(name):
 def traced_anew(monkeypatch):
     """Programs are traced with the mistake of the test, not taken from the cache on disk."""
     monkeypatch.setattr(
-        "kincheck.core.kinematics.compiled.program_cache.kept", lambda content, make: make()
+        "kincheck.core.kinematics.compiled.program_cache.kept",
+        lambda content, make, read: read(make()),
     )
 
 

@@ -109,14 +109,11 @@ class Assemblies(Tabular):
         closed = sum(each.starts for each in self.found)
         if not closed:
             return ""
-        head = "The list is not known to be complete: "
+        head = "The list may be incomplete: "
         if not self.once:
             # with a share above 3 / n, no start of n leads to it with a chance of 5 % at most
             rare = max(1, closed // 3)
-            return (
-                f"{head}an assembly to which fewer than 1 of {rare} starts that close lead can be"
-                " missing"
-            )
+            return f"{head}one that fewer than 1 of {rare} starts reach can be missing"
         return (
             f"{head}{self.once} of these {len(self.found)} were found by one start only; by such"
             f" counts, some {100.0 * self.unlisted:.3g} % of further starts would lead to others"
