@@ -91,8 +91,7 @@ IMPORTS = {
     "harness/workers": ". harness",
     "harness/reporting": "",
     "history": ". case case/io harness",
-    "history/regression": ". case case/io harness history",
-    "report": ". joints mechanism case case/io harness history history/regression",
+    "report": ". joints mechanism case case/io harness history",
     "studies/variation": ". joints mechanism kinematics case case/io",
     "studies/stress/truth": ". program joints mechanism kinematics case case/measures",
     "studies/stress/families": ". joints mechanism case case/measures case/io studies/stress/truth",
@@ -122,7 +121,7 @@ IMPORTS = {
     "cli": (
         ". program program/llvm joints kinematics case/models/hardpoints/templates case "
         "case/io case/models/hardpoints case/models harness harness/workers history "
-        "history/regression report studies/variation studies/stress/families studies "
+        "report studies/variation studies/stress/families studies "
         "studies/joint_check studies/engine_check studies/tolerance studies/stress "
         "studies/paper studies/diagnosis studies/bench"
     ),

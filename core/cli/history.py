@@ -182,7 +182,7 @@ def _cells(store: Store, row: RunRow) -> list[str]:
 
 def _print_trends(history: History) -> None:
     from ..harness.labels import number, product
-    from ..history.regression.change_points import steps
+    from ..history.steps import steps
     from ..report.regression_labels import step_says
     from ..report.terminal import columns, page
     from ..report.trends import largest_errors, run_name

@@ -92,7 +92,7 @@ def keeping(
 
 def _known(path: Path, facts: Mapping[str, Any]) -> bool:
     """Return whether a history has a run that was asked for the same."""
-    from ..history.selection import same
+    from ..history.queries import same
     from ..history.store import Store
 
     if not os.path.exists(path):

@@ -31,7 +31,7 @@ def _results() -> dict[str, Any]:
 
 
 def _regression() -> dict[str, Any]:
-    from ..history.regression.findings import Regressions
+    from ..history.findings import Regressions
 
     return msgspec.json.schema(Regressions)
 

@@ -13,6 +13,8 @@ Other queries are SQL on `store.connection`; `schema` describes the tables.
 from __future__ import annotations
 
 import hashlib
+import os
+import platform
 import sqlite3
 import zlib
 from collections.abc import Generator, Mapping, Sequence
@@ -24,11 +26,51 @@ from typing import Any, Literal, Self, TypeAlias
 
 import msgspec
 
-from ..harness.provenance import missing, versions
+from ..harness.provenance import missing, readable, versions
 from ..harness.record import Record, Results, settled
-from .connections import readable_connection, writable_connection
-from .faults import DamagedRunError, HistoryError, damage_lines, explained
-from .process_identity import alive, owner
+from .database import (
+    DamagedRunError,
+    HistoryError,
+    damage_lines,
+    explained,
+    readable_connection,
+    writable_connection,
+)
+
+
+def owner() -> str:
+    """Return host, process id and start of this process; systems reuse process ids."""
+    return f"{readable(platform.node())}|{os.getpid()}|{_begun(os.getpid())}"
+
+
+def alive(owner: str) -> bool:
+    """Return whether a process still runs. A process of another host counts as ended."""
+    host, number, begun = owner.rsplit("|", 2)
+    if host != readable(platform.node()):
+        return False
+    try:
+        os.kill(int(number), 0)  # signal 0 only tests the process
+    except ProcessLookupError:
+        return False
+    except OSError:  # the process is another user's, or the system cannot tell
+        pass
+    return _begun(int(number)) == begun
+
+
+def _begun(number: int) -> str:
+    """Return the clock ticks from the start of the system to the start of the process.
+
+    Empty without /proc, and for an ended process whose exit status nobody has read.
+    """
+    try:
+        # the second field is the program's name in brackets, which may hold any character
+        state, *fields = (
+            Path(f"/proc/{number}/stat").read_text("utf-8", "replace").rpartition(")")[2].split()
+        )
+        return "" if state in "ZX" else fields[18]
+    except (OSError, ValueError, IndexError):
+        return ""
+
 
 Status: TypeAlias = Literal["running", "finished", "interrupted", "killed"]
 """The file marks a run as running until it ends; without its process, the run was killed."""

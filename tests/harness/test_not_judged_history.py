@@ -10,8 +10,8 @@ import msgspec
 from kincheck.core.cli import main
 from kincheck.core.harness.record import Outcome, from_json, to_json
 from kincheck.core.harness.results_file import read_results
+from kincheck.core.history.findings import Kind
 from kincheck.core.history.queries import green, read
-from kincheck.core.history.regression.findings import Kind
 from kincheck.core.history.store import Store
 from kincheck.core.report.regression_junit import to_regression_junit
 from kincheck.core.report.regression_summary import to_markdown

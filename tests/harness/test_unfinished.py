@@ -17,7 +17,7 @@ from kincheck.core.errors import CaseError, KincheckError
 from kincheck.core.harness.execution import here
 from kincheck.core.harness.record import Outcome, Results, to_json
 from kincheck.core.harness.results_file import read_results
-from kincheck.core.history.regression.findings import Kind
+from kincheck.core.history.findings import Kind
 from kincheck.core.history.store import HistoryError, Store
 from kincheck.core.report.caveats import caveats
 from kincheck.core.report.junit import to_junit

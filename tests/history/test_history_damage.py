@@ -47,7 +47,7 @@ def cut_off(path, monkeypatch):
 
 def locked(path, monkeypatch):
     nights(path, 1)
-    monkeypatch.setattr("kincheck.core.history.faults.BUSY", 0.2)
+    monkeypatch.setattr("kincheck.core.history.database.BUSY", 0.2)
     holder = sqlite3.connect(path, isolation_level=None, check_same_thread=False)
     holder.execute("BEGIN EXCLUSIVE")
     HELD.append(holder)

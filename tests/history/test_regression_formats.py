@@ -5,7 +5,7 @@ import xml.etree.ElementTree as ET
 import msgspec
 from kincheck.core.cli import main
 from kincheck.core.harness.record import Outcome
-from kincheck.core.history.regression.findings import Regressions
+from kincheck.core.history.findings import Regressions
 from kincheck.core.history.store import Store
 from kincheck.core.report.regression_junit import to_regression_junit
 from kincheck.core.report.regression_labels import headline, rows

@@ -7,7 +7,7 @@ import math
 import msgspec
 import pytest
 from kincheck.core.harness.record import OutputSeries
-from kincheck.core.history.regression.findings import Kind
+from kincheck.core.history.findings import Kind
 
 from ..support.nights import changed, keep, records, worse
 from .test_regression import FIRST, reported

@@ -8,7 +8,7 @@ import msgspec
 import pytest
 from kincheck.core.cli import main
 from kincheck.core.harness.record import Outcome
-from kincheck.core.history.regression.findings import WHY, Kind
+from kincheck.core.history.findings import WHY, Kind
 
 from ..support.nights import changed, keep, nights, records, reported
 

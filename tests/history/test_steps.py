@@ -11,7 +11,7 @@ import pytest
 from kincheck.core.cli import main
 from kincheck.core.harness.record import Outcome
 from kincheck.core.history.queries import read
-from kincheck.core.history.regression.change_points import change_points, steps
+from kincheck.core.history.steps import change_points, steps
 from kincheck.core.history.store import Store
 
 from ..support.nights import changed, keep, nights, records, times, worse

@@ -13,9 +13,8 @@ import msgspec
 import pytest
 from kincheck.core.harness.run import run
 from kincheck.core.history import schema
-from kincheck.core.history.process_identity import alive, owner
 from kincheck.core.history.run_recorder import keep
-from kincheck.core.history.store import Store
+from kincheck.core.history.store import Store, alive, owner
 
 from ..harness.test_workers import timeless
 from ..support.fakes import Fake, crank, off, partial, raising

@@ -18,7 +18,7 @@ import msgspec
 import numpy as np
 
 from ...errors import KincheckError
-from ...history.run_digest import digest
+from ...history.run_recorder import digest
 from .chunk import Chunk
 from .study import Study
 

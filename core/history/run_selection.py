@@ -8,13 +8,12 @@ from os.path import exists  # a name too long for a file is no error here
 from pathlib import Path
 from typing import Any
 
-from ...errors import KincheckError
-from ...harness.record import Results
-from ...harness.results_file import read_results
-from ..queries import NIGHTS, Pair, compared, faultless, green
-from ..selection import alike, standing
-from ..store import RunRow, Store
+from ..errors import KincheckError
+from ..harness.record import Results
+from ..harness.results_file import read_results
 from .findings import RunName
+from .queries import NIGHTS, Pair, alike, compared, faultless, green, standing
+from .store import RunRow, Store
 
 LAST_GREEN = "last-green"
 BASELINE = "-baseline"
