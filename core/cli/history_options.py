@@ -98,7 +98,7 @@ def _known(path: Path, facts: Mapping[str, Any]) -> bool:
     if not os.path.exists(path):
         return False
     with Store(path, writable=False) as store:
-        return any(same(row.circumstances, facts) for row in store.runs())
+        return any(same(row.key, facts) for row in store.runs())
 
 
 def past(keeping: Keeping, problems: list[str]) -> Trends:

@@ -14,6 +14,7 @@ from ..harness.record import Record
 class Kind(StrEnum):
     """The kind of a finding."""
 
+    # regressions
     FAILURE = "new failure"
     LOST = "lost"
     UNJUDGED = "no longer judged"
@@ -24,6 +25,7 @@ class Kind(StrEnum):
     DRIFTED = "accuracy drifted"
     RESIDUAL = "residual grew"
     SLOWER = "slower"
+    # other changes
     FIXED = "fixed"
     JUDGED = "judged again"
     TOLERANCE = "tolerance changed"
@@ -35,38 +37,24 @@ class Kind(StrEnum):
     @property
     def regression(self) -> bool:
         """Return whether a pair is worse than before."""
-        return self in REGRESSIONS
+        kinds = [*Kind]
+        return kinds.index(self) <= kinds.index(Kind.SLOWER)
 
-
-REGRESSIONS = frozenset(
-    (
-        Kind.FAILURE,
-        Kind.LOST,
-        Kind.UNJUDGED,
-        Kind.GONE,
-        Kind.MOVED,
-        Kind.FREEDOM,
-        Kind.UNIT,
-        Kind.DRIFTED,
-        Kind.RESIDUAL,
-        Kind.SLOWER,
-    )
-)
 
 WHY: Mapping[Kind, str] = {
-    Kind.FAILURE: ("these results were right, or at least not wrong, and are no longer reliable"),
+    Kind.FAILURE: "these results were right, or at least not wrong, and are no longer reliable",
     Kind.LOST: (
         "results that are no longer reached or compared are not checked: a fault there goes unseen"
     ),
     Kind.UNJUDGED: "solved, but no longer compared: a fault there goes unseen",
-    Kind.GONE: ("values that were numbers are null now: readers of the results lose data"),
+    Kind.GONE: "values that were numbers are null now: readers of the results lose data",
     Kind.MOVED: "the case has changed, or its solution belongs to another assembly",
     Kind.FREEDOM: (
         "the mechanism has other degrees of freedom: it has changed, or the count is wrong"
     ),
     Kind.UNIT: "readers misread numbers in another unit or sense",
-    Kind.DRIFTED: ("within tolerance, but a decimal digit worse: a computation has changed"),
-    Kind.RESIDUAL: ("the constraints are met three digits worse: the solution is less converged"),
+    Kind.DRIFTED: "within tolerance, but a decimal digit worse: a computation has changed",
+    Kind.RESIDUAL: "the constraints are met three digits worse: the solution is less converged",
     Kind.SLOWER: "slower by more than this machine's spread from run to run",
     Kind.FIXED: "they failed in the run compared with",
     Kind.JUDGED: "nothing was compared in the run compared with",
@@ -107,6 +95,17 @@ class Finding(msgspec.Struct, frozen=True, kw_only=True):
     ratio: float | None = None
     limit: float | None = None
     since: int | None = None
+
+    @staticmethod
+    def of(kind: Kind, record: Record, message: str, **about: Any) -> Finding:
+        """Return a finding about the pair of a record."""
+        about |= {"case": record.case, "engine": record.engine, "mode": record.mode}
+        return Finding(kind=kind, message=message, **about)
+
+    @property
+    def pair(self) -> tuple[str, str, str]:
+        """Case, engine and mode."""
+        return self.case, self.engine, self.mode
 
 
 class Change(msgspec.Struct, frozen=True, kw_only=True):
@@ -155,6 +154,11 @@ class Step(msgspec.Struct, frozen=True, kw_only=True):
     worse: bool
     repaired: int | None = None
     changes: list[Change]
+
+    @property
+    def pair(self) -> tuple[str, str, str]:
+        """Case, engine and mode."""
+        return self.case, self.engine, self.mode
 
 
 class Loose(msgspec.Struct, frozen=True, kw_only=True):
@@ -234,18 +238,6 @@ class Regressions(msgspec.Struct, frozen=True, kw_only=True):
         return bool(self.regressions) or (self.against is None and bool(self.failing))
 
 
-def finding_of(kind: Kind, record: Record, message: str, **about: Any) -> Finding:
-    """Return a finding about the pair of a record."""
-    return Finding(
-        kind=kind,
-        case=record.case,
-        engine=record.engine,
-        mode=record.mode,
-        message=message,
-        **about,
-    )
-
-
 CIRCUMSTANCES = ("kincheck", "python", "numpy", "tol", "host", "processor", "platform")
 
 
@@ -260,19 +252,16 @@ def changes(now: Mapping[str, Any], before: Mapping[str, Any]) -> list[Change]:
         (name, old[name], new[name]) for name in new if name in old
     ]
     pairs += [(name, before.get(name), now.get(name)) for name in CIRCUMSTANCES]
-    pairs.append(("commit", _git(before, "commit"), _git(now, "commit")))
-    pairs.append(("uncommitted edits", _edits(before), _edits(now)))
+    a, b = (_files(facts) for facts in (before, now))
+    pairs += [(what, a[what], b[what]) for what in a]
     return [Change(what=what, before=a, now=b) for what, a, b in pairs if a != b]
 
 
-def _git(facts: Mapping[str, Any], what: str) -> Any:
-    git: Mapping[str, Any] = facts.get("git") or {}
-    return git.get(what)
-
-
-def _edits(facts: Mapping[str, Any]) -> str | None:
-    """Return the mark of uncommitted edits: a digest, or True without a digest."""
-    return _git(facts, "edits") or ("some" if _git(facts, "changed") else None)
+def _files(facts: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the state of the files of a run; edits are given by their digest, if it is known."""
+    git: dict[str, Any] = facts.get("git") or {}
+    edits = git.get("edits") or ("some" if git.get("changed") else None)
+    return {"commit": git.get("commit"), "uncommitted edits": edits}
 
 
 def same_machine(now: Mapping[str, Any], before: Mapping[str, Any]) -> bool:

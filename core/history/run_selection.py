@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from os.path import exists  # a name too long for a file is no error here
 from pathlib import Path
@@ -12,8 +13,8 @@ from ..errors import KincheckError
 from ..harness.record import Results
 from ..harness.results_file import read_results
 from .findings import RunName
-from .queries import NIGHTS, Pair, alike, compared, faultless, green, standing
-from .store import RunRow, Store
+from .queries import NIGHTS, alike, compared, faultless, most_compared, standing
+from .store import Pair, RunRow, Store
 
 LAST_GREEN = "last-green"
 BASELINE = "-baseline"
@@ -25,20 +26,25 @@ class Subject:
 
     Attributes:
         number: number in the history; None for a run outside it.
-        before: runs with smaller numbers are earlier; None if all runs are.
+        before: runs with smaller numbers are earlier; infinite if all runs are.
         passed_by: numbers of later runs of something else, which do not change the judgement.
     """
 
     name: str
     number: int | None
     results: Results
-    before: int | None
+    before: float
     passed_by: Sequence[int] = ()
 
     @property
     def facts(self) -> dict[str, Any]:
         """The circumstances of the run."""
         return self.results.run
+
+    @property
+    def pairs(self) -> set[Pair]:
+        """The planned pairs of the run."""
+        return {record.pair for record in self.results.records} | {*self.results.missing}
 
     @property
     def label(self) -> RunName:
@@ -70,16 +76,16 @@ def find(name: str | None, store: Store | None) -> Subject:
             raise KincheckError(
                 f"report: run {row.id} is still running; report it when it has ended"
             )
-        return _kept(store, row)
+        return _stored(store, row)
     rows = [row for row in store.runs() if row.status != "running"]
-    row = standing(rows, faultless(store, rows), NIGHTS)
+    row = standing(rows, faultless(store), NIGHTS)
     if row is None:
         raise KincheckError(
             f"history {store.path}: no run to report; `kincheck run --history {store.path}`"
             " records one"
         )
     later = [each.id for each in reversed(rows) if each.id > row.id]
-    return replace(_kept(store, row), passed_by=later)
+    return replace(_stored(store, row), passed_by=later)
 
 
 def find_against(name: str, subject: Subject, store: Store | None) -> tuple[Subject | None, str]:
@@ -92,40 +98,18 @@ def find_against(name: str, subject: Subject, store: Store | None) -> tuple[Subj
     if name == LAST_GREEN or (name.endswith(BASELINE) and not exists(name)):
         if store is None:
             return None, f"{name} needs a history, and none is given"
-        branch = name.removesuffix(BASELINE)
-        if name == LAST_GREEN:
-            # otherwise a lost comparison would be reported once, and never again
-            row = _most(
-                green(store, before=subject.before),
-                subject,
-                lambda row: _compared(store, row, subject),
-            )
-        else:
-            row = _most(
-                _of_branch(store, branch, subject),
-                subject,
-                lambda row: len(pairs_of(subject) & {*row.plan}),
-            )
+        row = _last_green(store, subject) if name == LAST_GREEN else _baseline(store, name, subject)
         if row is not None:
             with store.sparing():
-                return _kept(store, row, name.replace("-", " ")), ""
+                return _stored(store, row, name.replace("-", " ")), ""
             return find_against(name, subject, store)  # the next best
         if name == LAST_GREEN:
             return None, "no earlier green run has any of its pairs"
-        known = sorted(
-            {
-                str(git["branch"])
-                for row in store.runs()
-                if (git := row.circumstances.get("git")) and git.get("branch")
-            }
-        )
-        return (
-            None,
-            (
-                f"no earlier run of branch {branch!r}, without changes to its files, with any of"
-                " its pairs; the history has"
-                f" {'branches ' + ', '.join(known) if known else 'no branch'}"
-            ),
+        known = sorted({str(row.git["branch"]) for row in store.runs() if row.git.get("branch")})
+        return None, (
+            f"no earlier run of branch {name.removesuffix(BASELINE)!r}, without changes to its"
+            " files, with any of its pairs; the history has"
+            f" {'branches ' + ', '.join(known) if known else 'no branch'}"
         )
     against = find(name, store)
     if against.number is not None and against.number == subject.number:
@@ -141,80 +125,84 @@ def _in_file(file: Path, store: Store | None) -> Subject:
         raise KincheckError(f"report: there is no run {str(file)!r}; give {known}")
     results = read_results(file)
     rows, facts = store.runs() if store else [], results.run
-    same = [
-        row.id
-        for row in rows
-        if all(
-            row.circumstances.get(key) == facts.get(key) for key in ("started", "host", "command")
-        )
-    ]
+    known = tuple(facts.get(key) for key in ("started", "host", "command"))
+    same = [row.id for row in rows if (row.started, row.key["host"], row.command) == known]
     later = [row.id for row in rows if row.started > str(facts.get("started", "~"))]
-    return Subject(
-        str(file), max(same, default=None), results, max(same, default=min(later, default=None))
-    )
+    number = max(same, default=None)
+    return Subject(str(file), number, results, number or min(later, default=math.inf))
 
 
-def _kept(store: Store, row: RunRow, rule: str = "") -> Subject:
-    status = (
-        ""
-        if row.status == "finished"
-        else f", {'without an end' if row.status == 'killed' else row.status}"
-    )
-    return Subject(
-        f"run {row.id}" + (f" ({rule})" if rule else "") + status,
-        row.id,
-        store.results(row.id),
-        row.id,
-    )
+def _stored(store: Store, row: RunRow, rule: str = "") -> Subject:
+    name = f"run {row.id}" + (f" ({rule})" if rule else "")
+    if row.status != "finished":
+        name += ", without an end" if row.status == "killed" else f", {row.status}"
+    return Subject(name, row.id, store.results(row.id), row.id)
 
 
-def _of_branch(store: Store, branch: str, subject: Subject) -> list[RunRow]:
-    """Return the finished runs of a branch; runs with uncommitted edits are no baseline."""
+def _last_green(store: Store, subject: Subject) -> RunRow | None:
+    """Return the green run with the most comparisons of the subject's plan.
 
-    def fits(row: RunRow) -> bool:
-        git: dict[str, Any] = row.circumstances.get("git") or {}
-        earlier = subject.before is None or row.id < subject.before
-        return (
-            row.status == "finished"
-            and earlier
-            and git.get("branch") == branch
-            and not git.get("changed")
-        )
-
-    return [row for row in store.runs() if fits(row)]
-
-
-def pairs_of(subject: Subject) -> set[Pair]:
-    """Return the planned pairs of a run."""
-    return {(record.case, record.engine, record.mode) for record in subject.results.records} | {
-        *subject.results.missing
-    }
-
-
-def _compared(store: Store, row: RunRow, subject: Subject) -> int:
-    """Return the number of the subject's planned comparisons that a run has; outputs removed from a
-    case do not count.
+    The subject's own comparisons are no measure: a lost one would be reported once, and never
+    again.
     """
-    outputs = {
-        (record.case, record.engine, record.mode): {*record.errors}
-        for record in subject.results.records
-    }
-    there = compared(store, row.id)
-    shared = 0
-    for pair in pairs_of(subject) & there.keys():
-        still = outputs.get(pair)  # empty if the comparison is missing
-        shared += 1 + sum(not still or output in still for output, _ in there[pair])
-    return shared
+    outputs = {record.pair: {*record.errors} for record in subject.results.records}
+    good = faultless(store)
+
+    def shared(row: RunRow) -> int:
+        """Return the number of comparisons; outputs removed from a case do not count."""
+        there = compared(store, row.id)
+        count = 0
+        for pair in subject.pairs & there.keys():
+            still = outputs.get(pair)  # empty if the comparison is missing
+            count += 1 + sum(not still or output in still for output, _ in there[pair])
+        return count
+
+    most = most_compared(store, subject.pairs)
+    rows = [row for row in store.runs() if row.id in good and row.id < subject.before]
+    return _best(store, rows, subject, most, shared)
 
 
-def _most(rows: list[RunRow], subject: Subject, shared: Callable[[RunRow], int]) -> RunRow | None:
-    """Return the run with the most shared comparisons, the latest of several; None without any.
+def _baseline(store: Store, name: str, subject: Subject) -> RunRow | None:
+    """Return the finished run of a branch with the most pairs of the subject; runs with uncommitted
+    edits are no baseline.
+    """
+    rows = [
+        row
+        for row in store.runs()
+        if row.status == "finished"
+        and row.id < subject.before
+        and row.git.get("branch") == name.removesuffix(BASELINE)
+        and not row.git.get("changed")
+    ]
+    shared = {row.id: len(subject.pairs.intersection(row.plan)) for row in rows}
+    return _best(store, rows, subject, shared, lambda row: shared[row.id])
+
+
+def _best(
+    store: Store,
+    rows: Sequence[RunRow],
+    subject: Subject,
+    most: Mapping[int, int],
+    shared: Callable[[RunRow], int],
+) -> RunRow | None:
+    """Return the run that shares the most, the latest of several; None without any.
 
     Runs with the subject's options come first.
+
+    Args:
+        most: bounds of what each run shares; they spare reading most runs.
     """
-    amounts = {row.id: shared(row) for row in rows}
-    return max(
-        (row for row in rows if amounts[row.id]),
-        key=lambda row: (alike(row.circumstances, subject.facts), amounts[row.id], row.id),
-        default=None,
-    )
+
+    def key(row: RunRow, amount: int) -> tuple[bool, int, int]:
+        return alike(row.key, subject.facts), amount, row.id
+
+    best: tuple[tuple[bool, int, int], RunRow] | None = None
+    sharing = [(key(row, most[row.id]), row) for row in rows if most.get(row.id)]
+    for bound, row in sorted(sharing, key=lambda each: each[0], reverse=True):
+        if best and bound < best[0]:
+            break
+        with store.sparing():
+            amount = shared(row)
+            if amount and (best is None or key(row, amount) > best[0]):
+                best = key(row, amount), row
+    return best and best[1]

@@ -17,20 +17,20 @@ import math
 import statistics
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import combinations, pairwise
-from typing import TypeAlias
+from itertools import combinations, pairwise, product
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from ..case.case import Array
 from ..harness.labels import motion_unit, number
-from ..harness.record import Deviation, Outcome
+from ..harness.record import Deviation, Outcome, Record
 from ..trajectory import QUANTITIES
 from ..unit_text import motion_word, value_text
 from .findings import Change, Finding, Kind, Step, changes
-from .queries import IDLE, Entry, History, Pair, calibration, unit_of
+from .queries import IDLE, Entry, History, calibration, unit_of
 from .run_selection import Subject
-from .store import RunRow
+from .store import Pair
 
 DRIFT = 10.0
 """Ratio of errors: a decimal digit. Another order of summation changes round-off by a factor of 3
@@ -109,16 +109,14 @@ def slowest(history: History) -> float:
     The spread is that of ratios of successive runs, so a true change of speed counts once; about a
     median it would count in every later run.
     """
-    ratios = [ratio for entries in history.pairs.values() for ratio in _ratios(entries)]
+    series = (
+        [entry.seconds for entry in entries if entry.seconds] for entries in history.pairs.values()
+    )
+    ratios = [max(a, b) / min(a, b) for times in series for a, b in pairwise(times)]
     if len(history.runs) < ENOUGH or len(ratios) < 2:
         return TIME_RATIO
     usual = statistics.quantiles(ratios, n=10)[-1]
     return max(TIME_RATIO, math.exp(WIDE * math.log(max(usual, 1.0))))
-
-
-def _ratios(entries: Sequence[Entry]) -> list[float]:
-    times = [entry.seconds for entry in entries if entry.seconds]
-    return [max(a, b) / min(a, b) for a, b in pairwise(times)]
 
 
 SURE = 6.0
@@ -243,35 +241,34 @@ _Series: TypeAlias = Sequence[tuple[Entry, float]]
 
 
 @dataclass(frozen=True)
-class _Found:
-    """A change of level: indices of the values before and after it in the series, and the levels.
+class _Level:
+    """A new level of a series.
 
     Attributes:
-        repaired: index of the first value of a later level that is as low as the level before; None
-            without one.
+        earlier, later: indices of the values before the change and after it.
+        before, now: the levels.
+        last, first: the last entry of the old level, and the first one of the new.
+        repaired: the first run of a later level that is as low as the old one; None without one.
     """
 
     earlier: range
     later: range
     before: float
     now: float
+    last: Entry
+    first: Entry
     repaired: int | None
 
 
-def steps(history: History, *, standing: bool = False) -> list[Step]:
-    """Return the steps of all pairs, the latest first.
-
-    Args:
-        standing: return only those of `lasting`.
-    """
+def steps(history: History) -> list[Step]:
+    """Return the steps of all pairs, the latest first."""
     found: list[Step] = []
     for pair, entries in history.pairs.items():
-        found += _outcomes(pair, entries, history)
-        found += _times(pair, entries, history)
+        found += _outcomes(history, pair, entries)
+        found += _times(history, pair, entries)
         for motion in QUANTITIES:
-            found += _errors(pair, entries, history, motion)
-    found.sort(key=lambda step: -step.first)
-    return lasting(found) if standing else found
+            found += _errors(history, pair, entries, motion)
+    return sorted(found, key=lambda step: -step.first)
 
 
 def lasting(found: Sequence[Step]) -> list[Step]:
@@ -279,58 +276,56 @@ def lasting(found: Sequence[Step]) -> list[Step]:
     last: dict[tuple[str | None, ...], Step] = {}
     for step in found:  # the latest first
         if step.worse and step.repaired is None:
-            last.setdefault((step.case, step.engine, step.mode, step.quantity, step.output), step)
+            last.setdefault((*step.pair, step.quantity, step.output), step)
     return [*last.values()]
 
 
-def _outcomes(pair: Pair, entries: Sequence[Entry], history: History) -> list[Step]:
-    """Return the runs in which a pair began to fail, or to pass again. Runs without a verdict do
+def _outcomes(history: History, pair: Pair, entries: Sequence[Entry]) -> Iterator[Step]:
+    """Yield the runs in which a pair began to fail, or to pass again. Runs without a verdict do
     not count.
     """
     able = [entry for entry in entries if entry.outcome not in (*IDLE, Outcome.UNJUDGED)]
     turns = [(a, b) for a, b in pairwise(able) if a.outcome.bad is not b.outcome.bad]
-    repairs = [b.run if b.outcome.bad is False else None for _, b in turns[1:]] + [None]
-    return [
-        _step(pair, OUTCOME, None, a, b, history, worse=b.outcome.bad, repaired=repaired)
-        for (a, b), repaired in zip(turns, repairs, strict=False)
+    for k, (a, b) in enumerate(turns, 1):
+        next_turn = turns[k][1] if k < len(turns) else None
+        repaired = next_turn.run if next_turn and b.outcome.bad else None
+        yield _step(history, pair, a, b, quantity=OUTCOME, worse=b.outcome.bad, repaired=repaired)
+
+
+def _times(history: History, pair: Pair, entries: Sequence[Entry]) -> Iterator[Step]:
+    """Yield the changes of the time, in calibration loops, over the runs with a calibration."""
+    loops = {run: calibration(row.circumstances) for run, row in history.runs.items()}
+    series = [
+        (entry, math.log(entry.seconds / loop))
+        for entry in entries
+        if entry.seconds and (loop := loops[entry.run])
     ]
-
-
-def _times(pair: Pair, entries: Sequence[Entry], history: History) -> list[Step]:
-    """Return the changes of the time, in calibration loops, over the runs with a calibration."""
-    series: list[tuple[Entry, float]] = []
-    for entry in entries:
-        loop = calibration(history.runs[entry.run])
-        if entry.seconds and loop:
-            series.append((entry, math.log(entry.seconds / loop)))
-    found: list[Step] = []
-    for each in _levels(series, math.log(PACE), LASTING):
-        loop = calibration(history.runs[series[each.later[0]][0].run]) or 1.0
-        before, now = (math.exp(level) * loop for level in (each.before, each.now))
+    for level in _levels(series, math.log(PACE), LASTING):
+        loop = loops[level.first.run] or 1.0
+        before, now = math.exp(level.before) * loop, math.exp(level.now) * loop
         if abs(now - before) > TIME_FLOOR:
-            found.append(_levelled(pair, TIME, None, series, each, before, now, history))
-    return found
+            yield _new_level(history, pair, level, before, now, quantity=TIME)
 
 
-def _errors(pair: Pair, entries: Sequence[Entry], history: History, motion: str) -> list[Step]:
+def _errors(history: History, pair: Pair, entries: Sequence[Entry], motion: str) -> list[Step]:
     """Return the changes of outputs' errors; if several outputs change in a run, the largest."""
     largest: dict[tuple[int, bool, int | None], tuple[float, Step]] = {}
     for output in dict.fromkeys(output for entry in entries for output in entry.errors):
         errors = errors_of(entries, output, motion)
-        series = [
-            (entry, math.log(size))
-            for (entry, _), size in zip(errors, above_floor(errors), strict=True)
-        ]
-        for each in _levels(series, math.log(DRIFT), 1):
+        logs = [math.log(size) for size in above_floor(errors)]
+        series = [(entry, log) for (entry, _), log in zip(errors, logs, strict=True)]
+        for level in _levels(series, math.log(DRIFT), 1):
             before, now = (
                 float(np.median([errors[k][1].max_abs for k in part]))
-                for part in (each.earlier, each.later)
+                for part in (level.earlier, level.later)
             )
-            step = _levelled(pair, motion, output, series, each, before, now, history)
-            key, size = (step.first, step.worse, step.repaired), abs(each.now - each.before)
+            unit = unit_of(history.runs[level.first.run], pair[0], output)
+            about = {"quantity": motion, "output": output, "unit": unit}
+            step = _new_level(history, pair, level, before, now, **about)
+            key, size = (step.first, step.worse, step.repaired), abs(level.now - level.before)
             if key not in largest or size > largest[key][0]:
                 largest[key] = size, step
-    return [step for _, step in sorted(largest.values(), key=lambda each: each[1].first)]
+    return sorted((step for _, step in largest.values()), key=lambda step: step.first)
 
 
 def errors_of(entries: Sequence[Entry], output: str, motion: str) -> list[tuple[Entry, Deviation]]:
@@ -347,157 +342,102 @@ def above_floor(errors: Sequence[tuple[Entry, Deviation]]) -> list[float]:
     """Return the sizes of errors, raised to a common floor: smaller errors do not differ, whatever
     their tolerance.
     """
-    floor = DRIFT_FLOOR * min(
-        (each.tolerance for _, each in errors if each.tolerance > 0.0), default=0.0
-    )
+    tolerances = [each.tolerance for _, each in errors if each.tolerance > 0.0]
+    floor = DRIFT_FLOOR * min(tolerances, default=0.0)
     return [max(each.max_abs, floor) for _, each in errors]
 
 
-def _levels(series: _Series, least: float, lasting: int) -> Iterator[_Found]:
+def _levels(series: _Series, least: float, shortest: int) -> Iterator[_Level]:
     values = np.array([value for _, value in series])
-    places = change_points(values, least=least, lasting=lasting)
-    if not places:
-        return
-    parts = [range(*each) for each in pairwise([0, *places, len(values)])]
+    places = change_points(values, least=least, lasting=shortest)
+    parts = [range(*each) for each in pairwise([0, *places, len(values)])] if places else []
     levels = [float(np.median(values[part.start : part.stop])) for part in parts]
-    for k, ((earlier, later), (before, now)) in enumerate(
-        zip(pairwise(parts), pairwise(levels), strict=True), 2
-    ):
-        rest = zip(parts[k:], levels[k:], strict=True)
-        repaired = next((part.start for part, level in rest if now > before > level - least), None)
-        yield _Found(earlier, later, before, now, repaired)
+    for k, (earlier, later) in enumerate(pairwise(parts), 1):
+        before, now = levels[k - 1 : k + 1]
+        rest = zip(parts[k + 1 :], levels[k + 1 :], strict=True)
+        low = [part[0] for part, level in rest if now > before > level - least]
+        repaired = series[low[0]][0].run if low else None
+        last, first = series[earlier[-1]][0], series[later[0]][0]
+        yield _Level(earlier, later, before, now, last, first, repaired)
 
 
-def _levelled(
-    pair: Pair,
-    quantity: str,
-    output: str | None,
-    series: _Series,
-    found: _Found,
-    before: float,
-    now: float,
-    history: History,
+def _new_level(
+    history: History, pair: Pair, level: _Level, before: float, now: float, **about: Any
 ) -> Step:
-    a, b = series[found.earlier[-1]][0], series[found.later[0]][0]
-    repaired = None if found.repaired is None else series[found.repaired][0].run
-    return _step(
-        pair,
-        quantity,
-        output,
-        a,
-        b,
-        history,
-        worse=now > before,
-        before=before,
-        now=now,
-        repaired=repaired,
-    )
+    worse, repaired = now > before, level.repaired
+    about |= {"before": before, "now": now, "worse": worse, "repaired": repaired}
+    return _step(history, pair, level.last, level.first, **about)
 
 
-def _step(
-    pair: Pair,
-    quantity: str,
-    output: str | None,
-    a: Entry,
-    b: Entry,
-    history: History,
-    *,
-    worse: bool,
-    before: float | None = None,
-    now: float | None = None,
-    repaired: int | None = None,
-) -> Step:
+def _step(history: History, pair: Pair, last: Entry, first: Entry, **about: Any) -> Step:
+    """Return a step with the other differences between two runs; versions of the engine come from
+    its own records.
+    """
     case, engine, mode = pair
-    run: RunRow = history.runs[b.run]
+    before, now = (history.runs[entry.run] for entry in (last, first))
+    other: list[dict[str, Any]] = [{**row.circumstances, "engines": {}} for row in (now, before)]
+    version = Change(what=engine, before=last.version, now=first.version)
+    defaults: dict[str, Any] = {"output": None, "before": None, "now": None}
     return Step(
         case=case,
         engine=engine,
         mode=mode,
-        quantity=quantity,
-        output=output,
-        unit="" if output is None else unit_of(run, case, output),
-        first=b.run,
-        started=run.started,
-        last=a.run,
-        before=before,
-        now=now,
-        worse=worse,
-        repaired=repaired,
-        changes=_between(engine, a, b, history),
+        first=first.run,
+        started=now.started,
+        last=last.run,
+        changes=[version] * (last.version != first.version) + changes(*other),
+        **(defaults | about),
     )
-
-
-def _between(engine: str, a: Entry, b: Entry, history: History) -> list[Change]:
-    """Return the other differences between two runs; versions of the engine come from its own
-    records.
-    """
-    versions = (
-        [Change(what=engine, before=a.version, now=b.version)] if a.version != b.version else []
-    )
-    rest = changes(
-        history.runs[b.run].circumstances | {"engines": {}},
-        history.runs[a.run].circumstances | {"engines": {}},
-    )
-    return versions + rest
 
 
 def crept(subject: Subject, around: History, findings: Sequence[Finding]) -> Iterator[Finding]:
-    """Yield the subject's errors that are a digit above the least error since their last step, with
-    the same tolerance and standard.
+    """Yield the subject's errors that grew by less than a digit per night, but are a digit above
+    the least error since their last step, with the same tolerance and standard. Neither steps nor
+    the comparison with the last night show them.
 
     Args:
         findings: the findings on the subject so far.
     """
     known = {
-        (each.case, each.engine, each.mode, each.output, each.motion)
-        for each in findings
-        if each.kind is Kind.DRIFTED
+        (*each.pair, each.output, each.motion) for each in findings if each.kind is Kind.DRIFTED
     }
     for record in subject.results.records:
-        pair = record.case, record.engine, record.mode
-        entries = [entry for entry in around.pairs.get(pair, ()) if entry.run != subject.number]
-        for output, motion in (
-            (output, motion) for output in record.errors for motion in QUANTITIES
-        ):
+        pairs = around.pairs.get(record.pair, ())
+        entries = [entry for entry in pairs if entry.run != subject.number]
+        for output, motion in product(record.errors, QUANTITIES):
             now = getattr(record.errors[output], motion)
-            if now is None or not now.within or (*pair, output, motion) in known:
+            if now is None or not now.within or (*record.pair, output, motion) in known:
                 continue
             errors = [
                 (entry, each)
                 for entry, each in errors_of(entries, output, motion)
-                if each.tolerance == now.tolerance
+                if (each.tolerance, each.against) == (now.tolerance, now.against)
             ]
-            errors = [(entry, each) for entry, each in errors if each.against == now.against]
-            places = (
-                change_points(np.log(above_floor(errors)), least=math.log(DRIFT), lasting=1)
-                if errors
-                else []
-            )
-            level = errors[places[-1] if places else 0 :]
-            if not level:
+            if not errors:
                 continue
-            entry, least = min(level, key=lambda each: (each[1].max_abs, -each[0].run))
+            logs = np.log(above_floor(errors))
+            *_, start = 0, *change_points(logs, least=math.log(DRIFT), lasting=1)
+            entry, least = min(errors[start:], key=lambda each: (each[1].max_abs, -each[0].run))
             if drifted(least.max_abs, now.max_abs, now.tolerance):
-                unit = (
-                    motion_unit(record.outputs[output].unit, motion)
-                    if output in record.outputs
-                    else ""
-                )
-                size = f"{number(least.max_abs)} → {value_text(number(now.max_abs), unit)}"
-                yield Finding(
-                    kind=Kind.DRIFTED,
-                    case=record.case,
-                    engine=record.engine,
-                    mode=record.mode,
-                    message=(
-                        f"{output} {motion_word(motion, unit)} error {size}, gradually "
-                        f"since run {entry.run} "
-                        f"(tolerance {number(now.tolerance)})"
-                    ),
-                    output=output,
-                    motion=motion,
-                    before=least.max_abs,
-                    now=now.max_abs,
-                    ratio=now.max_abs / least.max_abs if least.max_abs else None,
-                    limit=DRIFT,
-                )
+                words = f", gradually since run {entry.run} (tolerance {number(now.tolerance)})"
+                yield drift(record, output, motion, least.max_abs, now, words)
+
+
+def drift(
+    record: Record, output: str, motion: str, before: float, now: Deviation, words: str
+) -> Finding:
+    """Return the finding of an error that has grown, with further words on it."""
+    base = record.outputs[output].unit if output in record.outputs else ""
+    size = value_text(number(now.max_abs), motion_unit(base, motion) if base else "")
+    word = motion_word(motion, base)
+    return Finding.of(
+        Kind.DRIFTED,
+        record,
+        f"{output} {word} error {number(before)} → {size}{words}",
+        output=output,
+        motion=motion,
+        before=before,
+        now=now.max_abs,
+        ratio=now.max_abs / before if before else None,
+        limit=DRIFT,
+    )

@@ -11,7 +11,7 @@ from kincheck.core.cli import main
 from kincheck.core.harness.record import Outcome, from_json, to_json
 from kincheck.core.harness.results_file import read_results
 from kincheck.core.history.findings import Kind
-from kincheck.core.history.queries import green, read
+from kincheck.core.history.queries import faultless, read
 from kincheck.core.history.store import Store
 from kincheck.core.report.regression_junit import to_regression_junit
 from kincheck.core.report.regression_summary import to_markdown
@@ -63,7 +63,7 @@ def test_a_history_of_before_is_read_as_what_it_is(path, capsys):
         assert [entry.outcome for entries in read(store).pairs.values() for entry in entries] == [
             "unjudged"
         ]
-        assert green(store) == []
+        assert faultless(store) == set()
     assert main.main(["history", "--history", str(path)]) == 0
     assert "1 not judged" in capsys.readouterr().out
     assert main.main(["history", "--history", str(path), "--case", "first"]) == 0
@@ -88,10 +88,10 @@ def test_runs_of_unjudged_pairs_alone_are_not_green(path):
     all_bare = bare(records(), "native")
     keep(path, [each for each in all_bare if each.outcome is Outcome.UNJUDGED])
     with Store(path) as store:
-        assert green(store) == []
+        assert faultless(store) == set()
     keep(path, all_bare)
     with Store(path) as store:
-        assert [row.id for row in green(store)] == [2]
+        assert faultless(store) == {2}
 
 
 # Reports

@@ -11,15 +11,16 @@ import pytest
 from kincheck.core.cli import main
 from kincheck.core.harness.record import Outcome
 from kincheck.core.history.queries import read
-from kincheck.core.history.steps import change_points, steps
+from kincheck.core.history.steps import change_points, lasting, steps
 from kincheck.core.history.store import Store
 
 from ..support.nights import changed, keep, nights, records, times, worse
 
 
-def found(path, **options):
+def found(path, standing=False):
     with Store(path) as store:
-        return steps(read(store), **options)
+        every = steps(read(store))
+    return lasting(every) if standing else every
 
 
 def noisy(levels, spread=0.05, seed=3):
