@@ -55,13 +55,9 @@ IMPORTS = {
         ". primitives program joints mechanism kinematics/formulation kinematics/forces "
         "kinematics/structure kinematics/compiled kinematics/continuation"
     ),
-    "kinematics/sparse": (
-        ". primitives program program/llvm mechanism kinematics/formulation "
-        "kinematics/structure kinematics/compiled"
-    ),
     "kinematics/blocks": (
         ". program mechanism kinematics/formulation kinematics/structure "
-        "kinematics/compiled kinematics/continuation kinematics/sparse"
+        "kinematics/compiled kinematics/continuation"
     ),
     "kinematics/diagnosis": (
         ". primitives mechanism kinematics/formulation kinematics/structure "
@@ -71,7 +67,7 @@ IMPORTS = {
         ". primitives program joints mechanism kinematics/formulation kinematics/forces "
         "kinematics/structure kinematics/compiled kinematics/assembly "
         "kinematics/continuation kinematics/verified kinematics/blocks "
-        "kinematics/sparse kinematics/diagnosis"
+        "kinematics/diagnosis"
     ),
     "case/models/hardpoints/templates": "joints mechanism",
     "case": ". joints mechanism kinematics",
@@ -180,7 +176,7 @@ OFFENDERS = [
         "core/kinematics/formulation/new.py",
         "from ..structure.components import Section",
     ),
-    ("core/kinematics/sparse/new.py", "from .. import blocks"),
+    ("core/kinematics/continuation/new.py", "from .. import blocks"),
     ("core/harness/run.py", "from ... import adapters"),
     ("core/kincheck/new.py", "from kincheck.adapters import engine"),
     ("core/kincheck/new.py", "from kincheck.core.program import Tape"),

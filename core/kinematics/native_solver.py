@@ -96,12 +96,11 @@ class NativeSolver:
         from .blocks.component_lanes import ComponentLanes
         from .blocks.sparse_lanes import SparseLanes
         from .blocks.sweep import BlockSweep
-        from .sparse.sparse_equations import SparseEquations
 
         lanes = (
             ComponentLanes(Cascade(mechanism, request))
             if self.method is Method.BY_COMPONENTS
-            else SparseLanes(SparseEquations(mechanism, compiled=self.compiled), request)
+            else SparseLanes(mechanism, request)
         )
         return BlockSweep(lanes, path).solve
 

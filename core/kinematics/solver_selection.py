@@ -33,8 +33,6 @@ from .formulation.constraints import Style, frames
 # it is compiled. Larger rings are so near to singular that the estimate of sigma by one program
 # leaves all their samples in doubt.
 ONE_PROGRAM = 40
-# Bodies of a component up to which one program for it is better than a sparse system for all.
-COMPONENT = 20
 
 
 def prepare(mechanism: Mechanism, request: Request, path: Path) -> Solver:
@@ -87,13 +85,12 @@ def _large(mechanism: Mechanism, request: Request) -> Callable[[Path], Solver]:
     except SolveError:
         require_driven(mechanism)  # which names what can still move
         raise
-    if parts and max(len(part.bodies) for part in parts) <= COMPONENT:
+    if parts and max(len(part.bodies) for part in parts) <= ONE_PROGRAM:
         lanes: Lanes = ComponentLanes(Cascade(mechanism, request, parts))
     else:
         from .blocks.sparse_lanes import SparseLanes
-        from .sparse.sparse_equations import SparseEquations
 
-        lanes = SparseLanes(SparseEquations(mechanism, compiled=request.compiled), request)
+        lanes = SparseLanes(mechanism, request)
 
     def along(path: Path) -> Solver:
         return BlockSweep(lanes, path).solve

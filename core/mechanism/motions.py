@@ -233,14 +233,11 @@ class Path:
         """Return value, velocity and acceleration of the drivers at times t, shape (3, names,
         *t.shape).
         """
-        still = (np.zeros_like(t),) * 3
-        return np.stack(
-            [
-                np.stack(self.motions[name].at(t) if name in self.motions else still)
-                for name in names
-            ],
-            axis=1,
-        )
+        found = np.zeros((3, len(names), *t.shape))
+        for k, name in enumerate(names):
+            if name in self.motions:
+                found[:, k] = self.motions[name].at(t)
+        return found
 
     def values(self, t: Array) -> Array:
         """Return the moving drivers' values from the design at times t, shape (drivers, n)."""

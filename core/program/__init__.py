@@ -32,10 +32,8 @@ From a plan to machine code:
 
 A mechanism's program is described once, in `core.kinematics.compiled`: `Tracing` names the slots of
 its lanes and holds its `Plan`, `Model` makes code of the plan, and an executor binds it to lanes.
-`core.caches` keeps recent models for the process, and bound lanes for each thread.
-
-Beside these, `static_lu` and `linker` write a sparse LU factorisation and many copies of a program
-as one interpreter table. `memory` aligns arrays to cache lines.
+`core.caches` keeps recent models for the process, and bound lanes for each thread. `memory` aligns
+arrays to cache lines.
 """
 
 from .elimination import Elimination

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from itertools import groupby
 
@@ -26,10 +27,9 @@ from ..compiled.request import (
 from ..compiled.solution import Columns
 from ..continuation.singular_crossing import SOUND, Numbers
 from ..formulation.acceptance_criteria import AMPLIFIED, doubtful
-from ..sparse.poses import ChosenPivots, error_bounds
-from ..sparse.sparse_equations import SparseEquations
 from .cascade import Cascade
 from .lanes import CLOSURES, MARGINS, SIGMAS, WORST, Anchor, Indices, Lanes
+from .sparse_lanes import SparseLanes
 
 # Samples at once: all are predicted from one pose, and the farther they are from it the more
 # iterations they take, and the more are tried in vain; and what a large chain takes its time for is
@@ -164,12 +164,8 @@ class ComponentLanes(Lanes):
 
     def sampled(self, times: Array, path: Path) -> list[Array]:
         """See `Lanes`: by component type; types without drivers share one table."""
-        models, alone = [kind.model for kind in self.cascade.kinds], times[None]
-        driven = [(model, model.request.drivers) for model in models]
-        return [
-            model.samples(times, path.drive(names, times)) if names else alone
-            for model, names in driven
-        ]
+        models, alone = (kind.model for kind in self.cascade.kinds), times[None]
+        return [each.samples(path, times) if each.request.drivers else alone for each in models]
 
     def attempt_at(self, tables: Sequence[Array], *, neighbours: bool = False) -> Array:
         """See `Lanes`."""
@@ -197,41 +193,33 @@ class ComponentLanes(Lanes):
         closure, sigma = (self.worst[row, :count] for row in (CLOSURES, SIGMAS))
         if not doubtful(float(sigma.min()), float(closure.max()), self._tol):
             return {}
-        at, model = np.flatnonzero(doubtful(sigma, closure, self._tol)), self._whole
+        at = np.flatnonzero(doubtful(sigma, closure, self._tol))
         state = np.stack([self._state(k) for k in at.tolist()], axis=1)
-        errors = error_bounds(
-            ChosenPivots(model, model.rows),
-            state,
-            model.drives(path, self._times[at]),
-            model.scale,
-            self.request.order,
-        )
+        sample = self._whole.sampled(self._times[at], path)[0]
+        errors = self._whole.error_bounds(state, sample)
         limit, found = AMPLIFIED * self._tol, zip(at.tolist(), errors.tolist(), strict=True)
         return {k: error for k, error in found if not error <= limit}  # or it is no number
 
     @cached_property
-    def _whole(self) -> SparseEquations:
-        return SparseEquations(self.mechanism, compiled=self.request.compiled)
+    def _whole(self) -> SparseLanes:
+        return SparseLanes(self.mechanism, replace(self.request, points=(), bodies=()))
 
     def _state(self, lane: int) -> Array:
         """Return the state of a lane as the equations of the whole mechanism have it."""
-        model, cascade = self._whole, self.cascade
-        places, scale = model.elements.numbering, cascade.unit / model.unit
-        found = np.zeros(places.state)
+        names, cascade = self._whole.system.names, self.cascade
+        found = np.zeros(len(self._whole.system.design))
         for k, part in enumerate(cascade.parts):
             kind, member = cascade.place[k]
             for name in kind.model.state:
                 what, own = name.split(" ", 1)
-                values = self.world[kind.rows(name, member), lane]
                 if what == "x":
                     joint, _, coordinate = own.rpartition(".")
-                    of_joint = f"{part.joints[int(joint[1:])].name}.{coordinate}"
-                    at = places.places(7, (), (of_joint,))
+                    whole = f"x {part.joints[int(joint[1:])].name}.{coordinate}"
                 else:
-                    of_body = places.places(7, (part.bodies[int(own[1:])],), ())
-                    at = of_body[:3] if what == "u" else of_body[3:]
+                    whole = f"{what} {part.bodies[int(own[1:])]}"
                 length = what == "u" or name.endswith(".translation")
-                found[at] = values * (scale if length else 1.0)
+                values = self.world[kind.rows(name, member), lane]
+                found[names[whole]] = values * (cascade.unit / self._whole.unit if length else 1.0)
         return found
 
     def each(self, name: str) -> Array:

@@ -62,7 +62,6 @@ class Lanes(ABC):
         many: number of lanes.
         worst: the worst tests of all blocks, shape (WORST, room).
         last: the lane of the last time of the last attempt.
-        worse: largest ratio of an estimate to a smallest singular value.
     """
 
     mechanism: Mechanism
@@ -73,7 +72,6 @@ class Lanes(ABC):
     many: int
     worst: Array
     last: int = 0
-    worse: float = WORSE
 
     def attempt(self, times: Array, path: Path) -> Array:
         """Solve all blocks at times, up to the number of lanes, each lane alone; return the margin
@@ -104,7 +102,7 @@ class Lanes(ABC):
     def taken(self, time: float) -> Anchor:
         """Return the pose that was carried from the first lane, with its motions."""
         closure, sigma = (float(self.worst[row, 0]) for row in (CLOSURES, SIGMAS))
-        error = self.worse * max(closure, EPSILON) / sigma
+        error = WORSE * max(closure, EPSILON) / sigma
         return replace(self.anchor(time), motions=self.motions(1)[:, 0], error=error)
 
     @abstractmethod

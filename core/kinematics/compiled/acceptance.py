@@ -23,7 +23,6 @@ from ...program import (
     minimum,
     program,
 )
-from ..formulation.acceptance_criteria import TURNED, WORSE
 from ..formulation.margins import (
     Block,
     Candidate,
@@ -151,4 +150,4 @@ def candidate(
 
 def limits(read: Callable[[str], Scalar]) -> Limits:
     """Return the limits of a lane, read from its slots."""
-    return Limits(*(read(label) for label in ACCEPT), worse=WORSE, turned=TURNED)
+    return Limits(*(read(label) for label in ACCEPT))

@@ -15,12 +15,13 @@ from ...caches import ThreadCache, keep_last
 from ...errors import SolveError
 from ...failures import FailureKind
 from ...mechanism.mechanism import Mechanism
+from ...mechanism.motions import Path
 from ...program import Executor, NumpyExecutor
 from ...program.llvm.compiler import available
 from ...program.llvm.executor import LlvmExecutor
 from ...program.llvm.jit import LlvmCode, make_loops_ready
 from ...trajectory import Array
-from ..formulation.driver_inputs import drive_numbers
+from ..formulation.driver_inputs import samples
 from ..structure.components import Section
 from .program_cache import Tracing, is_builtin, traced
 from .request import EARLIER, FROM, TIME, Request, slots_of
@@ -39,6 +40,7 @@ CLOSED = 1e-12
 # distance is taken up by them.
 ASSEMBLING = 50
 NONE_VARIED = np.empty((0, 1))
+STILL = Path({}, np.zeros(1))
 
 
 def compile_model(mechanism: Mechanism, request: Request, section: Section | None = None) -> Model:
@@ -138,15 +140,9 @@ class Model(Tracing):
             ),
         )
 
-    def samples(self, times: Array, drive: Array) -> Array:
-        """Return the values of the slots `sampled` at the times, shape (sampled, n).
-
-        Args:
-            drive: value from the design, velocity and acceleration of every moving driver [SI],
-                shape (3, drivers, n).
-        """
-        drivers = [self.mechanism.driver(name) for name in self.request.drivers]
-        return np.concatenate([times[None], drive_numbers(drivers, drive, self.frame.unit)])
+    def samples(self, path: Path, times: Array) -> Array:
+        """Return the values of the slots `sampled` at times of a path, shape (sampled, n)."""
+        return samples(self.mechanism, self.request.drivers, self.frame.unit, path, times)
 
     def departing(self, lane: Array, sample: Array) -> Array:
         """Return a lane ready for predictions from a solved lane, with rates by a sample of the
@@ -191,7 +187,7 @@ class Model(Tracing):
         return self.stand_at(
             executor,
             self.state,
-            self.samples(np.zeros(1), np.zeros((3, len(self.request.drivers), 1))),
+            self.samples(STILL, STILL.times),
             geometry,
         )
 

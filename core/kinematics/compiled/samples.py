@@ -160,7 +160,7 @@ class Route:
 
     def sampled(self, times: Array) -> Array:
         """Return the given values at the times, shape (sampled, n)."""
-        return self.model.samples(times, self.path.drive(self.model.request.drivers, times))
+        return self.model.samples(self.path, times)
 
 
 def _in_parts(start: float, times: Array, parts: int) -> Array:

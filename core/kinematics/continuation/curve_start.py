@@ -27,7 +27,7 @@ class Beginning:
     def __init__(self, walk: ArclengthWalk, first: Spot, longest: float) -> None:
         self.walk, self.first, self.longest = walk, first, longest
         self._poses = walk.system.poses(first.state)
-        after = walk.system.poses(walk.system.stepped(first.state, SMALL * first.dq[None]))
+        after = walk.system.poses(walk.system.stepped(first.state, SMALL * first.dq[:, None]))
         self._way = (after - self._poses) / SMALL
 
     def passed(self, before: Spot, after: Spot) -> Spot | None:

@@ -165,10 +165,10 @@ class _Scrutiny:
         """Solve samples closely."""
         state, sample = system.state(lanes), self.route.sampled(self.times[indices])
         solved = solve_closely(system, state, sample)
-        outputs = system.outputs(solved.state, sample, solved.rate, solved.rate_t)
-        closure, leftover, branch = (
-            outputs.pop(name)[0] for name in ("closure", "leftover", "branch")
-        )
+        found = system.equations(solved.state, sample)
+        closure, leftover = found.closure, found.leftover
+        outputs = system.outputs(solved.state, sample, solved.rate.T, solved.rate_t.T)
+        (branch,) = outputs.pop("branch")
         kept, rows = self.found.kept, self.rows
         # closely solved is nearly where it was; anything else is another solution
         moved = np.abs(solved.state - state).max(axis=0)

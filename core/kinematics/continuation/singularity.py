@@ -139,7 +139,7 @@ def _moves(
     system: System, state: Array, z: Array
 ) -> dict[str, tuple[tuple[float, ...], tuple[float, ...]]]:
     """Return the bodies by name, the fastest first; negligible shares are zero."""
-    unit = system.model.frame.unit
+    unit = system.tracer.frame.unit
     rates = {
         name: (np.array([*twist.v]), np.array([*twist.w]))
         for name, twist in system.twists(state, z).items()
@@ -211,13 +211,13 @@ def solve_closely(system: System, state: Array, sample: Array) -> Solved:
         best, closure = np.where(better, state, best), np.where(better, found.closure, closure)
         if not better.any():
             break
-        state = system.stepped(best, -_solved(found.jacobian, found.phi))
+        state = system.stepped(best, -_solved(found.jacobian, found.phi).T)
     _, sigma, z = np.linalg.svd(_finite(system.equations(best, sample).jacobian))
     rate, rate_t = _rates(system, best, sample)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         error = np.maximum(closure, EPSILON) / sigma[:, -1]
         ahead, behind = (
-            _rates(system, system.stepped(best, h * z[:, -1]), sample)
+            _rates(system, system.stepped(best, h * z[:, -1].T), sample)
             for h in (DIFFERENCE, -DIFFERENCE)
         )
         part = error / (2.0 * DIFFERENCE)
@@ -236,7 +236,8 @@ def solve_closely(system: System, state: Array, sample: Array) -> Solved:
 def _rates(system: System, state: Array, sample: Array) -> tuple[Array, Array]:
     found = system.equations(state, sample)
     rate = _solved(found.jacobian, found.nu)
-    return rate, _solved(found.jacobian, system.gamma(state, sample, rate))
+    gamma = system.gamma(state, sample, rate.T)[[*system.tracer.selection.chosen]]
+    return rate, _solved(found.jacobian, gamma.T)
 
 
 def _solved(jacobian: Array, b: Array) -> Array:

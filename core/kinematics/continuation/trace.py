@@ -253,6 +253,6 @@ def _stacked(walk: ArclengthWalk, spots: Sequence[Spot]) -> tuple[Array, Array]:
 
 
 def _points(walk: ArclengthWalk, spots: Sequence[Spot]) -> dict[str, Array]:
-    zero = np.zeros((len(spots), walk.system.unknowns))
+    zero = np.zeros((walk.system.unknowns, len(spots)))
     found = walk.system.outputs(*_stacked(walk, spots), zero, zero)
-    return {name: found[f"position {name}"].T for name in walk.system.model.request.points}
+    return {name: found[f"position {name}"].T for name in walk.system.tracer.request.points}

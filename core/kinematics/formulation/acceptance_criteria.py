@@ -53,9 +53,8 @@ LARGEST_CHANGE = 0.5
 # 1e-12 of `kincheck run` becomes the 1e-9 m required of outputs.
 AMPLIFIED = 1e3
 # The estimate of sigma (`Elimination.sigma`) is 0.16 to 4 times sigma over the case library: a
-# bound by sigma exceeds a bound by the estimate by up to the first factor. Sparse systems have
-# pivots only, 1.3 to 17 times sigma, hence the second factor.
-WORSE, WORSE_BY_PIVOTS = 10.0, 30.0
+# bound by sigma exceeds a bound by the estimate by up to this factor.
+WORSE = 10.0
 # With redundant rows, others are tried if a step fails and sigma is below this fraction of its
 # largest value so far; if none are better, again at this fraction of the present value.
 LOW = 0.1
@@ -69,9 +68,8 @@ ROUNDING = 64.0 * EPSILON
 # continue on another motion that crosses there. Away from a singular pose the second fraction is
 # required, because rounding may already have turned the motion. The other motion is about sigma
 # away, so rounding moves a pose by a ten-thousandth of that distance, or by a six-hundredth if the
-# estimate is four times too large. Pivots may be too large by much more: with them a parallelogram
-# ended on its other motion, hence the third fraction.
-FOLLOWED, TURNED, TURNED_BY_PIVOTS = 1e-2, 1e-3, 1e-5
+# estimate is four times too large.
+FOLLOWED, TURNED = 1e-2, 1e-3
 
 
 def doubtful(

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...mechanism.drivers import Driver
 from ...mechanism.mechanism import Mechanism
+from ...mechanism.motions import Path
 from ...primitives.base import Drive
 from ...trajectory import Array
 
@@ -25,6 +26,16 @@ def drive_numbers(drivers: Sequence[Driver], drive: Array, unit: float) -> Array
         numbers[:3] = motion * (1.0 if driver.turns else 1.0 / unit)
         numbers[3], numbers[4] = np.cos(0.5 * motion[0]), np.sin(0.5 * motion[0])
     return found.reshape(5 * len(drivers), drive.shape[-1])
+
+
+def samples(
+    mechanism: Mechanism, drivers: Sequence[str], unit: float, path: Path, times: Array
+) -> Array:
+    """Return the times, and the numbers of a `Drive` for each named driver at these times of a
+    path, shape (1 + 5 * drivers, n).
+    """
+    numbers = drive_numbers([*map(mechanism.driver, drivers)], path.drive(drivers, times), unit)
+    return np.concatenate([times[None], numbers])
 
 
 def turns(mechanism: Mechanism, drivers: Sequence[str]) -> list[str]:

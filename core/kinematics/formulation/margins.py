@@ -23,6 +23,8 @@ from .acceptance_criteria import (
     NEGLIGIBLE,
     STEEPER,
     STEEPEST,
+    TURNED,
+    WORSE,
 )
 
 
@@ -80,15 +82,11 @@ class Limits:
     Attributes:
         tol, consistent: largest accepted residual of the solved and of the redundant rows.
         crossing: added to margins of singular poses; zero unless they may be crossed.
-        worse: largest ratio of an estimate to sigma (`WORSE`).
-        turned: accepted uncertainty by rounding away from a singular pose (`TURNED`).
     """
 
     tol: Scalar
     consistent: Scalar
     crossing: Scalar
-    worse: float
-    turned: float
 
 
 def margins(pose: Candidate, limits: Limits) -> dict[str, Scalar]:
@@ -100,7 +98,7 @@ def margins(pose: Candidate, limits: Limits) -> dict[str, Scalar]:
     looks like one that turns back.
     """
     sigma, crossing = pose.sigma, limits.crossing
-    uncertain = (limits.worse * pose.largest) * maximum(pose.closure, EPSILON)
+    uncertain = (WORSE * pose.largest) * maximum(pose.closure, EPSILON)
     return {
         "converged": pose.done - 0.5,
         "closed": limits.tol - pose.closure,
@@ -115,9 +113,7 @@ def margins(pose: Candidate, limits: Limits) -> dict[str, Scalar]:
             reduce(minimum, (_between(block, pose.moved) for block in pose.blocks)) + crossing
         ),
         "certain": FOLLOWED * sigma * sigma - uncertain,
-        "not turned by rounding": maximum(
-            limits.turned * sigma * sigma - uncertain, pose.before - sigma
-        ),
+        "not turned by rounding": maximum(TURNED * sigma * sigma - uncertain, pose.before - sigma),
     }
 
 

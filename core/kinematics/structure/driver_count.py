@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...errors import SolveError
 from ...mechanism.mechanism import Mechanism
@@ -28,7 +29,6 @@ from ..formulation.cartesian import COLUMNS, Cartesian
 from ..formulation.constraints import frames, measured
 from .degrees_of_freedom import account, driven_account, imbalance, mismatch
 from .redundancy import RANK_TOLERANCE
-from .sparse_lu import NARROW
 
 # Up to this number of bodies the dense count takes some 20 ms.
 DENSE = 25
@@ -38,6 +38,10 @@ DENSE = 25
 ROUNDS, LEFT = 2, 1e-6
 FEW = 5
 """Largest number of names in a message."""
+# Supernodes of these matrices are a few columns wide; SuperLU's own settings (10 and 20) double the
+# time.
+NARROW = {"relax": 4, "panel_size": 4}
+Indices = NDArray[np.intp]
 
 
 def require_driven(mechanism: Mechanism) -> None:
@@ -123,38 +127,56 @@ def _balance(mechanism: Mechanism) -> _Balance:
     frame = measured(mechanism)[1]
     formulation = Cartesian.of(mechanism, frame)
     rows = formulation.rows(formulation.configuration(formulation.design))
-    null = _NullSpaces(rows, formulation.unknowns)
+    at = np.array([(k, column) for k, row in enumerate(rows) for column in row], np.intp)
+    values = np.array([value for row in rows for value in row.values()], dtype=np.float64)
+    at = at.reshape(-1, 2)
+    null = NullSpaces(at[:, 0], at[:, 1], values, (len(rows), formulation.unknowns))
     drivers = len(mechanism.drivers)
     excess = null.contradictions(drivers)[len(rows) - drivers :]
     return _Balance(mechanism, formulation, null.motions(), excess)
 
 
-class _NullSpaces:
-    """Both null spaces of a sparse matrix with rows scaled to length one."""
+class NullSpaces:
+    """Both null spaces of a sparse matrix with rows scaled to length one.
 
-    def __init__(self, rows: Sequence[Any], unknowns: int) -> None:
+    Args:
+        rows, columns, values: of the entries.
+        shape: rows and unknowns.
+    """
+
+    def __init__(
+        self, rows: Indices, columns: Indices, values: Array, shape: tuple[int, int]
+    ) -> None:
         sparse, linear = (
             importlib.import_module(name) for name in ("scipy.sparse", "scipy.sparse.linalg")
         )
-        self._rows, self._unknowns = len(rows), unknowns
-        at = (
-            np.array([(k, column) for k, row in enumerate(rows) for column in row], dtype=np.intp)
-            .reshape(-1, 2)
-            .T
-        )
-        values = np.array([value for row in rows for value in row.values()], dtype=np.float64)
-        lengths = np.sqrt(np.bincount(at[0], values**2, len(rows)))
-        A = sparse.csc_matrix(
-            (values / lengths[at[0]], (at[0], at[1])), shape=(len(rows), unknowns)
-        )
+        self._rows, self._unknowns = shape
+        lengths = np.sqrt(np.bincount(rows, values**2, shape[0]))
+        A = sparse.csc_matrix((values / lengths[rows], (rows, columns)), shape=shape)
         sides = [
-            [RANK_TOLERANCE * sparse.identity(len(rows)), A],
-            [A.T, -RANK_TOLERANCE * sparse.identity(unknowns)],
+            [RANK_TOLERANCE * sparse.identity(shape[0]), A],
+            [A.T, -RANK_TOLERANCE * sparse.identity(shape[1])],
         ]
         self._factors: Any = linear.splu(
             sparse.bmat(sides, format="csc"), permc_spec="COLAMD", **NARROW
         )
         self._random = np.random.default_rng(0)
+
+    def independent_rows(self, drivers: int) -> Indices | None:
+        """Return as many independent rows as there are unknowns, those of the drivers, the last
+        ones, among them; None if there are fewer, or a driver repeats other rows.
+
+        Rows with most weight in the vanishing sums are left out, by pivoted QR (rank-revealing):
+        the others are well conditioned.
+        """
+        sums, joints = self.contradictions(self._rows), self._rows - drivers
+        redundant = sums.shape[1]
+        repeated = np.abs(sums[joints:]).max(initial=0.0) > LEFT
+        if self._rows - redundant < self._unknowns or repeated:
+            return None
+        qr: Any = importlib.import_module("scipy.linalg").qr
+        _, order = qr(sums[:joints].T, mode="r", pivoting=True)
+        return np.setdiff1d(np.arange(self._rows), order[:redundant])
 
     def motions(self) -> Array:
         """Return x with A x = 0, orthonormal, shape (unknowns, motions)."""

@@ -63,13 +63,16 @@ class LlvmCode:
 
     Raises ImportError if llvmlite is missing.
 
+    Args:
+        often: limit of interpretation, see `OFTEN`; infinite for programs that are never compiled.
+
     Attributes:
         stride: slots of a lane, with the cells of intermediate values after `Plan.slots`.
         memory: the plan, as loops read it.
         interpreted: whether programs are not compiled yet.
     """
 
-    def __init__(self, plan: Plan) -> None:
+    def __init__(self, plan: Plan, often: float = OFTEN) -> None:
         self.width, self.plan, self._lock = compiler.vector_width(), plan, Lock()
         # content of the code as a key: writing the text takes longer than loading the code
         self._content = repr([plan.programs, self.width, _sources()])
@@ -83,7 +86,8 @@ class LlvmCode:
         else:
             self._interpret(tables)
         operations = sum(len(each.nodes) for each in plan.programs.values())
-        often = 0 if _AT_ONCE.get() else AGAIN if again else OFTEN
+        if often == OFTEN:
+            often = 0 if _AT_ONCE.get() else AGAIN if again else OFTEN
         self._left = often * max(OPERATIONS, operations) // OPERATIONS
 
     def call(self, loop: str, name: str) -> Callable[..., int]:
