@@ -89,8 +89,8 @@ IMPORTS = {
     "history": ". case case/io harness",
     "report": ". joints mechanism case case/io harness history",
     "studies/variation": ". joints mechanism kinematics case case/io",
-    "studies/stress/truth": ". program joints mechanism kinematics case case/measures",
-    "studies/stress/families": ". joints mechanism case case/measures case/io studies/stress/truth",
+    "studies/truth": ". program mechanism kinematics case case/measures",
+    "studies/stress/families": ". joints mechanism case case/measures case/io studies/truth",
     "studies": ". program joints kinematics case case/measures case/io harness report",
     "studies/joint_check": (
         ". primitives program joints mechanism kinematics case case/measures case/io "
@@ -106,7 +106,7 @@ IMPORTS = {
     ),
     "studies/stress": (
         ". joints mechanism kinematics case case/io harness harness/workers report "
-        "studies/stress/truth studies/stress/families"
+        "studies/truth studies/stress/families"
     ),
     "studies/paper": ". primitives program joints mechanism kinematics case harness report",
     "studies/diagnosis": ". joints kinematics case harness report studies/variation",

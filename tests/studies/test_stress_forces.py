@@ -16,8 +16,8 @@ from kincheck.core.studies.stress.reproducers import judge
 from kincheck.core.studies.stress.run import specimen
 from kincheck.core.studies.stress.shrink import rounded
 from kincheck.core.studies.stress.solving import interpreted, once
-from kincheck.core.studies.stress.truth.reference_forces import known_forces
 from kincheck.core.studies.stress.verdicts import Verdict, judged
+from kincheck.core.studies.truth.forces import known_forces
 
 demand = importlib.import_module("kincheck.core.kinematics.forces.demand")
 FORCES = Family.registry["forces"]

@@ -26,17 +26,16 @@ from kincheck.core.studies.stress.families.planar import (
     slider_crank,
     slider_crank_motion,
 )
-from kincheck.core.studies.stress.truth.conditions import NotStatedError, conditions
-from kincheck.core.studies.stress.truth.evaluation import Evaluator, Poses
-from kincheck.core.studies.stress.truth.long_double import extended
-from kincheck.core.studies.stress.truth.proofs import distance_from_proof
-from kincheck.core.studies.stress.truth.reference_motion import (
+from kincheck.core.studies.truth.motion import (
     ROUND_OFF,
     DefectError,
     Reach,
     closed,
     followed,
 )
+from kincheck.core.studies.truth.path import by_body
+from kincheck.core.studies.truth.proofs import distance_from_proof
+from kincheck.core.studies.truth.rows import NotStatedError, Poses, Rows, extended
 
 POLYNOMIAL = "polynomial"
 EVERY = {case.name: case for case in probes()}
@@ -54,31 +53,21 @@ def worst(truth, positions):
     return max(float(each.max()) for each in errors)
 
 
-@pytest.fixture
-def poses():
-    rng = np.random.default_rng(3)
-    still = Poses.design(2, 1)
-    return still.moved(extended(rng.normal(size=(2, 6, 1))))
-
-
 @pytest.mark.parametrize("name", PROBES)
-def test_the_jacobian_and_what_is_beyond_it_are_derivatives(name, poses):
+def test_the_jacobian_and_what_is_beyond_it_are_derivatives(name):
     case = PROBES[name]
-    rows = Evaluator(conditions(case.mechanism))
-    bodies, rng, h = rows.bodies, np.random.default_rng(5), 1e-5
-    at = (
-        poses
-        if bodies == 2
-        else Poses.design(bodies, 1).moved(extended(rng.normal(size=(bodies, 6, 1))))
-    )
-    rates, near = extended(rng.normal(size=(bodies, 6, 1))), rows.angles(at)
+    rows = Rows(case.mechanism)
+    bodies, rng, h = len(rows.bodies), np.random.default_rng(5), 1e-5
+    step, rates = (by_body(rng.normal(size=(1, 6 * bodies))) for _ in range(2))
+    at = Poses.design(bodies, 1).moved(step)
+    near = rows.angles(at)
     before, here, after = (
         rows.residual(at.moved(s * h * rates), extended(np.zeros((1, 1))), near) for s in (-1, 0, 1)
     )
     first, second = (after - before) / (2 * h), (after - 2 * here + before) / h**2
     # an angle's derivatives are those on the joint's own conditions, which these bodies are not
-    others = np.setdiff1d(np.arange(len(second)), [term.row for term in rows.stated.turns])
-    assert np.abs(rows.jacobian(at)[0] @ rates.reshape(-1) - first[:, 0])[others].max() < 1e-8
+    others = np.setdiff1d(np.arange(len(second)), rows.turn_rows)
+    assert np.abs(rows.jacobian(at)[0] @ rates[1:].reshape(-1) - first[:, 0])[others].max() < 1e-8
     assert np.abs(rows.beyond(at, rates) - second)[others].max() < 1e-6
 
 
@@ -141,7 +130,7 @@ def test_a_joint_type_that_it_does_not_know_is_named():
             for j in case.mechanism.joints
         ]
         with pytest.raises(NotStatedError, match="odd"):
-            conditions(replace(case.mechanism, joints=joints))
+            Rows(replace(case.mechanism, joints=joints))
     finally:
         del Spherical.registry["odd"]
 
@@ -260,7 +249,7 @@ def test_the_truth_is_proved(name):
     case = PROBES.get(name) or cases.load(name)
     truth = followed(case)
     assert distance_from_proof(truth, 3) < 1e-2
-    off = {name: (x + 1e-14, v, a) for name, (x, v, a) in truth.points.items()}
+    off = {name: moved + [[[1e-14]], [[0.0]], [[0.0]]] for name, moved in truth.points.items()}
     assert distance_from_proof(replace(truth, points=off), 3) > 1e-2
 
 

@@ -14,8 +14,8 @@ from kincheck.core.studies.stress.families.base import as_case
 from kincheck.core.studies.stress.families.dimensions import crank_rocker
 from kincheck.core.studies.stress.families.planar import any_plane, four_bar
 from kincheck.core.studies.stress.solving import once
-from kincheck.core.studies.stress.truth.reference_motion import Reach, followed
 from kincheck.core.studies.stress.verdicts import Verdict, described_wrong, judged
+from kincheck.core.studies.truth.motion import Reach, followed
 
 from .test_stress import NATIVE
 

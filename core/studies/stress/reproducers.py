@@ -15,12 +15,12 @@ from ...case.io.coordinates import with_all_coordinates
 from ...errors import KincheckError
 from ...harness.engine import Engine
 from ...harness.execution import Pair
+from ..truth.motion import Truth, followed
 from .families import Specimen
 from .results import Finding
 from .run import Example
 from .shrink import fewer_samples, reduced
 from .solving import solve_all
-from .truth.reference_motion import Truth, followed
 from .verdicts import Judgement, Verdict, judged
 
 

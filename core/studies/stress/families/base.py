@@ -17,8 +17,8 @@ from ....failures import FailureKind
 from ....mechanism.mechanism import Mechanism
 from ....mechanism.motions import Motion
 from ....trajectory import Array
-from ..truth.reference_motion import Truth as Known
-from ..truth.reference_motion import followed
+from ...truth.motion import Truth as Known
+from ...truth.motion import followed
 
 TOL = 1e-12
 """Largest accepted residual, as in `kincheck run`."""

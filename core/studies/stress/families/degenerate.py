@@ -25,7 +25,7 @@ from ....joints import (
 )
 from ....mechanism.drivers import JointAngle, PointCoordinate
 from ....mechanism.mechanism import GROUND, Body, Mechanism, Point
-from ..truth.reference_motion import followed
+from ...truth.motion import followed
 from .base import MOTION_ENDS, Family, Rng, Specimen, as_case, direction
 from .dimensions import crank_rocker
 from .planar import any_plane, four_bar, slider_crank

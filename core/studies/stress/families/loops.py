@@ -22,8 +22,7 @@ from ....mechanism.drivers import Driver, JointAngle, JointDisplacement, PointCo
 from ....mechanism.mechanism import GROUND, Body, Mechanism, Point
 from ....mechanism.motions import Motion, Sine
 from ....trajectory import Array
-from ..truth.conditions import conditions
-from ..truth.evaluation import Evaluator, Poses
+from ...truth.rows import Poses, Rows
 from .base import Family, Rng, Specimen, as_case, bodies, direction
 
 LARGEST = 30
@@ -139,9 +138,9 @@ class Builder:
 
     def _rows(self, mechanism: Mechanism, drop: int = 0) -> Array:
         """Return rows of unit length, translations in metres, without the first `drop` rows."""
-        rows = Evaluator(conditions(mechanism))
+        rows = Rows(mechanism)
         found: Array = rows.jacobian(Poses.design(len(self.bodies), 1))[0][drop:]
-        found[:, np.arange(found.shape[1]) % 6 < 3] /= rows.stated.unit
+        found[:, np.arange(found.shape[1]) % 6 < 3] /= rows.unit
         return found / np.linalg.norm(found, axis=1, keepdims=True)
 
     def _take(self, rows: Array, leave: int) -> bool:

@@ -13,8 +13,8 @@ from ....joints import Cylindrical, Distance, Joint, Revolute, Spherical, Transl
 from ....mechanism.drivers import JointAngle, JointDisplacement
 from ....mechanism.mechanism import Body, Mechanism, Point
 from ....trajectory import Array
-from ..truth.long_double import Real, extended, unit
-from ..truth.reference_motion import Motion
+from ...truth.motion import Motion
+from ...truth.rows import Real, extended, unit
 from .base import Rng, direction
 
 Plan = tuple[float, float]
