@@ -14,9 +14,9 @@ from kincheck.core.studies.stress.families.folds import Folds
 from kincheck.core.studies.stress.families.planar import any_plane, slider_crank
 from kincheck.core.studies.stress.run import specimen
 from kincheck.core.studies.stress.solving import once
+from kincheck.core.studies.stress.verdicts import Verdict, judged
 from kincheck.core.studies.truth.fold import first_fold
 from kincheck.core.studies.truth.motion import Reach, followed
-from kincheck.core.studies.stress.verdicts import Verdict, judged
 
 BEYOND = Path(__file__).parents[1] / "data" / "beyond_a_fold.toml"
 SIMULATORS = ["mujoco", "pinocchio", "exudyn", "drake", "dart", "simbody"]
