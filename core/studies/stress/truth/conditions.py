@@ -20,8 +20,8 @@ from __future__ import annotations
 from typing import Any
 
 from ....errors import KincheckError
-from ....mechanism.drivers import JointDriver, PointCoordinate
 from ....mechanism.mechanism import Mechanism
+from ....mechanism.motions import JointDriver, PointCoordinate
 from .constraint_rows import Conditions, Writer
 from .joint_conditions import JOINTS
 from .long_double import extended, unit

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....case.case import Case
-from ....mechanism.drivers import JointAngle
+from ....mechanism.motions import JointAngle
 from ....trajectory import Array
 from .conditions import conditions
 from .evaluation import Evaluator, Poses, spun
