@@ -168,7 +168,7 @@ def test_sources_import_by_the_table():
 
 
 OFFENDERS = [
-    ("core/algebra.py", "from .mechanism.drivers import JointAngle"),
+    ("core/algebra.py", "from .mechanism.motions import JointAngle"),
     ("core/primitives/new.py", "from ..joints.base import Joint"),
     ("core/kinematics/new.py", "from ..harness import record"),
     ("core/kinematics/new.py", "def f():\n    from .. import harness"),

@@ -14,8 +14,8 @@ import numpy as np
 
 from ...core.case.case import Case
 from ...core.joints.base import unit
-from ...core.mechanism.drivers import Driver, JointDriver, PointCoordinate
 from ...core.mechanism.mechanism import GROUND
+from ...core.mechanism.motions import Driver, JointDriver, PointCoordinate
 from .rows import Rows
 
 

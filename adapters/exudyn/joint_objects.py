@@ -24,14 +24,14 @@ import numpy as np
 
 from ...core import joints
 from ...core.joints.base import unit
-from ...core.mechanism.drivers import (
+from ...core.mechanism.mechanism import GROUND
+from ...core.mechanism.motions import (
     Driver,
     JointAngle,
     JointDisplacement,
     JointDriver,
     PointCoordinate,
 )
-from ...core.mechanism.mechanism import GROUND
 from ..shared.poses import frame_along
 from .equations import ABOUT_X, ABOUT_Y, ABOUT_Z, Equations, X, Y, Z
 

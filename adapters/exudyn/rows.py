@@ -9,8 +9,8 @@ from typing import Any
 from numpy.polynomial import Polynomial
 
 from ...core import joints
-from ...core.mechanism.drivers import Driver
 from ...core.mechanism.mechanism import Mechanism
+from ...core.mechanism.motions import Driver
 from .equations import Equations
 from .joint_objects import DRIVERS, JOINTS
 

@@ -17,8 +17,8 @@ import numpy as np
 
 from ...core.case.case import Case
 from ...core.joints.base import unit
-from ...core.mechanism.drivers import JointDriver, PointCoordinate
 from ...core.mechanism.mechanism import Vector
+from ...core.mechanism.motions import JointDriver, PointCoordinate
 from ...core.trajectory import Array
 from ..shared.force_solution import Dynamics
 from ..shared.tree_forces import Mass, TreeForces, mass_properties

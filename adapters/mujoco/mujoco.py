@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from ...core.case.case import Case
 from ...core.harness.engine import Floor
-from ...core.mechanism.drivers import JointDriver, PointCoordinate
+from ...core.mechanism.motions import JointDriver, PointCoordinate
 from ...core.trajectory import Array
 from ..shared.compiled_floor import floor_of
 from ..shared.force_solution import Dynamics

@@ -16,8 +16,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...core.joints import Coupler, Distance, Joint
-from ...core.mechanism.mechanism import GROUND, Mechanism
-from ...core.mechanism.topology import spanning_tree
+from ...core.mechanism.mechanism import GROUND, Mechanism, spanning_tree
 from ..shared.joint_chains import (
     CHAINS,
     Link,

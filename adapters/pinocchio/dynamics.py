@@ -19,9 +19,8 @@ import numpy as np
 
 from ...core.case.case import Case
 from ...core.joints import Distance, Fixed, Joint, Spherical
-from ...core.mechanism.drivers import JointDriver
-from ...core.mechanism.mechanism import GROUND, Mechanism, Vector
-from ...core.mechanism.topology import Branch, SpanningTree
+from ...core.mechanism.mechanism import GROUND, Branch, Mechanism, SpanningTree, Vector
+from ...core.mechanism.motions import JointDriver
 from ...core.trajectory import Array, Trajectory
 from ..shared.joint_chains import CHAINS, Link, end_of_loop, relations
 from ..shared.joint_equivalents import fits, jointed

@@ -17,8 +17,8 @@ import numpy as np
 from ...core.algebra import triple
 from ...core.joints import AxialJoint, Distance, Joint, Spherical, Translational, Universal
 from ...core.joints.base import triad, unit
-from ...core.mechanism.drivers import Driver, JointDisplacement, PointCoordinate
 from ...core.mechanism.mechanism import GROUND, Body, Mechanism, Vector
+from ...core.mechanism.motions import Driver, JointDisplacement, PointCoordinate
 
 # Largest difference of a rod's length from the distance at design for a body in its place [m].
 SAME_LENGTH = 1e-12

@@ -16,7 +16,7 @@ import numpy as np
 from ...core.case.case import Case, size
 from ...core.joints import Joint, Kind
 from ...core.kinematics import unit_near
-from ...core.mechanism.dimension import ACCELERATION
+from ...core.mechanism.body import ACCELERATION
 from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
 

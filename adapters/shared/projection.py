@@ -26,8 +26,7 @@ from ...core.kinematics import (
     solve_from_start,
     start_of,
 )
-from ...core.mechanism.drivers import Driver
-from ...core.mechanism.motions import Path, outwards
+from ...core.mechanism.motions import Driver, Path, outwards
 from ...core.trajectory import PointMotion, Trajectory, largest_found
 from .force_solution import ForceModel, solved_forces
 from .length_scaling import GLOBAL, OwnFrame

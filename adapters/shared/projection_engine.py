@@ -12,8 +12,8 @@ from ...core.case.case import Case
 from ...core.errors import SolveError
 from ...core.harness.engine import Floor
 from ...core.joints import Joint
-from ...core.mechanism.drivers import JointAngle, JointDisplacement, PointCoordinate
-from ...core.mechanism.equivalents import replaced_joints, with_equivalents
+from ...core.mechanism.mechanism import replaced_joints, with_equivalents
+from ...core.mechanism.motions import JointAngle, JointDisplacement, PointCoordinate
 from ...core.trajectory import Trajectory
 from .length_scaling import in_own_frame, own_frame
 from .projection import EFFORTS, solve_by_projection, without_counterpart

@@ -21,8 +21,8 @@ import numpy as np
 from ...core.case.case import Case
 from ...core.errors import SolveError
 from ...core.joints import Coupler, Distance, Fixed, Joint, Spherical
-from ...core.mechanism.drivers import JointDriver
 from ...core.mechanism.mechanism import Vector
+from ...core.mechanism.motions import JointDriver
 from ...core.trajectory import Array, Trajectory
 from .joint_chains import CHAINS, end_of_loop, relations
 from .joint_equivalents import fits, jointed

@@ -15,8 +15,8 @@ import numpy as np
 from ...core.case.case import Case
 from ...core.harness.engine import Floor
 from ...core.joints import Translational
-from ...core.mechanism.drivers import PointCoordinate
 from ...core.mechanism.mechanism import GROUND, Body, Mechanism, Point
+from ...core.mechanism.motions import PointCoordinate
 from .compiled_floor import Call, floor_of
 from .loop_closures import CLOSURES
 from .projection_engine import ProjectionEngine

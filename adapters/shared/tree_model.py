@@ -22,10 +22,16 @@ from numpy.polynomial import Polynomial
 from ...core.case.case import Case
 from ...core.joints import Fixed, Joint
 from ...core.joints.base import unit
-from ...core.mechanism.drivers import JointDriver, PointCoordinate
 from ...core.mechanism.loads import TorsionSpringDamper
-from ...core.mechanism.mechanism import GROUND, Mechanism, Vector
-from ...core.mechanism.topology import Branch, SpanningTree, spanning_tree
+from ...core.mechanism.mechanism import (
+    GROUND,
+    Branch,
+    Mechanism,
+    SpanningTree,
+    Vector,
+    spanning_tree,
+)
+from ...core.mechanism.motions import JointDriver, PointCoordinate
 from ...core.trajectory import Array
 from .force_solution import Dynamics
 from .frame_constraints import Condition

@@ -15,7 +15,7 @@ import numpy as np
 
 from ...core.case.case import Case
 from ...core.errors import SolveError
-from ...core.mechanism.drivers import JointDriver
+from ...core.mechanism.motions import JointDriver
 from ...core.trajectory import Array, Trajectory
 from ..shared.joint_equivalents import jointed
 from ..shared.simulation import Leg, SimulatedPose, SimulationEndedError, simulated, start_of

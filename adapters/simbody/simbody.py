@@ -18,8 +18,8 @@ import numpy as np
 
 from ...core.case.case import Case
 from ...core.harness.engine import Floor
-from ...core.mechanism.drivers import PointCoordinate
 from ...core.mechanism.mechanism import Vector
+from ...core.mechanism.motions import PointCoordinate
 from ...core.trajectory import Array
 from ..shared.compiled_floor import Call, floor_of
 from ..shared.opensim_frames import euler_angles

@@ -16,8 +16,7 @@ from typing import Literal
 from ...core.errors import KincheckError
 from ...core.joints import Distance, Joint
 from ...core.mechanism.body import Body
-from ...core.mechanism.mechanism import GROUND, Mechanism, Vector
-from ...core.mechanism.topology import spanning_tree
+from ...core.mechanism.mechanism import GROUND, Mechanism, Vector, spanning_tree
 from ..shared.joint_chains import CHAINS, Link, end_of_loop, polynomial_in_tree, relations
 from ..shared.loop_closures import ends_of
 from .xml_text import link_names

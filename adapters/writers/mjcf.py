@@ -18,8 +18,7 @@ from ...core.case.models.mjcf.masses import STAND_INS
 from ...core.errors import KincheckError
 from ...core.joints import Coupler, Distance, Joint
 from ...core.mechanism.loads import ForceElement, SpringDamper, TorsionSpringDamper
-from ...core.mechanism.mechanism import GROUND, Body, Mechanism
-from ...core.mechanism.topology import spanning_tree
+from ...core.mechanism.mechanism import GROUND, Body, Mechanism, spanning_tree
 from ...core.trajectory import BodyMotion
 from ..shared.joint_chains import (
     CHAINS,

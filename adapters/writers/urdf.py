@@ -19,8 +19,7 @@ from typing import Any, cast
 from ...core.algebra import vec
 from ...core.errors import KincheckError
 from ...core.joints import Fixed, Joint
-from ...core.mechanism.mechanism import GROUND, Body, Mechanism, Vector
-from ...core.mechanism.topology import spanning_tree
+from ...core.mechanism.mechanism import GROUND, Body, Mechanism, Vector, spanning_tree
 from ...core.trajectory import BodyMotion
 from ..shared.frame_constraints import Frame
 from ..shared.joint_chains import CHAINS, Link, polynomial_in_tree, relations

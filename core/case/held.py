@@ -14,8 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import MOST_NAMED, CaseError, shortened
-from ..mechanism.motions import Motion
-from ..mechanism.waypoints import Waypoints
+from ..mechanism.motions import Motion, Waypoints
 from ..trajectory import Array
 from .case import HELD_BUT, TIME, Case, Sweep, size
 

@@ -18,8 +18,8 @@ import numpy as np
 
 from ..errors import MechanismError
 from ..joints import AxialJoint, Coupler, Distance, Joint, Kind, Revolute, Translational
-from ..mechanism.drivers import JointAngle
 from ..mechanism.mechanism import GROUND, Body, Mechanism, Point, Vector
+from ..mechanism.motions import JointAngle
 from .case import Case, Output, Sweep, Truth
 
 # Design position: skew axes and uneven numbers, so no row vanishes by symmetry. Global, in metres.

@@ -6,8 +6,8 @@ import numpy as np
 
 from ..errors import Phrase
 from ..joints.base import unit
-from ..mechanism.drivers import JointDriver, PointCoordinate
 from ..mechanism.mechanism import GROUND, Mechanism
+from ..mechanism.motions import JointDriver, PointCoordinate
 from .case import Case
 from .quantity import Output
 from .sizes import size_notes

@@ -16,8 +16,8 @@ from ..errors import KincheckError
 from ..joints import Kind
 from ..joints.base import unit
 from ..kinematics import NativeSolver
-from ..mechanism.drivers import PointCoordinate
 from ..mechanism.mechanism import Vector
+from ..mechanism.motions import PointCoordinate
 from ..trajectory import Array, BodyMotion
 from .record import Record, Results
 from .scene_record import Scene, SceneBody, SceneForce, SceneJoint, ScenePoint, SceneWheel

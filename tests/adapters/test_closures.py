@@ -21,7 +21,7 @@ from kincheck.core import (
     Revolute,
     Universal,
 )
-from kincheck.core.mechanism.topology import Branch, SpanningTree, spanning_tree
+from kincheck.core.mechanism.mechanism import Branch, SpanningTree, spanning_tree
 from kincheck.core.trajectory import Trajectory
 
 pytest.importorskip("pinocchio")

@@ -10,9 +10,9 @@ import pytest
 from kincheck import adapters, cases
 from kincheck.core.joints import Fixed, Gear, RackPinion, Revolute, Translational
 from kincheck.core.mechanism.body import Body
-from kincheck.core.mechanism.drivers import JointAngle
 from kincheck.core.mechanism.loads import TorsionSpringDamper
 from kincheck.core.mechanism.mechanism import GROUND, Mechanism
+from kincheck.core.mechanism.motions import JointAngle
 
 from ..support.engine_forces import Beside, force_case, pushed, values
 from ..support.joint_loops import TYPES, crank_only, on_crank

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from kincheck.adapters.exudyn.exudyn import Exudyn
 from kincheck.core.joints import Distance, Revolute, Spherical, Translational
-from kincheck.core.mechanism.drivers import Driver, PointCoordinate
 from kincheck.core.mechanism.mechanism import Body
+from kincheck.core.mechanism.motions import Driver, PointCoordinate
 
 from ..support.exudyn_cases import TOL, assert_consistent, case_of, solve, solved, turned
 

@@ -20,9 +20,8 @@ from kincheck.core.joints import (
     Translational,
 )
 from kincheck.core.kinematics import solve
-from kincheck.core.mechanism.drivers import JointAngle, JointDisplacement, PointCoordinate
 from kincheck.core.mechanism.mechanism import Body, Mechanism, Point
-from kincheck.core.mechanism.motions import Sine
+from kincheck.core.mechanism.motions import JointAngle, JointDisplacement, PointCoordinate, Sine
 
 from ..support.joint_loops import RATE, TURN, TYPES, assert_moves_natively, on_crank
 

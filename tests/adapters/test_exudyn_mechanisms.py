@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 from kincheck.core.joints import Distance, Fixed, Revolute, Spherical, Translational, Universal
-from kincheck.core.mechanism.drivers import JointAngle, JointDisplacement
 from kincheck.core.mechanism.mechanism import Body
+from kincheck.core.mechanism.motions import JointAngle, JointDisplacement
 
 from ..support.exudyn_cases import assert_consistent, case_of, solved, turned
 

@@ -16,7 +16,7 @@ from kincheck.core.joints import (
     Spherical,
     Translational,
 )
-from kincheck.core.mechanism.drivers import Driver, JointAngle, PointCoordinate
+from kincheck.core.mechanism.motions import Driver, JointAngle, PointCoordinate
 
 from ..support.mujoco_cases import (
     C0,

@@ -16,9 +16,8 @@ from kincheck.core.joints import (
     Spherical,
     Translational,
 )
-from kincheck.core.mechanism.drivers import JointDisplacement, PointCoordinate
-from kincheck.core.mechanism.mechanism import Body
-from kincheck.core.mechanism.topology import SpanningTree, spanning_tree
+from kincheck.core.mechanism.mechanism import Body, SpanningTree, spanning_tree
+from kincheck.core.mechanism.motions import JointDisplacement, PointCoordinate
 
 from ..support.mujoco_cases import (
     B0,

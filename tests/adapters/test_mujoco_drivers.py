@@ -8,7 +8,7 @@ import pytest
 from kincheck.core.joints import (
     Translational,
 )
-from kincheck.core.mechanism.drivers import JointAngle, JointDisplacement, PointCoordinate
+from kincheck.core.mechanism.motions import JointAngle, JointDisplacement, PointCoordinate
 from numpy.polynomial import Chebyshev
 
 from ..support.mujoco_cases import (

@@ -26,7 +26,7 @@ from kincheck.core import (
     Translational,
     Universal,
 )
-from kincheck.core.mechanism.drivers import Driver
+from kincheck.core.mechanism.motions import Driver
 
 from ..support.joint_loops import CRANK, HINGE
 from ..support.pinocchio_cases import ENGINE, TOL, case_of, rotation, solved

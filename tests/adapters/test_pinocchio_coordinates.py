@@ -24,8 +24,8 @@ from kincheck.core import (
     Universal,
 )
 from kincheck.core.case.case import Sweep
-from kincheck.core.mechanism.drivers import Driver
-from kincheck.core.mechanism.topology import Branch, SpanningTree, spanning_tree
+from kincheck.core.mechanism.mechanism import Branch, SpanningTree, spanning_tree
+from kincheck.core.mechanism.motions import Driver
 from kincheck.core.trajectory import Trajectory
 
 from ..support.pinocchio_cases import ENGINE, TOL, case_of, solved

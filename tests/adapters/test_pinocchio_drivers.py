@@ -15,7 +15,7 @@ from kincheck.core import (
     Revolute,
     Translational,
 )
-from kincheck.core.mechanism.drivers import Driver
+from kincheck.core.mechanism.motions import Driver
 
 from ..support.joint_loops import HINGE
 from ..support.pinocchio_cases import rotation, solved

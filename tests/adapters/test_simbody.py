@@ -24,7 +24,7 @@ from kincheck.core import (
 )
 from kincheck.core.case.case import Case, Output, Sweep, Truth
 from kincheck.core.joints import Joint
-from kincheck.core.mechanism.topology import SpanningTree, spanning_tree
+from kincheck.core.mechanism.mechanism import SpanningTree, spanning_tree
 
 from ..joints.test_joints import EXAMPLES, TYPES
 

@@ -14,8 +14,8 @@ from kincheck.core.case.models.files import load
 from kincheck.core.case.models.mjcf.elements import parse_xml
 from kincheck.core.case.models.robots.urdf import read_urdf
 from kincheck.core.joints import Polynomial, Revolute
-from kincheck.core.mechanism.drivers import JointAngle
 from kincheck.core.mechanism.mechanism import Body, Mechanism
+from kincheck.core.mechanism.motions import JointAngle
 
 from ..fuzz import urdf as seeds
 from ..support.exported_again import same_motion

@@ -14,8 +14,8 @@ from kincheck.core.harness.compare import (
     output_series,
     pace,
 )
-from kincheck.core.mechanism.drivers import PointCoordinate
 from kincheck.core.mechanism.mechanism import Mechanism
+from kincheck.core.mechanism.motions import PointCoordinate
 
 from ..support.fakes import RADIUS, SAMPLES, crank, exact, partial, solution
 

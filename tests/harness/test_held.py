@@ -11,7 +11,7 @@ from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.models.hardpoints.templates import TEMPLATES
 from kincheck.core.errors import CaseError
 from kincheck.core.harness.execution import Answer, Pair, attempt
-from kincheck.core.mechanism.waypoints import Waypoints
+from kincheck.core.mechanism.motions import Waypoints
 from kincheck.core.studies.tolerance.study import Study
 
 from ..oracles.rods import Carrier

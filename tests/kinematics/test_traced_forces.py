@@ -12,9 +12,9 @@ from kincheck.core.kinematics.forces.wanted import wanted_forces
 from kincheck.core.kinematics.solver_selection import prepare
 from kincheck.core.mechanism import motions
 from kincheck.core.mechanism.body import Body
-from kincheck.core.mechanism.drivers import JointAngle
 from kincheck.core.mechanism.loads import Force, SpringDamper, Torque, TorsionSpringDamper
 from kincheck.core.mechanism.mechanism import Mechanism
+from kincheck.core.mechanism.motions import JointAngle
 from kincheck.core.program.llvm.compiler import available
 
 from ..support.loads import GRAVITY, loaded, six

@@ -72,7 +72,7 @@ def test_cached_code_is_used_and_a_damaged_entry_is_rebuilt(tmp_path, monkeypatc
     entries = [*(tmp_path / "kincheck").iterdir()]
     assert len(entries) == 5  # and its machine code
     for name in ("_trace", "bytecode", "_text"):
-        owner = {"_trace": program_cache, "bytecode": jit.bytecode, "_text": LlvmCode}[name]
+        owner = {"_trace": program_cache, "bytecode": jit, "_text": LlvmCode}[name]
         monkeypatch.setattr(owner, name, None)
     np.testing.assert_array_equal(positions(), fresh)
     monkeypatch.undo()

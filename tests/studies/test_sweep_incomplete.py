@@ -16,8 +16,8 @@ from kincheck.core.case.io.case_writer import case_text
 from kincheck.core.cli.main import main
 from kincheck.core.harness.record import to_json
 from kincheck.core.joints import Distance, Revolute
-from kincheck.core.mechanism.drivers import JointAngle
 from kincheck.core.mechanism.mechanism import Body, Mechanism, Point
+from kincheck.core.mechanism.motions import JointAngle
 from kincheck.core.studies.tolerance.chunk import RowLimit, limit_counts
 from kincheck.core.studies.tolerance.csv_tables import limits_csv
 from kincheck.core.studies.tolerance.page import page

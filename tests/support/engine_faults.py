@@ -10,9 +10,8 @@ from dataclasses import dataclass, replace
 
 import kincheck.adapters
 import numpy as np
-from kincheck.core.mechanism.drivers import JointAngle, JointDisplacement
 from kincheck.core.mechanism.loads import Force, SpringDamper, Torque, TorsionSpringDamper
-from kincheck.core.mechanism.motions import Sine
+from kincheck.core.mechanism.motions import JointAngle, JointDisplacement, Sine
 from kincheck.core.trajectory import Trajectory
 
 

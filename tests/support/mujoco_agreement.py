@@ -9,7 +9,7 @@ import pytest
 from kincheck.adapters.mujoco import spec
 from kincheck.core import solve as solve_natively
 from kincheck.core.case.case import Case, Output, Sweep, Truth
-from kincheck.core.mechanism.topology import SpanningTree, spanning_tree
+from kincheck.core.mechanism.mechanism import SpanningTree, spanning_tree
 
 from .mujoco_cases import assert_motion, solve
 

@@ -14,8 +14,8 @@ from kincheck.core.joints import (
     Translational,
     Universal,
 )
-from kincheck.core.mechanism.drivers import JointAngle
 from kincheck.core.mechanism.mechanism import Body, Mechanism, Point
+from kincheck.core.mechanism.motions import JointAngle
 
 TOL = 1e-12
 RATE = 3.0

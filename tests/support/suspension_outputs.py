@@ -13,8 +13,8 @@ from kincheck.core.case.suspension import (
 )
 from kincheck.core.harness.compare import output_series
 from kincheck.core.joints import Revolute
-from kincheck.core.mechanism.drivers import JointAngle
 from kincheck.core.mechanism.mechanism import Body, Mechanism, Point
+from kincheck.core.mechanism.motions import JointAngle
 
 TOL = 1e-12
 ROUND_OFF = 1e-14

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ...errors import MechanismError, unknown
 from ...joints import Kind
-from ...mechanism.dimension import ACCELERATION
+from ...mechanism.body import ACCELERATION
 from ...mechanism.mechanism import Body, Mechanism, Point
 from ..case import Case, Truth, size
 from ..quantity import with_markers

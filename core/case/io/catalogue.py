@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 
 from ...errors import MechanismError
 from ...joints import Coupler, Joint, Kind
-from ...mechanism.dimension import dimension_of
+from ...mechanism.body import dimension_of
 from ...mechanism.loads import ELEMENTS, SpringDamper
 from ...mechanism.motions import Motion
 from .. import measures

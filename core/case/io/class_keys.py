@@ -11,10 +11,9 @@ import msgspec
 from msgspec import Meta
 
 from ...joints import Coupler, Joint, Kind
-from ...mechanism.drivers import Driver
 from ...mechanism.loads import ForceElement
 from ...mechanism.mechanism import Vector
-from ...mechanism.motions import Motion
+from ...mechanism.motions import Driver, Motion
 from .schema import Bodies, Flag, Joints, Number, Numbers, Numbers3, Table, Text
 
 _SHAPES: Mapping[Kind, Any] = {

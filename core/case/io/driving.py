@@ -9,9 +9,18 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from ...mechanism.drivers import Driver, JointAngle, JointDisplacement, JointDriver, PointCoordinate
 from ...mechanism.mechanism import Mechanism
-from ...mechanism.motions import ROUNDED_TIME, Absolute, Measure, Motion
+from ...mechanism.motions import (
+    ROUNDED_TIME,
+    Absolute,
+    Driver,
+    JointAngle,
+    JointDisplacement,
+    JointDriver,
+    Measure,
+    Motion,
+    PointCoordinate,
+)
 from ...trajectory import Array
 from ..case import TIME, Sweep
 from ..units import SECOND, Unit, plain

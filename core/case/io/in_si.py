@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ...joints import Kind
-from ...mechanism.dimension import Dimension
+from ...mechanism.body import Dimension
 from ...mechanism.mechanism import Vector
 from ..units import Unit
 from .document import fault

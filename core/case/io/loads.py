@@ -35,8 +35,7 @@ from typing import Annotated, Any, Literal
 import msgspec
 from msgspec import Meta
 
-from ...mechanism.body import Inertia, checked_inertia
-from ...mechanism.dimension import ANGLE, INERTIA, dimension_of
+from ...mechanism.body import ANGLE, INERTIA, Inertia, checked_inertia, dimension_of
 from ...mechanism.loads import ELEMENTS, ForceElement, SpringDamper
 from ..units import RADIAN, Unit
 from .class_keys import key_of, kind_of, own_fields, shape_of

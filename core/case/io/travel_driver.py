@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ...joints.base import unit
-from ...mechanism.drivers import PointCoordinate
+from ...mechanism.motions import PointCoordinate
 from ..case import Case
 from ..suspension import Rate, SuspensionOutput, Vehicle
 from .document import fault, join, unknown_name

@@ -18,9 +18,9 @@ from ...algebra import Vec3, triple
 from ...errors import MechanismError, SolveError
 from ...forces import Forces
 from ...jet import Jet
-from ...mechanism.drivers import JointDriver, PointCoordinate
 from ...mechanism.loads import Force, SpringDamper, Torque, TorsionSpringDamper
 from ...mechanism.mechanism import Mechanism, Point, Vector
+from ...mechanism.motions import JointDriver, PointCoordinate
 from ...trajectory import Array
 from ..quantity import HIDDEN, MARKER
 from .base import Measure, place_on

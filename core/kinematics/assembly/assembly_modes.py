@@ -18,8 +18,7 @@ from ...algebra import Quat, quat, vec
 from ...dataset import Dataset, Variable
 from ...errors import number_of
 from ...input_checks import require_positive
-from ...mechanism.mechanism import Mechanism
-from ...mechanism.topology import spanning_tree
+from ...mechanism.mechanism import Mechanism, spanning_tree
 from ...primitives.base import GROUND_POSE, Pose
 from ...tabular import Tabular
 from ...trajectory import Array

@@ -12,7 +12,7 @@ import numpy as np
 from ...failures import FailureKind, PoseFailure
 from ...mechanism.motions import Path
 from ...program import Parts, Plan
-from ...program.memory import aligned
+from ...program.plan import aligned
 from ...trajectory import QUANTITIES, Array
 from ..compiled.request import (
     EARLIER,

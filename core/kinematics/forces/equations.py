@@ -14,8 +14,8 @@ from typing import Any
 
 from ...algebra import ZERO, Scalar, Vec3, cross, is_literal_zero, vec
 from ...joints.base import Joint
-from ...mechanism.drivers import Driver
 from ...mechanism.mechanism import Mechanism
+from ...mechanism.motions import Driver
 from ...primitives.base import GROUND_POSE
 from ..formulation.cartesian import COLUMNS, Cartesian
 from ..formulation.constraints import Constraint, Relation

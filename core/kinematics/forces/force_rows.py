@@ -11,7 +11,7 @@ import numpy as np
 from ...algebra import Scalar, Vec3
 from ...forces import AMPLIFIED, Multipliers
 from ...joints.base import Joint
-from ...mechanism.drivers import Driver
+from ...mechanism.motions import Driver
 from ...primitives.base import Drive
 from ...trajectory import Array
 from ..formulation.cartesian import Cartesian

@@ -11,9 +11,8 @@ import numpy as np
 from ...algebra import ZERO, angle_about, cross, quat, vec
 from ...errors import SolveError
 from ...joints.base import unit
-from ...mechanism.drivers import JointDriver
 from ...mechanism.mechanism import Mechanism
-from ...mechanism.motions import Path
+from ...mechanism.motions import JointDriver, Path
 from ...primitives.base import GROUND_POSE, Pose, Twist
 from ...trajectory import Array, Trajectory
 from ..formulation.constraints import frames

@@ -6,9 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ...mechanism.drivers import Driver
 from ...mechanism.mechanism import Mechanism
-from ...mechanism.motions import Path
+from ...mechanism.motions import Driver, Path
 from ...primitives.base import Drive
 from ...trajectory import Array
 

@@ -13,8 +13,7 @@ from typing import Any, TypeVar
 
 from ...algebra import Scalar
 from ...joints import Kind
-from ...mechanism.body import Body
-from ...mechanism.dimension import MASS, Dimension, dimension_of
+from ...mechanism.body import MASS, Body, Dimension, dimension_of
 from ...mechanism.loads import ForceElement
 from ...mechanism.mechanism import Mechanism
 

@@ -10,8 +10,8 @@ import numpy as np
 from ...algebra import ZERO, angle_about, quat, vec
 from ...joints import AxialJoint
 from ...joints.base import unit
-from ...mechanism.drivers import JointAngle
 from ...mechanism.mechanism import Mechanism
+from ...mechanism.motions import JointAngle
 from ...primitives.base import GROUND_POSE, Pose
 from ...trajectory import Array
 from .constraints import Frames

@@ -27,10 +27,9 @@ from ...joints import (
     Spherical,
 )
 from ...joints.base import triad
-from ...mechanism.drivers import JointDriver
 from ...mechanism.loads import TorsionSpringDamper
-from ...mechanism.mechanism import Mechanism, Reduced, Vector
-from ...mechanism.topology import spanning_tree
+from ...mechanism.mechanism import Mechanism, Reduced, Vector, spanning_tree
+from ...mechanism.motions import JointDriver
 from ...primitives.base import GROUND_POSE
 from ...trajectory import Array, BodyMotion
 from ..formulation.cartesian import COLUMNS, Cartesian

@@ -17,7 +17,7 @@ from ...mechanism.mechanism import Mechanism
 from ...primitives.base import GROUND_POSE, Drive
 from ...program import Program, Tape, Traced, program
 from ...program.ball_executor import Ball
-from ...program.derivative import jacobian
+from ...program.tape import jacobian
 from ..forces.wanted import WantedForces
 from ..formulation.cartesian import Cartesian
 from ..formulation.constraints import Frames, constraints, frames

@@ -22,12 +22,12 @@ from typing import Any, cast
 
 from ...algebra import ZERO, Quat, Scalar, quat, vec
 from ...joints.base import Joint, unit
-from ...mechanism.drivers import JointDriver, PointCoordinate
 from ...mechanism.loads import TorsionSpringDamper
 from ...mechanism.mechanism import Mechanism
+from ...mechanism.motions import JointDriver, PointCoordinate
 from ...primitives.base import GROUND_POSE, Drive, Twist
 from ...program import Program, Tape, Traced, program
-from ...program.derivative import Gradient
+from ...program.tape import Gradient
 from ..forces.demand import NO_WRENCH, BodyStates, Wrench, at_work
 from ..forces.equations import ForceEquations
 from ..forces.power import powers

@@ -10,11 +10,9 @@ from typing import Any
 import numpy as np
 
 from ...trajectory import Array
-from ..executor_protocol import Parts, Side, Table
-from ..memory import BYTES, address, aligned
-from ..plan import LINE
+from ..plan import BYTES, LINE, Parts, Side, Table, address, aligned
 from .jit import LlvmCode
-from .one_motion import MOTION, SIDE
+from .loops import MOTION, SIDE
 
 OUT, FORGET = (MOTION.index(each) for each in ("ptr out", "i64 forget"))
 REACHED = SIDE.index("i64 reached")

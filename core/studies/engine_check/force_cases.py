@@ -16,10 +16,9 @@ from ...case.measures.force import Axis
 from ...case.quantity import with_markers
 from ...joints import Fixed, Revolute, Translational
 from ...mechanism.body import Body
-from ...mechanism.drivers import JointAngle, JointDisplacement, PointCoordinate
 from ...mechanism.loads import Axes, Force, SpringDamper, Torque, TorsionSpringDamper
 from ...mechanism.mechanism import GROUND, Mechanism, Point
-from ...mechanism.motions import Sine
+from ...mechanism.motions import JointAngle, JointDisplacement, PointCoordinate, Sine
 from ..joint_check.loaded_probe import GRAVITY, INERTIA, loaded
 
 RATE = 0.75

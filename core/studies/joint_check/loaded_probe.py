@@ -16,10 +16,9 @@ from ...forces import Reaction
 from ...joints import AxialJoint, Joint
 from ...kinematics import NativeSolver
 from ...mechanism.body import Body
-from ...mechanism.drivers import JointAngle, JointDisplacement, JointDriver
 from ...mechanism.loads import SpringDamper
 from ...mechanism.mechanism import GROUND, Mechanism
-from ...mechanism.motions import Path, Sine
+from ...mechanism.motions import JointAngle, JointDisplacement, JointDriver, Path, Sine
 from ...trajectory import Trajectory
 
 # Samples of the probe: forces follow from each pose alone.

@@ -20,7 +20,7 @@ from ...harness.trajectory_check import check
 from ...harness.verdict import excess
 from ...joints import Joint
 from ...kinematics import solve
-from ...mechanism.equivalents import declared_equivalent, with_equivalents
+from ...mechanism.mechanism import declared_equivalent, with_equivalents
 from ...trajectory import Array, Trajectory
 from ..findings import Finding, Verdict, judged
 from .checks import ROUND_OFF

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from ...case.case import Case
-from ...mechanism.drivers import JointAngle
+from ...mechanism.motions import JointAngle
 from ...trajectory import Array
 from .rows import Indices, Poses, Real, Rows, cross, extended, nearest_turn, spun
 

@@ -32,8 +32,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import KincheckError
-from ...mechanism.drivers import JointDriver, PointCoordinate
 from ...mechanism.mechanism import GROUND, Mechanism
+from ...mechanism.motions import JointDriver, PointCoordinate
 
 Real: TypeAlias = NDArray[Any]
 """Array of longdoubles, which numpy's own type hints lose next to a plain number. On x86 they have

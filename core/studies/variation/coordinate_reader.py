@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ...case.io.document import fault, join, shown
-from ...mechanism.dimension import ANGLE, Dimension
+from ...mechanism.body import ANGLE, Dimension
 from .distributions import Law
 from .modes import Mode
 from .variation import Coordinate

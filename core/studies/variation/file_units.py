@@ -9,7 +9,7 @@ from ...case.case import Case
 from ...case.io.document import fault
 from ...case.units import ANGLES, LENGTHS, RADIAN
 from ...joints import Kind
-from ...mechanism.dimension import ANGLE, LENGTH, Dimension
+from ...mechanism.body import ANGLE, LENGTH, Dimension
 from .variation_schema import VaryUnits
 
 

@@ -13,7 +13,7 @@ from ...case.case import MARKER, Case
 from ...errors import remedy
 from ...joints import Kind
 from ...kinematics import kinds, load_places, places
-from ...mechanism.dimension import Dimension
+from ...mechanism.body import Dimension
 from ...trajectory import Array
 
 # Closer positions are one hardpoint [m]: hardpoints are measured to a micrometre at best.

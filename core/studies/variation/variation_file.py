@@ -15,7 +15,7 @@ from ...case.io.document import fault, join, shown
 from ...case.io.typed_tables import read_tables, typed
 from ...errors import unknown
 from ...joints import Kind
-from ...mechanism.drivers import PointCoordinate
+from ...mechanism.motions import PointCoordinate
 from ...trajectory import Array
 from .coordinate_reader import CoordinateReader
 from .correlations import Correlation, problem_of

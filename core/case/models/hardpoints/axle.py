@@ -8,9 +8,8 @@ from enum import StrEnum
 from pathlib import Path
 
 from ....joints import Joint, Translational
-from ....mechanism.drivers import Driver, JointDisplacement, PointCoordinate
 from ....mechanism.mechanism import GROUND, Body, Mechanism, Point, Vector
-from ....mechanism.motions import Motion, Ramp
+from ....mechanism.motions import Driver, JointDisplacement, Motion, PointCoordinate, Ramp
 from ...case import Sweep
 from ...io.coordinates import AXES
 from ...io.document import fault, unknown_name

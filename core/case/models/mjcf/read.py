@@ -11,10 +11,16 @@ from pathlib import Path
 from ....errors import MOST_NAMED, remedy, shortened
 from ....joints import Revolute
 from ....kinematics import degrees_of_freedom
-from ....mechanism.drivers import JointAngle, JointDisplacement, JointDriver
 from ....mechanism.loads import ForceElement
 from ....mechanism.mechanism import Mechanism, Point
-from ....mechanism.motions import Absolute, Motion, Table
+from ....mechanism.motions import (
+    Absolute,
+    JointAngle,
+    JointDisplacement,
+    JointDriver,
+    Motion,
+    Table,
+)
 from ...case import Case, Sweep, Truth
 from ...closing import within_digits
 from ...io.coordinates import with_all_motions

@@ -10,9 +10,8 @@ import numpy as np
 
 from ....algebra import triple
 from ....joints import AxialJoint, Cylindrical, Fixed, Joint, Revolute, Screw, Translational
-from ....mechanism.drivers import Driver, JointAngle, JointDisplacement
 from ....mechanism.mechanism import GROUND, Body, Mechanism, Point
-from ....mechanism.motions import Motion, Ramp, Sine
+from ....mechanism.motions import Driver, JointAngle, JointDisplacement, Motion, Ramp, Sine
 from ...truth.motion import Motion as Closed
 from ...truth.motion import closed
 from ...truth.rows import PI, Poses, Real, extended, unit

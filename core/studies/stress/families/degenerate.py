@@ -23,8 +23,8 @@ from ....joints import (
     Spherical,
     Universal,
 )
-from ....mechanism.drivers import JointAngle, PointCoordinate
 from ....mechanism.mechanism import GROUND, Body, Mechanism, Point
+from ....mechanism.motions import JointAngle, PointCoordinate
 from ...truth.motion import followed
 from .base import MOTION_ENDS, Family, Rng, Specimen, as_case, direction
 from .dimensions import crank_rocker

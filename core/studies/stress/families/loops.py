@@ -18,9 +18,15 @@ import numpy as np
 from ....algebra import triple
 from ....errors import MechanismError
 from ....joints import AxialJoint, Coupler, Gear, Joint, Kind, RackPinion
-from ....mechanism.drivers import Driver, JointAngle, JointDisplacement, PointCoordinate
 from ....mechanism.mechanism import GROUND, Body, Mechanism, Point
-from ....mechanism.motions import Motion, Sine
+from ....mechanism.motions import (
+    Driver,
+    JointAngle,
+    JointDisplacement,
+    Motion,
+    PointCoordinate,
+    Sine,
+)
 from ....trajectory import Array
 from ...truth.rows import Poses, Rows
 from .base import Family, Rng, Specimen, as_case, bodies, direction

@@ -12,8 +12,8 @@ import numpy as np
 from ....algebra import triple
 from ....failures import FailureKind
 from ....joints import Cylindrical, Distance, Joint, Revolute, Spherical, Translational, Universal
-from ....mechanism.drivers import JointAngle, JointDisplacement
 from ....mechanism.mechanism import GROUND, Body, Mechanism, Point
+from ....mechanism.motions import JointAngle, JointDisplacement
 from ....trajectory import Array
 from ...truth.motion import closed, followed
 from .base import Family, Rng, Specimen, as_case, direction, power
