@@ -27,16 +27,22 @@ from .joint_objects import JOINTS
 from .loads import COMPUTED_BY, Loads
 from .rows import Rows
 
-# Steps of the finite differences of the Jacobian at unit speed [units of length or -]. Round-off is
-# 1e-16 over the step. Truncation is the sixth power of the step times the seventh derivative of the
-# rows; it matters where the path curves within a hundred steps, as near a fold.
+# Steps of the finite differences of the rows' rates at unit speed [units of length or -]. Round-off
+# is 1e-16 over the step. Truncation is the sixth power of the step times the seventh derivative of
+# the rows; it matters where the path curves within a hundred steps, as near a fold.
 DIFFERENCES = tuple(1e-3 * 0.5**k for k in range(8))
 # If the estimates of fourth and sixth order agree to this fraction, the truncation of the latter is
 # below round-off: the ratio of the two truncations is about the square of the step times the
 # curvature, 1e-4 here.
 AGREE = 1e-9
-# Central differences: h f' = sum of weight * f(k h), of sixth order and of fourth.
-WEIGHTS = ((-3, -1 / 60, 0.0), (-2, 3 / 20, 1 / 12), (-1, -3 / 4, -2 / 3))
+# Central differences at k: h f' = sum of weight * f(k h), of sixth order and of fourth.
+STEPS = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])
+WEIGHTS = np.array(
+    [
+        [-1 / 60, 3 / 20, -3 / 4, 3 / 4, -3 / 20, 1 / 60],
+        [0.0, 1 / 12, -2 / 3, 2 / 3, -1 / 12, 0.0],
+    ]
+)
 
 
 class Exudyn(ProjectionEngine):
@@ -52,8 +58,8 @@ class Exudyn(ProjectionEngine):
             "residual": "ComputeAlgebraicEquations",
             "jacobian": "ComputeNewtonJacobian, constraint rows",
             "acceleration": (
-                "Jacobian differentiated along the velocity, sixth order, coordinates changed by"
-                f" {DIFFERENCES[0]:g} or less"
+                "ComputeAlgebraicEquations of rates, differentiated along the motion, sixth order,"
+                f" coordinates changed by {DIFFERENCES[0]:g} or less"
             ),
         }
 
@@ -68,7 +74,7 @@ class Exudyn(ProjectionEngine):
     def floor(self, case: Case) -> Floor:
         """Return the floor from the static solver's residual and Jacobian.
 
-        Rates need two more Jacobians for a difference.
+        Accelerations need two rates of the rows for a difference.
         """
         model = self.build(case)
         solved = self.solve(model, case, 1e-12)
@@ -83,13 +89,11 @@ class Exudyn(ProjectionEngine):
             for s, m, t in ((model.solver, model.mbs, model.settings), (solver, mbs, settings))
         )
         pose = {"ComputeAlgebraicEquations": residual, "ComputeNewtonJacobian": (own, empty, 1)}
-        return floor_of(
-            self.name,
-            solved,
-            model.unknowns,
-            pose,
-            {"ComputeNewtonJacobian (rates)": (own, empty, 2)},
-        )
+        once = {
+            "ComputeNewtonJacobian (rates)": (own, empty, 1),
+            "ComputeAlgebraicEquations (rates)": (*residual[:2], 2),
+        }
+        return floor_of(self.name, solved, model.unknowns, pose, once)
 
 
 def _least() -> tuple[Any, Any, Any, Any]:
@@ -105,6 +109,30 @@ def _least() -> tuple[Any, Any, Any, Any]:
     settings.solution.file.write = False
     solver.InitializeSolver(mbs, settings)
     return container, mbs, settings, solver
+
+
+class _Way:
+    """A motion of all nodes at constant rates: along lines and along great circles of the Euler
+    parameters, since Exudyn's rates are those of the rows only on the unit sphere.
+
+    Attributes:
+        turn: angle of the Euler parameters per unit of the way, by node.
+    """
+
+    def __init__(self, q: Array, v: Array) -> None:
+        self.q, self.v = q.reshape(-1, 7), v.reshape(-1, 7)
+        self.turn = np.sqrt((self.v[:, 3:] ** 2).sum(axis=1, keepdims=True))
+        self.p = self.q[:, 3:] + NO_ROTATION
+        self.d = self.v[:, 3:] / np.where(self.turn, self.turn, 1.0)
+
+    def at(self, s: Array) -> tuple[Array, Array]:
+        """Return coordinates and rates at n lengths of the way, shape (n, coordinates) each."""
+        s = s[:, None, None]
+        q, v = self.q + s * self.v, np.tile(self.v, (len(s), 1, 1))
+        c, d = np.cos(s * self.turn), np.sin(s * self.turn)
+        q[..., 3:] = c * self.p + d * self.d - NO_ROTATION
+        v[..., 3:] = self.turn * (c * self.d - d * self.p)
+        return q.reshape(len(s), -1), v.reshape(len(s), -1)
 
 
 class ExudynModel:
@@ -188,8 +216,8 @@ class ExudynModel:
         # sphere, Newton's convergence is not quadratic.
         x = self.x + dx
         q = x[: self.coordinates].reshape(-1, 7)
-        parameters = q[:, 3:] + NO_ROTATION
-        q[:, 3:] = parameters / np.linalg.norm(parameters, axis=1, keepdims=True) - NO_ROTATION
+        p = q[:, 3:] + NO_ROTATION
+        q[:, 3:] = p / np.sqrt((p * p).sum(axis=1, keepdims=True)) - NO_ROTATION
         self.restore(x)
 
     def residual(self, c: Array) -> Array:
@@ -217,15 +245,14 @@ class ExudynModel:
         return self.mbs.GetMarkerOutput(marker, self.rotation)[::3]
 
     def jacobian(self) -> Array:
-        for row, place, curve in self.bent:
-            self.shared[row, place] = curve.deriv()(self.x[self.coordinates + place])
-        return np.hstack([self._jacobian(), -self.shared])
-
-    def _jacobian(self) -> Array:
-        """Return the derivative of the rows by Exudyn's coordinates, shape (rows, coordinates)."""
         # ComputeJacobianAE adds to the matrix; this call clears it first
         self.solver.ComputeNewtonJacobian(self.mbs, self.settings)
-        return self.solver.GetSystemJacobian()[self.kept, : self.coordinates]
+        found = self.solver.GetSystemJacobian()[self.kept, : self.coordinates]
+        if not self.shared.size:
+            return found
+        for row, place, curve in self.bent:
+            self.shared[row, place] = curve.deriv()(self.x[self.coordinates + place])
+        return np.hstack([found, -self.shared])
 
     def driver_columns(self) -> Array:
         return self.driven
@@ -236,29 +263,28 @@ class ExudynModel:
         # the rate of the sweep.
         v, rates = v[: self.coordinates], v[self.coordinates :]
         speed = np.abs(v).max() or 1.0
+        way = _Way(self.q, v / speed)
         bias = np.zeros(len(self.kept))
         for h in DIFFERENCES:
-            bias, low = self._difference(v / speed, h)
+            bias, low = (
+                WEIGHTS @ [self._rates(*each) for each in zip(*way.at(h * STEPS), strict=True)] / h
+            )
             if np.abs(bias - low).max() <= AGREE * max(np.abs(bias).max(), 1.0):
                 break
+        # the rows of the normalisation, |p|^2 = 1, stay satisfied on the way by its curvature alone
+        bias[len(bias) - len(way.turn) :] = 2.0 * way.turn[:, 0] ** 2
         self.state.SetODE2Coordinates(self.q)
         bias *= speed**2
         for row, place, curve in self.bent:
             bias[row] -= curve.deriv(2)(self.x[self.coordinates + place]) * rates[place] ** 2
         return bias
 
-    def _difference(self, u: Array, h: float) -> tuple[Array, Array]:
-        """Return the derivative of J u along u by sixth and by fourth order, shape (rows,) each."""
-        high, low = np.zeros((2, len(self.kept)))
-        for k, sixth, fourth in WEIGHTS:
-            change = self._rates(u, k * h) - self._rates(u, -k * h)
-            high += sixth * change
-            low += fourth * change
-        return high / h, low / h
-
-    def _rates(self, u: Array, h: float) -> Array:
-        self.state.SetODE2Coordinates(self.q + h * u)
-        return self._jacobian() @ u
+    def _rates(self, q: Array, q_t: Array) -> Array:
+        """Return the rates of the rows."""
+        self.state.SetODE2Coordinates(q)
+        self.state.SetODE2Coordinates_t(q_t)
+        self.solver.ComputeAlgebraicEquations(self.mbs, True)
+        return self.solver.GetSystemResidual()[self.kept]
 
     def points(self, v: Array, a: Array) -> list[tuple[Array, Array, Array]]:
         self.state.SetODE2Coordinates_t(v[: self.coordinates])

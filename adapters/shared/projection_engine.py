@@ -51,7 +51,9 @@ class ProjectionEngine(ABC):
     @property
     def settings(self) -> Mapping[str, Any]:
         """The quantities in use, the linear solver and the Newton steps."""
-        solver = "numpy LU where the rows are square and of full rank at design, else least squares"
+        solver = (
+            "LAPACK: LU where the rows are square and of full rank at design, else least squares"
+        )
         steps = {} if self.corrections is None else {"newton_steps": self.corrections}
         return {**self.described, "linear solver": solver, **steps}
 

@@ -22,6 +22,7 @@ from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
 from .force_elements import Element, axis_of, places
 from .force_solution import Dynamics, reacting
+from .frame_constraints import skew
 from .rows_left_out import LeftOut, left_out_of
 from .tree_reactions import (
     Carried,
@@ -213,7 +214,7 @@ def demand_of(body: Body, frame: Any, gravity: Array) -> Array:
         return np.concatenate([force, np.zeros(3)])
     inertia = frame.rotation @ inertia_matrix(body.inertia) @ frame.rotation.T
     w, w_t = frame.velocity[3:], frame.acceleration[3:]
-    return np.concatenate([force, inertia @ w_t + np.cross(w, inertia @ w)])
+    return np.concatenate([force, inertia @ w_t + skew(w) @ (inertia @ w)])
 
 
 def mass_properties(body: Body, origin: Array) -> tuple[float, Array, Array]:

@@ -189,7 +189,7 @@ class SimbodyModel(LoadedSimbody):
         self.model.realizePosition(self.state)
 
     def rate(self, v: Array, a: Array) -> None:
-        self.a = a
+        self.u, self.a = v, a
         self.state.setU(self.o.Vector.createFromMat(v))
         self.model.realizeVelocity(self.state)
 

@@ -16,11 +16,14 @@ from ...core.trajectory import Array
 
 
 class Solved(Protocol):
-    """A model in Simbody's state; a: accelerations of the coordinates; matrix: for results."""
+    """A model in Simbody's state; u, a: velocities and accelerations of the coordinates; matrix:
+    for results.
+    """
 
     state: Any
     matter: Any
     matrix: Any
+    u: Array
     a: Array
 
 
@@ -73,8 +76,8 @@ class Station:
         """Return position, velocity and acceleration of the point."""
         matter, matrix = self.of.matter, self.of.matrix
         matter.calcStationJacobian(*self._place, matrix)
-        bias = matter.calcBiasForStationJacobian(*self._place).to_numpy()
-        return self.position, self._speed(), bias + matrix.to_numpy() @ self.of.a
+        J, bias = matrix.to_numpy(), matter.calcBiasForStationJacobian(*self._place)
+        return self.position, J @ self.of.u, bias.to_numpy() + J @ self.of.a
 
     def _speed(self) -> Array:
         return self.carrier.findStationVelocityInGround(self.of.state, self.point).to_numpy()
