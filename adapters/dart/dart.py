@@ -15,10 +15,10 @@ import numpy as np
 from ...core.case.case import Case
 from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
-from ..shared.joint_chains import Link
 from ..shared.tree_engine import TreeEngine
 from ..shared.tree_forces import NO_MASS, Mass, mass_properties
 from ..shared.tree_model import TreeModel
+from ..shared.tree_plan import Link
 
 # DART puts rotational components above translational ones.
 ROWS = np.array([3, 4, 5, 0, 1, 2])
@@ -95,7 +95,7 @@ class DartModel(TreeModel):
     def unknowns(self) -> int:
         return self.skeleton.getNumDofs()
 
-    def coordinate(self, body: int) -> tuple[int, int]:
+    def coordinate(self, body: Any) -> tuple[int, int]:
         at = self.joints[body].getIndexInSkeleton(0)
         return at, at
 

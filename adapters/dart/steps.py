@@ -13,6 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ...core.case.case import Case
+from ...core.joints import Spherical
 from ...core.trajectory import Array
 from ..shared.stepped_tree import SteppedTree, Stepping, Tie
 from .dart import Dart, DartModel
@@ -46,7 +47,7 @@ class DartWorld(SteppedTree, DartModel):
     def constraint(self, kinds: Any, tie: Tie) -> Any:
         """Return DART's constraint of a tie; the skeleton is at design."""
         nodes = [self.nodes[body] for body in tie.bodies if body]
-        if tie.kind == "point":
+        if tie.by is Spherical:
             made = kinds.BallJointConstraint(*nodes, np.array(tie.points[0]))
         else:
             made = kinds.WeldJointConstraint(*nodes)

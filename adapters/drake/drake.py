@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 from ...core.case.case import Case
 from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
-from ..shared.joint_chains import Link
 from ..shared.tree_engine import TreeEngine
 from ..shared.tree_forces import Mass, mass_properties
 from ..shared.tree_model import TreeModel
+from ..shared.tree_plan import Link
 
 # Drake puts rotational components above translational ones.
 ROWS = np.array([3, 4, 5, 0, 1, 2])
@@ -120,7 +120,7 @@ class DrakeModel(TreeModel):
     def unknowns(self) -> int:
         return len(self.turning)
 
-    def coordinate(self, body: int) -> tuple[int, int]:
+    def coordinate(self, body: Any) -> tuple[int, int]:
         joint = self.joints[body]
         return joint.position_start(), self.places[joint.velocity_start()]
 

@@ -15,11 +15,11 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ...core.case.case import Case
+from ...core.joints import Fixed, Spherical
 from ...core.trajectory import Array
-from ..shared.joint_chains import Link, dependence
 from ..shared.simulation import SimulationEndedError
 from ..shared.stepped_tree import SteppedTree, Stepping, Tie
-from ..shared.tree_rows import Terms
+from ..shared.tree_plan import Chain, Relation
 from .drake import Drake, DrakeModel
 
 # Inertia of driven coordinates [kg or kg m2] next to bodies with unit inertia: reactions change
@@ -46,18 +46,18 @@ class DrakePlant(SteppedTree, DrakeModel):
         self.rates = [self.coordinate(body)[1] for body, _ in self.driven]
         self.efforts = self.plant.get_applied_generalized_force_input_port()
 
-    def add_links(self, at: int, links: Sequence[Link], joint: str = "", sign: int = 1) -> int:
-        for link in links[::sign]:
-            carrier, at = at, super().add_links(at, [link], joint, sign)
+    def carry(self, chain: Chain) -> None:
+        first = len(self.origin)
+        super().carry(chain)
+        for at, link in enumerate(chain.links, first):
             if link.move == "ball":
-                self.tie(f"ball {at}", Tie("point", (carrier, at), (link.point, link.point)))
-        return at
+                bodies, points = (self.parents[at], at), (link.point, link.point)
+                self.tie(f"ball {at}", Tie(Spherical, bodies, points))
 
-    def relate(self, terms: Terms, curve: Sequence[float] = ()) -> None:
-        super().relate(terms, curve)
-        if len(terms) > 1:
-            moved = [(self.coordinates[joint, freedom], weight) for joint, freedom, weight in terms]
-            self.couplings.append(dependence((b, sign * weight) for (b, sign), weight in moved))
+    def relate(self, relation: Relation) -> None:
+        super().relate(relation)
+        one, other, (_, factor) = relation.follower(signed=True)
+        self.couplings.append((self.coordinates[one][0], self.coordinates[other][0], factor))
 
     def finish(self) -> None:
         plant, tree = self.plant, self.tree
@@ -83,13 +83,12 @@ class DrakePlant(SteppedTree, DrakeModel):
             np.array(point) - self.origin[body]
             for body, point in zip(tie.bodies, tie.points, strict=True)
         )
-        match tie.kind:
-            case "point":
-                plant.AddBallConstraint(one, P, other, Q)
-            case "frame":
-                plant.AddWeldConstraint(one, self.shift(P), other, self.shift(Q))
-            case "rod":
-                plant.AddDistanceConstraint(one, P, other, Q, tie.length)
+        if tie.by is Spherical:
+            plant.AddBallConstraint(one, P, other, Q)
+        elif tie.by is Fixed:
+            plant.AddWeldConstraint(one, self.shift(P), other, self.shift(Q))
+        else:
+            plant.AddDistanceConstraint(one, P, other, Q, tie.length)
 
     def step(self, q: Array, v: Array, driven: Array, h: float) -> tuple[Array, Array]:
         plant, context = self.plant, self.context

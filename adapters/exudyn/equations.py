@@ -21,8 +21,9 @@ from numpy.polynomial import Polynomial
 from ...core import joints
 from ...core.mechanism.mechanism import GROUND, Body, Mechanism
 from ...core.trajectory import Array
-from ..shared.poses import frame_along, middle
+from ..shared.poses import frame_along
 from ..shared.tree_forces import mass_properties
+from ..shared.tree_plan import middle
 
 # Constrained axes of a generic joint.
 X, Y, Z, ABOUT_X, ABOUT_Y, ABOUT_Z = range(6)

@@ -2,7 +2,7 @@
 Runge-Kutta method of fourth order.
 
 Pinocchio has no time stepping; the loop over the steps is ours. Every joint is a chain of slides,
-hinges and balls (see `joint_chains`), and one rigid constraint, of a point or of a whole frame,
+hinges and balls (see `tree_plan`), and one rigid constraint, of a point or of a whole frame,
 closes each loop. Driven coordinates have an armature far above all moving masses, and are set to
 their values, rates and forces at every step.
 """
@@ -10,7 +10,7 @@ their values, rates and forces at every step.
 from __future__ import annotations
 
 import importlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -18,15 +18,12 @@ from typing import Any
 import numpy as np
 
 from ...core.case.case import Case
-from ...core.joints import Distance, Fixed, Joint, Spherical
-from ...core.mechanism.drivers import JointDriver
-from ...core.mechanism.mechanism import GROUND, Mechanism, Vector
-from ...core.mechanism.topology import Branch, SpanningTree
+from ...core.joints import Distance, Fixed
 from ...core.trajectory import Array, Trajectory
-from ..shared.joint_chains import CHAINS, Link, end_of_loop, relations
 from ..shared.joint_equivalents import fits, jointed
-from ..shared.loop_closures import CLOSURES, ends_of
 from ..shared.simulation import Leg, SimulatedPose, SimulationEndedError, simulated, start_of
+from ..shared.stepped_tree import TiedTree
+from ..shared.tree_plan import Chain, Closure, Link, Relation, relations
 from .pinocchio import Pinocchio, PinocchioModel
 
 # Inertia of driven coordinates [kg or kg m2] next to bodies with unit inertia: reactions change
@@ -107,25 +104,21 @@ class Dynamics:
 
     def solve(self, model: _Model, case: Case, tol: float) -> Trajectory:
         """Simulate all possible samples, however far the constraints drift; see `Engine.solve`."""
-        return simulated(case, model.start, model.run, {"closures": model.closures})
+        return simulated(case, model.start, model.run, model.details)
 
 
-class _Model(PinocchioModel):
+class _Model(TiedTree, PinocchioModel):
     """The mechanism with masses, and its loops as rigid constraints."""
 
-    gives_forces = False
+    has = "rigid constraint"
 
     def __init__(self, pin: Any, case: Case, steps: int) -> None:
-        self.loops: list[tuple[Any, int, int, Vector]] = []
-        self.hung: dict[str, tuple[int, Vector, type[Joint]]] = {}
-        self.steps = steps
+        self.ties, self.steps = [], steps
         super().__init__(pin, case)
         self.start = start_of(self, case)
-        joints = [driver for driver in case.mechanism.drivers if isinstance(driver, JointDriver)]
-        driven = [self.coordinates[each.joint, each.freedom] for each in joints]
-        self.sign = np.array([float(sign) for _, sign in driven])
+        self.sign = np.array([float(sign) for _, sign in self.driven])
         self.driven_q, self.driven_v = map(
-            list, zip(*(self.coordinate(at) for at, _ in driven), strict=True)
+            list, zip(*(self.coordinate(at) for at, _ in self.driven), strict=True)
         )
         armature = np.array(self.model.armature)
         armature[self.driven_v] = ARMATURE
@@ -139,8 +132,13 @@ class _Model(PinocchioModel):
             pin.StdVec_RigidConstraintModel(),
             pin.StdVec_RigidConstraintData(),
         )
-        for kind, i, j, point in self.loops:
-            ends = [(at, pin.SE3(np.eye(3), np.array(point) - self.origin[at])) for at in (i, j)]
+        kinds = pin.ContactType
+        for tie in self.ties:
+            kind = kinds.CONTACT_6D if tie.by is Fixed else kinds.CONTACT_3D
+            ends = [
+                (at, pin.SE3(np.eye(3), np.array(point) - self.origin[at]))
+                for at, point in zip(tie.bodies, tie.points, strict=True)
+            ]
             self.constraints.append(
                 pin.RigidConstraintModel(
                     kind, self.model, *ends[0], *ends[1], pin.ReferenceFrame.LOCAL
@@ -158,37 +156,21 @@ class _Model(PinocchioModel):
             self.pin.SE3.Identity(),
         )
 
-    def branches(self, mechanism: Mechanism, tree: SpanningTree) -> Iterator[Branch]:
-        # Depth first, with the joints of a closure right after the body that carries them:
+    def plan(self) -> Iterable[Chain | Relation | Closure]:
+        # Depth first, with the links of a closure right after the body that carries them:
         # Pinocchio's inertia algorithms require consecutive joint numbers in a subtree. In any
         # other order the results of constraintDynamics are silently wrong.
-        waiting = [Branch("", GROUND, None)]
-        while waiting:
-            branch = waiting.pop()
-            if branch.parent:
-                yield branch
-            body = branch.child
-            for joint in tree.cut:
-                if body == (GROUND if mechanism.is_fixed(joint.i) else joint.i):
-                    self._hang(joint, self.carrier[body], ends_of(mechanism, joint)[0])
-            waiting += [each for each in reversed(tree.branches) if each.parent == body]
+        parts = [*super().plan()]
+        chains = [part for part in parts if isinstance(part, Chain)]
 
-    def _hang(self, joint: Joint, i: int, P: Vector) -> None:
-        """Add the slides and hinges of a closure on the body of joint i; the constraint replaces a
-        ball at their end.
-        """
-        links, point, turns = end_of_loop(CHAINS[type(joint)](joint, P), P)
-        tied = Spherical if turns else Fixed
-        self.hung[joint.name] = self.add_links(i, links, joint.name), point, tied
+        def carried(bodies: Collection[str]) -> Iterator[Chain]:
+            on = [chain for chain in chains if chain.parent in bodies]
+            for chain in sorted(on, key=lambda chain: not chain.cut):
+                yield chain
+                yield from carried([chain.child])
 
-    def close(self, joint: Joint, ends: tuple[Vector, Vector], named: bool) -> None:
-        (i, point, tied), j = self.hung[joint.name], self.carrier[joint.j]
-        kinds = self.pin.ContactType
-        self.loops.append((kinds.CONTACT_6D if tied is Fixed else kinds.CONTACT_3D, i, j, point))
-        self.closures[joint.name] = f"rigid constraint, {CLOSURES[tied].text}"
-        self.conditions += CLOSURES[tied].conditions(
-            joint, self.add_frame(i, point), self.add_frame(j, point)
-        )
+        yield from carried([*self.carrier])  # before any chain, those are the ground
+        yield from (part for part in parts if not isinstance(part, Chain))
 
     def run(self, leg: Leg) -> Iterator[SimulatedPose]:
         """Yield the poses of a leg."""

@@ -18,10 +18,10 @@ import numpy as np
 from ...core.case.case import Case
 from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
-from ..shared.joint_chains import Link
 from ..shared.tree_engine import TreeEngine
 from ..shared.tree_forces import Mass, mass_properties
 from ..shared.tree_model import TreeModel
+from ..shared.tree_plan import Link
 
 
 class Pinocchio(TreeEngine):
@@ -81,7 +81,7 @@ class PinocchioModel(TreeModel):
     def unknowns(self) -> int:
         return self.model.nv
 
-    def coordinate(self, body: int) -> tuple[int, int]:
+    def coordinate(self, body: Any) -> tuple[int, int]:
         joint = self.model.joints[body]
         return joint.idx_q, joint.idx_v
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.algebra import Vec3, triple
+from ...core.algebra import Vec3
 from ...core.joints import (
     ConstantVelocity,
     Cylindrical,
@@ -35,7 +35,6 @@ from ...core.joints import (
     Universal,
 )
 from ...core.joints.base import triad, unit
-from ...core.mechanism.mechanism import Mechanism, Vector
 from ...core.trajectory import Array
 from .frame_constraints import (
     Coincident,
@@ -48,12 +47,11 @@ from .frame_constraints import (
     Length,
     Thread,
 )
-from .poses import middle
 
 
 @dataclass(frozen=True)
 class Closure:
-    """The rows of a cut joint type and their description; `ends_of` gives the frames' points."""
+    """The rows of a cut joint type and their description."""
 
     text: str
     conditions: Callable[[Any, Frame, Frame], Sequence[Condition]]
@@ -164,22 +162,6 @@ CLOSURES: dict[type[Joint], Closure] = {
     ),
 }
 """Closures by exact joint type."""
-
-
-def near(mechanism: Mechanism, joint: Joint) -> Vector:
-    """Return the point of a joint, or else the middle of a moving body, global at design [m].
-
-    A fixed joint may lack a point, and some types have none. Any point works, and a near one keeps
-    all digits: the origin in a case file may be far away.
-    """
-    moving = (body for body in mechanism.moving if body.name in joint.bodies)
-    return vars(joint).get("point") or triple(middle(mechanism, next(moving)))
-
-
-def ends_of(mechanism: Mechanism, joint: Joint) -> tuple[Vector, Vector]:
-    """Return the points of a joint's frames on its first and second body, global at design [m]."""
-    P = near(mechanism, joint)
-    return vars(joint).get("points", (P, P))
 
 
 def _array(a: Vec3) -> Array:

@@ -127,8 +127,8 @@ class PoseSolver:
         A = self.model.jacobian()
         if not self.square:
             return self._least_squares(A, -r)
-        _, _, step, singular = self.lapack.dgesv(A, -r)
-        return np.full(self.unknowns, math.nan) if singular else np.asarray(step)
+        *_, step, singular = self.lapack.dgesv(A, -r)
+        return np.asarray(step if not singular else math.nan * r, dtype=np.float64)
 
     def newton(self, c: Array) -> tuple[Array, int, float] | None:
         """Return the sum of all steps, the iterations and the last residual at driver values c, or

@@ -1,7 +1,7 @@
 """Poses of bodies as displacements from design, and the coordinates of chains of links.
 
 A displacement maps every point of a body from its design position to its current position, x -> q x
-+ s, in global axes. So a chain of links (see `joint_chains`) displaces its second body relative to
++ s, in global axes. So a chain of links (see `tree_plan`) displaces its second body relative to
 its first by the product of its links' displacements; the reversed chain has the same coordinates
 with other signs.
 """
@@ -18,7 +18,7 @@ from ...core.joints import Joint
 from ...core.joints.base import triad
 from ...core.mechanism.mechanism import GROUND, Body, Mechanism, Vector
 from ...core.trajectory import Array, BodyMotion
-from .joint_chains import Link
+from .tree_plan import Link
 
 
 def rotated(q: Quat, a: Vec3) -> Vec3:
@@ -59,19 +59,6 @@ class Displacement:
 def frame_along(axis: Sequence[float], column: int) -> Array:
     """Return a right-handed frame with the unit vector of the axis in a column, shape (3, 3)."""
     return np.roll(np.column_stack([tuple(e) for e in triad(axis)]), column - 2, axis=1)
-
-
-def middle(mechanism: Mechanism, body: Body) -> Array:
-    """Return the mean of a body's joint points, or its origin without any; global at design [m],
-    shape (3,).
-    """
-    points = [
-        at
-        for joint in mechanism.joints
-        if body.name in joint.bodies
-        for at in joint.points_on(body.name)
-    ]
-    return np.mean(points, axis=0) if points else np.array(body.origin)
 
 
 def attitude(body: Body) -> Quat:

@@ -15,7 +15,8 @@ import numpy as np
 from ...core.joints import Joint
 from ...core.mechanism.mechanism import Mechanism, Vector
 from ...core.trajectory import Array
-from .loop_closures import CLOSURES, ends_of
+from .loop_closures import CLOSURES
+from .tree_plan import ends_of
 from .tree_reactions import RowWrench
 from .tree_rows import BodyFrame, by_frame
 

@@ -16,9 +16,8 @@ from ...core.mechanism.body import Body, inertia_matrix
 from ...core.mechanism.loads import ForceElement, SpringDamper, TorsionSpringDamper
 from ...core.mechanism.mechanism import Mechanism, Vector
 from ...core.trajectory import BodyMotion
-from .joint_chains import CHAINS
-from .loop_closures import ends_of
 from .poses import Displacement, displacements, link_coordinates, rotated
+from .tree_plan import CHAINS, ends_of
 
 
 def at_start(mechanism: Mechanism, way: Mapping[str, BodyMotion]) -> Mechanism:

@@ -1,7 +1,7 @@
 """Simulate mode of simulators that step a tree of links and close its loops by their own
 constraints.
 
-A cut joint has its chain on its first body (see `joint_chains`), and one tie of a point or of a
+A cut joint has its chain on its first body (see `tree_plan`), and one tie of a point or of a
 whole frame to its second body. Both simulators solve for velocities at the end of a step and move
 the configuration along them. So a driven coordinate with its mean velocity over the step has its
 value after it, a gap of the constraints closes a step later, and velocities belong to the middle of
@@ -14,40 +14,21 @@ from abc import abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any, ClassVar, Literal, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from ...core.case.case import Case
 from ...core.errors import SolveError
-from ...core.joints import Coupler, Distance, Fixed, Joint, Spherical
-from ...core.mechanism.drivers import JointDriver
+from ...core.joints import Coupler, Distance, Joint
 from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array, Trajectory
-from .joint_chains import CHAINS, end_of_loop, relations
 from .joint_equivalents import fits, jointed
 from .loop_closures import CLOSURES
 from .simulation import Leg, SimulatedPose, SimulationEndedError, simulated, start_of, uneven
 from .tree_engine import TreeEngine
 from .tree_model import TreeModel
-
-TIED: Mapping[str, type[Joint]] = {"point": Spherical, "frame": Fixed, "rod": Distance}
-
-
-@dataclass(frozen=True)
-class Tie:
-    """A constraint between two bodies, by their numbers: one point or the whole frame coincides, or
-    two points keep a distance.
-
-    Attributes:
-        points: points on the first and the second body, global at design [m].
-        length: length of a rod [m].
-    """
-
-    kind: Literal["point", "frame", "rod"]
-    bodies: tuple[int, int]
-    points: tuple[Vector, Vector]
-    length: float = 0.0
+from .tree_plan import Closure, relations
 
 
 @dataclass(frozen=True)
@@ -128,19 +109,60 @@ class Stepping:
         return simulated(case, model.start, model.run, model.details)
 
 
-class SteppedTree(TreeModel):
-    """A tree with ties and given velocities of the driven coordinates.
+@dataclass(frozen=True)
+class Tie:
+    """A constraint between two bodies, by their numbers.
 
-    The constructor of a simulator's class sets `ties`, makes the model and calls `set_off`.
+    Attributes:
+        by: a ball, a whole frame, or a distance.
+        points: points on the first and the second body, global at design [m].
+        length: length of a rod [m].
+    """
+
+    by: type[Joint]
+    bodies: tuple[int, int]
+    points: tuple[Vector, Vector]
+    length: float = 0.0
+
+
+class TiedTree(TreeModel):
+    """A tree whose loops a simulator closes by constraints of its own.
+
+    The constructor of a simulator's class sets `ties` before it makes the model.
 
     Attributes:
         ties: constraints that close loops.
-        driven_at: indices of the driven coordinates in q.
-        signs: signs of the driven coordinates in the tree.
+        has: what the simulator has for them.
     """
 
     gives_forces = False
+    whole = (Distance,)
     ties: list[Tie]
+    has: ClassVar[str] = "constraint"
+
+    def close(self, closure: Closure) -> None:
+        length = closure.joint.rod_length if isinstance(closure.joint, Distance) else 0.0
+        tie = Tie(closure.by, self.bodies_of(closure), closure.points, length)
+        self.tie(closure.joint.name, tie, closure.joint)
+
+    def tie(self, name: str, tie: Tie, joint: Any = None) -> None:
+        """Add a tie under the name of its joint."""
+        self.ties.append(tie)
+        closure = CLOSURES[tie.by]
+        self.closures[name] = f"{self.has}, {closure.text}"
+        frames = map(self.add_frame, tie.bodies, tie.points)
+        self.conditions += closure.conditions(joint, *frames)
+
+
+class SteppedTree(TiedTree):
+    """A tree with ties and given velocities of the driven coordinates.
+
+    The constructor makes the model and calls `set_off`.
+
+    Attributes:
+        driven_at: indices of the driven coordinates in q.
+        signs: signs of the driven coordinates in the tree.
+    """
 
     @abstractmethod
     def __init__(self, case: Case, steps: int) -> None:
@@ -158,12 +180,6 @@ class SteppedTree(TreeModel):
         self.driven_at = [self.coordinate(body)[0] for body, _ in self.driven]
         self.signs = np.array([float(sign) for _, sign in self.driven])
 
-    @property
-    def driven(self) -> list[tuple[int, int]]:
-        """The driven bodies, by their numbers, and the signs of their coordinates."""
-        drivers = [each for each in self.case.mechanism.drivers if isinstance(each, JointDriver)]
-        return [self.coordinates[each.joint, each.freedom] for each in drivers]
-
     @abstractmethod
     def step(self, q: Array, v: Array, driven: Array, h: float) -> tuple[Array, Array]:
         """Return the configuration and the velocities after a step.
@@ -176,29 +192,14 @@ class SteppedTree(TreeModel):
             SimulationEndedError: the simulator cannot continue.
         """
 
-    def close(self, joint: Joint, ends: tuple[Vector, Vector], named: bool) -> None:
-        i, j = self.bodies_of(joint)
-        if isinstance(joint, Distance):
-            self.tie(joint.name, Tie("rod", (i, j), ends, joint.rod_length), joint)
-            return
-        links, point, turns = end_of_loop(CHAINS[type(joint)](joint, ends[0]), ends[0])
-        i = self.add_links(i, links, joint.name)
-        for relation in relations(joint):
-            self.relate(relation)
-        if i == j:
+    def close(self, closure: Closure) -> None:
+        i, j = self.bodies_of(closure)
+        if i == j and closure.by is not Distance:
             raise SolveError(
-                f"case {self.case.name!r}: {joint} closes a loop of one body with itself, and the"
-                " simulator has no such constraint; use the projection mode"
+                f"case {self.case.name!r}: {closure.joint} closes a loop of one body with itself,"
+                " and the simulator has no such constraint; use the projection mode"
             )
-        self.tie(joint.name, Tie("point" if turns else "frame", (i, j), (point, point)), joint)
-
-    def tie(self, name: str, tie: Tie, joint: Any = None) -> None:
-        """Add a tie under the name of its joint."""
-        self.ties.append(tie)
-        closure = CLOSURES[TIED[tie.kind]]
-        self.closures[name] = f"constraint, {closure.text}"
-        frames = map(self.add_frame, tie.bodies, tie.points)
-        self.conditions += closure.conditions(joint, *frames)
+        super().close(closure)
 
     def run(self, leg: Leg) -> Iterator[SimulatedPose]:
         """Yield the poses of a leg."""

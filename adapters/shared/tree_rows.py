@@ -5,16 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Protocol, TypeAlias
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
 from ...core.trajectory import Array
 from .frame_constraints import Condition, FrameOnBody
-
-Terms: TypeAlias = Sequence[tuple[str, str, float]]
-"""Joint, freedom and weight of coordinates in a sum."""
 
 
 class Coordinates(Protocol):
@@ -27,7 +24,7 @@ class Coordinates(Protocol):
     @property
     def unknowns(self) -> int: ...
 
-    def coordinate(self, body: int) -> tuple[int, int]: ...
+    def coordinate(self, body: Any) -> tuple[int, int]: ...
 
 
 @dataclass(eq=False)
@@ -55,7 +52,7 @@ class Linear:
     """
 
     of: Coordinates
-    bodies: list[int]
+    bodies: list[Any]
     weights: Array
     n = 1
 

@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 
 from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
-from .joint_chains import Link
 from .tree_forces import Mass
+from .tree_plan import Link
 from .tree_rows import BodyFrame
 
 
@@ -48,7 +48,7 @@ class TreeSimulator(ABC):
         """The number of velocities."""
 
     @abstractmethod
-    def coordinate(self, body: int) -> tuple[int, int]:
+    def coordinate(self, body: Any) -> tuple[int, int]:
         """Return the indices of a slide's or hinge's coordinate in q and in v."""
 
     @abstractmethod

@@ -8,21 +8,19 @@ and neither is used.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
 from ...core.case.case import Case
-from ...core.joints import Distance, Inline, Joint
+from ...core.joints import Distance, Inline, Spherical
 from ...core.joints.base import unit
-from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
-from ..shared.joint_chains import CHAINS, Link, dependence, end_of_loop, relations
 from ..shared.opensim_frames import orientation
 from ..shared.tree_forces import NO_MASS
 from ..shared.tree_model import TreeModel
-from ..shared.tree_rows import Terms
+from ..shared.tree_plan import Closure, Link, Relation
 
 NO_TURN = (0.0, 0.0, 0.0)
 
@@ -36,15 +34,14 @@ class ConstrainedTree(TreeModel):
         model: OpenSim's model, which owns all other objects.
         bodies: OpenSim's bodies by their numbers; the first is the ground.
         moves: OpenSim's joint of each body after the ground.
-        constraints: purpose of each of OpenSim's constraints: the name of a cut joint, or joint and
-            freedom of the coordinates of a relation.
     """
+
+    whole = (Distance, Inline)
 
     def __init__(self, o: Any, case: Case) -> None:
         self.o, self.model = o, o.Model()
         self.bodies = [self.model.getGround()]
         self.moves: list[Any] = []
-        self.constraints: list[tuple[int, str | list[tuple[str, str]]]] = []
         super().__init__(case)
 
     def add_link(self, parent: int, link: Link, offset: Array) -> None:
@@ -70,23 +67,16 @@ class ConstrainedTree(TreeModel):
         self.bodies.append(body)
         self.moves.append(move)
 
-    def close(self, joint: Joint, ends: tuple[Vector, Vector], named: bool) -> None:
-        i, j = self.bodies_of(joint)
-        links, point, turns = (), ends[0], False
-        if not isinstance(joint, Distance | Inline):
-            links, point, turns = end_of_loop(CHAINS[type(joint)](joint, point), point)
-            ends = point, point
-        i = self.add_links(i, links, joint.name)
-        for relation in relations(joint):
-            self.relate(relation)
+    def close(self, closure: Closure) -> None:
+        i, j = self.bodies_of(closure)
         if i == j:
             # OpenSim aborts the process at a constraint of a body with itself
-            super().close(joint, ends, named=False)
+            super().close(closure)
             return
-        o = self.o
+        o, joint = self.o, closure.joint
         at_i, at_j = (
             (self.bodies[body], self.vector(np.array(P) - self.origin[body]))
-            for body, P in zip((i, j), ends, strict=True)
+            for body, P in zip((i, j), closure.points, strict=True)
         )
         none = self.vector(NO_TURN)
         if isinstance(joint, Distance):
@@ -95,31 +85,31 @@ class ConstrainedTree(TreeModel):
             body, P = at_i
             along = self.vector(unit(joint.axis))
             rows, constraint = 2, o.PointOnLineConstraint(body, along, P, *at_j)
-        elif turns:
+        elif closure.by is Spherical:
             rows, constraint = 3, o.PointConstraint(*at_i, *at_j)
         else:
             rows, constraint = 6, o.WeldConstraint("weld", *at_i, none, *at_j, none)
         self.constrain(constraint, rows, joint.name)
-        moved = f", on a body that {' and '.join(each.move for each in links)} move on {joint.i!r}"
-        self.closures[joint.name] = constraint.getConcreteClassName() + (moved if links else "")
+        moved = f", on a body that {' and '.join(closure.links)} move on {joint.i!r}"
+        name = constraint.getConcreteClassName()
+        self.closures[joint.name] = name + (moved if closure.links else "")
 
-    def relate(self, terms: Terms, curve: Sequence[float] = ()) -> None:
-        if len(terms) == 1 or curve:  # a driver or a polynomial
-            super().relate(terms, curve)
+    def relate(self, relation: Relation) -> None:
+        if relation.curve:
+            super().relate(relation)
             return
         o, coupler = self.o, self.o.CoordinateCouplerConstraint()
-        moved = [(self.coordinates[joint, freedom], weight) for joint, freedom, weight in terms]
-        one, other, factor = dependence((body, sign * weight) for (body, sign), weight in moved)
+        one, other, (_, factor) = relation.follower(signed=True)
         names = o.ArrayStr()
-        names.append(coordinate_name(other))
+        names.append(coordinate_name(self.coordinates[other][0]))
         coupler.setIndependentCoordinateNames(names)
-        coupler.setDependentCoordinateName(coordinate_name(one))
+        coupler.setDependentCoordinateName(coordinate_name(self.coordinates[one][0]))
         coupler.setFunction(o.LinearFunction(factor, 0.0))
-        self.constrain(coupler, 1, [(joint, freedom) for joint, freedom, _ in terms])
+        self.constrain(coupler, 1, relation)
 
-    def constrain(self, constraint: Any, rows: int, keeps: str | list[tuple[str, str]]) -> None:
+    def constrain(self, constraint: Any, rows: int, keeps: str | Relation) -> None:
         """Add a constraint with a number of rows under a unique name."""
-        self.constraints.append((rows, keeps))
+        self.own.append((rows, keeps))
         constraint.setName(f"constraint_{self.model.getNumConstraints()}")
         self.model.addConstraint(constraint)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import accumulate, pairwise
 from typing import Any, ClassVar
 
 import numpy as np
@@ -57,25 +56,13 @@ class LoadedSimbody(ConstrainedTree):
     def look(self, frame: Any) -> None:
         pass  # stations are read on demand
 
-    @property
-    def constraint_rows(self) -> list[tuple[slice, str | list[tuple[str, str]]]]:
-        """Return the rows and the purpose of each constraint."""
-        ends = accumulate((rows for rows, _ in self.constraints), initial=0)
-        kept = [keeps for _, keeps in self.constraints]
-        return [(slice(*pair), what) for pair, what in zip(pairwise(ends), kept, strict=True)]
-
-    def rows_of(self, joint: str) -> list[slice]:
-        return [rows for rows, keeps in self.constraint_rows if keeps == joint]
-
     def exerted(self) -> list[RowWrench]:
-        found, count = super().exerted(), sum(rows for rows, _ in self.constraints)
+        found = super().exerted()
         origins = [self.position_of(number) for number in range(len(self.bodies))]
-        for rows, keeps in self.constraint_rows:
+        for rows, keeps in self.own_rows:
             if not isinstance(keeps, str):
                 continue
-            wrenches = np.array(
-                [self._on_bodies(row, count) for row in range(rows.start, rows.stop)]
-            )
+            wrenches = np.array([self._on_bodies(row) for row in range(rows.start, rows.stop)])
             found += [
                 RowWrench(rows, number, origins[number], wrenches[:, number])
                 for number in range(len(self.bodies))
@@ -88,11 +75,11 @@ class LoadedSimbody(ConstrainedTree):
         body = self.bodies[number]
         return body.findStationLocationInGround(self.state, self.o.Vec3(0.0)).to_numpy()
 
-    def _on_bodies(self, row: int, count: int) -> Array:
+    def _on_bodies(self, row: int) -> Array:
         """Return the wrench of a unit multiplier on each body, shape (bodies, 6): force over moment
         about its origin.
         """
-        o, unit = self.o, np.zeros(count)
+        o, unit = self.o, np.zeros(self.own_count)
         unit[row] = 1.0
         on_bodies, on_coordinates = o.VectorOfSpatialVec(), o.Vector()
         self.matter.calcConstraintForcesFromMultipliers(
@@ -100,9 +87,3 @@ class LoadedSimbody(ConstrainedTree):
         )
         each = [on_bodies.get(int(body.getMobilizedBodyIndex())) for body in self.bodies]
         return np.array([[*w.get(1).to_numpy(), *w.get(0).to_numpy()] for w in each])
-
-    def coordinate_rows(self) -> dict[int, list[tuple[str, str]]]:
-        relations = {
-            rows.start: keeps for rows, keeps in self.constraint_rows if not isinstance(keeps, str)
-        }
-        return super().coordinate_rows() | relations

@@ -1,7 +1,7 @@
 """Simbody in projection mode: its joints as a spanning tree, its own constraints to close loops.
 
 The simulator comes with OpenSim's Python package. A cut joint has its slides and hinges on its
-first body (see `joint_chains`); one constraint of Simbody, of a point or of a whole frame, ties
+first body (see `tree_plan`); one constraint of Simbody, of a point or of a whole frame, ties
 their end to the second body. A rod is a constant distance, and a coordinate coupler relates two
 coordinates. Simbody gives residual, Jacobian and bias of these rows; the base adds the drivers.
 """
@@ -165,8 +165,8 @@ class SimbodyModel(LoadedSimbody):
     def unknowns(self) -> int:
         return self.state.getNU()
 
-    def coordinate(self, body: int) -> tuple[int, int]:
-        return self.places[body - 1]
+    def coordinate(self, body: Any) -> tuple[int, int]:
+        return self.places[int(body) - 1]
 
     def design(self) -> Array:
         q = np.zeros(self.slots)

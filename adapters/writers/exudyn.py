@@ -25,11 +25,11 @@ from ...core.joints.base import unit
 from ...core.mechanism.loads import Force, ForceElement, SpringDamper, Torque, TorsionSpringDamper
 from ...core.mechanism.mechanism import GROUND, Body, Mechanism
 from ...core.trajectory import Array, BodyMotion
-from ..shared.joint_chains import CHAINS, dependence, relations
-from ..shared.loop_closures import ends_of
 from ..shared.poses import Displacement, displacements, frame_along, link_coordinates, link_motions
+from ..shared.tree_plan import CHAINS, Relation, Terms, ends_of, relations
 from . import exudyn_loads
 from .exudyn_preamble import END, beginning
+from .text import require_known
 
 # Round-off of a right angle between unit vectors, which a generic joint leaves as a residual.
 RIGHT_ANGLE = 1e-15
@@ -55,12 +55,7 @@ def write(
     Raises:
         KincheckError: a joint or coupler has no counterpart in Exudyn.
     """
-    for joint in mechanism.joints:
-        if type(joint) not in CHAINS and type(joint) is not j.Distance:
-            raise KincheckError(
-                f"{joint} has no counterpart in Exudyn here; write an equivalent of known joints"
-                " instead"
-            )
+    require_known(mechanism, "Exudyn")
     if curved := next((each for each in mechanism.couplers if each.curve), None):
         raise KincheckError(f"{curved} has no counterpart in Exudyn; export MJCF or URDF instead")
     return {".py": _Script(*_spelled_out(mechanism, way)).text(start)}
@@ -200,11 +195,9 @@ class _Script:
             at = force.point if isinstance(force, Force) else (0.0, 0.0, 0.0)
             self.call(force.type, force.name, self.marker(force.body, at), **options)
 
-    def relate(self, name: str, terms: Sequence[tuple[str, str, float]]) -> None:
+    def relate(self, name: str, terms: Terms) -> None:
         """Keep the weighted sum of two coordinates (joint, freedom, weight) at zero."""
-        one, other, factor = dependence(
-            ((joint, freedom), weight) for joint, freedom, weight in terms
-        )
+        one, other, (_, factor) = Relation(name, terms, ()).follower(signed=False)
         self.call("relation", name, self.coordinate(*one), self.coordinate(*other), factor)
 
     def values(self, joint: Any) -> Mapping[str, tuple[float, ...]]:

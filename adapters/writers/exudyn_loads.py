@@ -15,16 +15,16 @@ from ...core.mechanism.loads import (
     Torque,
     TorsionSpringDamper,
 )
-from . import loads
+from . import text
 
 
 def inertial(body: Body) -> tuple[float, list[float], list[float]]:
     """Return mass, centre of mass and inertia of a body, relative to its origin and parallel to the
     global axes at design; Exudyn puts the product yz first.
     """
-    xx, yy, zz, xy, xz, yz = loads.six(loads.inertia_at_origin(body))
-    center = np.subtract(loads.center_of(body), body.origin)
-    return loads.mass_of(body), center.tolist(), [xx, yy, zz, yz, xz, xy]
+    xx, yy, zz, xy, xz, yz = text.six(text.inertia_at_origin(body))
+    center = np.subtract(text.center_of(body), body.origin)
+    return text.mass_of(body), center.tolist(), [xx, yy, zz, yz, xz, xy]
 
 
 def options(element: ForceElement) -> dict[str, Any]:

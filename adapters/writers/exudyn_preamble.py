@@ -1,11 +1,11 @@
 """Text of Exudyn scripts before the lines of a mechanism."""
 
-from . import loads
+from . import text
 
 
 def beginning(loaded: bool) -> str:
     """Return the functions that the lines call; with masses and force elements if loaded."""
-    masses, body = (loads.LOADED, LOADED_BODY) if loaded else (loads.PLAIN, PLAIN_BODY)
+    masses, body = (text.LOADED, LOADED_BODY) if loaded else (text.PLAIN, PLAIN_BODY)
     return BEGINNING.replace("MASSES", masses).replace("BODY", body)
 
 

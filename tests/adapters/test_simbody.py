@@ -73,7 +73,7 @@ def cut(monkeypatch, *names):
         rest = spanning_tree(replace(mechanism, joints=kept, drivers=(), couplers=()))
         return SpanningTree(rest.branches, (*rest.cut, *map(mechanism.joint, names)))
 
-    monkeypatch.setattr("kincheck.adapters.shared.tree_model.spanning_tree", tree)
+    monkeypatch.setattr("kincheck.adapters.shared.tree_plan.spanning_tree", tree)
 
 
 def test_strut_is_the_truth_to_round_off():
