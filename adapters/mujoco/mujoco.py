@@ -34,12 +34,11 @@ from ...core.harness.engine import Floor
 from ...core.joints import Distance, Spherical
 from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
-from ..shared.compiled_floor import floor_of
-from ..shared.tree_engine import TreeEngine
+from ..shared.force_solution import RowWrench
+from ..shared.projection_engine import floor_of
 from ..shared.tree_forces import Mass, mass_properties
-from ..shared.tree_model import TreeModel
+from ..shared.tree_model import TreeEngine, TreeModel
 from ..shared.tree_plan import CHAINS, Chain, Closure, Link, Relation
-from ..shared.tree_reactions import RowWrench
 
 ROWS = {"connect": 3, "weld": 6, "tendon": 1, "joint": 1}
 
@@ -371,7 +370,7 @@ class MuJoCoModel(TreeModel):
 
 
 class Equalities:
-    """The rows of all equalities; see `frame_constraints.Condition`."""
+    """The rows of all equalities; see `constraints.Condition`."""
 
     def __init__(self, of: MuJoCoModel, n: int) -> None:
         self.of, self.n = of, n

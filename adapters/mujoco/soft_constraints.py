@@ -21,7 +21,7 @@ from ...core.errors import CaseError, KincheckError
 from ...core.kinematics import start_of
 from ...core.mechanism.motions import outwards
 from ...core.trajectory import Array
-from ..shared.length_scaling import own_frame
+from ..shared.equivalents import own_frame
 from ..shared.pose_solver import Sample
 from ..shared.projection import Walk
 from .mujoco import MuJoCo, MuJoCoModel

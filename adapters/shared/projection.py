@@ -29,10 +29,9 @@ from ...core.kinematics import (
 from ...core.mechanism.drivers import Driver
 from ...core.mechanism.motions import Path, outwards
 from ...core.trajectory import Array, PointMotion, Trajectory, largest_found
+from .equivalents import GLOBAL, OwnFrame
 from .force_solution import ForceModel, solved_forces
-from .length_scaling import GLOBAL, OwnFrame
-from .pose_solver import PoseSolver, Sample
-from .projection_model import ProjectionModel
+from .pose_solver import PoseSolver, ProjectionModel, Sample
 
 # Newton steps after one predictor of second order, by effort; None iterates to convergence.
 EFFORTS: Mapping[str, int | None] = {

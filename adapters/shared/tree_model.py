@@ -1,6 +1,6 @@
 """A mechanism as one tree of slides, hinges and balls, for simulators with generalized coordinates.
 
-The base adds the parts of the plan (`tree_plan`), the conditions of loops (`loop_closures`) and the
+The base adds the parts of the plan (`tree_plan`), the conditions of loops (`constraints`) and the
 drivers. A simulator adds links and frames and reports their motion. It knows a body by the number
 of its link; the ground is body 0. The axes of every body are global at design, and its origin is
 the point of its link there.
@@ -13,7 +13,10 @@ simulator's data, which `placement`, `slope` and `motion` read frame by frame.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from abc import ABC, abstractmethod
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 from itertools import accumulate, pairwise
 from typing import Any, ClassVar
 
@@ -21,20 +24,119 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from ...core.case.case import Case
-from ...core.joints import Fixed, Joint
+from ...core.harness.engine import Floor
+from ...core.joints import Fixed, Joint, Translational
 from ...core.joints.base import unit
 from ...core.mechanism.drivers import JointDriver, PointCoordinate
 from ...core.mechanism.loads import TorsionSpringDamper
-from ...core.mechanism.mechanism import GROUND, Vector
+from ...core.mechanism.mechanism import GROUND, Body, Mechanism, Point, Vector
 from ...core.trajectory import Array
-from .force_solution import Dynamics
-from .frame_constraints import Condition
-from .loop_closures import CLOSURES
-from .tree_forces import TreeForces
-from .tree_plan import Chain, Closure, Relation, plan_tree
-from .tree_reactions import RowWrench
-from .tree_rows import BodyFrame, Curved, DrivenPoint, Linear, by_frame
-from .tree_simulator import TreeSimulator
+from .constraints import CLOSURES, BodyFrame, Condition, Curved, DrivenPoint, Linear, by_frame
+from .force_solution import Dynamics, RowWrench
+from .projection_engine import Call, ProjectionEngine, floor_of
+from .tree_forces import Mass, TreeForces
+from .tree_plan import Chain, Closure, Link, Relation, plan_tree
+
+
+class TreeSimulator(ABC):
+    """A simulator of trees of links.
+
+    Attributes:
+        q: the configuration, never changed in place.
+        recursion: whether the simulator gives the wrenches of its joints.
+        computed_by: the forces that the simulator computes, with its calls.
+    """
+
+    q: Array
+    recursion: ClassVar[bool] = True
+    computed_by: ClassVar[Mapping[str, str]]
+
+    @abstractmethod
+    def add_link(self, parent: int, link: Link, offset: Array) -> None:
+        """Add a body that moves by a link relative to its parent, at an offset from the parent's
+        origin [m].
+        """
+
+    @abstractmethod
+    def make_frame(self, body: int, offset: Array) -> Any:
+        """Return a handle of a frame of a body other than the ground, at an offset from its origin
+        [m].
+        """
+
+    @abstractmethod
+    def finish(self) -> None:
+        """Finish the model for solving; no link and no frame follows."""
+
+    @property
+    @abstractmethod
+    def unknowns(self) -> int:
+        """The number of velocities."""
+
+    @abstractmethod
+    def coordinate(self, body: Any) -> tuple[int, int]:
+        """Return the indices of a slide's or hinge's coordinate in q and in v."""
+
+    @abstractmethod
+    def design(self) -> Array:
+        """Return the configuration at design, zero for slides and hinges."""
+
+    @abstractmethod
+    def moved(self, dx: Array) -> Array:
+        """Return the configuration q advanced by dx, shape (unknowns,)."""
+
+    @abstractmethod
+    def place(self) -> None:
+        """Update the simulator's poses and Jacobians to q."""
+
+    @abstractmethod
+    def rate(self, v: Array, a: Array) -> None:
+        """Update the simulator's velocities and accelerations to v and a, at the q last placed."""
+
+    @abstractmethod
+    def placement(self, handle: Any) -> tuple[Array, Array]:
+        """Return the position of a frame [m], shape (3,), and the rotation since design, shape
+        (3, 3).
+        """
+
+    @abstractmethod
+    def slope(self, handle: Any) -> Array:
+        """Return the Jacobian of a frame's point over that of its rotation, global axes, shape
+        (6, unknowns).
+        """
+
+    @abstractmethod
+    def motion(self, handle: Any) -> tuple[Array, Array]:
+        """Return velocity and acceleration of a frame's point, over the angular velocity and
+        acceleration, global axes, each of shape (6,).
+
+        Without accelerations of the coordinates, the acceleration is Jdot v.
+        """
+
+    @abstractmethod
+    def set_loads(self, gravity: Vector, masses: Sequence[Mass]) -> None:
+        """Set the masses of these bodies, zero mass for others, and the gravity of the model."""
+
+    @abstractmethod
+    def inverse_dynamics(self, v: Array, a: Array) -> Array:
+        """Return M a + h at v and a, at the q last placed, shape (unknowns,).
+
+        It also updates velocities and accelerations, as `rate` does.
+        """
+
+    def passed_on(self, body: int, point: Array) -> Array:
+        """Return the wrench that a body's joint transmits to it and all carried bodies, after
+        `inverse_dynamics`: force over moment about a global point, shape (6,).
+
+        Only simulators with a recursion implement it.
+        """
+        raise NotImplementedError
+
+    def look(self, frame: BodyFrame) -> None:
+        """Read pose, Jacobian and motion of a frame."""
+        if frame.handle is not None:
+            frame.position, frame.rotation = self.placement(frame.handle)
+            frame.jacobian = self.slope(frame.handle)
+            frame.velocity, frame.acceleration = self.motion(frame.handle)
 
 
 class TreeModel(TreeSimulator):
@@ -302,3 +404,62 @@ class TreeModel(TreeSimulator):
     def coordinate_weight(self, row: int, joint: str, freedom: str) -> float:
         body, sign = self.coordinates[joint, freedom]
         return sign * float(self.J[row, self.coordinate(body)[1]])
+
+
+# The smallest model: one slide with a driven point, so one frame in a condition.
+LEAST = Mechanism(
+    "slide",
+    [Body("slide")],
+    [Translational("rail", GROUND, "slide", point=(0.0, 0.0, 0.0), axis=(1.0, 0.0, 0.0))],
+    [Point("slide", "slide", (1.0, 0.0, 0.0))],
+    [PointCoordinate("stroke", "slide", (1.0, 0.0, 0.0))],
+)
+
+
+class TreeEngine(ProjectionEngine):
+    """An engine whose model is a `TreeModel`."""
+
+    joints = CLOSURES
+
+    @property
+    def described(self) -> Mapping[str, Any]:
+        """Return the coordinates of the tree and the equations of its loops."""
+        return {
+            "coordinates": f"spanning tree in {self.title}; a joint is a chain of slides, hinges"
+            " and balls",
+            "closures": "conditions on placements, Jacobians and accelerations of frames",
+        }
+
+    @abstractmethod
+    def model_of(self, case: Case) -> TreeModel:
+        """Return the simulator's model of the unscaled case, at the design position."""
+
+    def build(self, case: Case) -> TreeModel:
+        """Return the simulator's model of the case in the scaled frame, at the design position."""
+        return self.model_of(self.own(case))
+
+    def floor(self, case: Case) -> Floor:
+        """Return the floor from all simulator calls for a pose and its rates."""
+        model, least = self.build(case), self.model_of(replace(case, mechanism=LEAST, outputs=()))
+        solved = self.solve(model, case, 1e-12)
+        n, wanted = len(model.moving), len(model.wanted)
+        # the same Python on the smallest model
+        least.moving, least.wanted = least.moving * n, least.moving * wanted
+        zeros = np.zeros(model.unknowns), np.zeros(least.unknowns)
+        pose: dict[str, tuple[Call, Call, int]] = {
+            f"placements and Jacobians of {n} frames": (model.observe, least.observe, 1),
+        }
+        own, empty = zeros
+        rates: dict[str, tuple[Call, Call, int]] = {
+            f"accelerations of {n} frames": (
+                partial(model.observe_rates, own),
+                partial(least.observe_rates, empty),
+                1,
+            ),
+            f"motions of {wanted} points": (
+                partial(model.points, own, own),
+                partial(least.points, empty, empty),
+                1,
+            ),
+        }
+        return floor_of(self.name, solved, model.unknowns, pose, rates)

@@ -16,7 +16,7 @@ import numpy as np
 from ...core.case.case import Case
 from ...core.errors import SolveError
 from ...core.trajectory import Array, Trajectory
-from ..shared.joint_equivalents import jointed
+from ..shared.equivalents import jointed
 from ..shared.simulation import Leg, SimulatedPose, SimulationEndedError, simulated, start_of
 from .simbody import Simbody, SimbodyModel, opensim
 

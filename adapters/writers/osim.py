@@ -20,9 +20,7 @@ from ...core.mechanism.body import Body
 from ...core.mechanism.loads import ForceElement, SpringDamper, TorsionSpringDamper
 from ...core.mechanism.mechanism import GROUND, Mechanism, Vector
 from ...core.trajectory import BodyMotion
-from ..shared.opensim_frames import euler_angles, orientation
-from ..shared.poses import about, attitude, local
-from ..shared.start_pose import at_start
+from ..shared.poses import about, at_start, attitude, euler_angles, local, orientation
 from . import text
 from .hung_tree import Hung, Tie, hung
 from .text import add_text, document, numbers, require_known

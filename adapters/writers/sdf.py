@@ -21,9 +21,8 @@ from ...core.mechanism.body import Body
 from ...core.mechanism.loads import ForceElement, SpringDamper, TorsionSpringDamper
 from ...core.mechanism.mechanism import GROUND, Mechanism, Vector
 from ...core.trajectory import BodyMotion
-from ..shared.joint_equivalents import cross_of
-from ..shared.poses import attitude, local
-from ..shared.start_pose import at_start
+from ..shared.equivalents import cross_of
+from ..shared.poses import at_start, attitude, local
 from . import text
 from .hung_tree import Hung, Tie, hung
 from .text import add_text, document, numbers, require_known

@@ -4,7 +4,7 @@ Every link is parallel to the global axes at design, so axes and arms are the nu
 its origin is the point of its joint. A joint is a chain of URDF's revolute and prismatic joints
 (see `tree_plan`). URDF has no ball joint, and three hinges would lock at a quarter turn, so a
 body that every chain connects by a ball floats, and its joints are conditions (see
-`loop_closures`). Hinges are "revolute" with very large limits, not "continuous": their coordinate
+`constraints`). Hinges are "revolute" with very large limits, not "continuous": their coordinate
 is then the angle including full turns.
 """
 
@@ -20,7 +20,8 @@ from ...core.algebra import vec
 from ...core.joints import Joint
 from ...core.mechanism.mechanism import GROUND, Body, Mechanism, Vector
 from ...core.trajectory import BodyMotion
-from ..shared.frame_constraints import (
+from ..shared.constraints import (
+    CLOSURES,
     Coincident,
     Condition,
     Difference,
@@ -29,7 +30,6 @@ from ..shared.frame_constraints import (
     Frame,
     Length,
 )
-from ..shared.loop_closures import CLOSURES
 from ..shared.poses import backwards, displacements, link_coordinates
 from ..shared.tree_plan import CHAINS, Chain, Closure, Relation, plan_tree, relations
 from . import text

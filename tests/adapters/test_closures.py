@@ -9,7 +9,7 @@ from unittest import mock
 
 import numpy as np
 import pytest
-from kincheck.adapters.shared.loop_closures import CLOSURES
+from kincheck.adapters.shared.constraints import CLOSURES
 from kincheck.core import (
     GROUND,
     Body,

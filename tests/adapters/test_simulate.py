@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from kincheck import adapters, cases
-from kincheck.adapters.shared.joint_equivalents import jointed
+from kincheck.adapters.shared.equivalents import jointed
 from kincheck.core import (
     Body,
     Distance,

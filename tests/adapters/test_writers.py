@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from kincheck import adapters
-from kincheck.adapters.shared.start_pose import at_start
+from kincheck.adapters.shared.poses import at_start
 from kincheck.core import (
     GROUND,
     Body,
