@@ -188,7 +188,7 @@ OFFENDERS = [
         "adapters/mujoco/new.py",
         "from ..pinocchio.dynamics import Dynamics",
     ),
-    ("adapters/shared/new.py", "from ..mujoco.spec import Sketch"),
+    ("adapters/shared/new.py", "from ..mujoco.mujoco import MuJoCo"),
     ("adapters/mujoco/new.py", "from ...cases import load"),
     ("cases/rssr.py", "from ..adapters import engine"),
 ]

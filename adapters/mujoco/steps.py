@@ -19,7 +19,7 @@ import numpy as np
 from ...core.case.case import Case
 from ...core.mechanism.motions import Ramp
 from ...core.trajectory import Array, Trajectory
-from ..shared.joint_equivalents import jointed
+from ..shared.equivalents import jointed
 from ..shared.simulation import Leg, SimulatedPose, SimulationEndedError, simulated, start_of
 from .mujoco import MuJoCo, MuJoCoModel, mujoco
 
@@ -142,7 +142,8 @@ class _Steps:
         self.start = start_of(self.of, case)
         m = self.m = self.of.m
         self.longest = float(m.opt.timestep)
-        self.q, self.v, self.sign = (np.array(each) for each in zip(*self.of.driven, strict=True))
+        places = [(*self.of.coordinate(name), sign) for name, sign in self.of.driven]
+        self.q, self.v, self.sign = (np.array(each) for each in zip(*places, strict=True))
         m.dof_armature[self.v] = ARMATURE
         mj.mj_setConst(m, self.of.d)  # MuJoCo scales the softness by this
         if how.kind == "stiff":
@@ -226,15 +227,19 @@ class _Steps:
         """Return the pose at the current state, with the steps since the previous sample."""
         mj, m, d = self.mj, self.m, self.of.d
         self.set(*driven)
-        points = np.full((3, len(self.of.watched), 3), np.nan)
-        if self.how.kind == "projecting":
-            mj.mj_fwdPosition(m, d)
-        else:
+        points, moves = np.full((3, len(self.of.wanted), 3), np.nan), self.how.kind != "projecting"
+        if moves:
             mj.mj_forward(m, d)
             mj.mj_rnePostConstraint(m, d)
-            for k, site in enumerate(self.of.watched):
-                for order, rate in ((1, mj.mj_objectVelocity), (2, mj.mj_objectAcceleration)):
-                    rate(m, d, mj.mjtObj.mjOBJ_SITE, site, self.twist, 0)
+        else:
+            mj.mj_fwdPosition(m, d)
+        for k, frame in enumerate(self.of.wanted):
+            if frame.handle is None:  # of the ground
+                points[:, k] = frame.position, np.zeros(3), np.zeros(3)
+                continue
+            points[0, k] = d.site_xpos[frame.handle]
+            for order, rate in ((1, mj.mj_objectVelocity), (2, mj.mj_objectAcceleration)):
+                if moves:
+                    rate(m, d, mj.mjtObj.mjOBJ_SITE, frame.handle, self.twist, 0)
                     points[order, k] = self.twist[3:]
-        points[0] = d.site_xpos[self.of.watched]
         return SimulatedPose(points, float(np.abs(d.efc_pos[: d.ne]).max(initial=0.0)), steps)

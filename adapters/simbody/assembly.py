@@ -15,9 +15,8 @@ import numpy as np
 
 from ...core.case.case import Case
 from ...core.errors import SolveError
-from ...core.mechanism.motions import JointDriver
 from ...core.trajectory import Array, Trajectory
-from ..shared.joint_equivalents import jointed
+from ..shared.equivalents import jointed
 from ..shared.simulation import Leg, SimulatedPose, SimulationEndedError, simulated, start_of
 from .simbody import Simbody, SimbodyModel, opensim
 
@@ -83,14 +82,12 @@ class _Assembled(SimbodyModel):
     def __init__(self, o: Any, case: Case, accuracy: float) -> None:
         super().__init__(o, case)
         self.accuracy, self.start = accuracy, start_of(self, case)
-        joints = [each for each in case.mechanism.drivers if isinstance(each, JointDriver)]
-        if len(self.conditions) > len(joints) + (self.state.getNQErr() > 0):
+        if len(self.conditions) > len(self.driven) + (self.state.getNQErr() > 0):
             raise SolveError(
                 f"case {case.name!r}: a joint closes a loop of one body with itself, which"
                 " Simbody's assembler does not support; use the projection mode"
             )
-        driven = [self.coordinates[each.joint, each.freedom] for each in joints]
-        self.driven = [(self.moves[body - 1].get_coordinates(0), sign) for body, sign in driven]
+        self.held = [(self.moves[at - 1].get_coordinates(0), sign) for at, sign in self.driven]
 
     def run(self, leg: Leg) -> Iterator[SimulatedPose]:
         """Yield the poses of a leg."""
@@ -103,7 +100,7 @@ class _Assembled(SimbodyModel):
         """Return the pose at values of the drivers."""
         o, state = self.o, self.state
         references = o.SimTKArrayCoordinateReference()
-        for (coordinate, sign), value in zip(self.driven, values.tolist(), strict=True):
+        for (coordinate, sign), value in zip(self.held, values.tolist(), strict=True):
             reference = o.CoordinateReference(coordinate.getName(), o.Constant(sign * value))
             reference.setWeight(1.0)
             references.push_back(reference)
@@ -119,7 +116,7 @@ class _Assembled(SimbodyModel):
         self.model.realizePosition(state)
         gaps = [
             coordinate.getValue(state) - sign * value
-            for (coordinate, sign), value in zip(self.driven, values.tolist(), strict=True)
+            for (coordinate, sign), value in zip(self.held, values.tolist(), strict=True)
         ]
         stations: list[Any] = self.wanted
         points = np.full((3, len(stations), 3), np.nan)

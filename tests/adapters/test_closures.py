@@ -9,7 +9,7 @@ from unittest import mock
 
 import numpy as np
 import pytest
-from kincheck.adapters.shared.loop_closures import CLOSURES
+from kincheck.adapters.shared.constraints import CLOSURES
 from kincheck.core import (
     GROUND,
     Body,
@@ -63,7 +63,7 @@ def test_every_joint_moves_as_in_the_native_engine(
 ) -> None:
     mechanism = on_crank(kind, *bodies)
     # the native engine, whose models are kept, has no tree
-    with mock.patch("kincheck.adapters.shared.tree_model.spanning_tree", tree):
+    with mock.patch("kincheck.adapters.shared.tree_plan.spanning_tree", tree):
         found = solved(mechanism, TURN, RATE)
     if tree is crank_only or kind in TOO_LOOSE:
         assert "tested" in found.details["closures"]
@@ -102,7 +102,7 @@ def test_cardan_joint(
     With the bearing cut, a body that turns about two moving axes carries a closure: the only place
     where a direction has a bias from the angular acceleration.
     """
-    monkeypatch.setattr("kincheck.adapters.shared.tree_model.spanning_tree", tree)
+    monkeypatch.setattr("kincheck.adapters.shared.tree_plan.spanning_tree", tree)
     a, u, center = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]), np.array([0.1, 0.2, 0.3])
     b = rotation(u, 0.6) @ a
     turn, rate = 0.02 * np.arange(-4, 162), 2.0

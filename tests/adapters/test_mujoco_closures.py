@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from kincheck.adapters.mujoco import mujoco as adapter
-from kincheck.adapters.mujoco import spec
+from kincheck.adapters.shared import tree_plan
 from kincheck.core.joints import (
     Distance,
     Fixed,
@@ -47,7 +47,7 @@ def cut(monkeypatch, name):
         )
         return SpanningTree(rest.branches, (*rest.cut, mechanism.joint(name)))
 
-    monkeypatch.setattr(spec, "spanning_tree", tree)
+    monkeypatch.setattr(tree_plan, "spanning_tree", tree)
 
 
 @pytest.fixture(scope="module")

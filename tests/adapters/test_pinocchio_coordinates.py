@@ -143,7 +143,7 @@ def test_spindle_lifts_a_lever(
     With the thread cut, bodies that turn about several moving axes carry it: the only place where
     its angle has a bias.
     """
-    monkeypatch.setattr("kincheck.adapters.shared.tree_model.spanning_tree", tree)
+    monkeypatch.setattr("kincheck.adapters.shared.tree_plan.spanning_tree", tree)
     along, eye = (0.1, 0.2, 1.0), (0.05, 0.1, 0.5)
     joints = [
         Universal("base", GROUND, "housing", (0.0, 0.0, 0.0), ((1.0, 0.0, -0.1), (0.02, 1.0, 0.2))),

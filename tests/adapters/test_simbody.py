@@ -30,8 +30,8 @@ from ..joints.test_joints import EXAMPLES, TYPES
 
 pytest.importorskip("opensim", reason="OpenSim is not installed: pip install 'kincheck[simbody]'")
 
-from kincheck.adapters.shared.opensim_frames import euler_angles
-from kincheck.adapters.simbody.rotations import turned
+from kincheck.adapters.shared.poses import euler_angles
+from kincheck.adapters.simbody.simbody import turned
 
 ENGINE = adapters.engine("simbody")
 # Round-off, amplified at most a thousandfold by the mechanisms here [m, m/s, m/s^2].
@@ -73,7 +73,7 @@ def cut(monkeypatch, *names):
         rest = spanning_tree(replace(mechanism, joints=kept, drivers=(), couplers=()))
         return SpanningTree(rest.branches, (*rest.cut, *map(mechanism.joint, names)))
 
-    monkeypatch.setattr("kincheck.adapters.shared.tree_model.spanning_tree", tree)
+    monkeypatch.setattr("kincheck.adapters.shared.tree_plan.spanning_tree", tree)
 
 
 def test_strut_is_the_truth_to_round_off():

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from kincheck import adapters, cases
-from kincheck.adapters.shared.joint_chains import Link
+from kincheck.adapters.shared.tree_plan import Link
 from kincheck.core.case.case import Case
 from kincheck.core.case.joint_probe import probe, probes
 from kincheck.core.harness.record import Outcome

@@ -6,7 +6,7 @@ from unittest import mock
 
 import numpy as np
 import pytest
-from kincheck.adapters.mujoco import spec
+from kincheck.adapters.shared import tree_plan
 from kincheck.core import solve as solve_natively
 from kincheck.core.case.case import Case, Output, Sweep, Truth
 from kincheck.core.mechanism.mechanism import SpanningTree, spanning_tree
@@ -55,7 +55,7 @@ def cutting(*names):
         rest = spanning_tree(replace(mechanism, joints=kept, drivers=(), couplers=()))
         return SpanningTree(rest.branches, (*rest.cut, *map(mechanism.joint, names)))
 
-    return mock.patch.object(spec, "spanning_tree", tree)
+    return mock.patch.object(tree_plan, "spanning_tree", tree)
 
 
 # Coordinates of joints: driven, coupled, over several turns
