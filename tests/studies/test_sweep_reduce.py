@@ -14,11 +14,9 @@ from kincheck.core.caches import clear_caches
 from kincheck.core.case.case import Output
 from kincheck.core.case.measures import Component, JointAngle, Orientation
 from kincheck.core.case.quantity import with_markers
-from kincheck.core.studies.tolerance import streaming_totals as room
-from kincheck.core.studies.tolerance.gradients import gradients
-from kincheck.core.studies.tolerance.reduce import QUANTILES, merged, nothing, quantiles
-from kincheck.core.studies.tolerance.streaming_totals import Totals
-from kincheck.core.studies.tolerance.study import Ready, Study
+from kincheck.core.studies.tolerance import statistics as room
+from kincheck.core.studies.tolerance.statistics import QUANTILES, Totals, merged, nothing, quantiles
+from kincheck.core.studies.tolerance.study import Ready, Study, gradients
 
 from ..support.fakes import crank
 from .test_vary import vary
@@ -174,7 +172,7 @@ def test_variants_of_a_coarse_sweep_count_the_turns_of_the_nominal_one(tmp_path)
 
 
 def test_gradients_that_are_rough_say_so(tmp_path, monkeypatch):
-    from kincheck.core.studies.tolerance import gradients as room
+    from kincheck.core.studies.tolerance import study as room
 
     monkeypatch.setattr(room, "STEP", 0.2)
     case = load("mcpherson_strut")

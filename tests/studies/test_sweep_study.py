@@ -17,7 +17,7 @@ from kincheck.core.case.suspension.base import where_moving
 from kincheck.core.errors import KincheckError
 from kincheck.core.harness.compare import output_series
 from kincheck.core.jet import Jet
-from kincheck.core.studies.tolerance.reduce import QUANTILES
+from kincheck.core.studies.tolerance.statistics import QUANTILES
 from kincheck.core.studies.tolerance.study import Ready, Study
 from kincheck.core.studies.tolerance.sweep import sweep_designs
 

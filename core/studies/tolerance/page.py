@@ -2,23 +2,75 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from ...harness.labels import notes, output_label, signs
+from ...harness.labels import notes, number, output_label, signs
 from ...harness.record import Outcome, Record
 from ...report.axis import Axis, driver_axis
 from ...report.figures import Figure, layout_over
 from ...report.page_parts import environment, figure_parts
 from ...unit_text import with_unit
-from .histograms import Histogram
-from .limit_words import interval, limit_notes, other_yield, percent
-from .output_view import DIGITS, OutputView, scaled_number
-from .results import Gradient, Numbers, SweepResults
+from .conformance import Capability, Histogram
+from .results import Envelope, Gradient, Numbers, SweepResults
+from .tables import effect, headline, interval, limit_notes, other_yield, percent
+
+DIGITS = 7
+"""Digits of a drawn number: one more than the page shows when the reader points at a curve."""
+
+
+@dataclass(frozen=True)
+class OutputView:
+    """An output as the page shows it, in display units: its figures by name, and its gradients,
+    the largest effect first.
+    """
+
+    name: str
+    unit: str
+    scale: float
+    envelope: Envelope
+    figure: str
+    spread: str
+    tornado: str
+    histogram: str
+    gradients: Sequence[Gradient]
+    limit: Capability | None
+
+    def shown(self, value: float | None) -> str:
+        """Return a value in display units."""
+        return scaled_number(self.scale, value)
+
+    @property
+    def limits(self) -> dict[str, float]:
+        """The limits in display units, by name."""
+        ends = (None, None) if self.limit is None else (self.limit.low, self.limit.high)
+        return {
+            name: float(f"{self.scale * value:.{DIGITS}g}")
+            for name, value in zip(("low limit", "high limit"), ends, strict=True)
+            if value is not None
+        }
+
+    def ends(self) -> tuple[str, str, str]:
+        """The least, the most, and the largest standard deviation, over all samples."""
+        least, most, spread = (
+            [value for value in values if value is not None]
+            for values in (self.envelope.min, self.envelope.max, self.envelope.standard_deviation)
+        )
+        return (
+            self.shown(min(least, default=None)),
+            self.shown(max(most, default=None)),
+            self.shown(max(spread, default=None)),
+        )
+
+
+def scaled_number(scale: float, value: float | None) -> str:
+    """Return a number times a factor, to three digits; a dash for None."""
+    return number(None if value is None else scale * value)
+
 
 _HERE = Path(__file__).parent
 
@@ -86,23 +138,6 @@ def page(results: SweepResults) -> str:
     )
 
 
-def headline(results: SweepResults) -> str:
-    """Return one sentence about the study."""
-    said = f"{results.partial or results.samples} variants of {results.case}"
-    said += ", partial: the sweep was stopped" if results.partial else ""
-    said += (
-        f", {results.unsolved} without a solution somewhere" if results.unsolved else ", all solved"
-    )
-    if results.checked:
-        off = len(results.deviating)
-        said += f"; {len(results.checked)} checked with {results.check_engine}, " + (
-            f"{off} deviate" if off else "none deviates"
-        )
-        said += f", {results.unjudged} not judged" if results.unjudged else ""
-        said += f"; {results.partly_judged}" if results.partly_judged else ""
-    return said
-
-
 def slopes(results: SweepResults, view: OutputView, each: Gradient) -> dict[str, str]:
     """Return the numbers of a gradient, and their unit, in units of the file."""
     its, factor = results.shown_unit(results.unit_of(each.coordinate))
@@ -114,13 +149,6 @@ def slopes(results: SweepResults, view: OutputView, each: Gradient) -> dict[str,
 def in_file_unit(results: SweepResults, unit: str, value: float | None) -> str:
     """Return a number of an SI unit as text in the unit of the file."""
     return scaled_number(results.shown_unit(unit)[1], value)
-
-
-def effect(gradient: Gradient) -> float:
-    """Return the size of a bar: the largest gradient times its coordinate's scale [unit of the
-    output].
-    """
-    return abs(gradient.largest or 0.0) * gradient.scale
 
 
 def _axis(results: SweepResults) -> Axis:

@@ -1,36 +1,176 @@
-"""Sweep over design variants: solve and reduce them chunk by chunk, differentiate, cross-check."""
+"""Sweep over design variants: solve and reduce them chunk by chunk, in threads or on a cluster;
+differentiate, cross-check.
+"""
 
 from __future__ import annotations
 
+import hashlib
+import pickle
 import sys
-from collections.abc import Callable
+from collections import OrderedDict, deque
+from collections.abc import Callable, Generator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
+from itertools import islice
+from threading import Lock
 from time import perf_counter, process_time
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeAlias
+
+import numpy as np
 
 from ...case.case import Case
 from ...errors import KincheckError
 from ...harness.engine import Engine
-from ...harness.execution import Solver
+from ...harness.execution import Solver, error_text
 from ...harness.interrupts import deferred, hold
 from ...harness.provenance import circumstances
-from ...harness.workers.distributed import ClusterError
-from ..variation.modes import Incomplete, Mode, Sampling
+from ...harness.workers.distributed import SILENT, ClusterError, Tasks, connected, loaded
+from ...harness.workers.messages import pack
+from ...trajectory import Array
+from ...version import VERSION
+from ..variation.study_choices import Incomplete, Mode, Sampling
 from ..variation.variation import Variation
-from . import cross_check, result_tables, results
-from .chunk import Chunk
-from .chunk_execution import Source, on_threads
-from .conformance import capabilities
-from .gathered import Gathered
-from .gradients import gradients
-from .histograms import histogram, worst_sample
-from .part_file import Part
-from .reduce import quantiles
-from .study import Ready, Study
+from . import cross_check, results
+from .chunk_files import Part
+from .conformance import capabilities, histogram, worst_sample
+from .statistics import merged, nothing, quantiles
+from .study import COUNTS, Chunk, Ready, Study, Unsolved, gradients
+
+# Unsolved variants listed in the results; all are counted.
+LISTED = 50
+
+
+class Gathered:
+    """Results of the finished chunks."""
+
+    def __init__(self, study: Study) -> None:
+        self.summary = nothing(len(study.rows), len(study.case.sweep.values))
+        self.kept: list[Array] = []
+        self.picked: dict[int, Array] = {}
+        self.unsolved: list[Unsolved] = []
+        self.effects: dict[int, Array] = {}
+        self.limited = np.zeros((len(study.limits) + 1, COUNTS), dtype=np.int64)
+        self.done = self.chunks = self.failures = self.retried = 0
+
+    def add(self, chunk: Chunk) -> None:
+        """Add a chunk; chunks come in order."""
+        self.summary = merged(self.summary, chunk.summary)
+        self.kept.append(chunk.kept)
+        self.picked |= chunk.picked
+        self.limited += chunk.limited
+        self.unsolved += islice(chunk.unsolved, LISTED - len(self.unsolved))
+        if chunk.effects is not None:  # the first variant is the nominal design
+            self.effects |= {
+                self.done + k: each for k, each in enumerate(chunk.effects.T) if self.done + k
+            }
+        self.done += chunk.count
+        self.chunks += 1
+        self.failures += chunk.failures
+        self.retried += chunk.retried
+
+
+Chunks: TypeAlias = Generator[Chunk]
+Source: TypeAlias = Callable[[Study, int], Chunks]
+"""Solves the chunks of a study from an index on, and yields each chunk once, in order."""
+
+# Chunks in progress for each thread: the thread solves one, the others wait for their turn.
+AHEAD = 3
+
+
+def on_threads(ready: Ready, jobs: int) -> Source:
+    """Return the source in threads of this process; the programs run without Python's lock."""
+
+    def solve(study: Study, first: int = 0) -> Chunks:
+        if jobs == 1:
+            yield from map(ready.chunk, range(first, study.chunks))
+            return
+        waiting = deque[Any]()
+        with ThreadPoolExecutor(jobs) as pool:
+            try:
+                for index in range(first, study.chunks):
+                    waiting.append(pool.submit(ready.chunk, index))
+                    if len(waiting) >= AHEAD * jobs:
+                        yield waiting.popleft().result()
+                while waiting:
+                    yield waiting.popleft().result()
+            finally:
+                pool.shutdown(wait=True, cancel_futures=True)
+
+    return solve
+
+
+def on_cluster(address: str, silent: float = SILENT) -> Source:
+    """Return the source on the workers of a dask.distributed scheduler.
+
+    If a worker is lost or silent, other workers repeat its tasks.
+
+    Args:
+        silent: longest time without a heartbeat of a worker [s].
+
+    Raises:
+        ClusterError: dask.distributed is not installed, the scheduler does not answer or
+            disappeared, every worker of a task was lost, or a worker cannot solve.
+    """
+
+    def solve(study: Study, first: int = 0) -> Chunks:
+        packed, ready = pack(study), dict[int, Chunk]()
+        with connected(loaded(), address) as client:
+            tasks = Tasks(client, address, silent)
+            waiting = iter(range(first, study.chunks))
+            for index in range(first, study.chunks):
+                while index not in ready:
+                    # asked each time: workers may come and go
+                    more = AHEAD * tasks.threads - len(tasks) - len(ready)
+                    for late in islice(waiting, max(0, more)):
+                        tasks.submit(late, (solve_there, packed, late, VERSION))
+                    number, found = tasks.next()
+                    ready[number] = _answered(found, address)
+                yield ready.pop(index)
+
+    return solve
+
+
+def _answered(found: Chunk | Exception, address: str) -> Chunk:
+    """Return a chunk; raise an exception in its place with an explanation."""
+    if isinstance(found, Chunk):
+        return found
+    if isinstance(found, ClusterError):
+        raise found
+    why = error_text(found)
+    if type(found).__name__ == "KilledWorker":
+        why = f"every worker that had some chunks was lost: {why}"
+    elif not isinstance(found, TimeoutError):
+        why = f"a worker cannot solve: {why}"
+    raise ClusterError(f"scheduler {address}: {why}") from found
+
+
+_ready: OrderedDict[bytes, Ready] = OrderedDict()
+_lock = Lock()
+
+
+def solve_there(packed: bytes, index: int, version: str) -> Chunk:
+    """Solve a chunk in a worker of a cluster. The worker keeps the compiled model for later chunks.
+
+    Raises:
+        ClusterError: the worker has another version of kincheck.
+    """
+    if version != VERSION:
+        raise ClusterError(
+            f"kincheck {VERSION} on the cluster's worker, expected {version} as in the sweep;"
+            " install the same there"
+        )
+    key = hashlib.sha256(packed).digest()
+    with _lock:  # a worker's threads share the model; a worker keeps the models of two studies
+        if key not in _ready:
+            _ready[key] = Ready.of(pickle.loads(packed))
+            if len(_ready) > 2:
+                _ready.popitem(last=False)
+        ready = _ready[key]
+    return ready.chunk(index)
+
 
 # Variants kept for quantiles: the share below a 1 % quantile then has a standard error of 0.1 %.
 KEPT = 10_000
@@ -196,21 +336,21 @@ def sweep_designs(
         seed=seed,
         samples=found.done,
         asked=study.samples,
-        coordinates=result_tables.coordinates(study),
+        coordinates=results.coordinates(study),
         driver={name: values.tolist() for name, values in case.sweep.moved.items()},
         sampling=str(sampling),
-        correlations=result_tables.correlations(study),
+        correlations=results.correlations(study),
         length_unit=variation.units.length,
         angle_unit=variation.units.angle,
-        outputs=result_tables.envelopes(study, found.summary, kept, ready.nominal, histograms),
+        outputs=results.envelopes(study, found.summary, kept, ready.nominal, histograms),
         limits=limits,
         incomplete=str(incomplete),
         quantiles_of=kept[0].kept,
-        gradients=result_tables.gradient_table(study, slopes),
+        gradients=results.gradient_table(study, slopes),
         gradient_messages={
             variation.coordinates[k].name: message for k, message in sorted(slopes.messages.items())
         },
-        effects=result_tables.effect_table(study, found.effects),
+        effects=results.effect_table(study, found.effects),
         unsolved=found.failures,
         failed=found.unsolved,
         retried=found.retried,
