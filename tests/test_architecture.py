@@ -106,7 +106,7 @@ IMPORTS = {
         "studies studies/joint_check"
     ),
     "studies/tolerance": (
-        ". program program/llvm mechanism kinematics case case/measures case/io harness "
+        ". mechanism kinematics case case/measures case/io harness "
         "harness/workers history report studies/variation"
     ),
     "studies/stress": (

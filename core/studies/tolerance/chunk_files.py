@@ -28,7 +28,7 @@ from .study import Chunk, Study
 # reader ignores a truncated chunk. The file keeps every bit of a number, so a resumed study equals
 # one without a stop.
 
-MAGIC = b"kincheck-part/2\n"
+MAGIC = b"kincheck-part/3\n"
 HASH = hashlib.sha256().digest_size
 LENGTH = 8
 
@@ -209,14 +209,14 @@ class ParquetStore:
         """Write a chunk; see `Store`."""
         if self.problems:
             return
-        assert chunk.values is not None
-        assert chunk.offsets is not None
+        parts = zip(*chunk.stored, strict=True)
+        values, offsets = (np.concatenate(each, axis=-1) for each in parts)
         arrow = self._arrow
         columns: list[Any] = [arrow.array(np.arange(self._first, self._first + chunk.count))]
-        columns += [arrow.array(each) for each in chunk.offsets]
-        for values in chunk.values:
-            flat = arrow.array(np.ascontiguousarray(values.T).ravel())
-            columns.append(arrow.FixedSizeListArray.from_arrays(flat, values.shape[0]))
+        columns += [arrow.array(each) for each in offsets]
+        for each in values:
+            flat = arrow.array(np.ascontiguousarray(each.T).ravel())
+            columns.append(arrow.FixedSizeListArray.from_arrays(flat, each.shape[0]))
         with self._tried():
             self._writer.write_table(arrow.table(columns, schema=self._schema))
         self._first += chunk.count

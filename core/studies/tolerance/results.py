@@ -6,7 +6,7 @@ Numbers are in SI units. A number is null if it was not computed.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, Literal
 
 import msgspec
@@ -299,23 +299,23 @@ def gradient_table(study: Study, found: Gradients) -> list[Gradient]:
     return table
 
 
-def effect_table(study: Study, effects: Mapping[int, Array]) -> list[Effect]:
+def effect_table(study: Study, effects: Array) -> list[Effect]:
     """Return the effects of a study of one coordinate at a time.
 
     Args:
-        effects: the largest changes by variant, shape (rows,).
+        effects: the largest changes, shape (rows, variants); the first is the nominal design.
     """
     table: list[Effect] = []
-    for variant, changes in effects.items():
+    for variant, changes in [*enumerate(effects.T)][1:]:
         offsets = study.variation.of_variant(study.seed, variant)
         (moved,) = np.flatnonzero(offsets)
-        each = study.variation.coordinates[int(moved)]
-        by_row = {
-            row.name: change for row, change in zip(study.rows, numbers(changes), strict=True)
-        }
+        by_row = zip((row.name for row in study.rows), numbers(changes), strict=True)
         table.append(
             Effect(
-                variant=variant, coordinate=each.name, offset=float(offsets[moved]), changes=by_row
+                variant=variant,
+                coordinate=study.variation.coordinates[int(moved)].name,
+                offset=float(offsets[moved]),
+                changes=dict(by_row),
             )
         )
     return table

@@ -27,7 +27,7 @@ from ...mechanism.motions import Path
 from ...trajectory import PER_TIME, QUANTITIES, Array
 from ..variation.study_choices import Mode
 from ..variation.variation import Stream, Variation, generator
-from .statistics import Summary, Totals
+from .statistics import Summary, merged, nothing, summary_of
 
 COUNTS = 7
 """Counts of a limit, seven numbers of variants: all; incomplete; with a sample below, and with a
@@ -62,6 +62,8 @@ def limit_counts(
         solved: whether each sample is reached, shape (n, V).
         nominal: values of the nominal design, shape (rows, n).
     """
+    if not limits:
+        return np.zeros((1, COUNTS), dtype=np.int64)
     states: list[NDArray[np.bool_]] = []
     for each in limits:
         row, missing = values[each.row], np.isnan(values[each.row])
@@ -78,6 +80,19 @@ def limit_counts(
     return found
 
 
+# Variants solved together: enough to make the cost of the calls for their reduction negligible.
+# `solve_designs` reduces nothing, and is as fast with a quarter of them.
+TOGETHER = 1024
+# Number of chunks for threads and workers to share, and the least and largest number of variants in
+# a chunk. A chunk has a price: the other threads wait for Python's lock, and the scheduler of a
+# cluster spends a millisecond.
+CHUNKS, LEAST, MOST = 64, 64, 4096
+# Largest chunk if the values of all variants are stored, to limit the memory.
+MOST_STORED = 256
+# Largest number of messages kept; the count of unsolved variants is complete.
+MOST_MESSAGES = 50
+
+
 @dataclass(frozen=True)
 class Unsolved:
     """A variant without a solution at some samples, and the reason."""
@@ -89,47 +104,49 @@ class Unsolved:
 
 @dataclass(frozen=True, eq=False)
 class Chunk:
-    """The result of a chunk of variants.
+    """Results of consecutive variants: plain data, picklable. A sum is of the variants of both.
 
     Attributes:
+        index: number of the chunk; of a sum, the last one.
         count: number of variants.
-        kept: values of the random subset, shape (rows, n, subset size).
+        kept: values of the random subset, in parts of shape (rows, n, some).
         picked: values of picked variants, by variant, shape (rows, n).
         unsolved: the first variants without a solution at some samples.
         failures: number of all such variants.
         retried: number of variants solved again alone, with divided steps.
         limited: counts of variants by specification limit, see `limit_counts`.
-        effects: the largest change of each row over the samples, signed, shape (rows, count); None
-            unless the mode varies one coordinate at a time.
-        values: values of all variants, shape (rows, n, count); None unless the study stores them.
-        offsets: their offsets, shape (coordinates, count); None unless the study stores them.
+        effects: the largest change of each row over the samples, signed, in parts of shape (rows,
+            some); of no variants unless the mode varies one coordinate at a time.
+        stored: values of all variants, shape (rows, n, some), and their offsets, shape
+            (coordinates, some), in parts; none unless the study stores them.
     """
 
     index: int
     count: int
     summary: Summary
-    kept: Array
+    kept: tuple[Array, ...]
     picked: Mapping[int, Array]
     unsolved: tuple[Unsolved, ...]
     failures: int
     retried: int
     limited: NDArray[np.int64]
-    effects: Array | None = None
-    values: Array | None = None
-    offsets: Array | None = None
+    effects: tuple[Array, ...] = ()
+    stored: tuple[tuple[Array, Array], ...] = ()
 
-
-# Variants solved together: enough to make the cost of the calls for their reduction negligible.
-# `solve_designs` reduces nothing, and is as fast with a quarter of them.
-TOGETHER = 1024
-# Number of chunks for threads and workers to share, and the least and largest number of variants in
-# a chunk. A chunk has a price: the other threads wait for Python's lock, and the scheduler of a
-# cluster spends a millisecond.
-CHUNKS, LEAST, MOST = 64, 64, 4096
-# Largest chunk if the values of all variants are stored, to limit the memory.
-MOST_STORED = 256
-# Largest number of messages kept from a chunk; the count of unsolved variants is complete.
-MOST_MESSAGES = 50
+    def __add__(self, later: Chunk) -> Chunk:
+        return Chunk(
+            later.index,
+            self.count + later.count,
+            merged(self.summary, later.summary),
+            self.kept + later.kept,
+            {**self.picked, **later.picked},
+            (self.unsolved + later.unsolved)[:MOST_MESSAGES],
+            self.failures + later.failures,
+            self.retried + later.retried,
+            self.limited + later.limited,
+            self.effects + later.effects,
+            self.stored + later.stored,
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,6 +232,15 @@ class Study:
             RowLimit(names.index(each.output), each.low, each.high)
             for each in self.variation.limits
         )
+
+    @property
+    def nothing(self) -> Chunk:
+        """The results of no variants, before the first chunk."""
+        rows, n = len(self.rows), len(self.case.sweep.values)
+        limited = np.zeros((len(self.limits) + 1, COUNTS), dtype=np.int64)
+        kept = (np.empty((rows, n, 0)),)
+        effects = (np.empty((rows, 0)),)
+        return Chunk(-1, 0, nothing(rows, n), kept, {}, (), 0, 0, limited, effects)
 
     def of_variant(self, index: int) -> Case:
         """The case with the geometry of one variant."""
@@ -324,53 +350,40 @@ class Ready:
         count = min(study.of_a_chunk, study.samples - first)
         offsets = study.variation.offsets(study.seed, first, count)
         chosen = generator(study.seed, index, Stream.SUBSET).random(count) < study.subset
-        totals, picked, kept = (
-            Totals(len(study.rows), len(study.case.sweep.values)),
-            dict[int, Array](),
-            list[Array](),
-        )
-        unsolved: list[Unsolved] = []
-        effects: list[Array] = []
-        stored: list[Array] = []
-        failures = retried = 0
-        limited = np.zeros((len(study.limits) + 1, COUNTS), dtype=np.int64)
+        found = study.nothing
         for start in range(0, count, self.lanes):
-            part = slice(start, min(start + self.lanes, count))
-            values, solved, again, messages = self.values(offsets[:, part])
-            totals.take(values, first + start)
-            if study.limits:
-                limited += limit_counts(values, solved, self.nominal, study.limits)
-            kept.append(values[:, :, chosen[part]])
-            picked |= {k: values[:, :, k - first - start].copy() for k in self._picked(first, part)}
-            failures += len(messages)
-            retried += again
-            some = sorted(messages)[:MOST_MESSAGES]
-            unsolved += [
-                Unsolved(first + start + k, int((~solved[:, k]).sum()), messages[k]) for k in some
-            ]
-            if study.variation.mode is Mode.ONE_AT_A_TIME:
-                effects.append(largest(values - self.nominal[:, :, None]))
-            if study.whole:
-                stored.append(values)
+            part = slice(start, start + self.lanes)
+            found += self._part(index, first + start, offsets[:, part], chosen[part])
+        return found
+
+    def _part(self, index: int, first: int, offsets: Array, chosen: NDArray[np.bool_]) -> Chunk:
+        """Solve the variants from a first one on, all at once.
+
+        Args:
+            chosen: whether each is in the random subset, shape (V,).
+        """
+        study, count = self.study, len(chosen)
+        values, solved, retried, messages = self.values(offsets)
+        alone = study.variation.mode is Mode.ONE_AT_A_TIME
         return Chunk(
             index,
             count,
-            totals.summary(),
-            np.concatenate(kept, axis=2),
-            picked,
-            tuple(unsolved[:MOST_MESSAGES]),
-            failures,
+            summary_of(values, first),
+            (values[:, :, chosen],) if chosen.any() else (),
+            {
+                k: values[:, :, k - first].copy()
+                for k in study.picked.intersection(range(first, first + count))
+            },
+            tuple(
+                Unsolved(first + k, int((~solved[:, k]).sum()), messages[k])
+                for k in sorted(messages)[:MOST_MESSAGES]
+            ),
+            len(messages),
             retried,
-            limited,
-            np.concatenate(effects, axis=1) if effects else None,
-            np.concatenate(stored, axis=2) if stored else None,
-            offsets if study.whole else None,
+            limit_counts(values, solved, self.nominal, study.limits),
+            (largest(values - self.nominal[:, :, None]),) if alone else (),
+            ((values, offsets),) if study.whole else (),
         )
-
-    def _picked(self, first: int, part: slice) -> Sequence[int]:
-        if not self.study.picked:
-            return ()
-        return [k for k in range(first + part.start, first + part.stop) if k in self.study.picked]
 
 
 def largest(changes: Array) -> Array:

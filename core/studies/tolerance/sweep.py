@@ -23,54 +23,20 @@ import numpy as np
 
 from ...case.case import Case
 from ...errors import KincheckError
-from ...harness.engine import Engine
-from ...harness.execution import Solver, error_text
+from ...harness.execution import error_text
 from ...harness.interrupts import deferred, hold
 from ...harness.provenance import circumstances
 from ...harness.workers.distributed import SILENT, ClusterError, Tasks, connected, loaded
 from ...harness.workers.messages import pack
-from ...trajectory import Array
 from ...version import VERSION
 from ..variation.study_choices import Incomplete, Mode, Sampling
 from ..variation.variation import Variation
-from . import cross_check, results
+from . import results
 from .chunk_files import Part
 from .conformance import capabilities, histogram, worst_sample
-from .statistics import merged, nothing, quantiles
-from .study import COUNTS, Chunk, Ready, Study, Unsolved, gradients
-
-# Unsolved variants listed in the results; all are counted.
-LISTED = 50
-
-
-class Gathered:
-    """Results of the finished chunks."""
-
-    def __init__(self, study: Study) -> None:
-        self.summary = nothing(len(study.rows), len(study.case.sweep.values))
-        self.kept: list[Array] = []
-        self.picked: dict[int, Array] = {}
-        self.unsolved: list[Unsolved] = []
-        self.effects: dict[int, Array] = {}
-        self.limited = np.zeros((len(study.limits) + 1, COUNTS), dtype=np.int64)
-        self.done = self.chunks = self.failures = self.retried = 0
-
-    def add(self, chunk: Chunk) -> None:
-        """Add a chunk; chunks come in order."""
-        self.summary = merged(self.summary, chunk.summary)
-        self.kept.append(chunk.kept)
-        self.picked |= chunk.picked
-        self.limited += chunk.limited
-        self.unsolved += islice(chunk.unsolved, LISTED - len(self.unsolved))
-        if chunk.effects is not None:  # the first variant is the nominal design
-            self.effects |= {
-                self.done + k: each for k, each in enumerate(chunk.effects.T) if self.done + k
-            }
-        self.done += chunk.count
-        self.chunks += 1
-        self.failures += chunk.failures
-        self.retried += chunk.retried
-
+from .cross_check import Check, Checked, chosen, cross_check, require_able
+from .statistics import quantiles
+from .study import Chunk, Ready, Study, gradients
 
 Chunks: TypeAlias = Generator[Chunk]
 Source: TypeAlias = Callable[[Study, int], Chunks]
@@ -201,17 +167,6 @@ class Store(Protocol):
         ...
 
 
-@dataclass(frozen=True, eq=False)
-class Check:
-    """A cross-check: another engine solves a share of the variants too."""
-
-    engine: Engine
-    share: float
-    solver: Solver
-    tol: float
-    progress: Callable[[int, int], None] = lambda done, total: None
-
-
 def sweep_designs(
     case: Case,
     variation: Variation,
@@ -263,61 +218,38 @@ def sweep_designs(
     variation = variation.sampled(sampling, count)
     study = Study(case, variation, count, seed, order, tol, whole=store is not None)
     if check is not None:
-        cross_check.require_able(study, check.engine, check.solver, check.tol)
-        study = replace(study, picked=cross_check.chosen(study.samples, check.share, seed))
+        require_able(study, check)
+        study = replace(study, picked=chosen(study.samples, check.share, seed))
     study = replace(study, subset=min(1.0, _kept(study) / study.samples))
     ready = Ready.of(study)
-    found = Gathered(study)
+    found = study.nothing
     for chunk in part.finished(study) if part is not None else ():
-        found.add(chunk)
-        if store is not None:
-            store.write(chunk)
-    begin, cpu, earlier = perf_counter(), process_time(), found.done
-    checked: list[cross_check.Checked] = []
-
-    def measured_so_far() -> dict[str, Any]:
-        return _measured(
-            study,
-            found.done - earlier,
-            jobs if source is None else None,
-            perf_counter() - begin,
-            process_time() - cpu,
-        )
-
+        found += _without_store(chunk, store)
+    begin, cpu, earlier = perf_counter(), process_time(), found.count
+    seconds = processor = 0.0
+    checked: list[Checked] = []
     try:
-        with closing((source or on_threads(ready, jobs))(study, found.chunks)) as chunks:
+        with closing((source or on_threads(ready, jobs))(study, found.index + 1)) as chunks:
             for chunk in chunks:
                 with deferred():  # an interrupt waits: a chunk is added everywhere or nowhere
-                    found.add(chunk)
-                    if store is not None:
-                        store.write(chunk)
                     if part is not None:
                         part.add(chunk)
-                progress(
-                    Progress(
-                        found.done,
-                        study.samples,
-                        found.failures,
-                        perf_counter() - begin,
-                        found.done - earlier,
-                    )
-                )
-        measured = measured_so_far()
+                    found += _without_store(chunk, store)
+                seconds, processor = perf_counter() - begin, process_time() - cpu
+                new = found.count - earlier
+                progress(Progress(found.count, study.samples, found.failures, seconds, new))
         if check is not None:
-            checked = cross_check.check(
-                study, check.engine, check.solver, found.picked, check.tol, check.progress
-            )
+            checked = cross_check(study, check, found.picked)
         hold()
     except (KeyboardInterrupt, ClusterError) as reason:
-        if stopped is None or not found.done:
+        if stopped is None or not found.count:
             raise
         stopped(reason)
-        measured = measured_so_far()
     slopes = gradients(ready)
     exact = (
         study.subset >= 1.0
         and variation.mode is not Mode.MONTE_CARLO
-        and found.done == study.samples
+        and found.count == study.samples
     )
     by_row = [[each[k] for each in found.kept] for k in range(len(study.rows))]
     limits = capabilities(study, found.limited, found.summary, by_row, incomplete)
@@ -329,12 +261,15 @@ def sweep_designs(
         kept = list(pool.map(partial(quantiles, exact=exact), by_row))
     run = circumstances([case], started=started, tol=tol, command=command)
     run["cases"][case.name]["notes"] += ready.designs.start_notes(tol)
+    measured = _measured(
+        study, found.count - earlier, jobs if source is None else None, seconds, processor
+    )
     return results.SweepResults(
         run=run,
         case=case.name,
         mode=str(variation.mode),
         seed=seed,
-        samples=found.done,
+        samples=found.count,
         asked=study.samples,
         coordinates=results.coordinates(study),
         driver={name: values.tolist() for name, values in case.sweep.moved.items()},
@@ -350,14 +285,21 @@ def sweep_designs(
         gradient_messages={
             variation.coordinates[k].name: message for k, message in sorted(slopes.messages.items())
         },
-        effects=results.effect_table(study, found.effects),
+        effects=results.effect_table(study, np.concatenate(found.effects, axis=1)),
         unsolved=found.failures,
-        failed=found.unsolved,
+        failed=[*found.unsolved],
         retried=found.retried,
         check_engine=check.engine.name if check else None,
         checked=checked,
         measured=measured | {"peak_memory_mb": _peak_memory()},
     )
+
+
+def _without_store(chunk: Chunk, store: Store | None) -> Chunk:
+    """Return a chunk without the values of all variants, after their storage."""
+    if store is not None:
+        store.write(chunk)
+    return replace(chunk, stored=())
 
 
 def how_many(variation: Variation, samples: int | None) -> int:
