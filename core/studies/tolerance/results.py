@@ -19,6 +19,7 @@ from ...harness.record import Outcome
 from ...report.axis import DRIVER_UNITS
 from ...tabular import Tabular
 from ...trajectory import Array
+from ..variation.variation import Law
 from .conformance import Capability, Histogram
 from .cross_check import Checked
 from .statistics import QUANTILES, Quantiles, Summary
@@ -31,7 +32,6 @@ class VariedCoordinate(msgspec.Struct, frozen=True, kw_only=True):
     """A varied coordinate.
 
     Attributes:
-        law: normal, truncated_normal, uniform, triangular, or values.
         scale: standard deviation, half width, or the largest offset [unit].
         values: the offsets [unit], if they are listed.
         bound: largest offset of a truncated normal distribution [unit]; zero for other laws.
@@ -40,7 +40,7 @@ class VariedCoordinate(msgspec.Struct, frozen=True, kw_only=True):
     name: str
     hardpoint: str
     unit: str
-    law: str
+    law: Law
     scale: float
     values: list[float] = []
     bound: float = 0.0
@@ -78,6 +78,12 @@ class Envelope(msgspec.Struct, frozen=True, kw_only=True):
     min_variant: int | None
     max_variant: int | None
     histogram: Histogram | None = None
+
+    @property
+    def ends(self) -> tuple[float | None, ...]:
+        """The least, the most, and the largest standard deviation, over all samples."""
+        ways = ((min, self.min), (max, self.max), (max, self.standard_deviation))
+        return tuple(way((x for x in xs if x is not None), default=None) for way, xs in ways)
 
 
 class Gradient(msgspec.Struct, frozen=True, kw_only=True):
@@ -323,18 +329,8 @@ def effect_table(study: Study, effects: Array) -> list[Effect]:
 
 def coordinates(study: Study) -> list[VariedCoordinate]:
     """Return the varied coordinates."""
-    return [
-        VariedCoordinate(
-            name=each.name,
-            hardpoint=each.hardpoint,
-            unit=each.unit,
-            law=str(each.law),
-            scale=each.scale,
-            values=[*each.values],
-            bound=each.bound,
-        )
-        for each in study.variation.coordinates
-    ]
+    varied = study.variation.coordinates
+    return msgspec.convert(varied, list[VariedCoordinate], from_attributes=True)
 
 
 def correlations(study: Study) -> list[Correlated]:

@@ -18,7 +18,7 @@ from ...report.fitting_table import FittingTable
 from ...report.table import print_signs
 from ..variation.study_choices import Incomplete
 from .conformance import Capability, sparkline
-from .results import Envelope, Gradient, Numbers, SweepResults
+from .results import Gradient, SweepResults
 
 
 def limit_notes(results: SweepResults) -> list[str]:
@@ -34,7 +34,7 @@ def limit_notes(results: SweepResults) -> list[str]:
             f"The confidence interval assumes independent variants; for {results.sampling}"
             " sampling it is usually too wide."
         )
-    if some := incomplete(results):
+    if some := _incomplete(results):
         variants = number_of(some, "variant")
         lines.append(
             f"Incomplete, and left out: {variants} without all samples."
@@ -47,8 +47,7 @@ def limit_notes(results: SweepResults) -> list[str]:
     return lines
 
 
-def incomplete(results: SweepResults) -> int:
-    """Return the number of incomplete variants."""
+def _incomplete(results: SweepResults) -> int:
     return max((each.incomplete for each in results.limits), default=0)
 
 
@@ -56,7 +55,7 @@ def other_yield(results: SweepResults) -> list[tuple[str, str]]:
     """Return head and attribute of the yield that is not judged; none without incomplete variants,
     as both are equal.
     """
-    if not incomplete(results):
+    if not _incomplete(results):
         return []
     if results.incomplete == Incomplete.IGNORE:
         return [("yield of all", "share_of_all")]
@@ -95,14 +94,13 @@ def print_sweep(results: SweepResults, file: TextIO) -> None:
 
 
 def _extremes(results: SweepResults) -> FittingTable:
-    table = FittingTable()
-    for name in ("output", "unit"):
-        table.add_column(name)
-    for name in ("least", "variant", "most", "variant", "largest\nst. dev.", "largest\n1-99 %"):
-        table.add_column(name, justify="right", no_wrap=True)
-    table.add_column("largest effect\n(gradient x scale)")
+    table = terminal.columns(
+        *("output", "unit", ">least", ">variant", ">most", ">variant"),
+        *(">largest\nst. dev.", ">largest\n1-99 %", "largest effect\n(gradient x scale)"),
+    )
     for name, each in results.outputs.items():
         unit, scale = results.shown_unit(each.unit)
+        least, most, spread = (scaled_number(scale, value) for value in each.ends)
         bands = zip(each.quantiles["0.01"], each.quantiles["0.99"], strict=True)
         widths = [high - low for low, high in bands if low is not None and high is not None]
         known = (g for g in results.gradients if g.output == name and g.largest is not None)
@@ -110,61 +108,56 @@ def _extremes(results: SweepResults) -> FittingTable:
         table.add_row(
             Text(name),
             unit,
-            *(_shown(scale, min(_known(each.min), default=None)), _count(each.min_variant)),
-            *(_shown(scale, max(_known(each.max), default=None)), _count(each.max_variant)),
-            _shown(scale, max(_known(each.standard_deviation), default=None)),
-            _shown(scale, max(widths, default=None)),
-            Text("–" if top is None else f"{top.coordinate} {_shown(scale, effect(top))}"),
+            *(least, _count(each.min_variant), most, _count(each.max_variant), spread),
+            scaled_number(scale, max(widths, default=None)),
+            Text("–" if top is None else f"{top.coordinate} {scaled_number(scale, effect(top))}"),
         )
     return table
+
+
+def _count(number: int | None) -> str:
+    return "–" if number is None else str(number)
 
 
 def _distributions(results: SweepResults) -> FittingTable:
     swept = next(iter(results.driver))
     driver_unit, factor = results.shown_driver
-    table = FittingTable(title="Distribution at one sample")
-    table.add_column("output")
-    table.add_column("unit")
-    table.add_column(f"at {swept}\n[{driver_unit}]", justify="right", no_wrap=True)
-    for name in ("mean", "st. dev.", "1 %", "50 %", "99 %"):
-        table.add_column(name, justify="right", no_wrap=True)
-    table.add_column("histogram", no_wrap=True)
+    table = terminal.columns(
+        *("output", "unit", f">at {swept}\n[{driver_unit}]", ">mean", ">st. dev."),
+        *(">1 %", ">50 %", ">99 %", "histogram"),
+        title="Distribution at one sample",
+    )
     for name, each in results.outputs.items():
-        found = each.histogram
-        if found is None:
+        if each.histogram is None:
             continue
         unit, scale = results.shown_unit(each.unit)
-        values = [column[found.sample] for column in _columns(each)]
+        k = each.histogram.sample
+        quantiles = (each.quantiles[p] for p in ("0.01", "0.5", "0.99"))
+        columns = (each.mean, each.standard_deviation, *quantiles)
         table.add_row(
             Text(name),
             unit,
-            _shown(factor, results.driver[swept][found.sample]),
-            *(_shown(scale, value) for value in values),
-            sparkline(found),
+            scaled_number(factor, results.driver[swept][k]),
+            *(scaled_number(scale, column[k]) for column in columns),
+            sparkline(each.histogram),
         )
     return table
 
 
-def _columns(each: Envelope) -> list[Numbers]:
-    quantiles = (each.quantiles[p] for p in ("0.01", "0.5", "0.99"))
-    return [each.mean, each.standard_deviation, *quantiles]
-
-
 def _print_limits(results: SweepResults, console: Console) -> None:
-    table = FittingTable(title="Specification limits")
-    table.add_column("output")
-    table.add_column("unit")
     other = other_yield(results)
-    beside = [head.replace(" of", "\nof") for head, _ in other]
-    for name in ("low", "high", "below", "above", "yield", "95 % interval", *beside, "Cp", "Cpk"):
-        table.add_column(name, justify="right", no_wrap=True)
-    table.add_column("Cpk by\nquantiles", justify="right", no_wrap=True)
+    table = terminal.columns(
+        *("output", "unit", ">low", ">high", ">below", ">above", ">yield", ">95 % interval"),
+        *(f">{head}".replace(" of", "\nof") for head, _ in other),
+        *(">Cp", ">Cpk", ">Cpk by\nquantiles"),
+        title="Specification limits",
+    )
     for each in results.limits:
         unit, scale = results.shown_unit(each.unit)
         table.add_row(
             Text(each.output or "all together"),
             unit,
-            *(_shown(scale, value) for value in (each.low, each.high)),
+            *(scaled_number(scale, value) for value in (each.low, each.high)),
             *(str(each.below), str(each.above)),
             percent(each.share),
             interval(each),
@@ -177,16 +170,9 @@ def _print_limits(results: SweepResults, console: Console) -> None:
         console.print(Text(line), soft_wrap=True)
 
 
-def _known(values: Numbers) -> list[float]:
-    return [value for value in values if value is not None]
-
-
-def _shown(scale: float, value: float | None) -> str:
+def scaled_number(scale: float, value: float | None) -> str:
+    """Return a number times a factor, to three digits; a dash for None."""
     return number(None if value is None else scale * value)
-
-
-def _count(number: int | None) -> str:
-    return "–" if number is None else str(number)
 
 
 def remarks(results: SweepResults) -> list[str]:
