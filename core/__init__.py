@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from .mechanism.drivers import JointAngle, JointDisplacement, PointCoordinate
     from .mechanism.mechanism import GROUND, Body, Mechanism, Point
     from .mechanism.motions import Ramp, Sine, Table
-    from .studies.joint_check.check_joint import check_joint
+    from .studies.checks.check_joint import check_joint
     from .trajectory import BodyMotion, PointMotion, Trajectory
 
 __version__ = VERSION
@@ -136,7 +136,7 @@ _NAMES = {
     ),
     "harness.engine": "Engine",
     "harness.record": "Outcome Record Results",
-    "studies.joint_check.check_joint": "check_joint",
+    "studies.checks.check_joint": "check_joint",
 }
 """Public names by the module that defines them, as for type checkers above."""
 _MODULES = {name: module for module, names in _NAMES.items() for name in names.split()}

@@ -25,7 +25,7 @@ from kincheck.core.caches import clear_caches
 from kincheck.core.joints import Gear, Joint, PerpendicularAxes, RackPinion, Screw, Universal
 from kincheck.core.mechanism.loads import TorsionSpringDamper
 from kincheck.core.mechanism.motions import Ramp, Table
-from kincheck.core.studies.joint_check.specimens import specimens
+from kincheck.core.studies.checks.joint_specimens import specimens
 
 
 def rssr(held=tuple):

@@ -23,7 +23,7 @@ from kincheck.core.joints.base import triad, unit
 from kincheck.core.primitives import Row
 
 pytestmark = pytest.mark.usefixtures("own_joint_types")
-checking = importlib.import_module("kincheck.core.studies.joint_check.check_joint")
+checking = importlib.import_module("kincheck.core.studies.checks.check_joint")
 
 
 def mistaken(base, primitive=None, **changes):

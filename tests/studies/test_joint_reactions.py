@@ -11,10 +11,10 @@ from kincheck.core.case.joint_probe import AXIS, probe
 from kincheck.core.harness.native_engine import NativeEngine
 from kincheck.core.joints import Joint
 from kincheck.core.joints.base import unit
-from kincheck.core.studies.findings import Verdict
-from kincheck.core.studies.joint_check import reactions as checks
-from kincheck.core.studies.joint_check.loaded_probe import driven, loaded, solved
-from kincheck.core.studies.joint_check.loop import loops
+from kincheck.core.studies.checks import loaded_probe as checks
+from kincheck.core.studies.checks.findings import Verdict
+from kincheck.core.studies.checks.joint_loops import loops
+from kincheck.core.studies.checks.loaded_probe import driven, loaded, solved
 from kincheck.core.studies.stress.solving import interpreted
 
 from .test_check_joint_mistakes import mistaken, negative_gamma

@@ -12,7 +12,7 @@ from typing import TextIO
 
 import numpy as np
 
-from ..trajectory import Array
+from ...trajectory import Array
 
 
 class Verdict(StrEnum):
@@ -127,8 +127,8 @@ class Report:
         """
         from rich.text import Text
 
-        from ..report import terminal
-        from ..report.fitting_table import FittingTable
+        from ...report import terminal
+        from ...report.fitting_table import FittingTable
 
         console = terminal.console(file)
         table = FittingTable()

@@ -17,9 +17,9 @@ from ...algebra import Quat, quat, vec
 from ...joints import Attachment, AxialJoint
 from ...primitives.base import Drive, Pose, Twist
 from ...trajectory import Array
-from ..findings import Finding, Verdict, judged
-from .checks import AMPLIFIED, AMPLIFIED_WHY, Specimen
-from .traced import COLUMNS, POSES
+from .findings import Finding, Verdict, judged
+from .manifold import AMPLIFIED, AMPLIFIED_WHY, Specimen
+from .traced_joint import COLUMNS, POSES
 
 FREEDOMS = ("rotation", "translation")
 WHATS = ("value", "rate", "acceleration", "force", "turns")

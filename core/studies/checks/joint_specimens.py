@@ -14,7 +14,7 @@ import numpy as np
 from ...errors import KincheckError, MechanismError
 from ...joints import Joint, Kind
 from ...trajectory import Array
-from .traced import BODIES, Place
+from .traced_joint import BODIES, Place
 
 # Usual size of a joint [m].
 SIZE = 0.1

@@ -22,10 +22,9 @@ from ...joints import Joint
 from ...kinematics import solve
 from ...mechanism.equivalents import declared_equivalent, with_equivalents
 from ...trajectory import Array, Trajectory
-from ..findings import Finding, Verdict, judged
-from .checks import ROUND_OFF
-from .loaded_probe import driven, loaded, solved
-from .reactions import reactions
+from .findings import Finding, Verdict, judged
+from .loaded_probe import driven, loaded, reactions, solved
+from .manifold import ROUND_OFF
 
 # Largest accepted constraint residual of an engine [m or -]: round-off of metre-sized coordinates,
 # x1000.

@@ -29,23 +29,26 @@ import numpy as np
 
 from ...harness.engine import Engine
 from ...joints import Joint
-from ..findings import Finding, Report, Verdict
-from . import specimens as joint_specimens
-from .arithmetic import cost, round_off
-from .branches import branches
-from .checks import (
-    Specimen,
+from . import joint_specimens
+from .findings import Finding, Report, Verdict
+from .joint_drivers import driver
+from .joint_equations import (
+    axis_lengths,
     composition,
     convergence,
+    cost,
     derivatives,
+    exchange,
     freedoms,
     intended_branch,
+    named_coordinates,
     right_sides,
-    specimen,
+    rigid_motion,
+    round_off,
+    size_and_place,
 )
-from .driver import driver
-from .loop import loops
-from .variants import axis_lengths, exchange, named_coordinates, rigid_motion, size_and_place
+from .joint_loops import loops
+from .manifold import Specimen, branches, moved_specimen
 
 # Number of random specimens of a class that offers none, poses of each specimen, and starts of
 # Newton's iteration for the first specimen.
@@ -132,7 +135,7 @@ def _examined(joint: Joint, number: int, samples: int, seed: list[int]) -> Itera
     rng = np.random.default_rng(seed)
     try:
         joint = joint_specimens.between(joint)
-        one = specimen(joint, joint_specimens.place(joint, rng), samples, rng)
+        one = moved_specimen(joint, joint_specimens.place(joint, rng), samples, rng)
     except Exception as error:  # any error of the joint's own code, reported with its line
         remedy = (
             "an equation is made of + - * / over any scalar, and of the functions of"

@@ -10,26 +10,129 @@ from __future__ import annotations
 import pickle
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from ...case.case import Case
+from ...case.case import TIME, Case
 from ...case.joint_probe import probe, probes
+from ...errors import shortened
 from ...harness.engine import Engine, may_run_here
 from ...harness.engine_versions import versions
 from ...harness.execution import Answer, Attempt, Attempts, Pair, Solver, here
-from ...harness.record import Outcome, Record
+from ...harness.record import Outcome, OutputSeries, Record
 from ...harness.resource_limits import Limits
 from ...harness.run import Progress, run
 from ...harness.standard import STANDARD
+from ...harness.verdict import NAMED
 from ...harness.workers.pool import in_workers
 from ...joints import Revolute
-from ..findings import Finding, Report, Verdict
-from .force_cases import at_rate, force_cases, uneven_drives
-from .forces import faults_of_forces
-from .rates import rates
-from .unknown_joint import UnknownJoint
+from ...trajectory import QUANTITIES, Array
+from .engine_cases import UnknownJoint, at_rate, force_cases, uneven_drives
+from .findings import Finding, Report, Verdict
+from .joint_loops import WEIGHTS, differences
+
+NOISE = 1e-9
+"""Error of the compared values relative to the largest: a thousand times the residual tolerance."""
+RATES_WHY = "over the change of the differences with a doubled step"
+
+
+def rates(solved: Sequence[tuple[Case, Record]]) -> Iterator[Finding]:
+    """Yield the worst defect of velocity and of acceleration over all cases.
+
+    Only uniform sweeps of one driver count: others have motions with corners.
+    """
+    for before, after in pairwise(QUANTITIES):
+        worst, where, compared = 0.0, "", 0
+        for case, record in solved:
+            dt = _step(case)
+            if dt is None or record.solved != record.samples:
+                continue
+            for name, output in record.outputs.items():
+                share = _share(output, before, after, dt)
+                compared += share is not None
+                if share is not None and share > worst:
+                    worst, where = share, f"{case.name}: {name}"
+        if not compared:
+            yield Finding(f"rates: {after}", Verdict.SKIP, message="the engine gives none")
+            continue
+        verdict = Verdict.PASS if worst <= 1.0 else Verdict.FAIL
+        message = "" if worst <= 1.0 else f"is not the rate of its {before}"
+        yield Finding(f"rates: {after}", verdict, worst, 1.0, RATES_WHY, row=where, message=message)
+
+
+def _step(case: Case) -> float | None:
+    """Return the time between samples [s]; None if the sweep is short, uneven or has several
+    drivers.
+    """
+    steps = np.diff(case.sweep.path.times)
+    if case.sweep.driver == TIME or case.sweep.motions or len(steps) < 3 * len(WEIGHTS):
+        return None
+    even = np.allclose(steps, steps[0], rtol=1e-9, atol=0.0)
+    return float(steps[0]) if even else None
+
+
+def _share(output: OutputSeries, before: str, after: str, dt: float) -> float | None:
+    """Return the defect of a rate over its limit; None if there is nothing to compare."""
+    values, found = getattr(output, before), getattr(output, after)
+    if values is None or found is None or None in values or None in found:
+        return None
+    position, rate = np.array(values, dtype=np.float64), np.array(found, dtype=np.float64)
+    slopes, coarse = differences(position, dt), differences(position[::2], 2.0 * dt)
+    noise = NOISE * (float(np.abs(position).max()) + abs(dt)) / abs(dt)
+    limit = float(np.abs(coarse - _beside(slopes, coarse)).max()) + noise
+    return float(np.abs(slopes - rate[3:-3]).max()) / limit
+
+
+def _beside(slopes: Array, coarse: Array) -> Array:
+    """Return the fine differences at the samples of the coarse differences."""
+    return slopes[3::2][: len(coarse)]
+
+
+def faults_of_forces(case: Case, mode: str, attempt: Attempt, native: Attempt) -> Iterator[str]:
+    """Yield what is wrong with the forces of an answer beside their values.
+
+    An engine may leave out the reactions of joints for which it solves others. A simulation need
+    not give forces.
+
+    Args:
+        native: the native engine's attempt at the same case.
+    """
+    found, right = attempt.result, native.result
+    if not (case.forces and isinstance(found, Answer) and isinstance(right, Answer)):
+        return
+    replaced = {joint.name for joint in case.mechanism.joints if "equivalents" in found.details}
+    outputs = [output for output in case.outputs if output.forces]
+    lacking = [
+        output.name
+        for output in outputs
+        if not found.outputs[output.name].possible and not replaced.issuperset(output.forces)
+    ]
+    if lacking and not (mode == "simulate" and found.power is None):
+        yield (
+            f"gives no {shortened(lacking, NAMED)}: return them in Trajectory.forces, or let"
+            " unsupported() refuse cases with such outputs"
+        )
+    loose = [
+        output.name
+        for output in outputs
+        if right.outputs[output.name].reason
+        and np.isfinite(found.outputs[output.name].position).any()
+    ]
+    if loose:
+        yield (
+            f"gives values of {shortened(loose, NAMED)}, which rigid bodies leave undetermined:"
+            " Reaction.free is to hold the undetermined directions"
+        )
+    if found.power is not None and right.power is not None:
+        missing = np.isfinite(right.power) & np.isnan(found.power)
+        if missing.any():
+            yield (
+                f"gives no balance of power at {missing.sum()} of {len(missing)} samples:"
+                " Forces.power is the drivers' power less the change of energy and the dissipation"
+            )
+
 
 MODES = ("projection", "simulate")
 LOOPS = ("python", "simulator", "compiled")
