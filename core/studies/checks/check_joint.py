@@ -30,7 +30,7 @@ import numpy as np
 from ...harness.engine import Engine
 from ...joints import Joint
 from . import joint_specimens
-from .findings import Finding, Report, Verdict
+from .findings import Finding, Report, Verdict, skipped, stated
 from .joint_drivers import driver
 from .joint_equations import (
     axis_lengths,
@@ -141,37 +141,33 @@ def _examined(joint: Joint, number: int, samples: int, seed: list[int]) -> Itera
             "an equation is made of + - * / over any scalar, and of the functions of"
             " kincheck.core.program"
         )
-        yield Finding(
-            "equations", Verdict.FAIL, specimen=number, message=f"{_told(error)}; {remedy}"
-        )
+        failed = stated("equations", f"{_error_with_line(error)}; {remedy}")
+        yield replace(failed, specimen=number)
         return
     kinds = ", ".join(dict.fromkeys(name.split(" row")[0] for name in one.traced.names))
-    yield Finding("equations", Verdict.PASS, message=f"{len(one.traced.names)} rows of {kinds}")
-    found = [each for examine in EQUATIONS for each in _made(examine, one)]
+    yield stated("equations", "", f"{len(one.traced.names)} rows of {kinds}")
+    found = [each for examine in EQUATIONS for each in _run_check(examine, one)]
     failing = [each.check for each in found if each.check in FIRST and each.verdict is Verdict.FAIL]
     for examine, names in VARIANTS.items():
         # an axis that is not a unit vector is often the reason of the other failures
         if failing and examine is not axis_lengths:
-            found += [
-                Finding(name, Verdict.SKIP, message=f"first repair {', '.join(failing)}")
-                for name in names
-            ]
+            found += [skipped(name, f"first repair {', '.join(failing)}") for name in names]
         else:
-            found += _made(examine, one)
+            found += _run_check(examine, one)
     yield from (replace(each, specimen=None if each.pose is None else number) for each in found)
     if number == 0:
         yield from branches(one, STARTS)
 
 
-def _made(examine: Check, one: Specimen) -> list[Finding]:
+def _run_check(examine: Check, one: Specimen) -> list[Finding]:
     """Return the findings of a check; an error of the joint's own code becomes the finding."""
     try:
         return list(examine(one))
     except Exception as error:  # any error of the joint's own code
-        return [Finding(examine.__name__.replace("_", " "), Verdict.FAIL, message=_told(error))]
+        return [stated(examine.__name__.replace("_", " "), _error_with_line(error))]
 
 
-def _told(error: Exception) -> str:
+def _error_with_line(error: Exception) -> str:
     """Return the text of an error with the line that raised it."""
     where = traceback.extract_tb(error.__traceback__)[-1]
     return f"{type(error).__name__}: {error} (in {where.name}: {where.line})"

@@ -1,34 +1,34 @@
 """Checks of a joint's reaction in its probe with masses, gravity and a spring, solved natively.
 
 The reaction does no work on the freedoms of the joint, the first body gets the opposite of what the
-second gets, and neither depends on the order of bodies and joints, on units or on place. Bodies are
-balanced by Newton and Euler from their motion: no equation of the forces takes part.
+second gets. Bodies are balanced by Newton and Euler from their motion: no equation of the forces
+takes part.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from ...algebra import quat, rotation_less_identity
 from ...case.case import Case
 from ...case.io.tolerance import default
 from ...case.measures import DriverEffort, ForceMeasure, JointForce, JointMoment
 from ...case.quantity import with_markers
-from ...errors import KincheckError, SolveError
+from ...errors import SolveError
 from ...forces import Reaction
-from ...joints import AxialJoint, Joint, Kind
+from ...joints import AxialJoint, Joint
 from ...kinematics import NativeSolver
 from ...mechanism.body import Body, inertia_matrix
 from ...mechanism.drivers import JointAngle, JointDisplacement, JointDriver
 from ...mechanism.loads import SpringDamper
 from ...mechanism.mechanism import GROUND, Mechanism
-from ...mechanism.motions import Path, Sine
-from ...trajectory import Array, BodyMotion, Trajectory
-from .findings import Finding, Verdict, judged
+from ...mechanism.motions import Sine
+from ...trajectory import Array, Trajectory
+from .findings import Finding, Limit, judged
+from .traced_joint import CarriedPoint, turned
 
 # Samples of the probe: forces follow from each pose alone.
 SAMPLES = 3
@@ -130,16 +130,16 @@ def _with_mass(body: Body, number: int, mechanism: Mechanism) -> Body:
     return replace(body, mass=2.0 + number, center_of_mass=(x, y, z), inertia=INERTIA)
 
 
-def solved(case: Case, mechanism: Mechanism) -> Probe:
+def solved(case: Case) -> Probe:
     """Solve the loaded probe natively.
 
     Raises:
         SolveError: samples are missing.
     """
-    path: Path = case.sweep.path
+    mechanism = case.mechanism
     names = tuple(body.name for body in mechanism.moving)
     forces = [each.name for each in (*mechanism.joints, *mechanism.drivers)]
-    solver = NativeSolver().prepare(mechanism, path, bodies=names, forces=forces)
+    solver = NativeSolver().prepare(mechanism, case.sweep.path, bodies=names, forces=forces)
     found = solver(TOL)
     if not found.solved.all() or found.forces is None:
         raise SolveError(f"the probe with masses cannot be solved: {found.message}")
@@ -151,40 +151,28 @@ def solved(case: Case, mechanism: Mechanism) -> Probe:
 # MERGED
 
 
-def _turn(motion: BodyMotion) -> Array:
-    """Return the rotation body -> global, shape (n, 3, 3)."""
-    change = rotation_less_identity(quat(motion.p.T))
-    return np.eye(3) + np.moveaxis(np.array([[*change.x], [*change.y], [*change.z]]), 2, 0)
-
-
-def _moving(probe: Probe, body: str, point: Any) -> tuple[Array, Array, Array, Array]:
-    """Return place, velocity and acceleration of a point of a body, and the body's angular
-    velocity, global axes, shape (n, 3).
-    """
+def _moving(probe: Probe, body: str, point: Any = (0.0, 0.0, 0.0)) -> CarriedPoint:
+    """Return a point of a body over the samples."""
     at = np.asarray(point, dtype=np.float64)
     motion = probe.motion.bodies.get(body)
     if motion is None:
         still = np.zeros((len(probe.motion.solved), 3))
-        return still + at, still, still, still
+        return CarriedPoint(at, still + at, *[still] * 4)
     assert motion.v is not None
     assert motion.a is not None
-    turn = _turn(motion)
-    w, w_t = (np.einsum("nab,nb->na", turn, each[:, 3:]) for each in (motion.v, motion.a))
-    arm = turn @ at
-    v = motion.v[:, :3] + np.cross(w, arm)
-    a = motion.a[:, :3] + np.cross(w_t, arm) + np.cross(w, np.cross(w, arm))
-    return motion.r + arm, v, a, w
+    w, w_t = (turned(motion.p, each[:, 3:]) for each in (motion.v, motion.a))
+    arm = turned(motion.p, at)
+    return CarriedPoint.of(arm, motion.r, motion.v[:, :3], w, motion.a[:, :3], w_t)
 
 
 def work(probe: Probe) -> Array:
     """Return the power of the joint's reaction on both bodies [W], shape (n,)."""
     joint = probe.joint
-    point = probe.mechanism.reaction_point(joint)
-    place, v, _, w = _moving(probe, joint.j, point)
-    origin, v_i, _, w_i = _moving(probe, joint.i, (0.0, 0.0, 0.0))
-    there = v_i + np.cross(w_i, place - origin)
+    j = _moving(probe, joint.j, probe.mechanism.reaction_point(joint))
+    i = _moving(probe, joint.i)
+    v = i.v + np.cross(i.w, j.place - i.place)
     force, moment = probe.reaction.force, probe.reaction.moment
-    return (force * (v - there)).sum(axis=1) + (moment * (w - w_i)).sum(axis=1)
+    return (force * (j.v - v)).sum(axis=1) + (moment * (j.w - i.w)).sum(axis=1)
 
 
 def speed(probe: Probe) -> float:
@@ -202,13 +190,12 @@ def unbalanced(probe: Probe, name: str) -> Array:
     assert motion.v is not None
     assert motion.a is not None
     assert body.inertia is not None
-    centre, _, a, _ = _moving(probe, name, body.center_of_mass)
-    force = body.mass * (np.array(GRAVITY) - a)
+    centre = _moving(probe, name, body.center_of_mass)
+    force = body.mass * (np.array(GRAVITY) - centre.a)
     inertia, w, w_t = inertia_matrix(body.inertia), motion.v[:, 3:], motion.a[:, 3:]
-    change = w_t @ inertia + np.cross(w, w @ inertia)
-    torque = -np.einsum("nab,nb->na", _turn(motion), change)
+    torque = -turned(motion.p, w_t @ inertia + np.cross(w, w @ inertia))
     for push, at, moment in _pushes(probe, name):
-        force, torque = force + push, torque + moment + np.cross(at - centre, push)
+        force, torque = force + push, torque + moment + np.cross(at - centre.place, push)
     return np.hstack([force, torque])
 
 
@@ -220,20 +207,20 @@ def _pushes(probe: Probe, name: str) -> Iterator[tuple[Array, Array, Array]]:
         sign = {joint.j: 1.0, joint.i: -1.0}.get(name)
         if sign is not None:
             found = forces.joints[joint.name]
-            place = _moving(probe, joint.j, mechanism.reaction_point(joint))[0]
+            place = _moving(probe, joint.j, mechanism.reaction_point(joint)).place
             yield sign * found.force, place, sign * found.moment
     for driver in mechanism.drivers:
         effort = forces.drivers[driver.name][:, None]
         yield from _by_driver(probe, driver, effort, name)
     (spring,) = (each for each in mechanism.forces if isinstance(each, SpringDamper))
     if name == spring.j:
-        start, v_i, *_ = _moving(probe, spring.i, spring.points[0])
-        end, v_j, *_ = _moving(probe, spring.j, spring.points[1])
-        length = np.linalg.norm(end - start, axis=1)
-        along = (end - start) / length[:, None]
-        rate = (along * (v_j - v_i)).sum(axis=1)
+        ends = zip((spring.i, spring.j), spring.points, strict=True)
+        start, end = (_moving(probe, body, at) for body, at in ends)
+        length = np.linalg.norm(end.place - start.place, axis=1)
+        along = (end.place - start.place) / length[:, None]
+        rate = (along * (end.v - start.v)).sum(axis=1)
         tension = spring.stiffness * (length - (spring.free_length or 0.0)) + spring.damping * rate
-        yield -tension[:, None] * along, end, 0.0 * end
+        yield -tension[:, None] * along, end.place, 0.0 * end.place
 
 
 def _by_driver(
@@ -243,138 +230,42 @@ def _by_driver(
     joint: Any = probe.mechanism.joint(driver.joint)
     if name not in joint.bodies:
         return
-    tip, start = (_moving(probe, joint.i, at)[0] for at in (joint.axis, (0.0, 0.0, 0.0)))
-    push = (1.0 if name == joint.j else -1.0) * effort * (tip - start)
-    push /= np.linalg.norm(joint.axis)
-    place = _moving(probe, joint.j, joint.point)[0]
+    axis = _moving(probe, joint.i, joint.axis).arm / np.linalg.norm(joint.axis)
+    push = (1.0 if name == joint.j else -1.0) * effort * axis
+    place = _moving(probe, joint.j, joint.point).place
     yield (0.0 * push, place, push) if driver.turns else (push, place, 0.0 * push)
 
 
 # MERGED
 # MERGED
 
-# Round-off of sums of some thirty products over the smallest singular value of the probes (0.01),
-# squared for accelerations, and ten times that.
-LIMIT = 1e-10
-WHY = "round-off over the squared smallest singular value of the probe, relative to the forces"
-# An exact change of units, and a shift of the probe [m]: its coordinates lose three digits.
-SMALLER, SHIFT = 2.0**-10, 128.0
-PLACE_LIMIT = 1e3 * LIMIT
+LIMIT = Limit(
+    1e-10, "round-off over the squared smallest singular value of the probe, relative to the forces"
+)
+"""Round-off of sums of some thirty products over the smallest singular value of the probes (0.01),
+squared for accelerations, and ten times that."""
 
 
-def reactions(probe: Probe, case: Case, what: str = "reaction") -> Iterator[Finding]:
+def reactions(probe: Probe, what: str = "reaction") -> Iterator[Finding]:
     """Yield the findings on the reaction of the joint under test.
 
     Args:
-        case: from `loaded` or `driven`, solved as `probe`.
+        probe: of a case from `loaded` or `driven`.
         what: first part of the names of the findings.
     """
     forces = probe.motion.forces
     assert forces is not None
-    largest = float(np.nanmax(forces.largest_power))
-    yield judged(
-        f"{what}: power",
-        np.abs(forces.power)[None] / largest,
-        LIMIT,
-        WHY,
-        ["power"],
-        remedy="drivers, masses and springs do not balance: a joint has nu = 0",
-    )
-    yield judged(
-        f"{what}: no work",
-        np.abs(work(probe))[None] / (probe.size * speed(probe)),
-        LIMIT,
-        WHY,
-        ["work"],
-        remedy="the reaction works on the joint's freedoms: see rows and nu",
-    )
+    missing = np.abs(forces.power)[None] / float(np.nanmax(forces.largest_power))
+    remedy = "drivers, masses and springs do not balance: a joint has nu = 0"
+    yield judged(f"{what}: power", missing, LIMIT, ["power"], remedy=remedy)
+    done = np.abs(work(probe))[None] / (probe.size * speed(probe))
+    remedy = "the reaction works on the joint's freedoms: see rows and nu"
+    yield judged(f"{what}: no work", done, LIMIT, ["work"], remedy=remedy)
     off = np.array([unbalanced(probe, body) for body in probe.joint.bodies])
-    yield judged(
-        f"{what}: acts and reacts",
-        np.abs(off).max(axis=2) / probe.size,
-        LIMIT,
-        WHY,
-        [f"body {body}" for body in probe.joint.bodies],
-        remedy="what one body gets is not the opposite of what the other gets: see rows; a driver's"
-        " force acts along the axis through the point: see measured()",
+    remedy = (
+        "what one body gets is not the opposite of what the other gets: see rows; a driver's"
+        " force acts along the axis through the point: see measured()"
     )
-    yield from _variants(probe, case, what)
-
-
-def _variants(probe: Probe, case: Case, what: str) -> Iterator[Finding]:
-    """Check that forces do not depend on what is arbitrary."""
-    mechanism = case.mechanism
-    others: Sequence[tuple[str, Mechanism, float, float]] = (
-        ("order", _turned_round(mechanism), 1.0, LIMIT),
-        ("units", _scaled(mechanism, SMALLER), SMALLER, LIMIT),
-        ("place", _shifted(mechanism, SHIFT), 1.0, PLACE_LIMIT),
-    )
-    for name, other, scale, limit in others:
-        remedy = (
-            f"the reaction depends on the {name}: use no constants of length, no global coordinates"
-            " and no internal origins in primitives()"
-        )
-        try:
-            found = solved(_paced(case, scale), other).reaction
-        except KincheckError as error:
-            yield Finding(f"{what}: {name}", Verdict.FAIL, message=f"{error}; {remedy}")
-            continue
-        off = np.concatenate(
-            [
-                found.force / scale - probe.reaction.force,
-                found.moment / scale**2 - probe.reaction.moment,
-            ],
-            axis=1,
-        )
-        yield judged(
-            f"{what}: {name}",
-            np.abs(off).T / probe.size,
-            limit,
-            WHY,
-            ["force x", "force y", "force z", "moment x", "moment y", "moment z"],
-            remedy=remedy,
-        )
-
-
-def _paced(case: Case, factor: float) -> Case:
-    """Return the case with lengths in the motions of its drivers by a factor."""
-    motions = {
-        name: replace(motion, amplitude=factor * motion.amplitude)
-        if isinstance(motion, Sine) and not case.mechanism.driver(name).turns
-        else motion
-        for name, motion in case.sweep.motions.items()
-    }
-    return replace(case, sweep=replace(case.sweep, motions=motions))
-
-
-def _turned_round(mechanism: Mechanism) -> Mechanism:
-    return replace(mechanism, bodies=mechanism.bodies[::-1], joints=mechanism.joints[::-1])
-
-
-def _scaled(mechanism: Mechanism, factor: float) -> Mechanism:
-    """Return the mechanism with all lengths by a factor, the same mass and times."""
-
-    def place(point: Any) -> Any:
-        return tuple(factor * x for x in point)
-
-    return replace(
-        mechanism,
-        bodies=[body.in_frame(place, 1.0 / factor) for body in mechanism.bodies],
-        joints=[joint.scaled(factor) for joint in mechanism.joints],
-        points=[replace(point, position=place(point.position)) for point in mechanism.points],
-        gravity=place(mechanism.gravity),
-        forces=[force.in_frame(place, 1.0 / factor) for force in mechanism.forces],
-    )
-
-
-def _shifted(mechanism: Mechanism, offset: float) -> Mechanism:
-    def place(point: Any) -> Any:
-        return tuple(x + offset for x in point)
-
-    return replace(
-        mechanism,
-        bodies=[body.in_frame(place) for body in mechanism.bodies],
-        joints=[replace(j, **j.mapped({Kind.POSITION: place})) for j in mechanism.joints],
-        points=[replace(point, position=place(point.position)) for point in mechanism.points],
-        forces=[force.in_frame(place) for force in mechanism.forces],
-    )
+    names = [f"body {body}" for body in probe.joint.bodies]
+    figures = np.abs(off).max(axis=2) / probe.size
+    yield judged(f"{what}: acts and reacts", figures, LIMIT, names, remedy=remedy)

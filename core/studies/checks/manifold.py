@@ -17,18 +17,11 @@ from numpy.typing import NDArray
 
 from ...joints import Joint
 from ...trajectory import Array
-from .findings import Finding, Verdict
+from .findings import Finding, Limit, Verdict
 from .traced_joint import COLUMNS, POSES, Place, TracedJoint
 
 Mask = NDArray[np.bool_]
 
-# Sums of some thirty products of numbers of size one, each rounded at 1e-16.
-ROUND_OFF = 1e-13
-ROUND_OFF_WHY = "round-off of sums of numbers of size one"
-# ROUND_OFF over the smallest singular value of accepted poses (a twentieth of the value at design),
-# and the same factor once more.
-AMPLIFIED = 1e-10
-AMPLIFIED_WHY = "round-off over the smallest singular value, x100"
 # Newton is quadratic: a step below this value ends at round-off.
 SETTLED = 1e-13
 # Branches meet near a pose whose rows are closer to dependence than this part of their distance at
@@ -41,11 +34,9 @@ LARGEST_CORRECTION = 0.25
 DEPENDENT = 1e-9
 
 
-def design(joint: TracedJoint, lanes: int) -> Array:
-    """Return the design position in all lanes."""
-    state = np.zeros((joint.size, lanes))
-    state[[3, 10]] = 1.0
-    return state
+def times(jacobian: Array, rate: Array) -> Array:
+    """Multiply rows by rates, shapes (lanes, rows, columns), (columns, lanes) -> (rows, lanes)."""
+    return np.einsum("lmn,nl->ml", jacobian, rate)
 
 
 def min_norm(matrix: Array, right: Array, columns: slice = slice(None)) -> Array:
@@ -55,9 +46,15 @@ def min_norm(matrix: Array, right: Array, columns: slice = slice(None)) -> Array
     Shapes (lanes, rows, columns), (rows, lanes) -> (columns, lanes).
     """
     even, size = _even(matrix)
-    return (np.linalg.pinv(even[:, :, columns], rcond=DEPENDENT) @ (right.T / size)[:, :, None])[
-        :, :, 0
-    ].T
+    inverse = np.linalg.pinv(even[:, :, columns], rcond=DEPENDENT)
+    return (inverse @ (right.T / size)[:, :, None])[:, :, 0].T
+
+
+def along(matrix: Array, wanted: Array, columns: slice = slice(None)) -> Array:
+    """Return the part of the wanted rates admitted by the rows."""
+    admitted = wanted.copy()
+    admitted[columns] -= min_norm(matrix, times(matrix, wanted), columns)
+    return admitted
 
 
 def newton(
@@ -78,10 +75,10 @@ def newton(
         active = np.flatnonzero(taken > iterations)
         if not len(active):
             break
-        here = state[:, active]
+        moving = state[:, active]
         step = np.zeros((joint.columns, len(active)))
-        step[columns] = -min_norm(jacobian(here), joint.phi(here), columns)
-        state[:, active] = joint.retract(here, step)
+        step[columns] = -min_norm(jacobian(moving), joint.phi(moving), columns)
+        state[:, active] = joint.retract(moving, step)
         settled = np.abs(step).max(axis=0) < SETTLED
         taken[active[settled]] = k + 1
     return state, taken
@@ -103,28 +100,23 @@ def walk(
     Args:
         aims: state, last step -> the wanted step (columns, lanes), projected onto the manifold.
     """
-    states, share, last = (
-        [start],
-        np.ones(start.shape[1]),
-        np.zeros((joint.columns, start.shape[1])),
-    )
-    matrix, at_design = joint.exact(start), joint.exact(design(joint, 1))
+    states, share = [start], np.ones(start.shape[1])
+    last = np.zeros((joint.columns, start.shape[1]))
+    matrix = joint.exact(start)
     for _ in range(steps):
-        here = states[-1]
-        step = np.zeros((joint.columns, here.shape[1]))
-        step[columns] = aims(here, last)[columns]
-        step[columns] -= min_norm(matrix, np.einsum("lmn,nl->ml", matrix, step), columns)
-        last, step = step, share * step
-        off = joint.retract(here, step)
+        state = states[-1]
+        wanted = np.zeros_like(last)
+        wanted[columns] = aims(state, last)[columns]
+        last = along(matrix, wanted, columns)
+        step = share * last
+        off = joint.retract(state, step)
         there, taken = newton(joint, off, joint.exact, 6, columns)
-        near = (
-            np.linalg.norm(there - off, axis=0)
-            <= LARGEST_CORRECTION * np.linalg.norm(step, axis=0) + SETTLED
-        )
+        corrected, length = (np.linalg.norm(each, axis=0) for each in (there - off, step))
         ahead = joint.exact(there)
-        good = (taken <= 6) & near & _regular(ahead, at_design, columns)
+        good = (taken <= 6) & (corrected <= LARGEST_CORRECTION * length + SETTLED)
+        good &= regular(joint, ahead, columns)
         share = np.where(good, np.minimum(1.0, 2.0 * share), 0.5 * share)
-        states.append(np.where(good, there, here))
+        states.append(np.where(good, there, state))
         matrix = np.where(good[:, None, None], ahead, matrix)
     return states
 
@@ -141,20 +133,16 @@ def straight(directions: Array, length: float) -> Callable[[Array, Array], Array
     return aims
 
 
-def regular(joint: TracedJoint, state: Array, columns: slice = slice(None)) -> Mask:
+def regular(joint: TracedJoint, matrix: Array, columns: slice = slice(None)) -> Mask:
     """Return which lanes have neither nearly dependent nor nearly zero rows, relative to
     the design position.
     """
-    return _regular(joint.exact(state), joint.exact(design(joint, 1)), columns)
-
-
-def _regular(matrix: Array, at_design: Array, columns: slice) -> Mask:
-    size = np.linalg.norm(at_design[:, :, columns], axis=2, keepdims=True)
-    size = np.where(size > 0.0, size, 1.0)
-    return np.asarray(
-        _smallest(matrix[:, :, columns] / size)
-        > NEARLY_SINGULAR * _smallest(at_design[:, :, columns] / size)
+    at_design = joint.exact_at_design[:, :, columns]
+    _, size = _even(at_design)
+    found, there = (
+        _smallest(each / size[:, :, None]) for each in (matrix[:, :, columns], at_design)
     )
+    return np.asarray(found > NEARLY_SINGULAR * there)
 
 
 def smallest(matrix: Array) -> Array:
@@ -165,10 +153,8 @@ def smallest(matrix: Array) -> Array:
 
 
 def _smallest(matrix: Array) -> Array:
-    singular: Array = np.asarray(
-        np.linalg.svd(np.nan_to_num(matrix), compute_uv=False), dtype=np.float64
-    )
-    return singular[:, -1]
+    sizes = np.linalg.svd(np.nan_to_num(matrix), compute_uv=False)
+    return np.asarray(sizes[:, -1], dtype=np.float64)
 
 
 def rank(matrix: Array) -> NDArray[np.int64]:
@@ -227,26 +213,14 @@ def moved_specimen(joint: Joint, place: Place, lanes: int, rng: np.random.Genera
     """
     traced = TracedJoint(joint, place)
     directions = rng.normal(size=(traced.columns, lanes))
-    start, _ = newton(traced, design(traced, lanes), traced.exact, 10)
+    start, _ = newton(traced, traced.design(lanes), traced.exact, 10)
     way = walk(traced, start, straight(directions, STEP), STEPS)
     state = way[-1]
     exact = traced.exact(state)
-    rate = _along(exact, rng.normal(size=directions.shape))
+    rate = along(exact, rng.normal(size=directions.shape))
     bent = traced.jets(state, rate, np.zeros_like(rate))[2]
-    acceleration = _along(exact, rng.normal(size=rate.shape)) - min_norm(exact, bent)
+    acceleration = along(exact, rng.normal(size=rate.shape)) - min_norm(exact, bent)
     return Specimen(joint, place, traced, way[NEAR], state, rate, acceleration, exact, rng)
-
-
-def _along(jacobian: Array, wanted: Array) -> Array:
-    """Return the part of the wanted rates admitted by the rows."""
-    return wanted - min_norm(jacobian, times(jacobian, wanted))
-
-
-def times(jacobian: Array, rate: Array) -> Array:
-    """Multiply rows by rates, shapes (lanes, rows, columns) and (columns,
-    lanes) -> (rows, lanes).
-    """
-    return np.einsum("lmn,nl->ml", jacobian, rate)
 
 
 # A pose is on the intended branch if small steps over the manifold lead from it to the design, or
@@ -254,6 +228,7 @@ def times(jacobian: Array, rate: Array) -> Array:
 # rows: branches meet there.
 
 ITERATIONS = 60
+CLOSED = 1e-11
 # Body i stays at design; body j and the joint's coordinates move.
 MOVING = slice(COLUMNS, None)
 SHIFT, TURN = slice(7, 10), slice(10, POSES)
@@ -266,24 +241,23 @@ STRIDE, LEGS, PROGRESS = 6, 12, 0.2 * STEP
 # further aims is tried.
 AIMS = 24
 ARRIVED = STEP
+UNCAUGHT = Limit(0.0, "each zero is on the intended branch, or a test says so")
 
 
 def branches(s: Specimen, starts: int) -> Iterator[Finding]:
-    """Run Newton with the declared rows from random poses of body j, and yield the outcome
-    of all starts.
+    """Run Newton with the declared rows from random poses of body j, and yield the outcome of all
+    starts: the intended branch, another one refused by the joint's branch tests, or another one
+    that they accept.
     """
     t, rng = s.traced, s.rng
-    state = design(t, starts)
+    state = t.design(starts)
     state[SHIFT] = rng.normal(size=(3, starts))
     q = rng.normal(size=(4, starts))
     state[TURN] = q * np.sign(q[0]) / np.linalg.norm(q, axis=0)
     state[POSES:] = rng.normal(size=(t.size - POSES, starts))
     ended, taken = newton(t, state, t.rows, ITERATIONS, MOVING)
-    closed = (
-        (taken <= ITERATIONS)
-        & (np.abs(t.phi(ended)).max(axis=0, initial=0.0) < 1e-11)
-        & regular(t, ended, MOVING)
-    )
+    off = np.abs(t.phi(ended)).max(axis=0, initial=0.0)
+    closed = (taken <= ITERATIONS) & (off < CLOSED) & regular(t, t.exact(ended), MOVING)
     caught, right = closed & (t.branch(ended) <= 0.0), np.zeros(starts, dtype=bool)
     asked = closed & ~caught
     right[asked] = connected(s, ended[:, asked])
@@ -297,7 +271,8 @@ def branches(s: Specimen, starts: int) -> Iterator[Finding]:
     text = f"Newton from {starts} poses anywhere: " + ", ".join(
         f"{mask.sum()} {name}" for name, mask in counts.items()
     )
-    if uncaught.any():
+    count = int(uncaught.sum())
+    if count:
         k = int(np.flatnonzero(uncaught)[0])
         turn, shift = (
             ", ".join(f"{x:.3g}" for x in ended[part, k] * unit)
@@ -305,16 +280,8 @@ def branches(s: Specimen, starts: int) -> Iterator[Finding]:
         )
         text += f"; one of them has body j at Euler parameters [{turn}], displacement [{shift}] m: "
         text += "give the primitive a branch test that is positive on the intended branch only"
-    count = float(uncaught.sum())
     verdict = Verdict.FAIL if count else Verdict.PASS
-    yield Finding(
-        "spurious branches",
-        verdict,
-        count,
-        0.0,
-        "each zero is on the intended branch, or a test says so",
-        message=text,
-    )
+    yield Finding("spurious branches", verdict, float(count), *UNCAUGHT, message=text)
 
 
 def connected(s: Specimen, state: Array) -> Mask:
@@ -322,11 +289,11 @@ def connected(s: Specimen, state: Array) -> Mask:
     t = s.traced
     directions = s.rng.normal(size=(t.columns, WALKS))
     directions[:COLUMNS] = 0.0
-    there = _led(t, state, np.repeat(design(t, 1), state.shape[1], axis=1))
+    there = _led(t, state, np.repeat(t.design(1), state.shape[1], axis=1))
     if there.all():
         return there
     known = np.concatenate(
-        walk(t, design(t, WALKS), straight(directions, STEP), STRIDES, MOVING), axis=1
+        walk(t, t.design(WALKS), straight(directions, STEP), STRIDES, MOVING), axis=1
     )
     for k in range(AIMS):
         astray = np.flatnonzero(~there)
