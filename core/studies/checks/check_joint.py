@@ -19,17 +19,21 @@ check that cannot run is a row too. A class may offer two methods of its own:
 
 from __future__ import annotations
 
+import math
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import Field, is_dataclass, replace
+from functools import partial
 from itertools import groupby
 from typing import Any
 
 import numpy as np
 
+from ...case.joint_probe import fitting, required
+from ...errors import KincheckError, MechanismError
 from ...harness.engine import Engine
-from ...joints import Joint
-from . import joint_specimens
+from ...joints import Joint, Kind
+from ...trajectory import Array
 from .findings import Finding, Report, Verdict, skipped, stated
 from .joint_drivers import driver
 from .joint_equations import (
@@ -49,6 +53,7 @@ from .joint_equations import (
 )
 from .joint_loops import loops
 from .manifold import Specimen, branches, moved_specimen
+from .traced_joint import BODIES, Place
 
 # Number of random specimens of a class that offers none, poses of each specimen, and starts of
 # Newton's iteration for the first specimen.
@@ -101,20 +106,14 @@ def check_joint(
     """
     given: Any = joint_class  # not known yet to be one
     if not isinstance(given, type):
-        raise joint_specimens.SpecimenError(
-            f"check_joint: joint_class is {given!r}, expected a class of joints"
-        )
+        raise SpecimenError(f"check_joint: joint_class is {given!r}, expected a class of joints")
     rng = np.random.default_rng(seed)
     own = specimens is not None or hasattr(joint_class, "specimens")
     offered = (
-        list(specimens)
-        if specimens is not None
-        else joint_specimens.specimens(joint_class, rng, SPECIMENS)
+        list(specimens) if specimens is not None else specimens_of(joint_class, rng, SPECIMENS)
     )
     if not offered:
-        raise joint_specimens.SpecimenError(
-            f"{joint_class.__name__}: no specimens were offered; give one or more"
-        )
+        raise SpecimenError(f"{joint_class.__name__}: no specimens were offered; give one or more")
     found = [
         finding
         for k, joint in enumerate(offered)
@@ -134,8 +133,8 @@ def _examined(joint: Joint, number: int, samples: int, seed: list[int]) -> Itera
     """Yield all findings of one specimen."""
     rng = np.random.default_rng(seed)
     try:
-        joint = joint_specimens.between(joint)
-        one = moved_specimen(joint, joint_specimens.place(joint, rng), samples, rng)
+        joint = between(joint)
+        one = moved_specimen(joint, place(joint, rng), samples, rng)
     except Exception as error:  # any error of the joint's own code, reported with its line
         remedy = (
             "an equation is made of + - * / over any scalar, and of the functions of"
@@ -171,3 +170,112 @@ def _error_with_line(error: Exception) -> str:
     """Return the text of an error with the line that raised it."""
     where = traceback.extract_tb(error.__traceback__)[-1]
     return f"{type(error).__name__}: {error} (in {where.name}: {where.line})"
+
+
+# Usual size of a joint [m].
+SIZE = 0.1
+# Coordinates are whole multiples of this length [m], so a move by a thousand kilometres does not
+# round them.
+GRID = 2.0**-30
+# Angles [degrees] of the two directions of a pair. First the cross of a universal joint, over a
+# right angle by round-off, so that a joint with a positive cosine refuses it; then shafts that
+# point in the same direction.
+ANGLES = (90.0 + 1e-8, 40.0)
+
+
+class SpecimenError(KincheckError):
+    """No specimen of a joint type can be made."""
+
+
+def specimens_of(joint_class: type[Joint], rng: np.random.Generator, count: int) -> list[Joint]:
+    """Return instances of a joint type between bodies i and j: those of its classmethod
+    `specimens`, or `count` random ones.
+
+    Raises:
+        SpecimenError: the class refuses geometry by the kinds of its fields, or a field
+            has no kind.
+    """
+    offered: Callable[[], Sequence[Joint]] | None = getattr(joint_class, "specimens", None)
+    if offered is not None:
+        return list(offered())
+    return [_random(joint_class, rng) for _ in range(count)]
+
+
+def _random(joint_class: type[Joint], rng: np.random.Generator) -> Joint:
+    remedy = f"offer some by a classmethod `specimens() -> list[{joint_class.__name__}]`"
+    if not is_dataclass(joint_class) or getattr(joint_class, "__abstractmethods__", None):
+        missing = ", ".join(sorted(getattr(joint_class, "__abstractmethods__", ()))) or "its fields"
+        raise SpecimenError(f"{joint_class.__name__} is not complete: define {missing}")
+    given = {"name": joint_class.__name__, **dict(zip("ij", BODIES, strict=True))}
+    unknown = [
+        each.name
+        for each in required(joint_class)
+        if each.name not in given and "kind" not in each.metadata
+    ]
+    if unknown:
+        raise SpecimenError(
+            f"{joint_class.__name__}: field {unknown[0]!r} has no kind; declare it by position(),"
+            f" direction(), positions(), directions() or length(), or {remedy}"
+        )
+    makers = (partial(_value, rng=rng, angle=math.radians(angle)) for angle in ANGLES)
+    try:
+        return fitting(joint_class, given, makers)
+    except MechanismError as refused:
+        raise SpecimenError(
+            f"{joint_class.__name__}: no specimen can be made of random geometry ({refused});"
+            f" {remedy}"
+        ) from refused
+
+
+def _value(field: Field[Any], rng: np.random.Generator, angle: float) -> Any:
+    centre = rng.uniform(-4.0 * SIZE, 4.0 * SIZE, 3)
+    ends = [centre, centre + SIZE * _unit(rng.normal(size=3))]
+    a, other = _unit(rng.normal(size=3)), rng.normal(size=3)
+    b = math.cos(angle) * a + math.sin(angle) * _unit(other - (a @ other) * a)
+    # directions may have any length
+    stretch = rng.uniform(0.5, 2.0, 2)
+    makers: Mapping[Kind, Callable[[], Any]] = {
+        Kind.POSITION: lambda: _snapped(centre),
+        Kind.POSITIONS: lambda: tuple(map(_snapped, ends)),
+        Kind.DIRECTION: lambda: tuple((stretch[0] * a).tolist()),
+        Kind.DIRECTIONS: lambda: (
+            tuple((stretch[0] * a).tolist()),
+            tuple((stretch[1] * b).tolist()),
+        ),
+        Kind.LENGTH: lambda: float(rng.uniform(0.5, 1.5) * SIZE),
+    }
+    return makers[field.metadata["kind"]]()
+
+
+def place(joint: Joint, rng: np.random.Generator) -> Place:
+    """Return body origins near the joint, but at none of its points, and a unit near its size."""
+    points = np.array(joint.points_on()).reshape(-1, 3)
+    lengths = [value for _, kind, value in joint.parts() if kind is Kind.LENGTH]
+    size = (
+        max(
+            [
+                float(np.ptp(points, axis=0).max()) if len(points) > 1 else 0.0,
+                *(abs(x) for x in lengths if x),
+            ]
+        )
+        or SIZE
+    )
+    centre = points.mean(axis=0) if len(points) else np.zeros(3)
+    origins = (_snapped(centre + size * rng.uniform(-1.0, 1.0, 3)) for _ in BODIES)
+    first, second = origins
+    return Place((first, second), 2.0 ** round(math.log2(size)))
+
+
+def between(joint: Joint) -> Joint:
+    """Return the joint between the bodies i and j instead of its own, with its
+    points on the grid.
+    """
+    return replace(joint, i=BODIES[0], j=BODIES[1], **joint.mapped({Kind.POSITION: _snapped}))
+
+
+def _unit(a: Array) -> Array:
+    return np.asarray(a / np.linalg.norm(a))
+
+
+def _snapped(point: Any) -> tuple[float, ...]:
+    return tuple((np.round(np.asarray(point) / GRID) * GRID).tolist())

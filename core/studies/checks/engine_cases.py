@@ -10,9 +10,9 @@ import numpy as np
 
 from ... import primitives as p
 from ...algebra import ZERO, vec
-from ...case.case import TIME, Case, Output, Sweep, Truth
+from ...case.case import TIME, Case, Quantity, Sweep, Truth
 from ...case.io.tolerance import default
-from ...case.joint_probe import ATOL, WHY, probe, probes
+from ...case.joint_probe import coordinates, probe, probes
 from ...case.measures import DriverEffort, ElementForce, ForceMeasure, JointForce, JointMoment
 from ...case.measures.force import Axis
 from ...case.quantity import with_markers
@@ -52,7 +52,6 @@ UnknownJoint.type = "unknown_to_engines"  # set here, so that it is not register
 RATE = 0.75
 """Rate of the probes' hinge [rad/s]; at one, rates by time and by angle are the same."""
 SOURCE = "made for check-engine"
-AXES = (("x", (1.0, 0.0, 0.0)), ("y", (0.0, 1.0, 0.0)), ("z", (0.0, 0.0, 1.0)))
 
 
 def force_cases() -> Iterator[tuple[str, Case]]:
@@ -140,12 +139,11 @@ def uneven_drives() -> Case:
         "reach": Sine(0.05, 0.4),
         "slide": Sine(-0.1, 0.3, 0.2),
     }
-    outputs = tuple(
-        Output(f"{point}_{axis}", point, direction, False, ATOL, 0.0, WHY)
-        for point in ("tip", "heel")
-        for axis, direction in AXES
-    )
     sweep = Sweep(TIME, np.linspace(0.0, 0.75, 4), motions=motions)
+    return _case(mechanism, sweep, coordinates(mechanism))
+
+
+def _case(mechanism: Mechanism, sweep: Sweep, outputs: tuple[Quantity, ...] = ()) -> Case:
     return Case(mechanism.name, SOURCE, Truth.CONSENSUS_ONLY, mechanism, sweep, outputs)
 
 
@@ -164,9 +162,7 @@ def _turns() -> Case:
         gravity=GRAVITY,
         forces=[TorsionSpringDamper("clock", "hub", 4.0, damping=0.5, free_angle=0.25)],
     )
-    sweep = Sweep("turn", np.linspace(7.0, -6.0, 14), RATE)
-    case = Case(mechanism.name, SOURCE, Truth.CONSENSUS_ONLY, mechanism, sweep, ())
-    return _with_forces(case)
+    return _with_forces(_case(mechanism, Sweep("turn", np.linspace(7.0, -6.0, 14), RATE)))
 
 
 def _undetermined() -> Case:
@@ -184,9 +180,7 @@ def _undetermined() -> Case:
         drivers=[JointAngle("turn", "hinge_0")],
         gravity=GRAVITY,
     )
-    sweep = Sweep("turn", np.linspace(-0.2, 0.3, 3), RATE)
-    case = Case(mechanism.name, SOURCE, Truth.CONSENSUS_ONLY, mechanism, sweep, ())
-    return _with_forces(case)
+    return _with_forces(_case(mechanism, Sweep("turn", np.linspace(-0.2, 0.3, 3), RATE)))
 
 
 def _body(name: str, number: int) -> Body:

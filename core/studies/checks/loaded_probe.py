@@ -15,6 +15,7 @@ import numpy as np
 
 from ...case.case import Case
 from ...case.io.tolerance import default
+from ...case.joint_probe import AXES
 from ...case.measures import DriverEffort, ForceMeasure, JointForce, JointMoment
 from ...case.quantity import with_markers
 from ...errors import SolveError
@@ -77,7 +78,7 @@ def loaded(case: Case) -> Case:
     outputs: list[ForceMeasure] = [
         cls(f"{what}_{k}", *default(weight, "N"), joint=name, direction=axis)
         for cls, what in ((JointForce, "force"), (JointMoment, "moment"))
-        for k, axis in zip("xyz", ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), strict=True)
+        for k, axis in AXES.items()
     ]
     outputs.append(DriverEffort("effort", *default(weight, "N m"), driver=case.sweep.driver))
     bound = tuple(output.bound(heavy) for output in outputs)
