@@ -33,6 +33,7 @@ def timeless(results):
     return msgspec.json.encode(msgspec.structs.replace(results, run={}, measured={}))
 
 
+@pytest.mark.nightly
 def test_a_sweep_is_the_same_on_a_cluster_as_here_though_a_worker_is_lost(cluster, tmp_path):
     """To the last bit, in whatever order the chunks were solved, and with those of the killed
     worker solved by the other.
