@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     )
     from .mechanism.mechanism import GROUND, Body, Mechanism, Point
     from .mechanism.motions import JointAngle, JointDisplacement, PointCoordinate, Ramp, Sine, Table
-    from .studies.joint_check.check_joint import check_joint
+    from .studies.checks.check_joint import check_joint
     from .trajectory import BodyMotion, PointMotion, Trajectory
 
 __version__ = VERSION
@@ -120,7 +120,8 @@ _NAMES = {
     "errors": "CaseError KincheckError MechanismError SolveError UnknownNameError",
     "trajectory": "BodyMotion PointMotion Trajectory",
     "mechanism.mechanism": "GROUND Body Mechanism Point",
-    "mechanism.motions": "JointAngle JointDisplacement PointCoordinate Ramp Sine Table",
+    "mechanism.drivers": "JointAngle JointDisplacement PointCoordinate",
+    "mechanism.motions": "Ramp Sine Table",
     "joints": (
         "ConstantVelocity Cylindrical Distance Fixed Gear Inline InPlane "
         "Joint OrientationLock ParallelAxes PerpendicularAxes Planar Polynomial RackPinion "
@@ -134,7 +135,7 @@ _NAMES = {
     ),
     "harness.engine": "Engine",
     "harness.record": "Outcome Record Results",
-    "studies.joint_check.check_joint": "check_joint",
+    "studies.checks.check_joint": "check_joint",
 }
 """Public names by the module that defines them, as for type checkers above."""
 _MODULES = {name: module for module, names in _NAMES.items() for name in names.split()}

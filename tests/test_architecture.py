@@ -92,16 +92,12 @@ IMPORTS = {
     "studies/truth": ". program mechanism kinematics case case/measures",
     "studies/stress/families": ". joints mechanism case case/measures case/io studies/truth",
     "studies": ". program joints kinematics case case/measures case/io harness report",
-    "studies/joint_check": (
+    "studies/checks": (
         ". primitives program joints mechanism kinematics case case/measures case/io "
-        "harness studies"
-    ),
-    "studies/engine_check": (
-        ". primitives joints mechanism case case/measures case/io harness harness/workers "
-        "studies studies/joint_check"
+        "harness harness/workers report"
     ),
     "studies/tolerance": (
-        ". program program/llvm mechanism kinematics case case/measures case/io harness "
+        ". mechanism kinematics case case/measures case/io harness "
         "harness/workers history report studies/variation"
     ),
     "studies/stress": (
@@ -118,11 +114,11 @@ IMPORTS = {
         ". program program/llvm joints kinematics case/models/hardpoints/templates case "
         "case/io case/models/hardpoints case/models harness harness/workers history "
         "report studies/variation studies/stress/families studies "
-        "studies/joint_check studies/engine_check studies/tolerance studies/stress "
+        "studies/checks studies/tolerance studies/stress "
         "studies/paper studies/diagnosis studies/bench"
     ),
-    "__init__": ". joints mechanism kinematics case case/io harness studies/joint_check",
-    "kincheck": "case case/io harness harness/workers studies cli __init__",
+    "__init__": ". joints mechanism kinematics case case/io harness studies/checks",
+    "kincheck": "case case/io harness harness/workers studies/checks cli __init__",
 }
 """Folder of core: the folders it imports besides itself, whenever the import runs."""
 

@@ -123,7 +123,7 @@ def test_a_full_disk_leaves_the_stored_values_as_they_were(here):
 KILLED = """
 import os, signal, sys
 from kincheck.core.cli.main import main
-from kincheck.core.studies.tolerance.parquet_store import ParquetStore
+from kincheck.core.studies.tolerance.chunk_files import ParquetStore
 
 write = ParquetStore.write
 

@@ -35,6 +35,7 @@ pytestmark = [
 ]
 
 
+@pytest.mark.nightly
 def test_pairs_are_solved_on_a_cluster_as_here_though_a_worker_is_lost_until_it_goes(cluster):
     """A worker is killed in the middle, with a pair on it: another has it, nothing is lost and
     nothing comes twice. A cluster that goes is a message.

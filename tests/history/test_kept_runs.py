@@ -99,6 +99,7 @@ def test_resume_needs_a_history_and_the_environment_can_name_it(path):
 # Kills
 
 
+@pytest.mark.nightly
 def test_a_run_killed_at_any_moment_is_resumed_to_the_same_records(tmp_path):
     """The moments are drawn over the whole of a run and its ways in and out; one run in three is
     killed twice.

@@ -103,11 +103,16 @@ def test_a_file_is_the_run_of_the_history_that_it_came_from(path, tmp_path):
 @pytest.mark.parametrize(
     "gone",
     [
-        {"outcome": Outcome.UNAVAILABLE, "errors": {}, "solved": None, "seconds": None},
-        {"outcome": Outcome.UNSUPPORTED, "errors": {}, "solved": None, "seconds": None},
-        without("acceleration"),
+        *(
+            pytest.param(
+                {"outcome": outcome, "errors": {}, "solved": None, "seconds": None},
+                marks=pytest.mark.nightly,
+                id=outcome.value,
+            )
+            for outcome in (Outcome.UNAVAILABLE, Outcome.UNSUPPORTED)
+        ),
+        pytest.param(without("acceleration"), id="acceleration"),
     ],
-    ids=["unavailable", "unsupported", "acceleration"],
 )
 def test_what_is_gone_is_told_for_as_long_as_it_is(path, gone):
     nights(path, 1)

@@ -25,7 +25,7 @@ from kincheck.core.caches import clear_caches
 from kincheck.core.joints import Gear, Joint, PerpendicularAxes, RackPinion, Screw, Universal
 from kincheck.core.mechanism.loads import TorsionSpringDamper
 from kincheck.core.mechanism.motions import Ramp, Table
-from kincheck.core.studies.joint_check.specimens import specimens
+from kincheck.core.studies.checks.check_joint import specimens_of
 
 
 def rssr(held=tuple):
@@ -270,7 +270,7 @@ def held(*joints, drivers=(), couplers=()):
 def test_a_joint_between_fixed_bodies_is_left_out(name):
     (joint,) = (
         replace(each, i="bed", j="bench")
-        for each in specimens(Joint.registry[name], np.random.default_rng(1), 1)
+        for each in specimens_of(Joint.registry[name], np.random.default_rng(1), 1)
     )
     mechanism = held(joint)
     assert mechanism.joints == held().joints

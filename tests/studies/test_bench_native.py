@@ -162,6 +162,7 @@ def test_growth_is_that_of_the_largest():
     assert size.growth(sizes[:1]) is None
 
 
+@pytest.mark.nightly
 def test_processes(monkeypatch):
     name = "mcpherson_strut"
     found = processes.measure_processes(cases.load(name), name, [adapters.engine("native")], TOL, 1)

@@ -16,10 +16,10 @@ from kincheck.core.cli import engine_loading, main
 from kincheck.core.harness.execution import here
 from kincheck.core.harness.run import run
 from kincheck.core.joints import Gear, Planar, Screw
-from kincheck.core.studies.engine_check import check_engine as checking
-from kincheck.core.studies.engine_check import force_cases
-from kincheck.core.studies.engine_check.rates import rates
-from kincheck.core.studies.findings import Verdict
+from kincheck.core.studies.checks import check_engine as checking
+from kincheck.core.studies.checks import engine_cases as force_cases
+from kincheck.core.studies.checks.check_engine import rates
+from kincheck.core.studies.checks.findings import Verdict
 
 from ..support.fakes import Fake, crank
 from ..support.faulty_engine import Odd, Shy, Sound

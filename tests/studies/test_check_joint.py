@@ -12,7 +12,7 @@ from kincheck.core import primitives as p
 from kincheck.core.cli.joint_loading import load_joint
 from kincheck.core.errors import KincheckError, MechanismError
 from kincheck.core.joints import AxialJoint
-from kincheck.core.studies.findings import Verdict
+from kincheck.core.studies.checks.findings import Verdict
 
 from ..support.fakes import Fake
 from .test_check_joint_mistakes import mistaken

@@ -12,10 +12,9 @@ import pytest
 from kincheck.core.harness.workers import distributed as ours
 from kincheck.core.harness.workers.distributed import ClusterError
 from kincheck.core.harness.workers.messages import pack
-from kincheck.core.studies.tolerance import chunk_execution
-from kincheck.core.studies.tolerance.chunk_execution import on_cluster, solve_there
+from kincheck.core.studies.tolerance import sweep as chunk_execution
 from kincheck.core.studies.tolerance.study import Study
-from kincheck.core.studies.tolerance.sweep import sweep_designs
+from kincheck.core.studies.tolerance.sweep import on_cluster, solve_there, sweep_designs
 
 from ..support.fakes import crank
 from .test_vary import vary
@@ -34,6 +33,7 @@ def timeless(results):
     return msgspec.json.encode(msgspec.structs.replace(results, run={}, measured={}))
 
 
+@pytest.mark.nightly
 def test_a_sweep_is_the_same_on_a_cluster_as_here_though_a_worker_is_lost(cluster, tmp_path):
     """To the last bit, in whatever order the chunks were solved, and with those of the killed
     worker solved by the other.

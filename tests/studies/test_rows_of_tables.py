@@ -18,10 +18,9 @@ from kincheck.core.case.models.hardpoints.templates import TEMPLATES
 from kincheck.core.cli.main import main
 from kincheck.core.kinematics import placed, solve_designs
 from kincheck.core.studies.diagnosis import diagnose
-from kincheck.core.studies.tolerance.gradients import gradients
-from kincheck.core.studies.tolerance.study import Ready, Study
-from kincheck.core.studies.variation.places import Geometry
+from kincheck.core.studies.tolerance.study import Ready, Study, gradients
 from kincheck.core.studies.variation.variation_file import read_variation
+from kincheck.core.studies.variation.varied_places import Geometry
 
 from ..support.rods_of_templates import solved
 from .test_vary import HEAD, moved, vary

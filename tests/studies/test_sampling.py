@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from kincheck.core import CaseError
 from kincheck.core.errors import KincheckError
-from kincheck.core.studies.variation.distributions import Law
-from kincheck.core.studies.variation.modes import Sampling
-from kincheck.core.studies.variation.sampling import DRAWN
+from kincheck.core.studies.variation.study_choices import Sampling
+from kincheck.core.studies.variation.variation import DRAWN, Law
 from kincheck.core.studies.variation.variation_file import read_variation
 
 from ..support.fakes import crank

@@ -8,8 +8,8 @@ from kincheck.cases import load
 from kincheck.core.errors import KincheckError
 from kincheck.core.harness.execution import here
 from kincheck.core.harness.record import Outcome
-from kincheck.core.studies.tolerance.cross_check import chosen
-from kincheck.core.studies.tolerance.sweep import Check, sweep_designs
+from kincheck.core.studies.tolerance.cross_check import Check, chosen
+from kincheck.core.studies.tolerance.sweep import sweep_designs
 from kincheck.core.studies.variation.variation_file import read_variation
 
 from ..support.fakes import Fake, crank

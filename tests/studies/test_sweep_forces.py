@@ -11,8 +11,9 @@ from kincheck.core.cli.main import main
 from kincheck.core.harness.compare import output_series
 from kincheck.core.harness.execution import here
 from kincheck.core.kinematics import NativeSolver
+from kincheck.core.studies.tolerance.cross_check import Check
 from kincheck.core.studies.tolerance.study import Ready, Study
-from kincheck.core.studies.tolerance.sweep import Check, sweep_designs
+from kincheck.core.studies.tolerance.sweep import sweep_designs
 from kincheck.core.studies.variation.variation_file import read_variation
 
 from .test_vary import HEAD, vary

@@ -18,13 +18,12 @@ from kincheck.core.harness.record import to_json
 from kincheck.core.joints import Distance, Revolute
 from kincheck.core.mechanism.mechanism import Body, Mechanism, Point
 from kincheck.core.mechanism.motions import JointAngle
-from kincheck.core.studies.tolerance.chunk import RowLimit, limit_counts
-from kincheck.core.studies.tolerance.csv_tables import limits_csv
 from kincheck.core.studies.tolerance.page import page
+from kincheck.core.studies.tolerance.study import RowLimit, limit_counts
 from kincheck.core.studies.tolerance.sweep import sweep_designs
-from kincheck.core.studies.tolerance.tables import print_sweep
-from kincheck.core.studies.variation.limits import Limit
-from kincheck.core.studies.variation.modes import Incomplete
+from kincheck.core.studies.tolerance.tables import limits_csv, print_sweep
+from kincheck.core.studies.variation.study_choices import Incomplete
+from kincheck.core.studies.variation.variation import Limit
 from scipy.stats import beta
 
 from .test_vary import HEAD, vary

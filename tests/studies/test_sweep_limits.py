@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from kincheck.core.cli.main import main
 from kincheck.core.errors import KincheckError
-from kincheck.core.studies.tolerance.histograms import sparkline
+from kincheck.core.studies.tolerance.conformance import sparkline
 from kincheck.core.studies.tolerance.page import page
 from kincheck.core.studies.tolerance.sweep import sweep_designs
-from kincheck.core.studies.variation.limits import Limit
-from kincheck.core.studies.variation.modes import Sampling
+from kincheck.core.studies.variation.study_choices import Sampling
+from kincheck.core.studies.variation.variation import Limit
 
 from ..support.fakes import crank
 from .test_vary import HEAD, vary

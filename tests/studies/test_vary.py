@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from kincheck.cases import load
 from kincheck.core import CaseError
-from kincheck.core.studies.variation.distributions import Law
-from kincheck.core.studies.variation.sampling import DRAWN
+from kincheck.core.studies.variation.variation import DRAWN, Law
 from kincheck.core.studies.variation.variation_file import read_variation
 
 from ..support.fakes import crank

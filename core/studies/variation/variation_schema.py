@@ -58,7 +58,7 @@ from typing import Annotated, Any, Literal
 import msgspec
 from msgspec import Meta
 
-from .modes import Mode
+from .study_choices import Mode
 
 SCHEMA = "kincheck-vary/1"
 MOST_STEPS = 10_000

@@ -1,30 +1,56 @@
-"""Cases of forces for the check of an engine: reactions, efforts and force elements."""
+"""Cases of forces for the check of an engine, and a joint that no engine knows."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...case.case import TIME, Case, Output, Sweep, Truth
+from ... import primitives as p
+from ...algebra import ZERO, vec
+from ...case.case import TIME, Case, Quantity, Sweep, Truth
 from ...case.io.tolerance import default
-from ...case.joint_probe import ATOL, WHY, probe, probes
+from ...case.joint_probe import coordinates, probe, probes
 from ...case.measures import DriverEffort, ElementForce, ForceMeasure, JointForce, JointMoment
 from ...case.measures.force import Axis
 from ...case.quantity import with_markers
-from ...joints import Fixed, Revolute, Translational
+from ...joints import Attachment, Fixed, Joint, Revolute, Translational
+from ...joints.base import directions, position, require_perpendicular, unit
 from ...mechanism.body import Body
 from ...mechanism.loads import Axes, Force, SpringDamper, Torque, TorsionSpringDamper
 from ...mechanism.mechanism import GROUND, Mechanism, Point
 from ...mechanism.motions import JointAngle, JointDisplacement, PointCoordinate, Sine
-from ..joint_check.loaded_probe import GRAVITY, INERTIA, loaded
+from .loaded_probe import GRAVITY, INERTIA, loaded
+
+
+@dataclass(frozen=True)
+class UnknownJoint(Joint):
+    """The point of body j stays in the plane through it normal to the first axis, on body i, and
+    the second axis, on body j, stays perpendicular to the first.
+    """
+
+    freedoms = ("translation x", "translation y", "rotation i", "rotation j")
+    symmetric = False
+    point: tuple[float, float, float] = position()
+    axes: tuple[tuple[float, float, float], tuple[float, float, float]] = directions()
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require_perpendicular(self, self.axes)
+
+    def primitives(self, i: Attachment, j: Attachment) -> Sequence[p.Primitive]:
+        point, (normal, along) = vec(self.point), map(unit, self.axes)
+        return p.Dot20(normal, i.arm(point), j.arm(point), ZERO), p.Dot10(normal, along)
+
+
+UnknownJoint.type = "unknown_to_engines"  # set here, so that it is not registered for case files
+
 
 RATE = 0.75
 """Rate of the probes' hinge [rad/s]; at one, rates by time and by angle are the same."""
 SOURCE = "made for check-engine"
-AXES = (("x", (1.0, 0.0, 0.0)), ("y", (0.0, 1.0, 0.0)), ("z", (0.0, 0.0, 1.0)))
 
 
 def force_cases() -> Iterator[tuple[str, Case]]:
@@ -112,12 +138,11 @@ def uneven_drives() -> Case:
         "reach": Sine(0.05, 0.4),
         "slide": Sine(-0.1, 0.3, 0.2),
     }
-    outputs = tuple(
-        Output(f"{point}_{axis}", point, direction, False, ATOL, 0.0, WHY)
-        for point in ("tip", "heel")
-        for axis, direction in AXES
-    )
     sweep = Sweep(TIME, np.linspace(0.0, 0.75, 4), motions=motions)
+    return _case(mechanism, sweep, coordinates(mechanism))
+
+
+def _case(mechanism: Mechanism, sweep: Sweep, outputs: tuple[Quantity, ...] = ()) -> Case:
     return Case(mechanism.name, SOURCE, Truth.CONSENSUS_ONLY, mechanism, sweep, outputs)
 
 
@@ -136,9 +161,7 @@ def _turns() -> Case:
         gravity=GRAVITY,
         forces=[TorsionSpringDamper("clock", "hub", 4.0, damping=0.5, free_angle=0.25)],
     )
-    sweep = Sweep("turn", np.linspace(7.0, -6.0, 14), RATE)
-    case = Case(mechanism.name, SOURCE, Truth.CONSENSUS_ONLY, mechanism, sweep, ())
-    return _with_forces(case)
+    return _with_forces(_case(mechanism, Sweep("turn", np.linspace(7.0, -6.0, 14), RATE)))
 
 
 def _undetermined() -> Case:
@@ -156,9 +179,7 @@ def _undetermined() -> Case:
         drivers=[JointAngle("turn", "hinge_0")],
         gravity=GRAVITY,
     )
-    sweep = Sweep("turn", np.linspace(-0.2, 0.3, 3), RATE)
-    case = Case(mechanism.name, SOURCE, Truth.CONSENSUS_ONLY, mechanism, sweep, ())
-    return _with_forces(case)
+    return _with_forces(_case(mechanism, Sweep("turn", np.linspace(-0.2, 0.3, 3), RATE)))
 
 
 def _body(name: str, number: int) -> Body:

@@ -10,33 +10,139 @@ from __future__ import annotations
 import pickle
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from itertools import pairwise
+from typing import Any, TypeAlias
 
 import numpy as np
 
-from ...case.case import Case
+from ...case.case import TIME, Case
 from ...case.joint_probe import probe, probes
+from ...errors import shortened
 from ...harness.engine import Engine, may_run_here
 from ...harness.engine_versions import versions
-from ...harness.execution import Answer, Attempt, Attempts, Pair, Solver, here
+from ...harness.execution import Answer, Attempt, Attempts, Pair, Solver, error_text, here
 from ...harness.record import Outcome, Record
 from ...harness.resource_limits import Limits
 from ...harness.run import Progress, run
 from ...harness.standard import STANDARD
+from ...harness.verdict import NAMED
 from ...harness.workers.pool import in_workers
 from ...joints import Revolute
-from ..findings import Finding, Report, Verdict
-from .force_cases import at_rate, force_cases, uneven_drives
-from .forces import faults_of_forces
-from .rates import rates
-from .unknown_joint import UnknownJoint
+from ...trajectory import QUANTITIES, Array
+from .engine_cases import UnknownJoint, at_rate, force_cases, uneven_drives
+from .findings import Finding, Limit, Report, Verdict, agreement, judged, skipped, stated
+
+Values: TypeAlias = Sequence[float | None] | None
+
+# Weights of sixth-order differences over seven samples.
+WEIGHTS = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60.0
+NOISE = 1e-9
+"""Error of the compared values relative to the largest: a thousand times the residual tolerance."""
+RATES = Limit(1.0, "over the change of the differences with a doubled step")
+
+
+def rates(solved: Sequence[tuple[Case, Record]]) -> Iterator[Finding]:
+    """Yield the worst defect of velocity and of acceleration, against differences of what they are
+    the rate of, over all cases.
+
+    Only uniform sweeps of one driver count: others have motions with corners.
+    """
+    for before, after in pairwise(QUANTITIES):
+        shares = [
+            (share, f"{case.name}: {name}")
+            for case, record in solved
+            if (dt := _step(case)) is not None and record.solved == record.samples
+            for name, output in record.outputs.items()
+            if (share := _share(getattr(output, before), getattr(output, after), dt)) is not None
+        ]
+        if not shares:
+            yield skipped(f"rates: {after}", "the engine gives none")
+            continue
+        worst, where = max(shares, key=lambda each: each[0])
+        remedy = f"is not the rate of its {before}"
+        found = judged(f"rates: {after}", np.array([worst]), RATES, [where], remedy=remedy)
+        yield replace(found, pose=None)
+
+
+def _step(case: Case) -> float | None:
+    """Return the time between samples [s]; None if the sweep is short, uneven or has several
+    drivers.
+    """
+    steps = np.diff(case.sweep.path.times)
+    if case.sweep.driver == TIME or case.sweep.motions or len(steps) < 3 * len(WEIGHTS):
+        return None
+    even = np.allclose(steps, steps[0], rtol=1e-9, atol=0.0)
+    return float(steps[0]) if even else None
+
+
+def _share(before: Values, after: Values, dt: float) -> float | None:
+    """Return the defect of a rate over its limit; None if there is nothing to compare."""
+    if before is None or after is None or None in before or None in after:
+        return None
+    position, rate = (np.array(values, dtype=np.float64) for values in (before, after))
+    slopes, coarse = _differences(position, dt), _differences(position[::2], 2.0 * dt)
+    noise = NOISE * (float(np.abs(position).max()) + abs(dt)) / abs(dt)
+    limit = float(np.abs(coarse - slopes[3::2][: len(coarse)]).max()) + noise
+    return float(np.abs(slopes - rate[3:-3]).max()) / limit
+
+
+def _differences(values: Array, dt: float) -> Array:
+    """Return differences of values at equal steps, without the first and last three samples."""
+    windows = np.lib.stride_tricks.sliding_window_view(values, len(WEIGHTS))
+    return np.asarray(windows @ WEIGHTS / dt)
+
+
+def faults_of_forces(case: Case, mode: str, attempt: Attempt, native: Attempt) -> Iterator[str]:
+    """Yield what is wrong with the forces of an answer beside their values.
+
+    An engine may leave out the reactions of joints for which it solves others. A simulation need
+    not give forces.
+
+    Args:
+        native: the native engine's attempt at the same case.
+    """
+    found, right = attempt.result, native.result
+    if not (case.forces and isinstance(found, Answer) and isinstance(right, Answer)):
+        return
+    replaced = {joint.name for joint in case.mechanism.joints if "equivalents" in found.details}
+    outputs = [output for output in case.outputs if output.forces]
+    lacking = [
+        output.name
+        for output in outputs
+        if not found.outputs[output.name].possible and not replaced.issuperset(output.forces)
+    ]
+    if lacking and not (mode == "simulate" and found.power is None):
+        yield (
+            f"gives no {shortened(lacking, NAMED)}: return them in Trajectory.forces, or let"
+            " unsupported() refuse cases with such outputs"
+        )
+    loose = [
+        output.name
+        for output in outputs
+        if right.outputs[output.name].reason
+        and np.isfinite(found.outputs[output.name].position).any()
+    ]
+    if loose:
+        yield (
+            f"gives values of {shortened(loose, NAMED)}, which rigid bodies leave undetermined:"
+            " Reaction.free is to hold the undetermined directions"
+        )
+    if found.power is not None and right.power is not None:
+        missing = np.isfinite(right.power) & np.isnan(found.power)
+        if missing.any():
+            yield (
+                f"gives no balance of power at {missing.sum()} of {len(missing)} samples:"
+                " Forces.power is the drivers' power less the change of energy and the dissipation"
+            )
+
 
 MODES = ("projection", "simulate")
 LOOPS = ("python", "simulator", "compiled")
 REACH = np.linspace(-3.0, 3.0, 61)
 """Angles of the probe of a revolute joint [rad]; rods lock it at -1.8 and 2.4."""
 AGREE_WHY = "largest error over the tolerance of its output"
-SAME_WHY = "the same bits from a new model, in another process and order"
+SAME = Limit(0.0, "the same bits from a new model, in another process and order")
+UNREACHED = Limit(0.0, "values at samples that cannot be reached")
 VERDICTS = {
     Outcome.PASS: Verdict.PASS,
     Outcome.UNSUPPORTED: Verdict.SKIP,
@@ -114,20 +220,17 @@ def _protocol(engine: Engine) -> Iterator[Finding]:
     wrong = [
         f"{name} is {value!r}, expected {wanted}" for name, value, good, wanted in facts if not good
     ]
-    yield Finding("protocol", Verdict.FAIL if wrong else Verdict.PASS, message="; ".join(wrong))
+    yield stated("protocol", "; ".join(wrong))
     try:
         pickle.loads(pickle.dumps(engine))
     except Exception as error:  # any error of the engine's own code
-        message = (
-            f"{type(error).__name__}: {error}; worker processes need an engine that pickle takes"
-        )
-        yield Finding("isolation: pickle", Verdict.FAIL, message=message)
+        remedy = "worker processes need an engine that pickle takes"
+        yield stated("isolation: pickle", f"{error_text(error)}; {remedy}")
         return
-    yield Finding("isolation: pickle", Verdict.PASS)
+    yield stated("isolation: pickle", "")
     (version,) = versions([engine])
-    message = "version() returns None: the engine is not installed, or cannot be imported"
-    verdict = Verdict.FAIL if version is None else Verdict.PASS
-    yield Finding("version", verdict, message=message if version is None else version)
+    fault = "version() returns None: the engine is not installed, or cannot be imported"
+    yield stated("version", fault if version is None else "", version or "")
 
 
 def _compared(name: str, record: Record, faults: str) -> Finding:
@@ -136,24 +239,16 @@ def _compared(name: str, record: Record, faults: str) -> Finding:
     Args:
         faults: what is wrong with the forces beside their values.
     """
-    shares = [
-        (each.max_abs / each.tolerance if each.tolerance else np.inf, f"{output} {quantity}")
-        for output, errors in record.errors.items()
-        for quantity, each in errors.items()
-    ]
-    worst, where = max(shares, default=(None, ""))
-    verdict = Verdict.FAIL if faults else VERDICTS.get(record.outcome, Verdict.FAIL)
     passed = record.outcome is Outcome.PASS
     message = faults or ("" if passed else f"{record.outcome.shown}: {record.message}")
-    limit = None if worst is None else 1.0
-    why = "" if worst is None else AGREE_WHY
-    return Finding(name, verdict, worst, limit, why, row=where, message=message)
+    verdict = Verdict.FAIL if faults else VERDICTS.get(record.outcome, Verdict.FAIL)
+    return replace(agreement(name, verdict, record.errors, AGREE_WHY, message), pose=None)
 
 
 def _folded(record: Record, attempt: Attempt) -> Finding:
     """Check samples beyond a fold: they have no values, and a message gives the reason."""
     if record.outcome is Outcome.UNSUPPORTED:
-        return Finding(BEYOND, Verdict.SKIP, message=record.message)
+        return skipped(BEYOND, record.message)
     beyond = sum(each.contradicted or 0 for each in record.errors.values())
     reached = record.solved or 0
     silent = isinstance(attempt.result, Answer) and not attempt.result.message
@@ -164,14 +259,9 @@ def _folded(record: Record, attempt: Attempt) -> Finding:
         "gives no message" if silent else "",
     ]
     message = "; ".join(filter(None, problems))
-    return Finding(
-        BEYOND,
-        Verdict.FAIL if message else Verdict.PASS,
-        float(beyond),
-        0.0,
-        "values at samples that cannot be reached",
-        message=message or f"reaches {reached} of {len(REACH)} samples",
-    )
+    verdict = Verdict.FAIL if message else Verdict.PASS
+    text = f"reaches {reached} of {len(REACH)} samples"
+    return Finding(BEYOND, verdict, float(beyond), *UNREACHED, message=message or text)
 
 
 def _unknown(record: Record) -> Finding:
@@ -179,8 +269,8 @@ def _unknown(record: Record) -> Finding:
     solved = record.outcome in (Outcome.PASS, Outcome.UNJUDGED)
     good = solved or (record.outcome is Outcome.UNSUPPORTED and record.message)
     message = record.outcome.shown + (f": {record.message}" if record.message else "")
-    remedy = "" if good else "; unsupported() is to return the reason"
-    return Finding(UNKNOWN, Verdict.PASS if good else Verdict.FAIL, message=message + remedy)
+    remedy = "; unsupported() is to return the reason"
+    return stated(UNKNOWN, "" if good else message + remedy, message)
 
 
 def _same(
@@ -193,9 +283,8 @@ def _same(
         off = _difference(first[case], attempt)
         if off > worst:
             worst, where = off, case
-    message = "keeps a state from one case to the next, or uses random numbers" if worst else ""
-    verdict = Verdict.FAIL if worst else Verdict.PASS
-    return Finding(name, verdict, worst, 0.0, SAME_WHY, row=where, message=message)
+    remedy = "keeps a state from one case to the next, or uses random numbers"
+    return replace(judged(name, np.array([worst]), SAME, [where], remedy=remedy), pose=None)
 
 
 def _difference(one: Attempt, other: Attempt) -> float:

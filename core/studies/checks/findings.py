@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from io import StringIO
-from typing import TextIO
+from typing import NamedTuple, TextIO
 
 import numpy as np
 
-from ..trajectory import Array
+from ...harness.record import Deviations
+from ...trajectory import Array
 
 
 class Verdict(StrEnum):
@@ -21,6 +22,20 @@ class Verdict(StrEnum):
     PASS = "pass"
     FAIL = "fail"
     SKIP = "skip"
+
+
+class Limit(NamedTuple):
+    """The largest accepted figure of a check, and its reason."""
+
+    value: float
+    why: str
+
+
+# Sums of some thirty products of numbers of size one, each rounded at 1e-16.
+ROUND_OFF = Limit(1e-13, "round-off of sums of numbers of size one")
+# ROUND_OFF over the smallest singular value of accepted poses (a twentieth of the value at design),
+# and the same factor once more.
+AMPLIFIED = Limit(1e-10, "round-off over the smallest singular value, x100")
 
 
 @dataclass(frozen=True)
@@ -53,12 +68,32 @@ class Finding:
         order = {Verdict.SKIP: 0, Verdict.PASS: 1, Verdict.FAIL: 2}
         return order[self.verdict], self.figure if self.figure is not None else 0.0
 
+    @property
+    def place(self) -> str:
+        """Where the worst figure is, in words."""
+        parts = [f"specimen {self.specimen}" if self.specimen is not None else ""]
+        parts += [f"pose {self.pose}" if self.pose is not None else "", self.row]
+        return ", ".join(part for part in parts if part)
+
+
+def skipped(check: str, why: str) -> Finding:
+    """Return the finding of a check that was not run."""
+    return Finding(check, Verdict.SKIP, message=why)
+
+
+def stated(check: str, fault: str, message: str = "") -> Finding:
+    """Return the finding of a check without figures, by its fault; empty if there is none.
+
+    Args:
+        message: text without a fault.
+    """
+    return Finding(check, Verdict.FAIL if fault else Verdict.PASS, message=fault or message)
+
 
 def judged(
     check: str,
     figures: Array,
-    limit: float,
-    why: str,
+    limit: Limit,
     names: Sequence[str] = ("",),
     message: str = "",
     remedy: str = "",
@@ -72,20 +107,40 @@ def judged(
     figures = np.where(np.isnan(figures), math.inf, np.atleast_2d(figures))
     row, pose = np.unravel_index(int(figures.argmax()), figures.shape)
     worst = float(figures[row, pose])
-    good = worst <= limit
-    where = int(pose) if worst else None
-    said = "; ".join(each for each in (message, "" if good else remedy) if each)
+    good = worst <= limit.value
     return Finding(
         check,
         Verdict.PASS if good else Verdict.FAIL,
         worst,
-        limit,
-        why,
-        None,
-        where,
-        names[int(row)] if worst else "",
-        said,
+        *limit,
+        pose=int(pose) if worst else None,
+        row=names[int(row)] if worst else "",
+        message="; ".join(each for each in (message, "" if good else remedy) if each),
     )
+
+
+AGREEMENT = 1.0
+"""Largest accepted error over the tolerance of its output."""
+
+
+def agreement(
+    check: str, verdict: Verdict, errors: Mapping[str, Deviations], why: str, message: str
+) -> Finding:
+    """Return the finding of a comparison of outputs.
+
+    Args:
+        errors: deviations by output.
+        why: reason of the limit.
+    """
+    shares = [
+        (off.max_abs / off.tolerance if off.tolerance else math.inf, f"{output} {quantity}", off)
+        for output, each in errors.items()
+        for quantity, off in each.items()
+    ]
+    if not shares:
+        return Finding(check, verdict, message=message)
+    worst, row, off = max(shares, key=lambda each: each[:2])
+    return Finding(check, verdict, worst, AGREEMENT, why, None, off.worst_step, row, message)
 
 
 @dataclass(frozen=True)
@@ -127,18 +182,10 @@ class Report:
         """
         from rich.text import Text
 
-        from ..report import terminal
-        from ..report.fitting_table import FittingTable
+        from ...report import terminal
 
         console = terminal.console(file)
-        table = FittingTable()
-        for name in ("check", "verdict", "worst", "limit", "at"):
-            table.add_column(
-                name,
-                justify="right" if name in ("worst", "limit") else "left",
-                no_wrap=name != "at",
-            )
-        table.add_column("limit because", overflow="fold")
+        table = terminal.columns("check", "verdict", ">worst", ">limit", "at", "limit because")
         colours = {Verdict.PASS: "green", Verdict.FAIL: "bold red", Verdict.SKIP: "yellow"}
         shown = [each for each in self.findings if not quiet or each.verdict is Verdict.FAIL]
         for each in shown:
@@ -147,7 +194,7 @@ class Report:
                 each.check,
                 Text(each.verdict, colours[each.verdict]),
                 *numbers,
-                _where(each),
+                each.place,
                 each.why,
             )
         if shown:
@@ -163,9 +210,3 @@ class Report:
         )
         seed = "" if self.seed is None else f" (seed {self.seed})"
         console.print(Text(f"{self.subject}: {summary}{seed}"))
-
-
-def _where(finding: Finding) -> str:
-    parts = [f"specimen {finding.specimen}" if finding.specimen is not None else ""]
-    parts += [f"pose {finding.pose}" if finding.pose is not None else "", finding.row]
-    return ", ".join(part for part in parts if part)

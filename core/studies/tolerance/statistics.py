@@ -49,6 +49,33 @@ def nothing(quantities: int, n: int) -> Summary:
     return Summary(none.astype(np.int64), unknown, unknown, unknown, none, extremes)
 
 
+def summary_of(values: Array, first: int) -> Summary:
+    """Return the summary of variants, by distances from their mean: these lose no digits if all
+    numbers are far from zero.
+
+    Args:
+        values: shape (quantities, n, V), NaN if missing.
+        first: index of the first variant.
+    """
+    total = values.sum(axis=2)
+    count, missing = np.full(total.shape, values.shape[2]), None
+    if not np.isfinite(total).all():  # rare: most studies are spared the search for NaN
+        missing = np.isnan(values)
+        total, count = np.nansum(values, axis=2), (~missing).sum(axis=2)
+    with np.errstate(all="ignore"):
+        mean = total / count
+        away = values - mean[:, :, None]
+        least, most = np.fmin.reduce(values, axis=2), np.fmax.reduce(values, axis=2)
+    if missing is not None:
+        away[missing] = 0.0
+    extremes = np.full((len(values), 2), -1, dtype=np.int64)
+    for q in np.flatnonzero(count.any(axis=1)).tolist():
+        for k, ends, outermost in ((0, least[q], np.nanargmin), (1, most[q], np.nanargmax)):
+            sample = int(outermost(ends))
+            extremes[q, k] = first + (values[q, sample] == ends[sample]).argmax()
+    return Summary(count, least, most, mean, np.einsum("qnv,qnv->qn", away, away), extremes)
+
+
 def merged(a: Summary, b: Summary) -> Summary:
     """Return the summary of the variants of both; b's variants come after a's.
 

@@ -8,7 +8,7 @@ the joint takes part.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,9 +17,9 @@ from ...algebra import Quat, quat, vec
 from ...joints import Attachment, AxialJoint
 from ...primitives.base import Drive, Pose, Twist
 from ...trajectory import Array
-from ..findings import Finding, Verdict, judged
-from .checks import AMPLIFIED, AMPLIFIED_WHY, Specimen
-from .traced import COLUMNS, POSES
+from .findings import AMPLIFIED, Finding, judged, skipped
+from .manifold import Specimen
+from .traced_joint import COLUMNS, POSES, CarriedPoint, turned
 
 FREEDOMS = ("rotation", "translation")
 WHATS = ("value", "rate", "acceleration", "force", "turns")
@@ -32,7 +32,7 @@ def driver(s: Specimen) -> Iterator[Finding]:
     joint = s.joint
     driven = [each for each in joint.freedoms if each in FREEDOMS]
     if not isinstance(joint, AxialJoint) or not driven:
-        yield Finding("driver", Verdict.SKIP, message="it has no coordinate that can be driven")
+        yield skipped("driver", "it has no coordinate that can be driven")
         return
     names = [f"{freedom}: {what}" for freedom in driven for what in WHATS]
     figures = np.concatenate([_defects(s, joint, freedom) for freedom in driven])
@@ -41,43 +41,16 @@ def driver(s: Specimen) -> Iterator[Finding]:
         " c_t, gamma of its c_tt; its rows are a force along the axis through the joint's point, or"
         " a couple about the axis; its branch tests are positive at c, and not a turn further"
     )
-    yield judged("driver", figures, AMPLIFIED, AMPLIFIED_WHY, names, remedy=remedy)
+    yield judged("driver", figures, AMPLIFIED, names, remedy=remedy)
 
 
-@dataclass(frozen=True, eq=False)
-class _Moving:
-    """A body and the joint's point on it, global axes, shape (lanes, 3).
-
-    Attributes:
-        arm: from the body's origin to the point.
-        place, v, a: of the point.
-        w, w_t: angular velocity and acceleration.
-    """
-
-    arm: Array
-    place: Array
-    v: Array
-    a: Array
-    w: Array
-    w_t: Array
-
-
-def _moving(s: Specimen, k: int, arm: Array) -> _Moving:
+def _moving(s: Specimen, k: int, arm: Array) -> CarriedPoint:
     state, rate, acceleration = (
         x[size * k : size * (k + 1)].T
         for x, size in ((s.state, 7), (s.rate, COLUMNS), (s.acceleration, COLUMNS))
     )
-    arm = _turned(state[:, 3:], arm)
-    w, w_t = rate[:, 3:], acceleration[:, 3:]
-    v = rate[:, :3] + np.cross(w, arm)
-    a = acceleration[:, :3] + np.cross(w_t, arm) + np.cross(w, np.cross(w, arm))
-    return _Moving(arm, s.traced.origins[k] + state[:, :3] + arm, v, a, w, w_t)
-
-
-def _turned(q: Array, a: Array) -> Array:
-    """Return a vector turned by Euler parameters, shape (lanes, 4) -> (lanes, 3)."""
-    twice = 2.0 * np.cross(q[:, 1:], a)
-    return a + q[:, :1] * twice + np.cross(q[:, 1:], twice)
+    rates = (*np.split(rate, 2, axis=1), *np.split(acceleration, 2, axis=1))
+    return CarriedPoint.of(turned(state[:, 3:], arm), s.traced.origins[k] + state[:, :3], *rates)
 
 
 def coordinate(s: Specimen, joint: AxialJoint, freedom: str) -> tuple[list[Array], Array]:
@@ -91,7 +64,7 @@ def coordinate(s: Specimen, joint: AxialJoint, freedom: str) -> tuple[list[Array
     axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
     point = np.array(joint.point) / s.place.unit
     i, j = (_moving(s, k, point - s.traced.origins[k]) for k in range(2))
-    h = _turned(s.state[3:7].T, axis)
+    h = turned(s.state[3:7].T, axis)
     return _rotation(s, i, j, h, axis) if freedom == "rotation" else _slide(i, j, h)
 
 
@@ -102,7 +75,7 @@ def _defects(s: Specimen, joint: AxialJoint, freedom: str) -> Array:
     attached = (Attachment(vec(tuple(origin))) for origin in s.traced.origins)
     measured: Any = scaled.measured(freedom, *attached)
     primitive, per_rate = (_driving(measured, c, rate, c_tt) for rate in (c_t, 1.0))
-    poses = [Pose.of(vec(tuple(x[:3])), quat(x[3:])) for x in (s.state[:7], s.state[7:POSES])]
+    poses = _poses(s.state)
     twists = [Twist(vec(tuple(x[:3])), vec(tuple(x[3:]))) for x in (s.rate[:6], s.rate[6:12])]
     (row,), (phi,) = primitive.rows(*poses), primitive.phi(*poses)
     (nu,), (one,), (gamma,) = (
@@ -113,11 +86,11 @@ def _defects(s: Specimen, joint: AxialJoint, freedom: str) -> Array:
     entries = np.array([x + np.zeros(s.lanes) for part in row for x in part])
     rates, accelerations = s.rate[: 2 * COLUMNS], s.acceleration[: 2 * COLUMNS]
     speed, pull = np.linalg.norm(rates, axis=0), np.linalg.norm(accelerations, axis=0)
-    there, turned = s.state, 0.0
+    there, further = s.state, 0.0
     if freedom == "rotation":
-        turned = np.linspace(-WAY, WAY, s.lanes)
-        there = _turned_on(s, joint, turned)
-    lost, far = _turns(measured, there, c + turned, turning=freedom == "rotation")
+        further = np.linspace(-WAY, WAY, s.lanes)
+        there = _turned_on(s, joint, further)
+    lost, far = _turns(measured, there, c + further, turning=freedom == "rotation")
     figures = (
         np.maximum(np.abs(phi), np.abs(far)),
         ((entries * rates).sum(axis=0) - nu) / (1.0 + speed),
@@ -129,18 +102,22 @@ def _defects(s: Specimen, joint: AxialJoint, freedom: str) -> Array:
     return np.abs(figures) / np.where(size > 0.0, size, 1.0)
 
 
+def _poses(state: Array) -> list[Pose]:
+    return [Pose.of(vec(tuple(x[:3])), quat(x[3:])) for x in (state[:7], state[7:POSES])]
+
+
 def _driving(measured: Any, c: Any, c_t: Any = 0.0, c_tt: Any = 0.0) -> Any:
     return replace(measured, drive=Drive(c, c_t, c_tt, np.cos(0.5 * c), np.sin(0.5 * c)))
 
 
 def _turned_on(s: Specimen, joint: AxialJoint, angle: Array) -> Array:
     """Return the state with body j turned further about the axis."""
-    h, state = _turned(s.state[3:7].T, np.array(joint.axis)), s.state.copy()
+    h, state = turned(s.state[3:7].T, np.array(joint.axis)), s.state.copy()
     h /= np.linalg.norm(h, axis=1)[:, None]
     arm = np.array(joint.point) / s.place.unit - s.traced.origins[1]
     turn = Quat(np.cos(0.5 * angle), vec([*(np.sin(0.5 * angle) * h.T)]))
     state[10:14] = np.array([*(turn * quat(s.state[10:14]))])
-    state[7:10] += (_turned(s.state[10:14].T, arm) - _turned(state[10:14].T, arm)).T
+    state[7:10] += (turned(s.state[10:14].T, arm) - turned(state[10:14].T, arm)).T
     return state
 
 
@@ -148,7 +125,7 @@ def _turns(measured: Any, state: Array, c: Array, *, turning: bool) -> tuple[Arr
     """Return one where a branch test refuses the drive's value, or accepts a zero of phi a turn
     further; and phi.
     """
-    pair = [Pose.of(vec(tuple(x[:3])), quat(x[3:])) for x in (state[:7], state[7:POSES])]
+    pair = _poses(state)
     wrong = np.zeros(state.shape[1], np.bool_)
     at_turns: list[Array] = []
     for turns in (0, 1) if turning else (0,):
@@ -156,12 +133,12 @@ def _turns(measured: Any, state: Array, c: Array, *, turning: bool) -> tuple[Arr
         (phi,) = primitive.phi(*pair)
         tests = [np.ones_like(c), *primitive.branch(*pair)]
         accepted = np.min(np.broadcast_arrays(*tests), axis=0) > 0.0
-        wrong |= accepted & (np.abs(phi) < AMPLIFIED) if turns else ~accepted
+        wrong |= accepted & (np.abs(phi) < AMPLIFIED.value) if turns else ~accepted
         at_turns.append(phi + 0.0 * c)
     return wrong.astype(np.float64), at_turns[0]
 
 
-def _slide(i: _Moving, j: _Moving, h: Array) -> tuple[list[Array], Array]:
+def _slide(i: CarriedPoint, j: CarriedPoint, h: Array) -> tuple[list[Array], Array]:
     """Return the displacement with its rates, and the wrench of a unit force on both bodies."""
     d, d_t, d_tt = j.place - i.place, j.v - i.v, j.a - i.a
     h_t = np.cross(i.w, h)
@@ -174,7 +151,7 @@ def _slide(i: _Moving, j: _Moving, h: Array) -> tuple[list[Array], Array]:
 
 
 def _rotation(
-    s: Specimen, i: _Moving, j: _Moving, h: Array, axis: Array
+    s: Specimen, i: CarriedPoint, j: CarriedPoint, h: Array, axis: Array
 ) -> tuple[list[Array], Array]:
     """Return the angle with its rates, and the wrench of a unit couple on both bodies."""
     p, q = s.state[3:7], s.state[10:14]

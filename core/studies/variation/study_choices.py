@@ -1,4 +1,4 @@
-"""Modes of a study: the choice of its variants."""
+"""Choices of a study, as files and the command line name them."""
 
 from __future__ import annotations
 
