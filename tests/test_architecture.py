@@ -73,40 +73,32 @@ IMPORTS = {
         "kinematics/continuation kinematics/verified kinematics/blocks "
         "kinematics/sparse kinematics/diagnosis"
     ),
-    "case/models/hardpoints/templates": "joints mechanism",
     "case": ". joints mechanism kinematics",
     "case/suspension": ". mechanism case",
-    "case/measures": ". joints mechanism kinematics case",
-    "case/io": ". joints mechanism kinematics case case/suspension case/measures",
-    "case/models/hardpoints": (
-        ". joints mechanism kinematics case/models/hardpoints/templates case case/suspension "
-        "case/io"
-    ),
+    "case/io": ". joints mechanism kinematics case case/suspension",
+    "case/models/hardpoints": (". joints mechanism kinematics case case/suspension case/io"),
     "case/models/mjcf": ". joints mechanism kinematics case case/io",
     "case/models/robots": ". joints mechanism case/io case/models/mjcf",
     "case/models": ". case case/io case/models/hardpoints case/models/mjcf case/models/robots",
-    "harness": (
-        ". program/llvm joints mechanism kinematics case case/suspension case/measures case/io"
-    ),
+    "harness": (". program/llvm joints mechanism kinematics case case/suspension case/io"),
     "harness/workers": ". harness",
     "harness/reporting": "",
     "history": ". case case/io harness",
     "history/regression": ". case case/io harness history",
     "report": ". joints mechanism case case/io harness history history/regression",
     "studies/variation": ". joints mechanism kinematics case case/io",
-    "studies/stress/truth": ". program joints mechanism kinematics case case/measures",
-    "studies/stress/families": ". joints mechanism case case/measures case/io studies/stress/truth",
-    "studies": ". program joints kinematics case case/measures case/io harness report",
+    "studies/stress/truth": ". program joints mechanism kinematics case",
+    "studies/stress/families": ". joints mechanism case case/io studies/stress/truth",
+    "studies": ". program joints kinematics case case/io harness report",
     "studies/joint_check": (
-        ". primitives program joints mechanism kinematics case case/measures case/io "
-        "harness studies"
+        ". primitives program joints mechanism kinematics case case/io harness studies"
     ),
     "studies/engine_check": (
-        ". primitives joints mechanism case case/measures case/io harness harness/workers "
+        ". primitives joints mechanism case case/io harness harness/workers "
         "studies studies/joint_check"
     ),
     "studies/tolerance": (
-        ". program program/llvm mechanism kinematics case case/measures case/io harness "
+        ". program program/llvm mechanism kinematics case case/io harness "
         "harness/workers history report studies/variation"
     ),
     "studies/stress": (
@@ -120,7 +112,7 @@ IMPORTS = {
         "studies/variation studies studies/tolerance studies/paper"
     ),
     "cli": (
-        ". program program/llvm joints kinematics case/models/hardpoints/templates case "
+        ". program program/llvm joints kinematics case "
         "case/io case/models/hardpoints case/models harness harness/workers history "
         "history/regression report studies/variation studies/stress/families studies "
         "studies/joint_check studies/engine_check studies/tolerance studies/stress "

@@ -14,8 +14,7 @@ from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.io.case_writer import case_text
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
-from kincheck.core.case.models.hardpoints.sample_table import sample_table
-from kincheck.core.case.models.hardpoints.templates import TEMPLATES
+from kincheck.core.case.models.hardpoints.templates import TEMPLATES, sample_table
 from kincheck.core.case.suspension import Convention
 from kincheck.core.errors import CaseError
 from kincheck.core.harness.execution import Answer, Pair, attempt

@@ -146,9 +146,8 @@ def _model(file: Path, text: str, supplied: Supplied) -> Case:
 
 def _hardpoints(file: Path, kind: str, supplied: Supplied) -> HardpointTable:
     """Return the table of hardpoints of a file."""
-    from .hardpoints.adams import read_adams
-    from .hardpoints.chrono import read_chrono
     from .hardpoints.plain import read_plain
+    from .hardpoints.programs import read_adams, read_chrono
     from .hardpoints.rows import read_spreadsheet
     from .hardpoints.tree import read_tree
 
@@ -189,7 +188,7 @@ def kind_of(file: Path, supplied: Supplied = NOTHING) -> str:
 
 
 def _kind_of_json(file: Path, supplied: Supplied) -> str:
-    from .hardpoints.chrono import is_chrono, without_comments
+    from .hardpoints.programs import is_chrono, without_comments
     from .hardpoints.tree import has_points, json_tree
 
     text = without_comments(_text(file))

@@ -11,8 +11,7 @@ import numpy as np
 from ...case.case import TIME, Case, Output, Sweep, Truth
 from ...case.io.tolerance import default
 from ...case.joint_probe import ATOL, WHY, probe, probes
-from ...case.measures import DriverEffort, ElementForce, ForceMeasure, JointForce, JointMoment
-from ...case.measures.force import Axis
+from ...case.measures import Axis, DriverEffort, ElementForce, ForceMeasure, JointForce, JointMoment
 from ...case.quantity import with_markers
 from ...joints import Fixed, Revolute, Translational
 from ...mechanism.body import Body

@@ -1,33 +1,32 @@
-"""Suspension outputs of a case of hardpoints: all outputs defined by its points and template."""
+"""Suspension outputs of a case of hardpoints: all outputs defined by its points and template; and
+the rows of its table as hardpoints of the case.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from ....algebra import vec
-from ....mechanism.mechanism import Vector
-from ...case import Case, Quantity, size
+from ....dual_numbers import Slope, derivatives
+from ....kinematics import places
+from ....mechanism.mechanism import Mechanism, Vector
+from ...case import Case, Hardpoint, Quantity, size
 from ...io.coordinates import with_all_coordinates
 from ...io.document import fault
 from ...io.suspension import with_slopes
 from ...io.tolerance import default
 from ...quantity import with_markers
 from ...suspension import Convention, Side, SuspensionOutput, Vehicle
-from ...suspension.vehicle import MARKER_DISTANCE
+from ...suspension.corner import MARKER_DISTANCE
 from ...suspension.wheel import Place
-from .axle import STROKE, AxleMotion, name_of
-from .car import Car, read_length
-from .table import HardpointTable
-from .templates.base import (
-    WHEEL_AXIS,
-    WHEEL_CENTER,
-    WHEEL_CONTACT,
-    Template,
-    prefixed,
-)
+from .axle import STROKE, AxleMotion, Car, name_of, read_length
+from .roles import WHEEL_AXIS, WHEEL_CENTER, WHEEL_CONTACT, Template, prefixed
+from .table import Axes, HardpointTable
 
 WHEEL = ("toe", "camber")
 STEERING_AXIS = ("caster", "kingpin_inclination")
@@ -208,3 +207,50 @@ def _types(
     for name, ends in template.springs.items():
         if all(role in at for role in ends):
             yield name, SuspensionOutput.registry["motion_ratio"], {"between": ends}
+
+
+def hardpoints_of(
+    named: Mapping[str, str],
+    at: Mapping[str, Vector],
+    axes: Axes,
+    mechanism_at: Callable[[Mapping[str, Vector]], Mechanism],
+) -> tuple[Hardpoint, ...]:
+    """Return a hardpoint for each row that fills a role.
+
+    The template itself states what follows: its mechanism is made once more, of positions with
+    their derivatives by the coordinates of the rows. Places are linear in positions.
+
+    Args:
+        named: names of the rows by role.
+        at: positions by role [m], axes of the case.
+        axes: of the table.
+        mechanism_at: makes the mechanism from positions by role.
+    """
+    rows = list(dict.fromkeys(named.values()))
+    by_table = np.zeros((len(rows), 3, 3 * len(rows)))
+    for row, seeds in enumerate(by_table):
+        for column, (k, sign) in enumerate(axes):
+            seeds[k, 3 * row + column] = sign
+    moving: dict[str, Any] = {
+        role: tuple(
+            Slope(x, seed) for x, seed in zip(place, by_table[rows.index(named[role])], strict=True)
+        )
+        for role, place in at.items()
+    }
+    found = places(mechanism_at(moving))
+    slopes = {
+        place: np.array([np.broadcast_to(derivatives(x), by_table.shape[2]) for x in value])
+        for place, value in found.items()
+    }
+    return tuple(
+        Hardpoint(
+            name,
+            tuple(role for role, filled in named.items() if filled == name),
+            {
+                place: each[:, 3 * row : 3 * row + 3]
+                for place, each in slopes.items()
+                if each[:, 3 * row : 3 * row + 3].any()
+            },
+        )
+        for row, name in enumerate(rows)
+    )

@@ -12,9 +12,9 @@ from ...io.column_units import split_head
 from ...io.document import decimal, fault, shown
 from ...io.workbook import Cell, Row
 from ...units import LENGTHS
+from .roles import compact
 from .table import length_name, twice
 from .templates import ROLES
-from .templates.base import compact
 
 FEWEST = 3
 """Fewest rows to recognise a form."""

@@ -17,14 +17,11 @@ from ...io.document import explained, fault, parse, read_text, shown, unknown_na
 from ...io.escape import visible
 from ...io.reader_options import LEFT_OUT, Supplied
 from ...quantity import with_markers
-from .axle import one_wheel, whole_axle
-from .car import read_car
-from .default_outputs import far_out, wheel_of, with_axis, with_suspension_outputs
-from .followers import hardpoints_of
+from .axle import one_wheel, read_car, read_travels, whole_axle
+from .default_outputs import far_out, hardpoints_of, wheel_of, with_axis, with_suspension_outputs
+from .roles import WHEEL_CONTACT, compact, side_of
 from .table import HardpointTable, axes_of, coordinate, placed, require_size, unit_of
 from .templates import TEMPLATES, Template
-from .templates.base import WHEEL_CONTACT, compact, side_of
-from .travels import read_travels
 
 WHEEL = "wheel_center"
 # Inner joints of a rack near the middle may be a little beyond it. No point of a wheel's suspension

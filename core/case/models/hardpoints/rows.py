@@ -19,9 +19,9 @@ from ...io.workbook import Cell, Row, one_sheet, read_sheets
 from ...units import LENGTHS
 from .forms import with_head
 from .head import HEAD, Head, as_head, turned, upright, written
+from .roles import compact
 from .table import Hardpoint, HardpointTable, length_name, number, require_name, twice
 from .templates import ROLES
-from .templates.base import compact
 
 _UNIT = re.compile(r"[\[(]?\s*([a-z]+)\s*[\])]?", re.IGNORECASE)
 # Largest number of points on a sheet, and as many other rows.

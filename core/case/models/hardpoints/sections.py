@@ -9,7 +9,7 @@ from typing import TypeAlias
 
 from ....errors import remedy, shortened
 from ...io.document import fault, shown
-from .templates.base import normal
+from .roles import normal
 
 Keys: TypeAlias = tuple[str, ...]
 """Path of a point: the keys of the tree from its root."""

@@ -15,7 +15,7 @@ from ....errors import CaseError
 from ....mechanism.mechanism import Vector
 from ...io.column_units import UNIT_NAMES
 from ...io.document import decimal, fault, shown, unknown_name, usable
-from ...sizes import SUSPENSIONS
+from ...notes import SUSPENSIONS
 from ...units import LENGTHS, Unit, plain
 
 _DIRECTIONS: Mapping[str, tuple[int, float]] = {

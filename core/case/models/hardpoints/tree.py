@@ -19,12 +19,12 @@ from ....mechanism.mechanism import Vector
 from ...io.document import fault, parse
 from ...io.yaml_document import parse_yaml
 from ...units import LENGTHS
-from .chrono import without_comments
 from .forms import FEWEST, axis_of, is_number
+from .programs import without_comments
+from .roles import compact, normal
 from .sections import Keys, chosen_points
 from .table import Hardpoint, HardpointTable, is_axes, length_name, number, twice
 from .templates import ROLES, TEMPLATES
-from .templates.base import compact, normal
 
 _LAST = ("position", "pos", "coordinates", "coords", "coord", "location", "loc", "xyz", "point")
 _NAMES = ("name", "id", "label", "point")

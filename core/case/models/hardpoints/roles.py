@@ -11,8 +11,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
-from .....joints import Joint
-from .....mechanism.mechanism import GROUND, Point, Vector
+from ....joints import Joint
+from ....mechanism.mechanism import GROUND, Point, Vector
 
 KNUCKLE = "knuckle"
 """The wheel carrier in every template."""
