@@ -10,7 +10,7 @@ import pytest
 from kincheck import cases
 from kincheck.core import CaseError
 from kincheck.core.case.case import HELD_BUT, ORDERS
-from kincheck.core.case.io.case_writer import case_text
+from kincheck.core.case.io.case_file import case_text
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
 from kincheck.core.case.models.hardpoints.templates import TEMPLATES, sample_table

@@ -10,7 +10,7 @@ from ..case import Case
 from ..io.case_file import LARGEST_FILE, load_case
 from ..io.document import fault, parse, read_text
 from ..io.reader_options import NOTHING, Supplied
-from ..io.workbook import WORKBOOKS
+from ..io.table import WORKBOOKS
 
 if TYPE_CHECKING:
     from .hardpoints.table import HardpointTable
@@ -146,9 +146,8 @@ def _model(file: Path, text: str, supplied: Supplied) -> Case:
 
 def _hardpoints(file: Path, kind: str, supplied: Supplied) -> HardpointTable:
     """Return the table of hardpoints of a file."""
-    from .hardpoints.plain import read_plain
     from .hardpoints.programs import read_adams, read_chrono
-    from .hardpoints.rows import read_spreadsheet
+    from .hardpoints.rows import read_plain, read_spreadsheet
     from .hardpoints.tree import read_tree
 
     if kind == WORKBOOK:

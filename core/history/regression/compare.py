@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from ...case.io.tolerance import DEFAULT_ATOL
+from ...case.io.outputs import DEFAULT_ATOL
 from ...harness.labels import UNMADE, motion_unit, number
 from ...harness.record import Outcome, OutputSeries, Record
 from ...trajectory import QUANTITIES

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...case.case import TIME, Case, Output, Sweep, Truth
-from ...case.io.tolerance import default
+from ...case.io.outputs import default
 from ...case.joint_probe import ATOL, WHY, probe, probes
 from ...case.measures import Axis, DriverEffort, ElementForce, ForceMeasure, JointForce, JointMoment
 from ...case.quantity import with_markers

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...case.case import Case
-from ...case.io.tolerance import default
+from ...case.io.outputs import default
 from ...case.measures import DriverEffort, ForceMeasure, JointForce, JointMoment
 from ...case.quantity import with_markers
 from ...errors import SolveError

@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ...case.case import Case, Quantity
-from ...case.io.document import decimal, fault, join
-from ...case.io.typed_tables import typed
+from ...case.io.document import decimal, fault, join, typed
 from ...case.units import ANGLES, LENGTHS, in_units
 from ...errors import KincheckError, remedy
 from ...trajectory import PER_TIME, QUANTITIES

@@ -11,8 +11,7 @@ from typing import TypeVar
 import numpy as np
 
 from ...case.case import Case
-from ...case.io.document import fault, join, shown
-from ...case.io.typed_tables import read_tables, typed
+from ...case.io.document import fault, join, read_tables, shown, typed
 from ...errors import unknown
 from ...joints import Kind
 from ...mechanism.drivers import PointCoordinate

@@ -17,8 +17,8 @@ from ....mechanism.mechanism import GROUND, Body, Mechanism, Point, Vector
 from ....mechanism.motions import Motion, Ramp, Table
 from ....trajectory import Array
 from ...case import Sweep
-from ...io.coordinates import AXES
 from ...io.document import decimal, fault, shown, unknown_name
+from ...io.outputs import AXES
 from ...io.reader_options import Supplied
 from ...io.schema import MOST_SAMPLES
 from ...suspension import Axle, Side

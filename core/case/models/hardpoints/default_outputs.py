@@ -16,10 +16,8 @@ from ....dual_numbers import Slope, derivatives
 from ....kinematics import places
 from ....mechanism.mechanism import Mechanism, Vector
 from ...case import Case, Hardpoint, Quantity, size
-from ...io.coordinates import with_all_coordinates
 from ...io.document import fault
-from ...io.suspension import with_slopes
-from ...io.tolerance import default
+from ...io.outputs import default, with_all_coordinates, with_slopes
 from ...quantity import with_markers
 from ...suspension import Convention, Side, SuspensionOutput, Vehicle
 from ...suspension.corner import MARKER_DISTANCE

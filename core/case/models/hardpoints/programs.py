@@ -10,7 +10,6 @@ from typing import Any, cast
 
 from ....errors import MOST_NAMED, remedy, shortened
 from ...io.document import fault, parse, shown
-from ...io.typed_tables import as_table
 from .table import Hardpoint, HardpointTable, number, require_name, twice
 
 BLOCK = "[HARDPOINT]"
@@ -171,7 +170,7 @@ def read_chrono(file: Path, text: str) -> HardpointTable:
             left_out.append(section)
             continue
         others: list[str] = []
-        for key, value in as_table(file, section, cast("object", content)).items():
+        for key, value in cast("dict[str, Any]", content).items():
             name = f"{section}/{key}"
             if key.startswith("Location") or name == WHEEL_CENTER:
                 points[name] = Hardpoint(_point(file, name, value), name)

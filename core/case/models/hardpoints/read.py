@@ -19,9 +19,9 @@ from ...io.reader_options import LEFT_OUT, Supplied
 from ...quantity import with_markers
 from .axle import one_wheel, read_car, read_travels, whole_axle
 from .default_outputs import far_out, hardpoints_of, wheel_of, with_axis, with_suspension_outputs
-from .roles import WHEEL_CONTACT, compact, side_of
+from .roles import WHEEL_CONTACT, Template, compact, side_of
 from .table import HardpointTable, axes_of, coordinate, placed, require_size, unit_of
-from .templates import TEMPLATES, Template
+from .templates import TEMPLATE_NAMES, TEMPLATES
 
 WHEEL = "wheel_center"
 # Inner joints of a rack near the middle may be a little beyond it. No point of a wheel's suspension
@@ -90,7 +90,7 @@ def case_of_hardpoints(table: HardpointTable, supplied: Supplied) -> Case:
 
 
 def _template(table: HardpointTable, said: str | None) -> Template:
-    known = {compact(name): each for each in TEMPLATES.values() for name in (each.name, *each.also)}
+    known = TEMPLATE_NAMES
     if said is not None and compact(said) not in known:
         raise unknown_name(table.file, "--template", said, TEMPLATES, "a template")
     names = ", ".join(TEMPLATES)

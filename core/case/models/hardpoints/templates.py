@@ -23,6 +23,7 @@ from .roles import (
     Template,
     arm_names,
     between,
+    compact,
     spring_bodies,
     spring_roles,
 )
@@ -450,6 +451,13 @@ TEMPLATES = {
     )
 }
 """Templates by name, as for --template."""
+
+TEMPLATE_NAMES = {
+    compact(name): template
+    for template in TEMPLATES.values()
+    for name in (template.name, *template.also)
+}
+"""Templates by all their names, in their compact form."""
 
 ROLES = frozenset(
     name
