@@ -22,7 +22,7 @@ from ...io.outputs import AXES
 from ...io.reader_options import Supplied
 from ...io.schema import MOST_SAMPLES
 from ...suspension import Axle, Side
-from .roles import TIEROD_INNER, WHEEL_CENTER, Template
+from .templates import TIEROD_INNER, WHEEL_CENTER, Template
 
 # The middle of the wheel travel of passenger cars, which is about 0.08 m each way; samples every
 # 2.5 mm.
@@ -218,7 +218,7 @@ def one_wheel(
         MechanismError: the places do not fit the mechanism.
     """
     joints = [*template.joints(at)]
-    drivers: list[Driver] = [PointCoordinate(STROKE, WHEEL_CENTER.name, AXES["z"])]
+    drivers: list[Driver] = [PointCoordinate(STROKE, WHEEL_CENTER, AXES["z"])]
     motions: dict[str, Motion] = {}
     if travels.rack is not None:
         _require_tie_rod(file, "--rack", "a travel", template)
@@ -267,7 +267,7 @@ def whole_axle(
             for point in template.points(places)
         ]
         name = name_of(side, STROKE)
-        drivers.append(PointCoordinate(name, name_of(side, WHEEL_CENTER.name), AXES["z"]))
+        drivers.append(PointCoordinate(name, name_of(side, WHEEL_CENTER), AXES["z"]))
     if steered:
         slide, driver = _rack(at)
         joints.append(slide)
@@ -294,7 +294,7 @@ def _require_tie_rod(file: Path, option: str, said: str, template: Template) -> 
 
 def _rack(at: Mapping[str, Vector]) -> tuple[Joint, Driver]:
     """Return the slide of the rack along y, and its driver."""
-    slide = Translational(SLIDE, GROUND, RACK, at[TIEROD_INNER.name], AXES["y"])
+    slide = Translational(SLIDE, GROUND, RACK, at[TIEROD_INNER], AXES["y"])
     return slide, JointDisplacement(RACK_TRAVEL, SLIDE)
 
 
@@ -321,7 +321,7 @@ def _named(side: Side, joint: Joint, template: Template) -> Joint:
 def _body(side: Side, role: str, body: str, *, steered: bool = False) -> str:
     """Return the body of a role on a side; the rack for the inner joint of a steered tie rod."""
     if body == GROUND:
-        return RACK if steered and role == TIEROD_INNER.name else GROUND
+        return RACK if steered and role == TIEROD_INNER else GROUND
     return name_of(side, body)
 
 

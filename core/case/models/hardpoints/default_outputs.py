@@ -23,8 +23,8 @@ from ...suspension import Convention, Side, SuspensionOutput, Vehicle
 from ...suspension.corner import MARKER_DISTANCE
 from ...suspension.wheel import Place
 from .axle import STROKE, AxleMotion, Car, name_of, read_length
-from .roles import WHEEL_AXIS, WHEEL_CENTER, WHEEL_CONTACT, Template, prefixed
 from .table import Axes, HardpointTable
+from .templates import WHEEL_AXIS, WHEEL_CENTER, WHEEL_CONTACT, Template
 
 WHEEL = ("toe", "camber")
 STEERING_AXIS = ("caster", "kingpin_inclination")
@@ -68,33 +68,33 @@ def wheel_of(
     Raises:
         CaseError: a length is unusable or contradicts the points, or the axis points inboard.
     """
-    center = at[WHEEL_CENTER.name]
-    if WHEEL_AXIS.name in at and at[WHEEL_AXIS.name][1] <= center[1]:
+    center = at[WHEEL_CENTER]
+    if WHEEL_AXIS in at and at[WHEEL_AXIS][1] <= center[1]:
         raise fault(
             table.file,
-            named[WHEEL_AXIS.name],
-            f"found a point inboard of {named[WHEEL_CENTER.name]}, expected one outboard;"
+            named[WHEEL_AXIS],
+            f"found a point inboard of {named[WHEEL_CENTER]}, expected one outboard;"
             " mirror it at the wheel's centre",
         )
-    contact = at.get(WHEEL_CONTACT.name)
+    contact = at.get(WHEEL_CONTACT)
     measured = None if contact is None else math.dist(center, contact)
     if radius is not None and measured is not None:
         raise fault(
             table.file,
             "--wheel-radius",
-            f"found {radius}, and the point {named[WHEEL_CONTACT.name]}, expected one of them;"
+            f"found {radius}, and the point {named[WHEEL_CONTACT]}, expected one of them;"
             " leave out --wheel-radius",
         )
     given = read_length(table.file, "wheel-radius", radius) if measured is None else measured
     if given is not None and not RADII[0] <= given <= RADII[1]:
-        where = "--wheel-radius" if measured is None else named[WHEEL_CONTACT.name]
+        where = "--wheel-radius" if measured is None else named[WHEEL_CONTACT]
         raise fault(
             table.file,
             where,
             f"found a wheel's radius of {given:.6g} m, expected {RADII[0]:g} to {RADII[1]:g} m;"
             " correct it",
         )
-    by_points = WHEEL_AXIS.name in at, contact is not None
+    by_points = WHEEL_AXIS in at, contact is not None
     toe, camber = (0.0, 0.0) if by_points[0] else (table.static_toe, table.static_camber)
     return Wheel(given, toe, camber, by_points)
 
@@ -103,17 +103,17 @@ def far_out(at: Mapping[str, Vector]) -> float:
     """Return the factor from the distance of the given point of the wheel's axis to the distance of
     markers from the wheel's centre: directions then keep all digits of positions.
     """
-    axis = at.get(WHEEL_AXIS.name)
-    return 1.0 if axis is None else MARKER_DISTANCE / math.dist(at[WHEEL_CENTER.name], axis)
+    axis = at.get(WHEEL_AXIS)
+    return 1.0 if axis is None else MARKER_DISTANCE / math.dist(at[WHEEL_CENTER], axis)
 
 
 def with_axis(at: Mapping[str, Vector], far: float) -> Mapping[str, Vector]:
     """Return the positions by role with the point of the wheel's axis so many times as far out."""
-    if WHEEL_AXIS.name not in at:
+    if WHEEL_AXIS not in at:
         return at
-    center = vec(at[WHEEL_CENTER.name])
-    place = center + far * (vec(at[WHEEL_AXIS.name]) - center)
-    return {**at, WHEEL_AXIS.name: (place.x, place.y, place.z)}
+    center = vec(at[WHEEL_CENTER])
+    place = center + far * (vec(at[WHEEL_AXIS]) - center)
+    return {**at, WHEEL_AXIS: (place.x, place.y, place.z)}
 
 
 def with_suspension_outputs(
@@ -168,23 +168,27 @@ def with_suspension_outputs(
 def _vehicle(side: Side, template: Template, wheel: Wheel, car: Car, axle: bool) -> Vehicle:
     """Return the vehicle with the wheel of a side."""
     prefix, (axis, contact) = f"{side}_" if axle else "", wheel.by_points
+    kingpin: list[Any] = [
+        prefix + each if isinstance(each, str) else tuple(prefix + end for end in each)
+        for each in template.kingpin
+    ]
     return Vehicle(
         convention=Convention.ISO_8855,
         side=side,
         forward=(1.0, 0.0, 0.0),
         up=(0.0, 0.0, 1.0),
-        wheel_center=prefix + WHEEL_CENTER.name,
+        wheel_center=prefix + WHEEL_CENTER,
         static_toe=wheel.toe,
         static_camber=wheel.camber,
-        wheel_axis=prefix + WHEEL_AXIS.name if axis else None,
+        wheel_axis=prefix + WHEEL_AXIS if axis else None,
         wheel_radius=wheel.radius,
-        wheel_contact=prefix + WHEEL_CONTACT.name if contact else None,
+        wheel_contact=prefix + WHEEL_CONTACT if contact else None,
         axle=car.position,
         wheelbase=car.wheelbase,
         cg_height=car.cg_height,
         brake_share=car.brake_share,
         drive_share=car.drive_share,
-        kingpin=prefixed(prefix, template.kingpin),
+        kingpin=tuple(kingpin) or None,
     )
 
 

@@ -19,11 +19,17 @@ from ...io.reader_options import LEFT_OUT, Supplied
 from ...quantity import with_markers
 from .axle import one_wheel, read_car, read_travels, whole_axle
 from .default_outputs import far_out, hardpoints_of, wheel_of, with_axis, with_suspension_outputs
-from .roles import WHEEL_CONTACT, Template, compact, side_of
 from .table import HardpointTable, axes_of, coordinate, placed, require_size, unit_of
-from .templates import TEMPLATE_NAMES, TEMPLATES
+from .templates import (
+    TEMPLATE_NAMES,
+    TEMPLATES,
+    WHEEL_CENTER,
+    WHEEL_CONTACT,
+    Template,
+    compact,
+    side_of,
+)
 
-WHEEL = "wheel_center"
 # Inner joints of a rack near the middle may be a little beyond it. No point of a wheel's suspension
 # is farther beyond the middle than this share of the half track.
 ACROSS = 0.25
@@ -192,21 +198,21 @@ def _require_left_and_upright(
         return coordinate(table, named[role], k, supplied.units, supplied.axes)
 
     advice = "correct --axes" if table.axes is None else "correct the points"
-    if at[WHEEL][1] <= 0.0:
+    if at[WHEEL_CENTER][1] <= 0.0:
         raise fault(
             table.file,
-            named[WHEEL],
-            f"found {written(WHEEL, 1)}, not left of the middle, expected the left side; {advice},"
-            " or give the left points; those of the right side are read as left ones if --axes"
-            " says left for right",
+            named[WHEEL_CENTER],
+            f"found {written(WHEEL_CENTER, 1)}, not left of the middle, expected the left side;"
+            f" {advice}, or give the left points; those of the right side are read as left ones if"
+            " --axes says left for right",
         )
-    across = [role for role, (_, y, _) in at.items() if y < -ACROSS * at[WHEEL][1]]
+    across = [role for role, (_, y, _) in at.items() if y < -ACROSS * at[WHEEL_CENTER][1]]
     for role in across[:1]:
         raise fault(
             table.file,
             named[role],
-            f"found {written(role, 1)}, on the other side than {named[WHEEL]} with"
-            f" {written(WHEEL, 1)}, expected all points on one side; correct its sign",
+            f"found {written(role, 1)}, on the other side than {named[WHEEL_CENTER]} with"
+            f" {written(WHEEL_CENTER, 1)}, expected all points on one side; correct its sign",
         )
     arms = [(f"{role.removesuffix('_rear')}_front", role) for role in at if role.endswith("_rear")]
     for front, rear in (*arms, *template.ahead):
@@ -217,7 +223,7 @@ def _require_left_and_upright(
                 f"found {written(front, 0)}, and {named[rear]} with {written(rear, 0)}, expected it"
                 f" in front of that; {advice}",
             )
-    for high, low in (*template.above, (WHEEL, WHEEL_CONTACT.name)):
+    for high, low in (*template.above, (WHEEL_CENTER, WHEEL_CONTACT)):
         if low in at and at[high][2] <= at[low][2]:
             raise fault(
                 table.file,

@@ -32,9 +32,8 @@ from ...io.table import (
     trimmed,
 )
 from ...units import LENGTHS
-from .roles import compact
 from .table import Hardpoint, HardpointTable, length_name, number, one_unit, require_name, twice
-from .templates import ROLES
+from .templates import ROLES, compact
 from .tree import FEWEST, axis_of, fact_of, is_assignments, read_assignments
 
 COMMENTS = ("#", "%", "//")

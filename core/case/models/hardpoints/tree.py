@@ -23,9 +23,8 @@ from ...io.document import fault, parse, parse_yaml, shown
 from ...io.table import is_number
 from ...units import LENGTHS
 from .programs import without_comments
-from .roles import compact, normal
 from .table import Hardpoint, HardpointTable, is_axes, length_name, number, one_unit, twice
-from .templates import ROLES, TEMPLATE_NAMES
+from .templates import ROLES, TEMPLATE_NAMES, compact, normal
 
 FEWEST = 3
 """Fewest points, rows or assignments to recognise a form."""
