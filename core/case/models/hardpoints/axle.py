@@ -1,10 +1,11 @@
-"""Mechanism and motion of a template: one wheel, or both of an axle with a rack between them; the
-travels and the data of the vehicle that options state.
+"""Mechanism and motion of a template: one wheel, or both of an axle with a rack between them; and
+the travels that options state.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
@@ -19,9 +20,8 @@ from ....trajectory import Array
 from ...case import Sweep
 from ...io.document import decimal, fault, shown, unknown_name
 from ...io.outputs import AXES
-from ...io.reader_options import Supplied
 from ...io.schema import MOST_SAMPLES
-from ...suspension import Axle, Side
+from ...suspension import Side
 from .templates import TIEROD_INNER, WHEEL_CENTER, Template
 
 # The middle of the wheel travel of passenger cars, which is about 0.08 m each way; samples every
@@ -61,137 +61,44 @@ def read_travels(file: Path, travel: str | None, rack: str | None) -> Travels:
     Raises:
         CaseError: an option is not a travel.
     """
-    if travel is None:
-        return Travels(np.linspace(-TRAVEL, TRAVEL, SAMPLES), _ends(file, rack))
-    parts = travel.split(":")
-    samples = SAMPLES
-    try:
-        if len(parts) > 1:
-            samples = int(parts.pop())
-        ends = _interval([decimal(each) for each in parts])
-    except ValueError:
-        ends = None
-    if ends is None or ends[0] == ends[1] or not 1 < samples <= MOST_SAMPLES:
-        raise fault(
-            file,
-            "--travel",
-            f"found {shown(travel)}, expected METRES or METRES:SAMPLES, 2 to {MOST_SAMPLES} of"
-            f" them, or START:STOP:SAMPLES, up to {FARTHEST:g} m; say --travel 0.05 for 50 mm up"
-            " and down",
-        )
-    return Travels(np.linspace(*ends, samples), _ends(file, rack))
-
-
-def _ends(file: Path, rack: str | None) -> tuple[float, float] | None:
-    """Return the first and the last travel of the rack."""
-    if rack is None:
-        return None
-    try:
-        ends = _interval([decimal(each) for each in rack.split(":")])
-    except ValueError:
-        ends = None
-    if ends is None:
+    wheel, samples = (-TRAVEL, TRAVEL), SAMPLES
+    if travel is not None:
+        parts = travel.split(":")
+        count = parts.pop() if len(parts) > 1 else str(SAMPLES)
+        ends = _interval(parts)
+        with suppress(ValueError):
+            samples = int(count)
+        if ends is None or ends[0] == ends[1] or not 1 < samples <= MOST_SAMPLES:
+            raise fault(
+                file,
+                "--travel",
+                f"found {shown(travel)}, expected METRES or METRES:SAMPLES, 2 to {MOST_SAMPLES} of"
+                f" them, or START:STOP:SAMPLES, up to {FARTHEST:g} m; say --travel 0.05 for 50 mm"
+                " up and down",
+            )
+        wheel = ends
+    ends = None if rack is None else _interval(rack.split(":"))
+    if rack is not None and ends is None:
         raise fault(
             file,
             "--rack",
             f"found {shown(rack)}, expected METRES or START:STOP, up to {FARTHEST:g} m; say --rack"
             " 0.04 for 40 mm to the right, then to the left",
         )
-    return ends
+    return Travels(np.linspace(*wheel, samples), ends)
 
 
-def _interval(numbers: list[float]) -> tuple[float, float] | None:
+def _interval(parts: Sequence[str]) -> tuple[float, float] | None:
     """Return the ends of METRES, which goes both ways, or of START:STOP; None for another text."""
+    try:
+        numbers = [decimal(each) for each in parts]
+    except ValueError:
+        return None
     if len(numbers) == 1 and numbers[0] > 0.0:
         numbers = [-numbers[0], numbers[0]]
     if len(numbers) != 2 or not all(abs(each) <= FARTHEST for each in numbers):
         return None
     return numbers[0], numbers[1]
-
-
-@dataclass(frozen=True)
-class Car:
-    """Data of the vehicle; None if unknown.
-
-    Attributes:
-        position: the axle of the hardpoints.
-        wheelbase, cg_height: wheelbase, and height of the centre of gravity above the road [m].
-        brake_share, drive_share: shares of the braking and driving force at this axle [-].
-    """
-
-    position: Axle | None = None
-    wheelbase: float | None = None
-    cg_height: float | None = None
-    brake_share: float | None = None
-    drive_share: float | None = None
-
-    @property
-    def anti_outputs(self) -> Iterator[str]:
-        """Yield the types of the outputs defined by these data, for a wheel of known radius."""
-        if self.position is None:
-            return
-        yield "wheelbase_change"
-        if self.wheelbase is None or self.cg_height is None:
-            return
-        if self.brake_share is not None:
-            yield "anti_dive" if self.position is Axle.FRONT else "anti_lift"
-        if self.drive_share is not None and self.position is Axle.REAR:
-            yield "anti_squat"
-
-
-def read_car(file: Path, supplied: Supplied) -> Car:
-    """Return the vehicle stated by options.
-
-    Raises:
-        CaseError: an option is not a length, a share, or an axle.
-    """
-    position = supplied.position
-    if position is not None and position not in list(Axle):
-        raise unknown_name(file, "--position", position, [*Axle], "an axle")
-    return Car(
-        None if position is None else Axle(position),
-        read_length(file, "wheelbase", supplied.wheelbase),
-        read_length(file, "cg-height", supplied.cg_height),
-        _share(file, "brake-share", supplied.brake_share),
-        _share(file, "drive-share", supplied.drive_share),
-    )
-
-
-def read_length(file: Path, option: str, text: str | None) -> float | None:
-    """Return the length stated by an option [m].
-
-    Raises:
-        CaseError: the text is not a length, or the length is not positive.
-    """
-    if text is None:
-        return None
-    try:
-        found = decimal(text)
-    except ValueError:
-        raise fault(
-            file,
-            f"--{option}",
-            f"found {shown(text)}, expected metres; say --{option} 0.3",
-        ) from None
-    if not 0.0 < found < float("inf"):
-        raise fault(file, f"--{option}", f"found {found:.6g} m, expected a length; correct it")
-    return found
-
-
-def _share(file: Path, option: str, text: str | None) -> float | None:
-    if text is None:
-        return None
-    try:
-        found = decimal(text)
-    except ValueError:
-        found = float("nan")
-    if not 0.0 <= found <= 1.0:
-        raise fault(
-            file,
-            f"--{option}",
-            f"found {shown(text)}, expected the part of a force, 0 to 1; say --{option} 0.6",
-        )
-    return found
 
 
 RACK, SLIDE, RACK_TRAVEL, STROKE = "rack", "rack_slide", "rack_travel", "stroke"

@@ -17,8 +17,8 @@ from ...io.document import explained, fault, parse, read_text, shown, unknown_na
 from ...io.escape import visible
 from ...io.reader_options import LEFT_OUT, Supplied
 from ...quantity import with_markers
-from .axle import one_wheel, read_car, read_travels, whole_axle
-from .default_outputs import far_out, hardpoints_of, wheel_of, with_axis, with_suspension_outputs
+from .axle import one_wheel, read_travels, whole_axle
+from .default_outputs import far_out, hardpoints_of, vehicle_of, with_axis, with_suspension_outputs
 from .table import HardpointTable, axes_of, coordinate, placed, require_size, unit_of
 from .templates import (
     TEMPLATE_NAMES,
@@ -61,8 +61,7 @@ def case_of_hardpoints(table: HardpointTable, supplied: Supplied) -> Case:
     named = _filled(table, template, supplied.names)
     at = {role: points[name] for role, name in named.items()}
     require_size(table, at, supplied.units)
-    wheel = wheel_of(table, named, at, supplied.wheel_radius)
-    car = read_car(file, supplied)
+    vehicle = vehicle_of(table, template, named, at, supplied)
     travels = read_travels(file, supplied.travel, supplied.rack)
     _require_left_and_upright(table, template, named, at, supplied)
     far = far_out(at)
@@ -80,13 +79,13 @@ def case_of_hardpoints(table: HardpointTable, supplied: Supplied) -> Case:
         f"{table.tool} hardpoints of {file.name} on the template {template.name},"
         f" {'left side' if supplied.axle is None else 'both sides'}, x forward, y left, z up"
     )
-    if wheel.radius is None:
+    if vehicle.wheel_radius is None:
         source += "; without a wheel's radius (--wheel-radius) no outputs at the road"
     source += f"{LEFT_OUT}{_listed(others)}"
     case = Case(file.stem, source, Truth.CONSENSUS_ONLY, mechanism, sweep, ())
     case = replace(case, length_unit=unit_of(table, supplied.units).name)
     case = with_suspension_outputs(
-        case, template, wheel, car, at, supplied.axle, steered=supplied.rack is not None
+        case, template, vehicle, at, supplied.axle, steered=supplied.rack is not None
     )
     axes = axes_of(table, supplied.axes)
     hardpoints = hardpoints_of(

@@ -14,7 +14,7 @@ import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 from ....errors import CaseError, unknown
 from ....joints import Distance, Joint
@@ -24,7 +24,6 @@ KNUCKLE = "knuckle"
 """The wheel carrier in every template."""
 WHEEL_CENTER, WHEEL_CONTACT, WHEEL_AXIS = "wheel_center", "wheel_contact", "wheel_axis"
 TIEROD_INNER = "tierod_inner"
-Kingpin: TypeAlias = Sequence[str] | Sequence[Sequence[str]]
 
 _SIDES = (
     re.compile(r"(?P<name>.+?)_(?P<side>left|right|l|r|fl|fr|rl|rr)"),
@@ -85,10 +84,10 @@ class Template:
     sample: Mapping[str, Vector]
     springs: Mapping[str, tuple[str, str]]
     bodies: Mapping[str, str]
-    above: Sequence[tuple[str, str]] = ()
-    ahead: Sequence[tuple[str, str]] = ()
-    kingpin: Kingpin = ()
-    steered: str = ""
+    above: Sequence[tuple[str, str]]
+    ahead: Sequence[tuple[str, str]]
+    kingpin: tuple[str, str] | tuple[tuple[str, str], ...] | None
+    steered: str
 
     def joints(self, at: Mapping[str, Vector]) -> list[Joint]:
         """Return the joints for the places of the roles; they name the bodies."""
@@ -106,7 +105,14 @@ class Template:
 
     def points(self, at: Mapping[str, Vector]) -> list[Point]:
         """Return the points for outputs, from the roles with a place."""
-        read = [*self.watched, *flattened(self.kingpin)]
+        read = [
+            *self.watched,
+            *(
+                role
+                for each in self.kingpin or ()
+                for role in ([each] if isinstance(each, str) else each)
+            ),
+        ]
         read += [role for ends in self.springs.values() if all(map(at.get, ends)) for role in ends]
         read += [role for role in (WHEEL_CONTACT, WHEEL_AXIS) if role in at]
         return [
@@ -146,11 +152,6 @@ def side_of(name: str) -> tuple[str, str]:
     return plain, ""
 
 
-def flattened(kingpin: Kingpin) -> list[str]:
-    """Return the roles of a steering axis."""
-    return [role for each in kingpin for role in ([each] if isinstance(each, str) else each)]
-
-
 def _further_names(role: str) -> Iterable[str]:
     """Yield names of wishbones and tie rods in tables of Adams/Car, Lotus Suspension Analysis,
     suspension-explorer, OptimumK and others.
@@ -185,12 +186,18 @@ def _read_templates() -> dict[str, Template]:
         wanted = roles(keys["roles"])
         optional = roles({**common["optional"], **keys.get("optional", {})})
         known = [role.name for role in (*wanted, *optional)]
+        kingpin: Any = tuple(
+            each if isinstance(each, str) else tuple(each) for each in keys.get("kingpin", ())
+        )
         templates[name] = Template(
             *(name, own["also"], wanted, optional, keys["joints"], keys["watched"]),
             sample={role: place for role, place in keys["sample"].items() if role in known},
             springs=keys["springs"],
             bodies={**common["bodies"], **keys.get("bodies", {})},
-            **{key: keys[key] for key in ("above", "ahead", "kingpin", "steered") if key in keys},
+            above=keys.get("above", ()),
+            ahead=keys.get("ahead", ()),
+            kingpin=kingpin or None,
+            steered=keys.get("steered", ""),
         )
     return templates
 
