@@ -69,35 +69,28 @@ IMPORTS = {
         "kinematics/continuation kinematics/verified kinematics/blocks "
         "kinematics/diagnosis"
     ),
-    "case/models/hardpoints/templates": "joints mechanism",
     "case": ". joints mechanism kinematics",
     "case/suspension": ". mechanism case",
-    "case/measures": ". joints mechanism kinematics case",
-    "case/io": ". joints mechanism kinematics case case/suspension case/measures",
-    "case/models/hardpoints": (
-        ". joints mechanism kinematics case/models/hardpoints/templates case case/suspension "
-        "case/io"
-    ),
+    "case/io": ". joints mechanism kinematics case case/suspension",
+    "case/models/hardpoints": (". joints mechanism kinematics case case/suspension case/io"),
     "case/models/mjcf": ". joints mechanism kinematics case case/io",
     "case/models/robots": ". joints mechanism case/io case/models/mjcf",
     "case/models": ". case case/io case/models/hardpoints case/models/mjcf case/models/robots",
-    "harness": (
-        ". program/llvm joints mechanism kinematics case case/suspension case/measures case/io"
-    ),
+    "harness": (". program/llvm joints mechanism kinematics case case/suspension case/io"),
     "harness/workers": ". harness",
     "harness/reporting": "",
     "history": ". case case/io harness",
     "report": ". joints mechanism case case/io harness history",
     "studies/variation": ". joints mechanism kinematics case case/io",
-    "studies/truth": ". program mechanism kinematics case case/measures",
-    "studies/stress/families": ". joints mechanism case case/measures case/io studies/truth",
-    "studies": ". program joints kinematics case case/measures case/io harness report",
+    "studies/truth": ". program mechanism kinematics case",
+    "studies/stress/families": ". joints mechanism case case/io studies/truth",
+    "studies": ". program joints kinematics case case/io harness report",
     "studies/checks": (
-        ". primitives program joints mechanism kinematics case case/measures case/io "
+        ". primitives program joints mechanism kinematics case case/io "
         "harness harness/workers report"
     ),
     "studies/tolerance": (
-        ". mechanism kinematics case case/measures case/io harness "
+        ". mechanism kinematics case case/io harness "
         "harness/workers history report studies/variation"
     ),
     "studies/stress": (
@@ -111,7 +104,7 @@ IMPORTS = {
         "studies/variation studies studies/tolerance studies/paper"
     ),
     "cli": (
-        ". program program/llvm joints kinematics case/models/hardpoints/templates case "
+        ". program program/llvm joints kinematics case "
         "case/io case/models/hardpoints case/models harness harness/workers history "
         "report studies/variation studies/stress/families studies "
         "studies/checks studies/tolerance studies/stress "

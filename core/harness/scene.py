@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 
 from ..case.case import MARKER, Case
-from ..case.measures.force import DriverEffort, JointForce
+from ..case.measures import DriverEffort, JointForce
 from ..case.suspension import SuspensionOutput
 from ..errors import KincheckError
 from ..joints import Kind

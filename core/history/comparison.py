@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 
 import msgspec
 
-from ..case.io.tolerance import DEFAULT_ATOL
+from ..case.io.outputs import DEFAULT_ATOL
 from ..harness.labels import UNMADE, motion_unit, number
 from ..harness.record import Deviation, Outcome, OutputSeries, Record
 from ..trajectory import QUANTITIES

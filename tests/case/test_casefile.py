@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from kincheck.core.case.case import Case, Truth
 from kincheck.core.case.io.case_file import load_case
-from kincheck.core.case.io.tolerance import DEFAULT_ATOL, DEFAULT_RTOL, DEFAULT_WHY
+from kincheck.core.case.io.outputs import DEFAULT_ATOL, DEFAULT_RTOL, DEFAULT_WHY
 from kincheck.core.joints import Distance, Joint, Spherical
 from kincheck.core.joints.base import length, position
 

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 import msgspec
 from kincheck.core.case.io import schema
 from kincheck.core.case.io.catalogue import catalogue, rows_of
-from kincheck.core.case.io.class_keys import driver_keys, joint_keys, motion_keys
-from kincheck.core.case.io.driving import DRIVERS
-from kincheck.core.case.io.loads import force_keys
+from kincheck.core.case.io.mechanism_sections import DRIVERS
+from kincheck.core.case.io.schema import keys_of
 from kincheck.core.cli import main
 from kincheck.core.errors import MechanismError
 from kincheck.core.joints import Coupler, Joint, Spherical
@@ -52,10 +51,10 @@ def test_every_type_is_printed(capsys):
 
 def test_every_key_is_printed():
     for registry, keys in (
-        (Joint.registry | Coupler.registry, joint_keys),
-        (DRIVERS, driver_keys),
-        (Motion.registry, motion_keys),
-        (ELEMENTS, force_keys),
+        (Joint.registry | Coupler.registry, keys_of),
+        (DRIVERS, keys_of),
+        (Motion.registry, keys_of),
+        (ELEMENTS, keys_of),
     ):
         for name, cls in registry.items():
             for key in set(keys(cls).__struct_fields__) - {"type", "bodies", "joints", "motion"}:
@@ -137,7 +136,7 @@ def test_every_key_of_a_file_is_in_the_reference_that_is_printed(capsys):
         if issubclass(each, msgspec.Struct) and each is not msgspec.Struct
     ]
     assert len(keys) >= 8
-    keys += [*map(force_keys, ELEMENTS.values())]
+    keys += [*map(keys_of, ELEMENTS.values())]
     for name in [name for each in keys for name in msgspec.structs.fields(each)]:
         assert re.search(rf"[\[( ]{name.encode_name}\b", said), name.encode_name
     assert "kincheck-case/1" in said

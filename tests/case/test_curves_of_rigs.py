@@ -10,8 +10,7 @@ from kincheck.adapters.native import Native
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.io.reference_curve import CurveOptions, with_curve
 from kincheck.core.case.models.files import load
-from kincheck.core.case.models.hardpoints.sample_table import sample_table
-from kincheck.core.case.models.hardpoints.templates import TEMPLATES
+from kincheck.core.case.models.hardpoints.templates import TEMPLATES, sample_table
 from kincheck.core.cli.main import main
 from kincheck.core.errors import CaseError
 from kincheck.core.harness.record import Outcome

@@ -11,8 +11,7 @@ from itertools import product
 import numpy as np
 import pytest
 from kincheck import adapters
-from kincheck.core.case.io.case_file import load_case
-from kincheck.core.case.io.case_writer import case_text
+from kincheck.core.case.io.case_file import case_text, load_case
 from kincheck.core.case.quantity import with_markers
 from kincheck.core.errors import CaseError
 from kincheck.core.forces import Multipliers

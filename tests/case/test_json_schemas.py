@@ -10,7 +10,7 @@ import msgspec
 import pytest
 from kincheck.core import Joint
 from kincheck.core.case.io.case_file import load_case
-from kincheck.core.case.io.json_schema import case_schema
+from kincheck.core.case.io.catalogue import case_schema
 from kincheck.core.cli import main
 from kincheck.core.cli.schema import SCHEMAS
 from kincheck.core.errors import CaseError

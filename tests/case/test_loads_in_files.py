@@ -8,9 +8,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from kincheck.core.case.case import Case, Sweep, Truth
-from kincheck.core.case.io.case_file import load_case
-from kincheck.core.case.io.case_writer import case_text
-from kincheck.core.case.io.coordinates import with_all_coordinates
+from kincheck.core.case.io.case_file import case_text, load_case
+from kincheck.core.case.io.outputs import with_all_coordinates
 from kincheck.core.cli.main import main
 from kincheck.core.mechanism.body import Body
 from kincheck.core.mechanism.loads import Force, SpringDamper, Torque, TorsionSpringDamper

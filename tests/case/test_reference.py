@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 from kincheck.core.case.case import Truth
-from kincheck.core.case.io import reference_table
+from kincheck.core.case.io import reference_samples
 from kincheck.core.case.io.case_file import load_case
 
 from ..support.case_texts import BASE, BY_FILE, CSV, INLINE, complains, edited, write
@@ -124,7 +124,7 @@ def test_references_below_the_folder_are_fine(tmp_path: Path):
 
 
 def test_a_large_reference_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(reference_table, "LARGEST_FILE", 20)
+    monkeypatch.setattr(reference_samples, "LARGEST_FILE", 20)
     write(tmp_path, CSV, "tip.csv")
     complains(write(tmp_path, BASE + BY_FILE), ["tip.csv", "larger than 20 bytes", "thin out"])
 

@@ -8,10 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 from kincheck.adapters.native import Native
-from kincheck.core.case.interpolation import bounded, interpolated, matched, slopes
+from kincheck.core.case.curves import (
+    Printed,
+    bounded,
+    even,
+    interpolated,
+    matched,
+    multiples,
+    slopes,
+)
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.notes import notes
-from kincheck.core.case.printed import Printed, even, multiples
 from kincheck.core.harness.compare import deviation
 from kincheck.core.harness.record import Outcome, from_json, to_json
 from kincheck.core.harness.run import run

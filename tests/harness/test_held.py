@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from kincheck.adapters import engine
-from kincheck.core.case.held import held_case
+from kincheck.core.case.closing import held_case
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.models.hardpoints.templates import TEMPLATES
 from kincheck.core.errors import CaseError

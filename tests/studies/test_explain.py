@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from kincheck import cases
 from kincheck.core import Distance, Point, Revolute
-from kincheck.core.case.io.case_writer import case_text
+from kincheck.core.case.io.case_file import case_text
 from kincheck.core.case.models.files import load
 from kincheck.core.cli.main import main
 from kincheck.core.harness.program_account import explain

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from kincheck.adapters import engine
 from kincheck.core.caches import clear_caches
-from kincheck.core.case.io.case_file import load_case
-from kincheck.core.case.io.case_writer import case_text
+from kincheck.core.case.io.case_file import case_text, load_case
 from kincheck.core.errors import KincheckError, SolveError
 from kincheck.core.harness.execution import Answer, Pair
 from kincheck.core.studies.stress.families import Family

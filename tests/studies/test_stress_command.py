@@ -10,8 +10,7 @@ import pytest
 from kincheck import cases
 from kincheck.adapters.native import Native
 from kincheck.core import solve
-from kincheck.core.case.io.case_file import load_case
-from kincheck.core.case.io.case_writer import case_text
+from kincheck.core.case.io.case_file import case_text, load_case
 from kincheck.core.case.joint_probe import probes
 from kincheck.core.cli import main
 from kincheck.core.errors import CaseError

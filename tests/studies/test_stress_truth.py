@@ -9,7 +9,7 @@ import pytest
 from kincheck import cases
 from kincheck.core import solve
 from kincheck.core.case.case import Output, without_forces
-from kincheck.core.case.io.coordinates import with_all_coordinates
+from kincheck.core.case.io.outputs import with_all_coordinates
 from kincheck.core.case.joint_probe import probes
 from kincheck.core.errors import KincheckError
 from kincheck.core.joints import Spherical

@@ -12,7 +12,7 @@ import msgspec
 import numpy as np
 import pytest
 from kincheck.core.case.case import Case, Output, Sweep, Truth
-from kincheck.core.case.io.case_writer import case_text
+from kincheck.core.case.io.case_file import case_text
 from kincheck.core.cli.main import main
 from kincheck.core.harness.record import to_json
 from kincheck.core.joints import Distance, Revolute

@@ -3,7 +3,7 @@
 import numpy as np
 from kincheck.adapters.native import Native
 from kincheck.core.case.case import Case, Sweep, Truth
-from kincheck.core.case.io.suspension import with_slopes
+from kincheck.core.case.io.outputs import with_slopes
 from kincheck.core.case.quantity import with_markers
 from kincheck.core.case.suspension import (
     Convention,

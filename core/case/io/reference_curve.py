@@ -17,28 +17,28 @@ from ...errors import MOST_NAMED, brief, shortened
 from ...trajectory import Array
 from ..case import TIME, Case, Origin, Quantity, Truth
 from ..suspension import Convention
-from ..units import METRE, RADIAN, SECOND, Unit
-from .column_units import required_unit, unit_of_head
-from .curve_columns import MAP, Target, match, read_stated
+from ..units import METRE, RADIAN, SECOND, Convert, FileUnits, Unit
+from .columns import MAP, Target, match, read_stated, required_unit, unit_of_head
 from .document import decimal, fault, shown, unknown_name
 from .reference import compared
-from .reference_columns import (
+from .reference_file import sha256
+from .reference_samples import (
     Column,
     Columns,
-    Convert,
+    Samples,
     column_of,
     driver_unit,
+    head_of,
     known_columns,
+    read_table,
     require_positions,
+    samples_of,
 )
-from .reference_samples import Samples, sha256
-from .reference_table import from_table
 from .schema import MOST_SAMPLES
 
 # A rig may go farther than the sweep. Millimetres taken for metres are 1000 times as far, degrees
 # for radians 57 times.
 FARTHER = 20.0
-_SI: dict[str, Convert] = {"m": METRE, "rad": RADIAN, "1": float, "N": float, "N m": METRE}
 
 
 @dataclass(frozen=True)
@@ -71,25 +71,26 @@ def with_curve(case: Case, file: Path, options: CurveOptions) -> tuple[Case, lis
     """
     driver, known = case.sweep.driver, known_columns(case.outputs)
     stated = read_stated(file, options.columns, driver, known)
-    targets: list[Target] = []
-    left_out: list[str] = []
-
-    def choose(file: Path, where: str, heads: Sequence[str]) -> Sequence[int]:
-        found = match(file, where, heads, driver, known, stated)
-        targets[:] = found.values()
-        left_out[:] = [head for k, head in enumerate(heads) if head and k not in found]
-        return [*found]
-
-    samples = _stated_units(
-        from_table(file, options.sheet, "--reference-sheet NAME", choose), targets
+    table = read_table(file, options.sheet, "--reference-sheet NAME")
+    where, heads = head_of(table)
+    found = match(file, where, heads, driver, known, stated)
+    left_out = [head for k, head in enumerate(heads) if head and k not in found]
+    targets = [*found.values()]
+    samples = samples_of(table, [*found])
+    columns = zip(samples.columns, targets, strict=True)
+    samples = replace(
+        samples, columns=[f"{text} [{each.unit}]" if each.unit else text for text, each in columns]
     )
     unit, of = _columns(case, samples, targets)
     outputs = _with_accuracy(file, case.outputs, [*of], options.accuracy)
     convention, signs = _convention(outputs, [*of]), _signs(file, samples.signs, options.signs)
     if signs and convention not in ("", signs):
-        problem = f"found {shown(signs)}, expected {convention!r} as in the case; turn columns with"
-        advice = f' the opposite sign by {MAP} "COLUMN=-OUTPUT", and say --signs {convention}'
-        raise fault(file, "signs", problem + advice)
+        raise fault(
+            file,
+            "signs",
+            f"found {shown(signs)}, expected {convention!r} as in the case; turn columns with the"
+            f' opposite sign by {MAP} "COLUMN=-OUTPUT", and say --signs {convention}',
+        )
     bare = [text for text in samples.columns if not unit_of_head(file, "", text, known)[1]]
     driven = np.array([unit(row[0]) for _, row in samples.rows])
     if samples.columns[0] in bare:
@@ -98,30 +99,22 @@ def with_curve(case: Case, file: Path, options: CurveOptions) -> tuple[Case, lis
     if len(values) > MOST_SAMPLES:
         problem = f"found {len(values)} rows, expected {MOST_SAMPLES} at most"
         raise fault(file, "--at-reference", f"{problem}; thin them out")
-    origin = Origin((options.citation or "").strip(), file.name, sha256(file))
-    series, origin = compared(
-        samples, Columns(unit, driver, of), outputs, values, origin, options.own_samples
-    )
     assumed = bool(convention) and not signs
-    words = convention + " (assumed: the file names none)" * assumed
     case = replace(
         case,
         truth=Truth.THIRD_PARTY_DATA,
         sweep=replace(case.sweep, values=values),
         outputs=outputs,
-        reference=series,
-        origin=replace(origin, signs=words),
+        origin=Origin(
+            (options.citation or "").strip(),
+            file.name,
+            sha256(file),
+            signs=convention + " (assumed: the file names none)" * assumed,
+        ),
     )
-    return case, _notes(file, origin, left_out, bare, convention if assumed else "")
-
-
-def _stated_units(samples: Samples, targets: Sequence[Target]) -> Samples:
-    """Return samples whose heads have the units that the user states."""
-    heads = zip(samples.columns, targets, strict=True)
-    return replace(
-        samples,
-        columns=[f"{text} [{target.unit}]" if target.unit else text for text, target in heads],
-    )
+    case = compared(samples, Columns(unit, driver, of), case, own=options.own_samples)
+    assert case.origin is not None
+    return case, _notes(file, case.origin, left_out, bare, convention if assumed else "")
 
 
 def _columns(
@@ -138,7 +131,7 @@ def _columns(
         if k == 0:
             continue
         name, written = unit_of_head(samples.file, samples.header, text, known)
-        found = column_of(samples, k, written, known[target.name], _SI)
+        found = column_of(samples, k, written, known[target.name], FileUnits())
         words = found.unit
         if name != target.name:
             words += f", column {shown(text)}"

@@ -10,7 +10,7 @@ from ..case import Case
 from ..io.case_file import LARGEST_FILE, load_case
 from ..io.document import fault, parse, read_text
 from ..io.reader_options import NOTHING, Supplied
-from ..io.workbook import WORKBOOKS
+from ..io.table import WORKBOOKS
 
 if TYPE_CHECKING:
     from .hardpoints.table import HardpointTable
@@ -146,10 +146,8 @@ def _model(file: Path, text: str, supplied: Supplied) -> Case:
 
 def _hardpoints(file: Path, kind: str, supplied: Supplied) -> HardpointTable:
     """Return the table of hardpoints of a file."""
-    from .hardpoints.adams import read_adams
-    from .hardpoints.chrono import read_chrono
-    from .hardpoints.plain import read_plain
-    from .hardpoints.rows import read_spreadsheet
+    from .hardpoints.programs import read_adams, read_chrono
+    from .hardpoints.rows import read_plain, read_spreadsheet
     from .hardpoints.tree import read_tree
 
     if kind == WORKBOOK:
@@ -189,7 +187,7 @@ def kind_of(file: Path, supplied: Supplied = NOTHING) -> str:
 
 
 def _kind_of_json(file: Path, supplied: Supplied) -> str:
-    from .hardpoints.chrono import is_chrono, without_comments
+    from .hardpoints.programs import is_chrono, without_comments
     from .hardpoints.tree import has_points, json_tree
 
     text = without_comments(_text(file))

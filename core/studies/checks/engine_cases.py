@@ -11,10 +11,9 @@ import numpy as np
 from ... import primitives as p
 from ...algebra import ZERO, vec
 from ...case.case import TIME, Case, Quantity, Sweep, Truth
-from ...case.io.tolerance import default
+from ...case.io.outputs import default
 from ...case.joint_probe import coordinates, probe, probes
-from ...case.measures import DriverEffort, ElementForce, ForceMeasure, JointForce, JointMoment
-from ...case.measures.force import Axis
+from ...case.measures import Axis, DriverEffort, ElementForce, ForceMeasure, JointForce, JointMoment
 from ...case.quantity import with_markers
 from ...joints import Attachment, Fixed, Joint, Revolute, Translational
 from ...joints.base import directions, position, require_perpendicular, unit

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ...case.case import Case
-from ...case.io.tolerance import default
+from ...case.io.outputs import default
 from ...case.joint_probe import AXES
 from ...case.measures import DriverEffort, ForceMeasure, JointForce, JointMoment
 from ...case.quantity import with_markers

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from ...algebra import Vec3
 from ...case.case import Case, Quantity, size, without_forces
-from ...case.held import require_no_held
+from ...case.closing import require_no_held
 from ...case.measures import ForceMeasure
-from ...case.measures.turns import counted
+from ...case.turns import counted
 from ...errors import KincheckError
 from ...jet import Jet
 from ...kinematics import ForcesOfDesigns, NativeSolver, PreparedDesigns, Variants, placed

@@ -11,8 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ...case.case import Case, Quantity
-from ...case.io.document import decimal, fault, join, shown
-from ...case.io.typed_tables import read_tables, typed
+from ...case.io.document import decimal, fault, join, read_tables, shown, typed
 from ...case.units import ANGLES, LENGTHS, RADIAN, in_units
 from ...errors import KincheckError, remedy, unknown
 from ...joints import Kind

@@ -7,15 +7,17 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
 
 from ....errors import CaseError
 from ....mechanism.mechanism import Vector
-from ...io.column_units import UNIT_NAMES
+from ...io.columns import UNIT_NAMES
 from ...io.document import decimal, fault, shown, unknown_name, usable
-from ...sizes import SUSPENSIONS
+from ...io.table import numeral
+from ...notes import SUSPENSIONS
 from ...units import LENGTHS, Unit, plain
 
 _DIRECTIONS: Mapping[str, tuple[int, float]] = {
@@ -91,6 +93,26 @@ def twice(file: Path, where: str, name: str, before: str) -> CaseError:
     )
 
 
+def one_unit(file: Path, units: Mapping[str, str]) -> str:
+    """Return the only unit; empty without any.
+
+    Args:
+        units: places of coordinates by their unit.
+
+    Raises:
+        CaseError: there are several units.
+    """
+    if len(units) > 1:
+        first, other, *_ = units
+        raise fault(
+            file,
+            units[other],
+            f"found {shown(other)}, and {shown(first)} above, expected one unit; write all"
+            " coordinates in one",
+        )
+    return next(iter(units), "")
+
+
 def require_name(file: Path, where: str, name: str) -> None:
     """Refuse a name of a point that cannot be printed, or none."""
     if not name or not name.isprintable():
@@ -110,15 +132,8 @@ def number(file: Path, where: str, text: object, sign: str = ".") -> float:
     """
     found = math.nan
     if isinstance(text, str | int | float) and not isinstance(text, bool):
-        try:
-            # word processors write the typographic minus sign
-            found = (
-                decimal(text.replace(sign, ".").replace("\u2212", "-"))
-                if isinstance(text, str)
-                else float(text)
-            )
-        except (ValueError, OverflowError):
-            found = math.nan
+        with suppress(ValueError, OverflowError):
+            found = decimal(numeral(text, sign)) if isinstance(text, str) else float(text)
     if not usable(found):
         advice = next((advice for kind, advice in _ADVICE if kind.match(str(text))), "")
         raise fault(

@@ -23,8 +23,8 @@ from ....mechanism.motions import (
 )
 from ...case import Case, Sweep, Truth
 from ...closing import within_digits
-from ...io.coordinates import with_all_motions
 from ...io.document import explained, fault
+from ...io.outputs import with_all_motions
 from ...io.reader_options import LEFT_OUT, Supplied
 from .assembly import Assembled, assemble, size_of
 from .attributes import EXPANDED, MAKE_BODIES, ROOT, WRITE_OUT, require_known_attributes

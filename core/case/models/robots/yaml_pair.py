@@ -15,8 +15,7 @@ from pathlib import Path
 import msgspec
 
 from ....algebra import X
-from ...io.document import fault, shown, unknown_name
-from ...io.yaml_document import parse_yaml
+from ...io.document import fault, parse_yaml, shown, unknown_name
 from .robot import Connection, Described, Loop, Move, Robot
 
 _UNIVERSAL = re.compile(r"UJOINT_([XYZ])([XYZ])")

@@ -12,7 +12,7 @@ from typing import ClassVar
 import numpy as np
 
 from ....case.case import Case, Sweep, Truth
-from ....case.io.coordinates import with_all_coordinates
+from ....case.io.outputs import with_all_coordinates
 from ....failures import FailureKind
 from ....mechanism.mechanism import Mechanism
 from ....mechanism.motions import Motion
