@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..case.io.atomic_files import write
-from ..case.io.table_file import Kind, no_parquet, write_csv, write_parquet
+from ..case.io.table_file import WRITERS, Kind, lack
 from ..errors import KincheckError
 from .queries import entries_of
 from .store import Store
@@ -53,14 +53,15 @@ def export(
             f"--export {path}: ends in {path.suffix or 'nothing'!r}; give a file that ends in"
             f" {' or '.join(SUFFIXES)}"
         )
-    if suffix == ".parquet" and (lack := no_parquet(f"--export {path}", "or give a .csv")):
-        raise KincheckError(lack)
+    kind = suffix.removeprefix(".")
+    if missing := lack(kind, f"--export {path}", "or give a .csv"):
+        raise KincheckError(missing)
 
     def put(part: Path) -> int:
         chunks = _rows(store, cases, engines)
         (names,) = next(chunks)
         columns = {name: KINDS.get(name, Kind.TEXT) for name in names}
-        return (write_parquet if suffix == ".parquet" else write_csv)(part, columns, chunks)
+        return WRITERS[kind](part, columns, chunks)
 
     return write("--export", path, put)
 
