@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from functools import cache
 from pathlib import Path
 
-from kincheck.core.case.io import loads, schema
+from kincheck.core.case.io import schema
 from kincheck.core.case.io.catalogue import output_tables, type_tables
 from kincheck.core.cli.main import parser as parser_of
 from kincheck.core.studies.variation import variation_schema
