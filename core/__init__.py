@@ -120,8 +120,7 @@ _NAMES = {
     "errors": "CaseError KincheckError MechanismError SolveError UnknownNameError",
     "trajectory": "BodyMotion PointMotion Trajectory",
     "mechanism.mechanism": "GROUND Body Mechanism Point",
-    "mechanism.drivers": "JointAngle JointDisplacement PointCoordinate",
-    "mechanism.motions": "Ramp Sine Table",
+    "mechanism.motions": "JointAngle JointDisplacement PointCoordinate Ramp Sine Table",
     "joints": (
         "ConstantVelocity Cylindrical Distance Fixed Gear Inline InPlane "
         "Joint OrientationLock ParallelAxes PerpendicularAxes Planar Polynomial RackPinion "
