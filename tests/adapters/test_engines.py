@@ -51,6 +51,24 @@ def test_the_strut_is_the_truth_to_round_off(engine: str) -> None:
             assert each.max_abs <= STRUT[quantity]
 
 
+SHARED_ROWS = "points coincide (3 rows)", "points at constant distance (1 row)"
+CLOSED_BY = {
+    "mujoco": ("connect", "tendon"),
+    **dict.fromkeys(("pinocchio", "drake", "dart"), SHARED_ROWS),
+    "simbody": ("PointConstraint", "ConstantDistanceConstraint"),
+}
+
+
+@pytest.mark.parametrize("engine", TREES)
+def test_the_record_says_what_closes_the_loops(engine: str) -> None:
+    given, case = installed(engine), strut([0.0])
+    details = given.solve(given.build(case), case, TOL).details
+    assert details["closures"] == dict(
+        zip(("strut_top", "tie_rod"), CLOSED_BY[engine], strict=True)
+    )
+    assert details["unknowns"] == details["rank"] == 5
+
+
 @ENGINES
 def test_rates_are_those_of_the_sweep(engine: str) -> None:
     """Forty times as fast, and backwards; points of fixed bodies stay."""
