@@ -29,9 +29,10 @@ from ...core.mechanism.loads import Axes, Force, SpringDamper, Torque, TorsionSp
 from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
 from ..shared.constraints import BodyFrame, skew
+from ..shared.exudyn_joints import JOINTS
 from ..shared.force_solution import Dynamics, left_out_of, reacting
 from ..shared.projection_engine import ProjectionEngine, floor_of
-from .rows import JOINTS, NO_ROTATION, Rows, turned
+from .rows import NO_ROTATION, Rows, turned
 
 COMPUTED_BY = {
     "inverse dynamics": "ComputeMassMatrix, ComputeODE2RHS with LoadMassProportional",
