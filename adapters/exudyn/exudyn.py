@@ -29,9 +29,10 @@ from ...core.mechanism.loads import Axes, Force, SpringDamper, Torque, TorsionSp
 from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
 from ..shared.constraints import BodyFrame, skew
+from ..shared.exudyn_joints import JOINTS
 from ..shared.force_solution import Dynamics, left_out_of, reacting
 from ..shared.projection_engine import ProjectionEngine, floor_of
-from .rows import JOINTS, NO_ROTATION, Rows, turned
+from .rows import NO_ROTATION, Rows, turned
 
 COMPUTED_BY = {
     "inverse dynamics": "ComputeMassMatrix, ComputeODE2RHS with LoadMassProportional",
@@ -301,28 +302,21 @@ def _least() -> tuple[Any, Any, Any, Any]:
     return container, mbs, settings, solver
 
 
-class _Way:
-    """A motion of all nodes at constant rates: along lines and along great circles of the Euler
-    parameters, since Exudyn's rates are those of the rows only on the unit sphere.
+def _way(q: Array, v: Array, lengths: Array) -> tuple[Array, Array]:
+    """Return coordinates and rates of all nodes at n lengths of a motion at constant rates, shape
+    (n, coordinates) each.
 
-    Attributes:
-        turn: angle of the Euler parameters per unit of the way, by node.
+    The motion is along lines and along great circles of the Euler parameters, since Exudyn's rates
+    are those of the rows only on the unit sphere.
     """
-
-    def __init__(self, q: Array, v: Array) -> None:
-        self.q, self.v = q.reshape(-1, 7), v.reshape(-1, 7)
-        self.turn = np.sqrt((self.v[:, 3:] ** 2).sum(axis=1, keepdims=True))
-        self.p = self.q[:, 3:] + NO_ROTATION
-        self.d = self.v[:, 3:] / np.where(self.turn, self.turn, 1.0)
-
-    def at(self, s: Array) -> tuple[Array, Array]:
-        """Return coordinates and rates at n lengths of the way, shape (n, coordinates) each."""
-        s = s[:, None, None]
-        q, v = self.q + s * self.v, np.tile(self.v, (len(s), 1, 1))
-        c, d = np.cos(s * self.turn), np.sin(s * self.turn)
-        q[..., 3:] = c * self.p + d * self.d - NO_ROTATION
-        v[..., 3:] = self.turn * (c * self.d - d * self.p)
-        return q.reshape(len(s), -1), v.reshape(len(s), -1)
+    q, v, s = q.reshape(-1, 7), v.reshape(-1, 7), lengths[:, None, None]
+    turn = np.sqrt((v[:, 3:] ** 2).sum(axis=1, keepdims=True))
+    p, d = q[:, 3:] + NO_ROTATION, v[:, 3:] / np.where(turn, turn, 1.0)
+    cosine, sine = np.cos(s * turn), np.sin(s * turn)
+    coordinates, rates = q + s * v, np.empty((len(s), *v.shape))
+    coordinates[..., 3:] = cosine * p + sine * d - NO_ROTATION
+    rates[..., :3], rates[..., 3:] = v[:, :3], turn * (cosine * d - sine * p)
+    return coordinates.reshape(len(s), -1), rates.reshape(len(s), -1)
 
 
 class ExudynModel:
@@ -453,16 +447,15 @@ class ExudynModel:
         # the rate of the sweep.
         v, rates = v[: self.coordinates], v[self.coordinates :]
         speed = np.abs(v).max() or 1.0
-        way = _Way(self.q, v / speed)
-        bias = np.zeros(len(self.kept))
+        unit_rates, bias = v / speed, np.zeros(len(self.kept))
         for h in DIFFERENCES:
-            bias, low = (
-                WEIGHTS @ [self._rates(*each) for each in zip(*way.at(h * STEPS), strict=True)] / h
-            )
+            way = zip(*_way(self.q, unit_rates, h * STEPS), strict=True)
+            bias, low = WEIGHTS @ [self._rates(*each) for each in way] / h
             if np.abs(bias - low).max() <= AGREE * max(np.abs(bias).max(), 1.0):
                 break
         # the rows of the normalisation, |p|^2 = 1, stay satisfied on the way by its curvature alone
-        bias[len(bias) - len(way.turn) :] = 2.0 * way.turn[:, 0] ** 2
+        turns = unit_rates.reshape(-1, 7)[:, 3:]
+        bias[len(bias) - len(turns) :] = 2.0 * (turns**2).sum(axis=1)
         self.state.SetODE2Coordinates(self.q)
         bias *= speed**2
         for row, place, curve in self.bent:

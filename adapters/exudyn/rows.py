@@ -5,27 +5,13 @@ coordinates in a fixed ratio (screw, gear, rack and pinion) follow the same unkn
 two products whose difference a constant-velocity joint keeps at zero. A displacement is compared
 with its value. For an angle, the frame on the first body is turned by the value, and the row is the
 sine of the remaining angle: any number of turns can be followed, in steps of less than a quarter
-turn.
-
-Rows of Exudyn, measured on version 1.13.6 against rotation matrices; markers 0 and 1 are at p0 and
-p1, d = p1 - p0:
-
-    object                  constrained axes            rows
-    generic joint           some translations           those of x0 . d, y0 . d, z0 . d
-                            all translations            d, global
-                            rotations x, y              z0 . x1, z0 . y1
-                            rotations x, y, z           z0 . y1, z0 . x1, x0 . y1
-                            rotation z                  x0 . y1
-    revolute joint Z                                    d, z0 . x1, z0 . y1
-    prismatic joint X                                   y0 . d, z0 . d, z0 . y1, z0 . x1, x0 . y1
-
-A free axis of a generic joint gives an empty row, which is dropped.
+turn. The objects are those of `exudyn_joints`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -34,21 +20,14 @@ from numpy.polynomial import Polynomial
 
 from ...core import joints
 from ...core.joints.base import unit
+from ...core.mechanism.motions import Driver, JointDriver, PointCoordinate
 from ...core.mechanism.mechanism import GROUND, Body, Mechanism
-from ...core.mechanism.motions import (
-    Driver,
-    JointAngle,
-    JointDisplacement,
-    JointDriver,
-    PointCoordinate,
-)
 from ...core.trajectory import Array
+from ..shared.exudyn_joints import ABOUT_Z, X, objects_of
 from ..shared.poses import frame_along
 from ..shared.tree_forces import mass_properties
-from ..shared.tree_plan import middle
+from ..shared.tree_plan import ends_of, middle
 
-# Constrained axes of a generic joint.
-X, Y, Z, ABOUT_X, ABOUT_Y, ABOUT_Z = range(6)
 NO_ROTATION = (1.0, 0.0, 0.0, 0.0)
 
 
@@ -70,13 +49,14 @@ class Following:
     weight: float
 
 
-class Equations:
+class Rows:
     """The bodies of a mechanism and the equations between them, as objects of an Exudyn system.
 
     Attributes:
         bodies: Exudyn's number and the origin [m] of each body; fixed bodies are Exudyn's ground.
         nodes: numbers of the nodes, one for each moving body.
         rows: all equations, in order.
+        owned: the rows of each joint.
         following: the equations that follow a value.
         turning: rows that follow an angle, with their markers on the first and second body; the
             first marker turns about its z axis.
@@ -96,6 +76,18 @@ class Equations:
         self.bent: list[tuple[int, int, Polynomial]] = []
         self.values = len(mechanism.drivers)
         self._add_bodies()
+        self.owned: dict[str, slice] = {}
+        for joint in mechanism.joints:
+            first = len(self.rows)
+            self._join(joint)
+            self.owned[joint.name] = slice(first, len(self.rows))
+        for coupler in mechanism.couplers:
+            if coupler.curve:
+                self.curve(coupler.terms, coupler.curve)
+            else:
+                self.relate(coupler.terms)
+        for value, driver in enumerate(mechanism.drivers):
+            self.drive(driver, value)
 
     def _add_bodies(self) -> None:
         for body in self.mechanism.bodies:
@@ -164,6 +156,31 @@ class Equations:
         )
         return self.connect(item, axes, keeps)
 
+    def _join(self, joint: joints.Joint) -> None:
+        for each in objects_of(joint, ends_of(self.mechanism, joint)):
+            places = zip(joint.bodies, each.points, each.frames, strict=True)
+            markers = [self.marker(*place) for place in places]
+            item = getattr(self.items, each.kind)(markerNumbers=markers, **each.options)
+            self.connect(item, each.rows, each.keeps)
+        if isinstance(joint, joints.ConstantVelocity):
+            self._prevent_twist(joint)
+        for relation in joint.relations if isinstance(joint, joints.AxialJoint) else ():
+            self.relate([(joint.name, freedom, weight) for freedom, weight in relation.items()])
+
+    def _prevent_twist(self, joint: joints.ConstantVelocity) -> None:
+        h, k = (np.array(tuple(unit(axis))) for axis in joint.axes)
+        first = frame_along(joint.axes[0], 2)
+        # The shortest rotation from h to k is two reflections, in the planes normal to h and to
+        # h + k.
+        between = (h + k) / np.linalg.norm(h + k)
+        second = first - 2.0 * np.outer(between, between @ first)
+        second[:, 2] = k
+        i, j = self.marker(joint.i, joint.point, first), self.marker(joint.j, joint.point, second)
+        # x0 . y1 - x1 . y0 stays zero: both products follow the same unknown, which prevents twist
+        product, common = float(first[:, 0] @ second[:, 1]), self.unknown()
+        for markers in ((i, j), (j, i)):
+            self.follow(self.connect_generic(markers, (ABOUT_Z,), keeps=product), common)
+
     def coordinate(self, name: str, freedom: str) -> int:
         """Add a row for the rotation about or translation along a joint's axis; return its number.
 
@@ -189,182 +206,16 @@ class Equations:
         """Let a row follow a value."""
         self.following.append(Following(row, value, weight))
 
-
-def turned(angle: float) -> Array:
-    """Return the rotation about z by an angle [rad] as a homogeneous matrix, shape (4, 4)."""
-    frame = np.eye(4)
-    c, s = math.cos(angle), math.sin(angle)
-    frame[:2, :2] = [[c, -s], [s, c]]
-    return frame
-
-
-def _generic(*axes: int, along: int = 2) -> Callable[[Equations, Any], None]:
-    """Return the function for a joint that is a generic joint with these constrained axes; the
-    joint's axis is x (0), y or z of the frame.
-    """
-
-    def add(rows: Equations, joint: Any) -> None:
-        rows.connect_generic(
-            rows.markers(
-                joint, getattr(joint, "point", (0.0, 0.0, 0.0)), frame_along(joint.axis, along)
-            ),
-            axes,
-        )
-
-    return add
-
-
-def _spherical(rows: Equations, joint: joints.Spherical | joints.ConstantVelocity) -> None:
-    rows.connect(
-        rows.items.ObjectJointSpherical(markerNumbers=rows.markers(joint, joint.point)), range(3)
-    )
-
-
-def _revolute(rows: Equations, joint: joints.Revolute) -> None:
-    markers = rows.markers(joint, joint.point, frame_along(joint.axis, 2))
-    rows.connect(rows.items.ObjectJointRevoluteZ(markerNumbers=markers), range(5))
-
-
-def _translational(rows: Equations, joint: joints.Translational) -> None:
-    markers = rows.markers(joint, joint.point, frame_along(joint.axis, 0))
-    rows.connect(rows.items.ObjectJointPrismaticX(markerNumbers=markers), range(5))
-
-
-def _universal(rows: Equations, joint: joints.Universal) -> None:
-    _cross(rows, joint, joint.point, (X, Y, Z, ABOUT_Z))
-
-
-def _perpendicular_axes(rows: Equations, joint: joints.PerpendicularAxes) -> None:
-    _cross(rows, joint, (0.0, 0.0, 0.0), (ABOUT_Z,))
-
-
-def _cross(
-    rows: Equations,
-    joint: joints.Universal | joints.PerpendicularAxes,
-    point: Sequence[float],
-    axes: Sequence[int],
-) -> None:
-    # The last row is x0 . y1, the cosine of the cross: an angle rounded by a table is kept.
-    first, second = joint.axes
-    markers = [
-        rows.marker(joint.i, point, frame_along(first, 0)),
-        rows.marker(joint.j, point, frame_along(second, 1)),
-    ]
-    rows.connect_generic(markers, axes, keeps=unit(first) @ unit(second))
-
-
-def _constant_velocity(rows: Equations, joint: joints.ConstantVelocity) -> None:
-    _spherical(rows, joint)
-    h, k = (np.array(tuple(unit(axis))) for axis in joint.axes)
-    first = frame_along(joint.axes[0], 2)
-    # The shortest rotation from h to k is two reflections, in the planes normal to h and to h + k.
-    between = (h + k) / np.linalg.norm(h + k)
-    second = first - 2.0 * np.outer(between, between @ first)
-    second[:, 2] = k
-    i, j = rows.marker(joint.i, joint.point, first), rows.marker(joint.j, joint.point, second)
-    # x0 . y1 - x1 . y0 stays zero: both products follow the same unknown, which prevents twist
-    product, common = float(first[:, 0] @ second[:, 1]), rows.unknown()
-    for markers in ((i, j), (j, i)):
-        rows.follow(rows.connect_generic(markers, (ABOUT_Z,), keeps=product), common)
-
-
-def _distance(rows: Equations, joint: joints.Distance) -> None:
-    _rod(rows, joint, joint.rod_length)
-
-
-def _revolute_spherical(rows: Equations, joint: joints.RevoluteSpherical) -> None:
-    link = np.subtract(joint.points[1], joint.points[0])
-    _rod(rows, joint, float(np.linalg.norm(link)))
-    frame = frame_along(joint.axis, 0)
-    markers = [
-        rows.marker(body, point, frame)
-        for body, point in zip(joint.bodies, joint.points, strict=True)
-    ]
-    rows.connect_generic(markers, (X,), keeps=float(frame[:, 0] @ link))
-
-
-def _rod(rows: Equations, joint: joints.Distance | joints.RevoluteSpherical, length: float) -> None:
-    markers = [
-        rows.marker(body, point) for body, point in zip(joint.bodies, joint.points, strict=True)
-    ]
-    rows.connect(
-        rows.items.ObjectConnectorDistance(markerNumbers=markers, distance=length), range(1)
-    )
-
-
-def _fixed(rows: Equations, joint: joints.Fixed) -> None:
-    point = rows.bodies[joint.j][1] if joint.point is None else joint.point
-    rows.connect_generic(rows.markers(joint, point), range(6))
-
-
-def _orientation_lock(rows: Equations, joint: joints.OrientationLock) -> None:
-    rows.connect_generic(rows.markers(joint, (0.0, 0.0, 0.0)), (ABOUT_X, ABOUT_Y, ABOUT_Z))
-
-
-def _point_coordinate(rows: Equations, driver: PointCoordinate) -> int:
-    point, frame = rows.mechanism.point(driver.point), frame_along(driver.direction, 0)
-    return rows.connect_generic(
-        [rows.marker(body, point.position, frame) for body in (GROUND, point.body)], (X,)
-    )
-
-
-def _joint_driver(rows: Equations, driver: JointDriver) -> int:
-    return rows.coordinate(driver.joint, driver.freedom)
-
-
-# By exact type: a subclass may have another meaning.
-JOINTS: Mapping[type[joints.Joint], Callable[[Equations, Any], None]] = {
-    joints.ConstantVelocity: _constant_velocity,
-    joints.Cylindrical: _generic(X, Y, ABOUT_X, ABOUT_Y),
-    joints.Distance: _distance,
-    joints.Fixed: _fixed,
-    joints.InPlane: _generic(X, along=0),
-    joints.Inline: _generic(X, Y),
-    joints.OrientationLock: _orientation_lock,
-    joints.ParallelAxes: _generic(ABOUT_X, ABOUT_Y),
-    joints.PerpendicularAxes: _perpendicular_axes,
-    joints.Planar: _generic(Z, ABOUT_X, ABOUT_Y),
-    joints.Revolute: _revolute,
-    joints.RevoluteSpherical: _revolute_spherical,
-    joints.Screw: _generic(X, Y, ABOUT_X, ABOUT_Y),  # and its relation
-    joints.Spherical: _spherical,
-    joints.Translational: _translational,
-    joints.Universal: _universal,
-}
-DRIVERS: Mapping[type[Driver], Callable[[Equations, Any], int]] = {
-    JointAngle: _joint_driver,
-    JointDisplacement: _joint_driver,
-    PointCoordinate: _point_coordinate,
-}
-
-
-class Rows(Equations):
-    """The equations of all joints, couplers and drivers of a mechanism.
-
-    Attributes:
-        owned: the rows of each joint.
-    """
-
-    def __init__(self, mbs: Any, items: Any, mechanism: Mechanism, *, loaded: bool = False) -> None:
-        super().__init__(mbs, items, mechanism, loaded=loaded)
-        self.owned: dict[str, slice] = {}
-        for joint in mechanism.joints:
-            first = len(self.rows)
-            JOINTS[type(joint)](self, joint)
-            for relation in joint.relations if isinstance(joint, joints.AxialJoint) else ():
-                self.relate([(joint.name, freedom, weight) for freedom, weight in relation.items()])
-            self.owned[joint.name] = slice(first, len(self.rows))
-        for coupler in mechanism.couplers:
-            if coupler.curve:
-                self.curve(coupler.terms, coupler.curve)
-            else:
-                self.relate(coupler.terms)
-        for value, driver in enumerate(mechanism.drivers):
-            self.drive(driver, value)
-
     def drive(self, driver: Driver, value: int) -> None:
         """Make the driver's coordinate follow its value."""
-        self.follow(DRIVERS[type(driver)](self, driver), value)
+        if isinstance(driver, PointCoordinate):
+            point, frame = self.mechanism.point(driver.point), frame_along(driver.direction, 0)
+            ends = [self.marker(body, point.position, frame) for body in (GROUND, point.body)]
+            row = self.connect_generic(ends, (X,))
+        else:
+            assert isinstance(driver, JointDriver)
+            row = self.coordinate(driver.joint, driver.freedom)
+        self.follow(row, value)
 
     def curve(self, terms: Sequence[tuple[str, str, float]], curve: Sequence[float]) -> None:
         """Make the first coordinate, of weight one, follow the polynomial of the second."""
@@ -380,3 +231,11 @@ class Rows(Equations):
         value, size = self.unknown(), math.hypot(weight, other)
         self.follow(self.coordinate(first, freedom), value, other / size)
         self.follow(self.coordinate(second, other_freedom), value, -weight / size)
+
+
+def turned(angle: float) -> Array:
+    """Return the rotation about z by an angle [rad] as a homogeneous matrix, shape (4, 4)."""
+    frame = np.eye(4)
+    c, s = math.cos(angle), math.sin(angle)
+    frame[:2, :2] = [[c, -s], [s, c]]
+    return frame

@@ -18,14 +18,14 @@ from ...core import joints
 from ...core.case.case import Case
 from ...core.joints.base import unit
 from ...core.kinematics import start_of as where_from
-from ...core.mechanism.mechanism import GROUND
 from ...core.mechanism.motions import Driver, JointDriver, PointCoordinate
-from ...core.trajectory import Array, Trajectory
+from ...core.mechanism.mechanism import GROUND
+from ...core.trajectory import Array
 from ..shared.simulation import (
     Leg,
     SimulatedPose,
+    Simulation,
     SimulationEndedError,
-    simulated,
     start_of,
     uneven,
 )
@@ -163,7 +163,7 @@ TIGHT = 1e-12
 
 
 @dataclass(frozen=True)
-class Solver:
+class Solver(Simulation):
     """Exudyn's solver.
 
     Attributes:
@@ -181,7 +181,7 @@ class Solver:
     modified: bool = True
     tolerance: float = TIGHT
     steps: int = 1
-    mode = "simulate"
+    projection = Exudyn
     loop = "simulator"
 
     @property
@@ -205,10 +205,6 @@ class Solver:
             "linear solver": "EXUdense; where rows are redundant, EigenDense that ignores it",
         }
 
-    def version(self) -> str | None:
-        """Version of Exudyn, or None if it cannot be imported."""
-        return Exudyn().version()
-
     def unsupported(self, case: Case) -> str | None:
         """Return a message on an unsupported joint, driver or sample grid, or None."""
         return Exudyn().unsupported(case) or limitation_of(Exudyn().known(case))
@@ -222,16 +218,9 @@ class Solver:
             }
         return {f"{n} steps a sample": replace(self, steps=n) for n in (1, 2, 4, 8, 16)}
 
-    def floor(self, case: Case) -> None:
-        """Return None: the simulator runs its own loop."""
-
     def build(self, case: Case) -> _Solved:
         """Return Exudyn's system and its start."""
         return _Solved(Exudyn().known(case), self)
-
-    def solve(self, model: _Solved, case: Case, tol: float) -> Trajectory:
-        """Simulate all samples; Exudyn uses its own tolerance (see `settings`), not tol."""
-        return simulated(case, model.start, model.run, model.details)
 
 
 def trapezoidal() -> Solver:

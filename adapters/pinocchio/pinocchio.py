@@ -26,14 +26,14 @@ import numpy as np
 from ...core.case.case import Case
 from ...core.joints import Distance, Fixed
 from ...core.mechanism.mechanism import Vector
-from ...core.trajectory import Array, Trajectory
+from ...core.trajectory import Array
 from ..shared.equivalents import fits, jointed
 from ..shared.simulation import (
     Leg,
     SimulatedPose,
+    Simulation,
     SimulationEndedError,
     TiedTree,
-    simulated,
     start_of,
 )
 from ..shared.tree_forces import Mass, mass_properties
@@ -162,7 +162,7 @@ DECAY = 50.0
 
 
 @dataclass(frozen=True)
-class Dynamics:
+class Dynamics(Simulation):
     """Pinocchio's constrained forward dynamics.
 
     Attributes:
@@ -171,7 +171,7 @@ class Dynamics:
 
     steps: int = 2
     name = "pinocchio"
-    mode = "simulate"
+    projection = Pinocchio
     loop = "python"
 
     @property
@@ -186,10 +186,6 @@ class Dynamics:
             "driven coordinates": f"set at every step, armature {ARMATURE:g}",
             "rods": "bodies between a cross and a ball",
         }
-
-    def version(self) -> str | None:
-        """Version of Pinocchio, or None if it cannot be imported."""
-        return Pinocchio().version()
 
     def unsupported(self, case: Case) -> str | None:
         """Return a message on the joint or driver that is not supported here, or None."""
@@ -212,9 +208,6 @@ class Dynamics:
         """Return the efforts by the number of steps."""
         return {f"{n} steps a sample": replace(self, steps=n) for n in (1, 2, 4, 8)}
 
-    def floor(self, case: Case) -> None:
-        """Return None: the steps are in Python, with the same bound as in projection."""
-
     def build(self, case: Case) -> _Model:
         """Return tree, constraints and start."""
         return _Model(
@@ -222,10 +215,6 @@ class Dynamics:
             replace(case, mechanism=jointed(Pinocchio().known(case).mechanism)),
             self.steps,
         )
-
-    def solve(self, model: _Model, case: Case, tol: float) -> Trajectory:
-        """Simulate all possible samples, however far the constraints drift; see `Engine.solve`."""
-        return simulated(case, model.start, model.run, model.details)
 
 
 class _Model(TiedTree, PinocchioModel):

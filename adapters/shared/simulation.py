@@ -36,7 +36,8 @@ from .constraints import CLOSURES
 from .equivalents import fits, jointed
 from .pose_solver import ProjectionModel
 from .projection import Walk
-from .tree_model import TreeEngine, TreeModel
+from .projection_engine import ProjectionEngine
+from .tree_model import TreeModel
 from .tree_plan import Closure, relations
 
 # A loop that is open by more than this fraction of the mechanism's size is torn: the pose does not
@@ -248,13 +249,36 @@ def legs(case: Case, start: int) -> list[Leg]:
     return [leg for leg in ways if len(leg.samples) > 1] or ways[:1]
 
 
+class Simulation:
+    """An engine in simulate mode; see `Engine`.
+
+    Attributes:
+        projection: the engine of the same simulator in projection mode.
+    """
+
+    projection: ClassVar[type[ProjectionEngine]]
+    mode = "simulate"
+
+    def version(self) -> str | None:
+        """Return the version of the simulator, or None if the import fails."""
+        return self.projection().version()
+
+    def floor(self, case: Case) -> None:
+        """Return None: the bound on steps in Python is that of projection."""
+
+    def solve(self, model: Any, case: Case, tol: float) -> Trajectory:
+        """Simulate all reachable samples with the simulator's own tolerance (see `settings`),
+        however far the constraints drift.
+        """
+        return simulated(case, model.start, model.run, model.details)
+
+
 @dataclass(frozen=True)
-class Stepping:
+class Stepping(Simulation):
     """Time stepping of a simulator, with steps of equal length between samples.
 
     Attributes:
         steps: between samples.
-        projection: the engine of the same simulator in projection mode.
         model: class of the simulator's model.
         described: description of solver, constraints and drivers.
         rods: whether the simulator has a distance constraint; otherwise rods are bodies.
@@ -263,13 +287,11 @@ class Stepping:
     """
 
     steps: int = 4
-    projection: ClassVar[type[TreeEngine]]
     model: ClassVar[type[SteppedTree]]
     described: ClassVar[Mapping[str, Any]]
     rods: ClassVar[bool] = False
     couples: ClassVar[bool] = False
     equal: ClassVar[bool] = False
-    mode = "simulate"
     loop = "python"
 
     @property
@@ -282,10 +304,6 @@ class Stepping:
         """Solver, steps, drivers and rods."""
         rods = "distance constraints" if self.rods else "bodies between a cross and a ball"
         return {**self.described, "steps per sample": self.steps, "rods": rods}
-
-    def version(self) -> str | None:
-        """Return the version of the simulator, or None if the import fails."""
-        return self.projection().version()
 
     def unsupported(self, case: Case) -> str | None:
         """Return a message on the joint, coupler or driver without a constraint here, or None."""
@@ -313,17 +331,10 @@ class Stepping:
         """Return the efforts by the number of steps."""
         return {f"{n} steps a sample": replace(self, steps=n) for n in (1, 2, 4, 8, 16)}
 
-    def floor(self, case: Case) -> None:
-        """Return None: the bound on its steps is that of projection."""
-
     def build(self, case: Case) -> SteppedTree:
         """Return tree, constraints and start."""
         mechanism = jointed(self.projection().known(case).mechanism, rods=self.rods)
         return self.model(replace(case, mechanism=mechanism), self.steps)
-
-    def solve(self, model: SteppedTree, case: Case, tol: float) -> Trajectory:
-        """Solve all reachable samples, however far the constraints drift; see `Engine.solve`."""
-        return simulated(case, model.start, model.run, model.details)
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,9 @@ import numpy as np
 
 from ...core.case.case import Case
 from ...core.errors import SolveError
-from ...core.trajectory import Array, Trajectory
+from ...core.trajectory import Array
 from ..shared.equivalents import jointed
-from ..shared.simulation import Leg, SimulatedPose, SimulationEndedError, simulated, start_of
+from ..shared.simulation import Leg, SimulatedPose, Simulation, SimulationEndedError, start_of
 from .simbody import Simbody, SimbodyModel, opensim
 
 # Weight of constraints; a driven coordinate has weight 1. With OpenSim's default, an infinite
@@ -26,7 +26,7 @@ WEIGHT = 1e3
 
 
 @dataclass(frozen=True)
-class Assembly:
+class Assembly(Simulation):
     """Simbody's assembler, pose after pose.
 
     Attributes:
@@ -35,7 +35,7 @@ class Assembly:
 
     accuracy: float = 1e-12
     name = "simbody"
-    mode = "simulate"
+    projection = Simbody
     loop = "python"
 
     @property
@@ -48,10 +48,6 @@ class Assembly:
             "rods": "bodies between a cross and a ball",
         }
 
-    def version(self) -> str | None:
-        """Return the version of OpenSim's package, or None if the import fails."""
-        return Simbody().version()
-
     def unsupported(self, case: Case) -> str | None:
         """Return a message on the joint or driver that is not supported here, or None."""
         for coupler in case.mechanism.couplers:
@@ -63,17 +59,10 @@ class Assembly:
         """Return the efforts by the accuracy."""
         return {f"accuracy {x:g}": replace(self, accuracy=x) for x in (1e-3, 1e-6, 1e-9, 1e-12)}
 
-    def floor(self, case: Case) -> None:
-        """Return None: the simulator runs its own iterations."""
-
     def build(self, case: Case) -> _Assembled:
         """Return OpenSim's model and its start."""
         case = replace(case, mechanism=jointed(case.mechanism))
         return _Assembled(opensim(), case, self.accuracy)
-
-    def solve(self, model: _Assembled, case: Case, tol: float) -> Trajectory:
-        """Solve all samples that can be assembled; see `Engine.solve`."""
-        return simulated(case, model.start, model.run, model.details)
 
 
 class _Assembled(SimbodyModel):

@@ -33,6 +33,7 @@ from ...core.mechanism.loads import (
 )
 from ...core.mechanism.mechanism import GROUND, Mechanism
 from ...core.trajectory import Array, BodyMotion
+from ..shared.exudyn_joints import objects_of
 from ..shared.poses import Displacement, displacements, frame_along, link_coordinates, link_motions
 from ..shared.tree_plan import CHAINS, Relation, Terms, ends_of, relations
 from . import text
@@ -189,18 +190,6 @@ END = "\nmbs.Assemble()\n"
 # Round-off of a right angle between unit vectors, which a generic joint leaves as a residual.
 RIGHT_ANGLE = 1e-15
 
-GENERIC: Mapping[type[j.Joint], tuple[int, Sequence[int]]] = {
-    j.Cylindrical: (2, (1, 1, 0, 1, 1, 0)),
-    j.Screw: (2, (1, 1, 0, 1, 1, 0)),  # and its relation
-    j.InPlane: (0, (1, 0, 0, 0, 0, 0)),
-    j.Inline: (2, (1, 1, 0, 0, 0, 0)),
-    j.ParallelAxes: (2, (0, 0, 0, 1, 1, 0)),
-    j.Planar: (2, (0, 0, 1, 1, 1, 0)),
-}
-"""Joints about one axis as generic joints: the axis of the frame that is the joint's axis, and the
-constrained directions: x, y, z, then rotations about them.
-"""
-
 
 def write(
     mechanism: Mechanism, way: Mapping[str, BodyMotion], start: Mapping[str, float]
@@ -278,62 +267,17 @@ class _Script:
         frame = [] if axes is None else [_text(axes)]
         return _Code(f"({', '.join([repr(body), self.arm(body, P), *frame])})")
 
-    def add(
-        self,
-        joint: j.Joint,
-        kind: str,
-        axes: Array | None = None,
-        *,
-        ends: Any = None,
-        second: Array | None = None,
-        **options: Any,
-    ) -> None:
-        """Add an object of Exudyn between the two bodies of a joint, with equal frames unless the
-        second has another.
-        """
-        P_i, P_j = ends or ends_of(self.mechanism, joint)
-        markers = (
-            self.marker(joint.i, P_i, axes),
-            self.marker(joint.j, P_j, axes if second is None else second),
-        )
-        self.call("joint", joint.name, _Code(kind), *markers, **options)
-
-    def generic(
-        self, joint: j.Joint, constrained: Sequence[int], axes: Array | None = None, **options: Any
-    ) -> None:
-        """Add a generic joint with constrained directions: x, y, z, then rotations about them."""
-        self.add(joint, "ObjectJointGeneric", axes, constrainedAxes=[*constrained], **options)
-
     def joint(self, joint: j.Joint) -> None:
         """Add a joint as objects of Exudyn."""
-        match joint:
-            case j.Spherical():
-                self.add(joint, "ObjectJointSpherical")
-            case j.Revolute():
-                self.add(joint, "ObjectJointRevoluteZ", frame_along(joint.axis, 2))
-            case j.Translational():
-                self.add(joint, "ObjectJointPrismaticX", frame_along(joint.axis, 0))
-            case j.Universal() | j.PerpendicularAxes():
-                point = int(isinstance(joint, j.Universal))
-                first, second = frame_along(joint.axes[0], 0), frame_along(joint.axes[1], 1)
-                self.generic(joint, (point, point, point, 0, 0, 1), first, second=second)
-            case j.Fixed():
-                self.generic(joint, (1, 1, 1, 1, 1, 1))
-            case j.OrientationLock():
-                self.generic(joint, (0, 0, 0, 1, 1, 1))
-            case j.Distance():
-                self.add(joint, "ObjectConnectorDistance", distance=joint.rod_length)
-            case j.RevoluteSpherical(points=(hinge, ball), axis=axis):
+        for each in objects_of(joint, ends_of(self.mechanism, joint)):
+            points = each.points
+            if isinstance(joint, j.RevoluteSpherical) and each.axes:
                 # the link keeps its position along the hinge; if its foot is on the hinge, the
                 # generic joint needs no offset
-                link = vec(ball) - vec(hinge)
-                self.add(joint, "ObjectConnectorDistance", distance=float(np.hypot.reduce([*link])))
-                foot = [*(vec(hinge) + (unit(axis) @ link) * unit(axis))]
-                self.generic(joint, (1, 0, 0, 0, 0, 0), frame_along(axis, 0), ends=(foot, ball))
-            case _:
-                axis: Sequence[float] = vars(joint)["axis"]
-                column, constrained = GENERIC[type(joint)]
-                self.generic(joint, constrained, frame_along(axis, column))
+                link, axis = vec(points[1]) - vec(points[0]), unit(joint.axis)
+                points = [*(vec(points[0]) + (axis @ link) * axis)], points[1]
+            markers = map(self.marker, joint.bodies, points, each.frames)
+            self.call("joint", joint.name, _Code(each.kind), *markers, **each.options)
 
     def load(self, force: ForceElement) -> None:
         """Add a force element as an object or load of Exudyn."""

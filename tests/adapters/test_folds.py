@@ -67,6 +67,7 @@ def past_folds():
     return [specimen(Folds(), 0, number, 5) for number in (0, 16, 21)]
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", SIMULATORS)
 def test_no_simulator_steps_over_a_fold(name, past_folds):
     """A small part of a campaign: `kincheck stress --family folds --engine mujoco --samples
