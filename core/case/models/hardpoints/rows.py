@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import TypeAlias
 
 from ....errors import brief
-from ...io.columns import split_head
 from ...io.document import fault, shown
 from ...io.table import (
     DELIMITERS,
@@ -28,6 +27,7 @@ from ...io.table import (
     is_number,
     one_sheet,
     read_sheets,
+    split_head,
     text_table,
     trimmed,
 )

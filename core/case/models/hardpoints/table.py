@@ -14,9 +14,8 @@ from typing import TypeAlias
 
 from ....errors import CaseError
 from ....mechanism.mechanism import Vector
-from ...io.columns import UNIT_NAMES
 from ...io.document import decimal, fault, shown, unknown_name, usable
-from ...io.table import numeral
+from ...io.table import UNIT_NAMES, numeral
 from ...notes import SUSPENSIONS
 from ...units import LENGTHS, Unit, plain
 
