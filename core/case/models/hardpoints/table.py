@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -89,6 +89,12 @@ def twice(file: Path, where: str, name: str, before: str) -> CaseError:
     return fault(
         file, where, f"{name}: given before, in {before}, expected once; remove one of them"
     )
+
+
+def incomplete(file: Path, where: str, name: str, axes: Collection[str]) -> CaseError:
+    """Return the error of a point of which a file gives some coordinates."""
+    missing = " and ".join(axis for axis in "xyz" if axis not in axes)
+    return fault(file, where, f"found {name} without {missing}, expected all three; add it")
 
 
 def one_unit(file: Path, units: Mapping[str, str]) -> str:
