@@ -23,6 +23,7 @@ from kincheck.core.case.curves import (
 from kincheck.core.case.io import reference_samples
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.notes import notes
+from kincheck.core.errors import CaseError
 from kincheck.core.harness.compare import deviation
 from kincheck.core.harness.record import Outcome, from_json, to_json
 from kincheck.core.harness.run import run
@@ -61,6 +62,19 @@ def test_dialects_of_spreadsheets(tmp_path: Path, kind: str):
     assert series.position.tolist() == [1.4, 1.5, 1.6]
     assert series.velocity is not None
     assert series.velocity.tolist() == [2.0, 2.0, 2.0]
+
+
+def test_tables_of_recordings_have_gaps(tmp_path: Path):
+    """And lines above them, to a last one; without gaps, an empty cell is a fault."""
+    text = "run 3\nversion=1\nendheader\ntime\ta\tb\n0\t1.5\n1\tNaN\t2\n"
+    file = write(tmp_path, text, "run.sto")
+    table = reference_samples.read_table(file, None, "--sheet", above="endheader")
+    samples = reference_samples.samples_of(table, gaps=True)
+    expected = [[0.0, 1.5, np.nan], [1.0, np.nan, 2.0]]
+    np.testing.assert_array_equal(samples.numbers, expected)
+    assert samples.places == ["line 5", "line 6"]
+    with pytest.raises(CaseError, match="line 5: found 2 numbers, expected 3"):
+        reference_samples.samples_of(table)
 
 
 def test_outputs_may_lack_a_reference(tmp_path: Path):

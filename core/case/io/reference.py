@@ -25,7 +25,7 @@ from ..case import Case, Origin, Quantity, Series, Truth
 from ..curves import FEWEST, Printed, bounded, even, interpolated, matched, multiples, slopes
 from ..units import Convert, FileUnits, Unit
 from .document import fault, shown, toml_table
-from .reference_file import read, series, sha256
+from .reference_file import SAME_GRID, read, series, sha256
 from .reference_samples import (
     DERIVATIVES,
     Columns,
@@ -44,9 +44,6 @@ PROVED = ".json"
 # Of the rows of a formula, those with fewer digits are not rounded.
 FEWEST_DIGITS = 4
 CHOICE = 'sheet = "NAME" in [reference]'
-# Twelve digits of a driver value: a smaller error moves no output by as much as a tolerance; a
-# rounded table has a larger error.
-SAME_GRID = 1e-12
 
 
 def read_grid(case_file: Path, keys: ReferenceKeys, driver: Unit) -> Sequence[float]:

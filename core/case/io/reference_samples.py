@@ -87,12 +87,13 @@ class Samples:
         return next(str(cells[self.first]) for place, cells in rows if place == self.places[k])
 
 
-def read_table(file: Path, sheet: str | None, option: str) -> Table:
-    """Read the table of a reference.
+def read_table(file: Path, sheet: str | None, option: str, above: str = "") -> Table:
+    """Read the table of a reference or a recording.
 
     Args:
         sheet: name of the sheet of a workbook; None for the only sheet with cells.
         option: the option to choose a sheet, for messages.
+        above: the last line of a text that is above the table, if it has one, in small letters.
 
     Raises:
         CaseError: the file is unreadable, too large, or has no such sheet.
@@ -103,14 +104,18 @@ def read_table(file: Path, sheet: str | None, option: str) -> Table:
         problem = f"found the sheet {shown(sheet)} of a file that is no workbook (.xlsx)"
         raise fault(file, "sheet", f"{problem}, expected none; leave it out")
     text = read_text(file, LARGEST_FILE, "thin out the samples", of_spreadsheet=True)
-    if (lines := len(text.splitlines())) > MOST_LINES:
+    lines = text.splitlines()
+    if len(lines) > MOST_LINES:
         raise fault(
             file,
             "",
-            f"found {lines} lines, expected a row for each sample of the sweep; thin out the"
+            f"found {len(lines)} lines, expected a row for each sample of the sweep; thin out the"
             " samples",
         )
-    return text_table(file, text, ("#",), _delimiter)
+    if above:
+        last = next((k for k, line in enumerate(lines, 1) if line.strip().lower() == above), 0)
+        lines[:last] = [""] * last
+    return text_table(file, lines, ("#",), _delimiter)
 
 
 def _delimiter(table: Table) -> str:
@@ -141,11 +146,12 @@ def head_of(table: Table) -> tuple[str, list[str]]:
     )
 
 
-def samples_of(table: Table, wanted: Sequence[int] | None = None) -> Samples:
+def samples_of(table: Table, wanted: Sequence[int] | None = None, *, gaps: bool = False) -> Samples:
     """Return the samples of a table: a head and rows of numbers; a row of units may stand between.
 
     Args:
         wanted: indices of the columns to read, the driver first; None for all.
+        gaps: whether empty cells and "nan" are gaps, and no faults.
 
     Raises:
         CaseError: a row lacks a number, or has a text in place of one.
@@ -166,6 +172,8 @@ def samples_of(table: Table, wanted: Sequence[int] | None = None) -> Samples:
             continue
         if not every and not any(cells[n] != "" for n in wanted if n < len(cells)):
             continue  # a note
+        if gaps:
+            cells = [*cells, *[""] * (len(names) - len(cells))]
         width = len(cells)
         if not (width == len(names) if every else max(wanted) < width <= len(names)):
             expected = f"{len(names)} ({', '.join(names)})"
@@ -174,6 +182,9 @@ def samples_of(table: Table, wanted: Sequence[int] | None = None) -> Samples:
             )
         # convert at once: the cells of a large file as texts would take many times its size
         for column, n in zip(printed, wanted, strict=True):
+            if gaps and str(cells[n]).lower().lstrip("+-") in ("", "nan"):
+                numbers.append(math.nan)
+                continue
             text = numeral(cells[n], sign)
             column.add(text)
             numbers.append(_number(file, f"{place}, column {names[n]}", cells[n], text))

@@ -153,7 +153,10 @@ class Table:
 
 
 def text_table(
-    file: Path, text: str, comments: tuple[str, ...], find_delimiter: Callable[[Table], str]
+    file: Path,
+    lines: Sequence[str],
+    comments: tuple[str, ...],
+    find_delimiter: Callable[[Table], str],
 ) -> Table:
     """Return a table of text.
 
@@ -164,7 +167,6 @@ def text_table(
     Raises:
         CaseError: a line has more columns than people write.
     """
-    lines = text.splitlines()
     remarks = [line.strip('" \t\r').startswith(comments) for line in lines]
     said = [line for line, remark in zip(lines, remarks, strict=True) if remark]
     lines = ["" if remark else line for line, remark in zip(lines, remarks, strict=True)]

@@ -95,7 +95,7 @@ def read_plain(file: Path, text: str, wanted: str | None = None) -> HardpointTab
     Raises:
         CaseError: no head, or a row at odds with the head.
     """
-    table = text_table(file, text, COMMENTS, _delimiter)
+    table = text_table(file, text.splitlines(), COMMENTS, _delimiter)
     facts: dict[str, str] = {}
     for comment in table.comments:
         bare = comment.strip('" \t\r').lstrip("".join(COMMENTS)).rstrip(f'"{DELIMITERS}')
