@@ -20,7 +20,7 @@ from ...io.reader_options import LEFT_OUT, Supplied
 from ...notes import SUSPENSIONS
 from ...quantity import with_markers
 from ...units import plain
-from .axle import one_wheel, read_travels, whole_axle
+from .axle import mechanism_of, read_travels
 from .default_outputs import far_out, hardpoints_of, vehicle_of, with_axis, with_suspension_outputs
 from .table import HardpointTable, axes_of, placed, unit_of
 from .templates import (
@@ -80,10 +80,7 @@ def case_of_hardpoints(table: HardpointTable, supplied: Supplied) -> Case:
     far = far_out(at)
 
     def design(at: Mapping[str, Vector]) -> tuple[Mechanism, Sweep]:
-        moved = with_axis(at, far)
-        if supplied.axle is None:
-            return one_wheel(file, template, moved, travels)
-        return whole_axle(file, supplied.axle, template, moved, travels)
+        return mechanism_of(file, supplied.axle, template, with_axis(at, far), travels)
 
     with explained(file, "", unit):
         mechanism, sweep = design(at)
