@@ -389,11 +389,10 @@ def typed(file: Path, key: str, value: object, struct: type[_Struct]) -> _Struct
     fields = _fields(struct)
     for name in table:
         if name not in fields:
-            raise fault(
-                file,
-                join(key, name),
-                f"unknown key, expected one of {', '.join(fields)}; {_key_remedy(name, fields)}",
-            )
+            close = similar(name, fields)
+            advice = f"did you mean {close!r}?" if close else "remove it"
+            problem = f"unknown key, expected one of {', '.join(fields)}; {advice}"
+            raise fault(file, join(key, name), problem)
     for name, field in fields.items():
         if field.required and name not in table:
             raise fault(
@@ -418,11 +417,6 @@ def typed(file: Path, key: str, value: object, struct: type[_Struct]) -> _Struct
 def _fields(struct: type[msgspec.Struct]) -> Mapping[str, msgspec.structs.FieldInfo]:
     """Return the fields of a struct by key; cached, as a file may have ten thousand bodies."""
     return {field.encode_name: field for field in msgspec.structs.fields(struct)}
-
-
-def _key_remedy(name: str, known: Iterable[str]) -> str:
-    close = similar(name, known)
-    return f"did you mean {close!r}?" if close else "remove it"
 
 
 def description(annotation: Any) -> str:

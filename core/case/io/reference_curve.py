@@ -17,7 +17,7 @@ import numpy as np
 from ...errors import MOST_NAMED, brief, remedy, shortened
 from ...trajectory import Array
 from ..case import TIME, Case, Origin, Quantity, Truth
-from ..suspension import Convention
+from ..suspension import Convention, PerTravel
 from ..units import METRE, RADIAN, SECOND, Convert, FileUnits, Unit
 from .document import decimal, fault, shown, unknown_name
 from .reference import compared
@@ -103,7 +103,9 @@ def with_curve(case: Case, file: Path, options: CurveOptions) -> tuple[Case, lis
     )
     unit, of = _columns(case, samples, targets)
     outputs = _with_accuracy(file, case.outputs, [*of], options.accuracy)
-    convention, signs = _convention(outputs, [*of]), _signs(file, samples.signs, options.signs)
+    compared_outputs: list[Any] = [each for each in outputs if each.name in of and each.signs]
+    convention = str(compared_outputs[0].vehicle.convention) if compared_outputs else ""
+    signs = _signs(file, samples.signs, options.signs)
     if signs and convention not in ("", signs):
         raise fault(
             file,
@@ -180,10 +182,10 @@ def _with_accuracy(
             raise unknown_name(file, "--accuracy", name, units, "an output with a column")
         number, _, unit = right.partition(" ")
         try:
-            found = decimal(number)
+            size = decimal(number)
         except ValueError:
-            found = float("nan")
-        if not 0.0 < found < float("inf") or not (unit.strip() or units[name] == "1"):
+            size = float("nan")
+        if not 0.0 < size < float("inf") or not (unit.strip() or units[name] == "1"):
             raise fault(
                 file,
                 "--accuracy",
@@ -191,27 +193,14 @@ def _with_accuracy(
                 f' "{name}=0.02 {"deg" if units[name] == "rad" else units[name]}"',
             )
         measured = required_unit(file, "--accuracy", name, unit.strip() or "-", units[name])
-        stated[name] = measured.convert(found)
+        stated[name] = measured.convert(size)
     why = f"the accuracy of {file.name}, as its user states it"
-    return tuple(
-        _replaced(output, stated[output.name], why) if output.name in stated else output
-        for output in outputs
-    )
-
-
-def _replaced(output: Any, atol: float, why: str) -> Quantity:
-    """Return an output with another tolerance; a slope has that of its own alone."""
-    if hasattr(output, "of_output"):
-        return replace(output, atol=atol)
-    return replace(output, atol=atol, rtol=0.0, why=why)
-
-
-def _convention(outputs: Sequence[Any], compared: Sequence[str]) -> str:
-    """Return the convention of signs of the compared suspension outputs; empty without any."""
-    return next(
-        (str(each.vehicle.convention) for each in outputs if each.name in compared and each.signs),
-        "",
-    )
+    found: list[Any] = [*outputs]
+    for k, output in enumerate(found):
+        if output.name in stated:  # a slope has the other tolerances of its output
+            rest = {} if isinstance(output, PerTravel) else {"rtol": 0.0, "why": why}
+            found[k] = replace(output, atol=stated[output.name], **rest)
+    return tuple(found)
 
 
 def _signs(file: Path, written: str, stated: str | None) -> str:
