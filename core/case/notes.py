@@ -31,54 +31,43 @@ def notes(case: Case) -> list[str]:
     parts = (*case.mechanism.joints, *case.mechanism.couplers)
     joints = [note for part in parts for note in part.notes]
     said = [note.within(written) if isinstance(note, Phrase) else note for note in joints]
-    said += [*case.assembly, *size_notes(case), *_closure_notes(case)]
+    said += [*case.assembly, *size_notes(case)]
+    if no_output_depends_on_a_closure(case):
+        said.append(
+            "no output depends on a closure: all of them follow from the drivers alone, so that"
+            " agreement says nothing of the loops; add outputs of the other bodies or joints"
+        )
     return [*said, *_reference_notes(case)]
 
 
-def _closure_notes(case: Case) -> list[str]:
-    if not no_output_depends_on_a_closure(case):
-        return []
-    return [
-        "no output depends on a closure: all of them follow from the drivers alone, so that"
-        " agreement says nothing of the loops; add outputs of the other bodies or joints"
-    ]
-
-
-def _reference_notes(case: Case) -> list[str]:
-    grid = [f"the reference has {case.origin.grid}"] if case.origin and case.origin.grid else []
-    return [*grid, *_coarse_notes(case), *_source_notes(case)]
-
-
-def _coarse_notes(case: Case) -> list[str]:
-    names: list[str] = []
+def _reference_notes(case: Case) -> Iterator[str]:
+    origin = case.origin
+    if origin and origin.grid:
+        yield f"the reference has {origin.grid}"
+    coarse: list[str] = []
     for name, series in (case.reference or {}).items():
         known = series.position[np.isfinite(series.position)]
         half = series.uncertainty.get("position", np.zeros(1))
         if known.size and half.max() > COARSE * np.abs(known).max():
-            names.append(name)
-    if not names:
-        return []
-    return [
-        f"{', '.join(names)}: the reference is known to a tenth of its largest value or worse, by"
-        " too few digits or rows: agreement says little; give more of them"
-    ]
-
-
-def _source_notes(case: Case) -> list[str]:
-    if not (case.reference and case.truth.validates and case.origin):
-        return []
-    if case.origin.own:
-        return [
+            coarse.append(name)
+    if coarse:
+        yield (
+            f"{', '.join(coarse)}: the reference is known to a tenth of its largest value or worse,"
+            " by too few digits or rows: agreement says little; give more of them"
+        )
+    if not (case.reference and case.truth.validates and origin):
+        return
+    if origin.own:
+        yield (
             f"judged against a reference that kincheck has made, which is no {case.truth}: no pass"
             " is called validated"
-        ]
-    if not case.origin.citation:
-        return [
+        )
+    elif not origin.citation:
+        yield (
             f"judged against an uncited reference: truth is {case.truth}, and [reference] does not"
             " say where it comes from, so that no pass is called validated; add citation ="
             ' "author, title, page or address" to [reference]'
-        ]
-    return []
+        )
 
 
 def no_output_depends_on_a_closure(case: Case) -> bool:

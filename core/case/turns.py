@@ -72,11 +72,10 @@ def turns_of(
     assert isinstance(output, JointAngle)
     if near_design(mechanism, path) and not in_doubt(x + output.period * count, v, part.times):
         return count
-    followed = followed_angle(mechanism, path, output.joint)
-    near = None if followed is None else followed[samples]
-    if near is None or not np.isfinite(near).any():
+    near = _reached(followed_angle(mechanism, path, output.joint), samples, part.times)
+    if near is None:
         return count
-    near = _completed(near, part.times).reshape(-1, *(1,) * (x.ndim - 1))
+    near = near.reshape(-1, *(1,) * (x.ndim - 1))
     # of the same solution the difference is zero; of a variant it changes little between samples
     return turns(x - near, np.full_like(x, np.nan), output.period, part)
 
@@ -104,22 +103,28 @@ def oriented(
     sign, doubt = signs(values, angular_velocity(e), part)
     moves = any(body.name == output.body for body in mechanism.moving)
     if moves and (doubt or not near_design(mechanism, path)):
-        followed = followed_attitude(mechanism, path, output.body)
-        near = None if followed is None else followed[samples]
-        if near is not None and np.isfinite(near).any():
-            lanes = (1,) * (values.ndim - 2)
-            near = _completed(near, part.times).T.reshape(4, -1, *lanes)
+        near = _reached(followed_attitude(mechanism, path, output.body), samples, part.times)
+        if near is not None:
+            near = near.T.reshape(4, -1, *(1,) * (values.ndim - 2))
             sign = np.where((near * values).sum(axis=0) < 0.0, -1.0, 1.0)
     return output.component_of(signed(sign, e))
 
 
-def _completed(near: Array, times: Array) -> Array:
-    """Return followed values, those not reached like the reached ones nearest in time."""
+def _reached(
+    followed: Array | None, samples: NDArray[np.intp] | slice, times: Array
+) -> Array | None:
+    """Return followed values at samples, those not reached like the reached ones nearest in time;
+    None if none is reached.
+    """
+    if followed is None:
+        return None
+    near = followed[samples]
     known = np.flatnonzero(np.isfinite(near.reshape(len(near), -1)).all(axis=1))
     if len(known) == len(near):
         return near
-    nearest = np.abs(times[:, None] - times[known]).argmin(axis=1)
-    return near[known[nearest]]
+    if not known.size:
+        return None
+    return near[known[np.abs(times[:, None] - times[known]).argmin(axis=1)]]
 
 
 def turns(x: Array, v: Array, period: float, path: Path) -> Array:

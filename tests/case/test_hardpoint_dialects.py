@@ -1,6 +1,8 @@
-"""Hardpoint tables as spreadsheets and people write them: decimal commas, titles, further columns,
-UTF-16, own names; what has two meanings is refused.
+"""Hardpoint tables as spreadsheets, people and public projects write them: decimal commas, titles,
+further columns, UTF-16, own names; what has two meanings is refused.
 """
+
+from pathlib import Path
 
 import pytest
 from kincheck.core.case.io.reader_options import LEFT_OUT, Supplied
@@ -219,3 +221,70 @@ def test_variants_of_adams(tmp_path, plain):
     assert case.mechanism == plain
     assert "(VARIANTS): lca_outer in line 16, spare in line 17" in case.source
     assert "[PARAMETER] (1 rows)" in case.source
+
+
+DRIVE = Supplied(drive=("hinge:0:0.1:2",), hold_rest=True)
+ARM = '<body name="arm"><joint name="hinge"/></body>'
+SDF_ARM = """<link name="arm"/><joint name="hinge" type="revolute"><parent>world</parent>
+<child>arm</child><axis/></joint>"""
+
+
+def read_public(tmp_path: Path, text: str, name: str, supplied: Supplied = DRIVE):
+    file = tmp_path / name
+    file.write_text(text)
+    return load(file, supplied)
+
+
+def test_a_declaration_may_stand_after_white_space(tmp_path: Path):
+    text = f"""
+ <?xml version="1.0" encoding="UTF-8"?>
+<mujoco><worldbody>{ARM}</worldbody><x/></mujoco>"""
+    with pytest.raises(CaseError, match="line 3: <x>"):
+        read_public(tmp_path, text, "arm.xml")
+    assert read_public(tmp_path, text.replace("<x/>", ""), "arm.xml").mechanism.joints
+
+
+def test_a_body_that_stands_still_may_be_called_ground(tmp_path: Path):
+    text = f"""<mujoco><worldbody><body name="ground" pos="1 0 0">{ARM}</body>{{}}</worldbody>
+<equality><connect body1="ground" body2="arm" anchor="0 0 0"/></equality></mujoco>"""
+    case = read_public(tmp_path, text.format(""), "arm.xml")
+    assert case.mechanism.joint("hinge").bodies == ("ground", "arm")
+    assert case.mechanism.body("arm").origin == (1.0, 0.0, 0.0)
+    moving = text.format('<body name="x"><joint/><body name="ground"/></body>')
+    with pytest.raises(CaseError, match="rename the body"):
+        read_public(tmp_path, moving.replace('"ground" pos', '"base" pos'), "arm.xml")
+
+
+def test_what_stands_still_may_be_joined(tmp_path: Path):
+    text = f"""<mujoco><worldbody>{ARM}<body name="a"/><body name="b" mocap="true"/></worldbody>
+<equality><weld body1="a" body2="b"/><connect body1="a" anchor="0 0 0"/></equality></mujoco>"""
+    case = read_public(tmp_path, text, "arm.xml")
+    assert "equalities of what stands still (2)" in case.source.split(LEFT_OUT)[1]
+    text = f"""<sdf version="1.9"><world name="w"><model name="cart"><static>1</static>
+<link name="a"/><link name="b"/><joint name="wheel" type="ball"><parent>a</parent><child>b</child>
+</joint></model><model name="m">{SDF_ARM}</model></world></sdf>"""
+    case = read_public(tmp_path, text, "arm.sdf", Supplied(drive=("m::hinge:0:0.1:2",)))
+    assert "joints of what stands still (1)" in case.source.split(LEFT_OUT)[1]
+
+
+def test_the_world_of_a_urdf_needs_no_link(tmp_path: Path):
+    text = """<robot name="r"><link name="base"/><link name="arm"/><joint name="foot" type="fixed">
+<parent link="world"/><child link="base"/><origin xyz="0 0 2"/></joint>
+<joint name="hinge" type="continuous"><parent link="base"/><child link="arm"/></joint></robot>"""
+    case = read_public(tmp_path, text, "arm.urdf")
+    assert case.mechanism.body("arm").origin == (0.0, 0.0, 2.0)
+
+
+def test_joints_in_one_place_have_no_size(tmp_path: Path):
+    """Rounding of a composed place is no gap of a tenth of the model."""
+    text = """<mujoco><worldbody><body name="arm" pos="0.1 0.2 0.3" euler="1 2 3">
+<joint name="hinge"/><body name="tip" pos="-0.1 -0.2 -0.3">
+<joint name="other" pos="0.1 0.2 0.3"/></body></body>
+</worldbody><equality><weld body1="tip" body2="arm"/></equality></mujoco>"""
+    assert read_public(tmp_path, text, "arm.xml").mechanism.joints
+
+
+def test_messages_name_the_element_of_the_file(tmp_path: Path):
+    text = '<sdf version="1.9"><model name="m"><link name="a"/><static>1</static></model></sdf>'
+    with pytest.raises(CaseError, match="line 1: <sdf>: has no body with a joint"):
+        read_public(tmp_path, text, "still.sdf")

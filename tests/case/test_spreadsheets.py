@@ -20,7 +20,7 @@ from kincheck.core.harness.run import run
 
 from ..support.case_texts import write
 from .test_hardpoint_dialects import POINTS, SAID, read, table
-from .test_reference_grid import AT, CRANK, OWN, curve
+from .test_reference import AT, CRANK, OWN, curve
 
 openpyxl = pytest.importorskip("openpyxl")
 HEAD = ["name", "x", "y", "z"]

@@ -114,17 +114,18 @@ def output_tables() -> dict[str, Rows]:
     """Return the output types by heading: name, keys and meaning; of a wheel: name, unit, keys,
     sign and needs.
     """
+
+    def keys(cls: type[Measure | SuspensionOutput]) -> str:
+        named = ((key_of(each), each.default) for each in own_keys(cls))
+        return ", ".join(key if default is MISSING else f"({key})" for key, default in named)
+
     rows: Rows = []
     for name, cls in sorted(SuspensionOutput.registry.items()):
-        keys = [
-            each.name if each.default is MISSING else f"({each.name})" for each in own_keys(cls)
-        ]
         needs = f"needs {', '.join(cls.needs)}" if cls.needs else ""
-        rows.append((name, f"[{cls.measure}]", ", ".join(keys), f"positive: {cls.positive}", needs))
+        rows.append((name, f"[{cls.measure}]", keys(cls), f"positive: {cls.positive}", needs))
     return {
         "outputs: (type) = coordinate, point, component or direction, (relative); or a type, and": [
-            (name, ", ".join(_measure_keys(cls)), _meaning(cls))
-            for name, cls in sorted(Measure.registry.items())
+            (name, keys(cls), _meaning(cls)) for name, cls in sorted(Measure.registry.items())
         ],
         "outputs of a wheel: type, and": rows,
     }
@@ -162,12 +163,6 @@ def _keys(cls: type[Described]) -> str:
     return ", ".join(names) or "nothing else"
 
 
-def _measure_keys(cls: type[Measure]) -> Iterator[str]:
-    for each in own_keys(cls):
-        key = key_of(each)
-        yield key if each.default is MISSING else f"({key})"
-
-
 def _meaning(cls: type[Described] | type[Measure]) -> str:
     """Return the first sentence of a class's docstring. For a dataclass without a docstring,
     Python gives the signature.
@@ -179,16 +174,10 @@ def _meaning(cls: type[Described] | type[Measure]) -> str:
 def _printed(tables: Mapping[str, Rows]) -> Iterator[str]:
     for heading, rows in tables.items():
         yield heading
-        yield from _columns(rows)
-
-
-def _columns(rows: Rows) -> Iterator[str]:
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    for row in rows:
-        yield (
-            "  "
-            + "  ".join(f"{cell:{width}}" for cell, width in zip(row, widths, strict=True)).rstrip()
-        )
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        for row in rows:
+            cells = (f"{cell:{width}}" for cell, width in zip(row, widths, strict=True))
+            yield f"  {'  '.join(cells).rstrip()}"
 
 
 Keys: TypeAlias = type[msgspec.Struct]
@@ -248,7 +237,10 @@ def document_schema(
     for table, each in {**tables, **(further or {})}.items():
         kinds = each if isinstance(each, Mapping) else {"": each}
         structs |= {f"{table}.{kind}".rstrip("."): struct for kind, struct in kinds.items()}
-    definitions = {label: _definition(label, struct) for label, struct in structs.items()}
+    definitions = {label: struct_schema(struct) for label, struct in structs.items()}
+    for label, definition in definitions.items():
+        if kind := label.partition(".")[2]:
+            definition["properties"]["type"] = {"const": kind}
     whole = definitions.pop("")
     properties = whole["properties"] | {"schema": {"const": name}}
     for table, each in tables.items():
@@ -262,15 +254,6 @@ def any_of(labels: list[str]) -> dict[str, Any]:
     """Return the schema of a value of any of the definitions."""
     refs = [{"$ref": TEMPLATE.format(name=label)} for label in labels]
     return refs[0] if len(refs) == 1 else {"anyOf": refs}
-
-
-def _definition(label: str, struct: Keys) -> dict[str, Any]:
-    """Return the schema of one struct; the type in the label is the only value of `type`."""
-    found = struct_schema(struct)
-    _, _, kind = label.partition(".")
-    if kind:
-        found["properties"]["type"] = {"const": kind}
-    return found
 
 
 def struct_schema(struct: Keys) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, TypeAlias, TypeVar, cast, get_args, get_origin
+from typing import Annotated, Any, TypeVar, cast, get_args, get_origin
 
 import msgspec
 
@@ -235,31 +235,14 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return table
 
 
-_Path: TypeAlias = "tuple[_Path, str | int] | None"
-"""Path to a value: the path of its container, and its name or index there. It becomes text only for
-an error.
-"""
-
-
-def _written(path: _Path) -> str:
-    steps: list[str | int] = []
-    while path is not None:
-        path, step = path
-        steps.append(step)
-    key = ""
-    for step in reversed(steps):
-        key = f"{key}[{step}]" if isinstance(step, int) else join(key, step)
-    return key
-
-
 def check_values(file: Path, tables: object) -> None:
     """Refuse unusable numbers, deep nesting, and text unprintable on terminals and in reports."""
     # a stack: nesting may be deeper than Python recurses
-    waiting: list[tuple[_Path, Any, int]] = [(None, tables, 0)]
+    waiting: list[tuple[tuple[str | int, ...], Any]] = [((), tables)]
     while waiting:
-        path, value, depth = waiting.pop()
+        path, value = waiting.pop()
         problem = ""
-        if depth > DEEPEST:
+        if len(path) > DEEPEST:
             problem = (
                 f"nested more than {DEEPEST} deep, expected tables and rows of numbers; correct the"
                 " table"
@@ -271,11 +254,9 @@ def check_values(file: Path, tables: object) -> None:
                     expected = f"expected 1 to {LONGEST_NAME} printable characters"
                     problem = f"found the name {shown(name)}, {expected}; rename it"
                     break
-            waiting += [((path, name), each, depth + 1) for name, each in table.items()]
+            waiting += [((*path, name), each) for name, each in table.items()]
         elif isinstance(value, list):
-            waiting += [
-                ((path, k), each, depth + 1) for k, each in enumerate(cast("list[Any]", value))
-            ]
+            waiting += [((*path, k), each) for k, each in enumerate(cast("list[Any]", value))]
         elif isinstance(value, str):
             if not all(letter.isprintable() or letter in "\n\t" for letter in value):
                 problem = (
@@ -294,7 +275,10 @@ def check_values(file: Path, tables: object) -> None:
                 " correct the number"
             )
         if problem:
-            raise fault(file, _written(path), problem)
+            key = ""
+            for step in path:
+                key = f"{key}[{step}]" if isinstance(step, int) else join(key, step)
+            raise fault(file, key, problem)
 
 
 def usable(number: float) -> bool:
@@ -405,11 +389,10 @@ def typed(file: Path, key: str, value: object, struct: type[_Struct]) -> _Struct
     fields = _fields(struct)
     for name in table:
         if name not in fields:
-            raise fault(
-                file,
-                join(key, name),
-                f"unknown key, expected one of {', '.join(fields)}; {_key_remedy(name, fields)}",
-            )
+            close = similar(name, fields)
+            advice = f"did you mean {close!r}?" if close else "remove it"
+            problem = f"unknown key, expected one of {', '.join(fields)}; {advice}"
+            raise fault(file, join(key, name), problem)
     for name, field in fields.items():
         if field.required and name not in table:
             raise fault(
@@ -434,11 +417,6 @@ def typed(file: Path, key: str, value: object, struct: type[_Struct]) -> _Struct
 def _fields(struct: type[msgspec.Struct]) -> Mapping[str, msgspec.structs.FieldInfo]:
     """Return the fields of a struct by key; cached, as a file may have ten thousand bodies."""
     return {field.encode_name: field for field in msgspec.structs.fields(struct)}
-
-
-def _key_remedy(name: str, known: Iterable[str]) -> str:
-    close = similar(name, known)
-    return f"did you mean {close!r}?" if close else "remove it"
 
 
 def description(annotation: Any) -> str:

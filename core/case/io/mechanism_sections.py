@@ -12,20 +12,12 @@ import numpy as np
 
 from ...errors import CaseError, with_article
 from ...joints import Coupler, Joint, Polynomial
-from ...mechanism.body import ACCELERATION, INERTIA, Inertia, checked_inertia
+from ...mechanism.body import checked_inertia
+from ...mechanism.dimension import ACCELERATION, INERTIA
+from ...mechanism.drivers import Driver, JointAngle, JointDisplacement, JointDriver, PointCoordinate
 from ...mechanism.loads import ELEMENTS
 from ...mechanism.mechanism import Body, Mechanism, Point
-from ...mechanism.motions import (
-    ROUNDED_TIME,
-    Absolute,
-    Driver,
-    JointAngle,
-    JointDisplacement,
-    JointDriver,
-    Motion,
-    PointCoordinate,
-    Table,
-)
+from ...mechanism.motions import ROUNDED_TIME, Absolute, Motion, Table
 from ...trajectory import Array
 from ..case import MARKER, TIME, Case, Sweep
 from ..units import RADIAN, SECOND, FileUnits, Unit, plain
@@ -82,8 +74,13 @@ def read_mechanism(root: Section, keys: CaseKeys, units: FileUnits) -> Mechanism
 
 def _body(name: str, section: Section, units: FileUnits) -> Body:
     keys = section.typed(BodyKeys)
-    center = keys.center_of_mass
+    center, inertia = keys.center_of_mass, keys.inertia
     with explained(section.file, section.key):
+        if inertia is not None:  # an error is in the unit of the file
+            of_file = INERTIA.of(units.length.name, RADIAN.name)
+            inertia = FileUnits(units.length).power(
+                INERTIA, checked_inertia(name, inertia, of_file)
+            )
         return Body(
             name,
             units.place(keys.origin),
@@ -91,16 +88,8 @@ def _body(name: str, section: Section, units: FileUnits) -> Body:
             keys.fixed,
             keys.mass,
             center and units.place(center),
-            _inertia(name, keys.inertia, units.length),
+            inertia,
         )
-
-
-def _inertia(body: str, inertia: Inertia | None, length: Unit) -> Inertia | None:
-    """Return an inertia of a file in kg m^2; an error of it is in the file's unit."""
-    if inertia is None:
-        return None
-    checked = checked_inertia(body, inertia, INERTIA.of(length.name, RADIAN.name))
-    return FileUnits(length).power(INERTIA, checked)
 
 
 def _built(

@@ -25,7 +25,7 @@ from ..case import Case, Origin, Quantity, Series, Truth
 from ..curves import FEWEST, Printed, bounded, even, interpolated, matched, multiples, slopes
 from ..units import Convert, FileUnits, Unit
 from .document import fault, shown, toml_table
-from .reference_file import read, series, sha256
+from .reference_file import SAME_GRID, read, series, sha256
 from .reference_samples import (
     DERIVATIVES,
     Columns,
@@ -44,9 +44,6 @@ PROVED = ".json"
 # Of the rows of a formula, those with fewer digits are not rounded.
 FEWEST_DIGITS = 4
 CHOICE = 'sheet = "NAME" in [reference]'
-# Twelve digits of a driver value: a smaller error moves no output by as much as a tolerance; a
-# rounded table has a larger error.
-SAME_GRID = 1e-12
 
 
 def read_grid(case_file: Path, keys: ReferenceKeys, driver: Unit) -> Sequence[float]:
@@ -66,14 +63,14 @@ def read_grid(case_file: Path, keys: ReferenceKeys, driver: Unit) -> Sequence[fl
         return [driver(row[0]) for row in keys.rows if row]
     samples = _samples(case_file, keys, (), Truth.THIRD_PARTY_DATA)
     _, driver = driver_unit(samples, driver)
-    return [driver(row[0]) for _, row in samples.rows]
+    return [driver(x) for x in samples.numbers[:, 0].tolist()]
 
 
 def _samples(
     case_file: Path, keys: ReferenceKeys, outputs: Sequence[Quantity], truth: Truth
 ) -> Samples:
     if keys.file is None:
-        samples = inline(case_file, keys, outputs)
+        samples = samples_of(inline(case_file, keys, outputs))
         if truth is Truth.THIRD_PARTY_DATA:
             return samples
         # values of a formula: those with few digits, such as 0.5 and 1.0, are exact
@@ -272,7 +269,7 @@ class Grid:
 
     def __init__(self, samples: Samples, driver: Unit, values: Array, *, own: bool) -> None:
         self._samples, self._at = samples, values
-        self._written = np.array([row[0] for _, row in samples.rows])
+        self._written = samples.numbers[:, 0]
         rows = np.array([driver(x) for x in self._written.tolist()])
         self._allowed = allowed = SAME_GRID * float(np.max(np.abs(values)))
         self._index = np.arange(len(rows)) if own else matched(rows, values, allowed)
@@ -309,14 +306,14 @@ class Grid:
                 f" sweep, the nearest is {driver.written(float(nearest))}, expected {FEWEST} rows"
                 f" or more to interpolate, found {len(self._x)}"
             )
-            raise fault(samples.file, samples.rows[k][0], f"{problem}; correct it, {at}")
+            raise fault(samples.file, samples.places[k], f"{problem}; correct it, {at}")
         twice = np.flatnonzero(np.diff(self._x) <= 0.0)
         if twice.size:
             k = int(self._order[twice[0] + 1])
             problem = f"found driver value {samples.driver_value(k)} {driver.name} twice"
             raise fault(
                 samples.file,
-                samples.rows[k][0],
+                samples.places[k],
                 f"{problem}, expected it once where rows are interpolated; remove one, {at}",
             )
 
@@ -336,7 +333,7 @@ class Grid:
         Args:
             scale: conversion from the unit of the file to SI.
         """
-        written = np.array([row[k] for _, row in self._samples.rows])
+        written = self._samples.numbers[:, k]
         printed = self._samples.printed[k]
         y = np.array([scale(value) for value in written.tolist()])
         half = printed.half(written) * abs(scale(1.0))

@@ -18,8 +18,8 @@ from ..case import Case, Origin, Quantity, Series, Truth
 from .document import fault, read_text, shown
 
 LARGEST_FILE = 256_000_000
-# Twelve digits of a driver value, as for reference tables: a smaller error moves no output by as
-# much as a tolerance.
+# Twelve digits of a driver value: a smaller error moves no output by as much as a tolerance; a
+# rounded table has a larger error.
 SAME_GRID = 1e-12
 # Fewer forms than Python's numbers: no 1_0, no nan.
 _DECIMAL = re.compile(r"[-+]?\d++(?:\.\d*+)?(?:[eE][-+]?\d++)?", re.ASCII)

@@ -18,11 +18,13 @@ from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 
+import numpy as np
+
 from ...errors import remedy
+from ...trajectory import Array
 from ..case import PER_TRAVEL, Quantity
 from ..curves import Printed
 from ..units import Convert, FileUnits, Unit, si_of
-from .columns import is_unit_row, required_unit, unit_of_head
 from .document import LARGEST, SMALLEST, decimal, fault, read_text, shown
 from .schema import ReferenceKeys
 from .table import (
@@ -33,56 +35,65 @@ from .table import (
     Table,
     find_decimal_sign,
     is_number,
+    is_unit_row,
     numeral,
     one_sheet,
     read_sheets,
+    required_unit,
     text_table,
     trimmed,
+    unit_of_head,
 )
 
 # A line for each sample of the largest sweep, and as many other lines.
 MOST_LINES = 2_000_000
-ROWS = "expected rows of numbers, one for each sample; add them"
+COLUMNS, ROWS = "reference.columns", "reference.rows"
+"""Places of a table in a case file."""
 DERIVATIVES = (".velocity", ".acceleration")
 _SIGNS = re.compile(r"\"?\s*#\s*signs:\s*(\w+)")
 
 
 @dataclass(frozen=True)
 class Samples:
-    """Columns by name, and rows with their place for messages.
+    """Columns by name, and their numbers.
 
     Attributes:
         header: place of the names.
-        key: key of all rows.
-        signs: sign convention named in a comment.
-        table: the table that they are from, with the driver values in its column `first`.
+        places: of the rows, for messages.
+        numbers: shape (rows, columns), NaN for gaps.
         printed: digits of the numbers, by column.
+        table: the table that they are from, with the driver values in its column `first`.
+        signs: sign convention named in a comment.
     """
 
     file: Path
     header: str
     columns: Sequence[str]
-    rows: Sequence[tuple[str, Sequence[float]]]
-    key: str = ""
-    signs: str = ""
-    table: Table | None = None
-    first: int = 0
-    printed: Sequence[Printed] = ()
+    places: Sequence[str]
+    numbers: Array
+    printed: Sequence[Printed]
+    table: Table
+    first: int
+    signs: str
+
+    @property
+    def key(self) -> str:
+        """Key of the rows in a case file; empty in a file of their own."""
+        return ROWS if self.header == COLUMNS else ""
 
     def driver_value(self, k: int) -> str:
         """Return the driver value of a row as written."""
-        where, row = self.rows[k]
-        rows = self.table.rows() if self.table else ()
-        cells = next((cells for place, cells in rows if place == where), None)
-        return str(cells[self.first]) if cells else repr(row[0])
+        rows = self.table.rows()
+        return next(str(cells[self.first]) for place, cells in rows if place == self.places[k])
 
 
-def read_table(file: Path, sheet: str | None, option: str) -> Table:
-    """Read the table of a reference.
+def read_table(file: Path, sheet: str | None, option: str, above: str = "") -> Table:
+    """Read the table of a reference or a recording.
 
     Args:
         sheet: name of the sheet of a workbook; None for the only sheet with cells.
         option: the option to choose a sheet, for messages.
+        above: the last line of a text that is above the table, if it has one, in small letters.
 
     Raises:
         CaseError: the file is unreadable, too large, or has no such sheet.
@@ -93,14 +104,18 @@ def read_table(file: Path, sheet: str | None, option: str) -> Table:
         problem = f"found the sheet {shown(sheet)} of a file that is no workbook (.xlsx)"
         raise fault(file, "sheet", f"{problem}, expected none; leave it out")
     text = read_text(file, LARGEST_FILE, "thin out the samples", of_spreadsheet=True)
-    if (lines := len(text.splitlines())) > MOST_LINES:
+    lines = text.splitlines()
+    if len(lines) > MOST_LINES:
         raise fault(
             file,
             "",
-            f"found {lines} lines, expected a row for each sample of the sweep; thin out the"
+            f"found {len(lines)} lines, expected a row for each sample of the sweep; thin out the"
             " samples",
         )
-    return text_table(file, text, ("#",), _delimiter)
+    if above:
+        last = next((k for k, line in enumerate(lines, 1) if line.strip().lower() == above), 0)
+        lines[:last] = [""] * last
+    return text_table(file, lines, ("#",), _delimiter)
 
 
 def _delimiter(table: Table) -> str:
@@ -131,11 +146,12 @@ def head_of(table: Table) -> tuple[str, list[str]]:
     )
 
 
-def samples_of(table: Table, wanted: Sequence[int] | None = None) -> Samples:
+def samples_of(table: Table, wanted: Sequence[int] | None = None, *, gaps: bool = False) -> Samples:
     """Return the samples of a table: a head and rows of numbers; a row of units may stand between.
 
     Args:
         wanted: indices of the columns to read, the driver first; None for all.
+        gaps: whether empty cells and "nan" are gaps, and no faults.
 
     Raises:
         CaseError: a row lacks a number, or has a text in place of one.
@@ -144,7 +160,7 @@ def samples_of(table: Table, wanted: Sequence[int] | None = None) -> Samples:
     wanted = range(len(names)) if wanted is None else wanted
     every = [*wanted] == [*range(len(names))]
     sign = "." if table.delimiter == "," else _decimal_sign(table, wanted)
-    numbers: list[tuple[str, Sequence[float]]] = []
+    places, numbers = list[str](), array("d")
     printed = [Printed() for _ in wanted]
     for k, (place, cells) in enumerate(_body(table)):
         if k == 0 and is_unit_row(cells):
@@ -156,26 +172,35 @@ def samples_of(table: Table, wanted: Sequence[int] | None = None) -> Samples:
             continue
         if not every and not any(cells[n] != "" for n in wanted if n < len(cells)):
             continue  # a note
-        if every or not max(wanted) < len(cells) <= len(names):
-            check_width(file, place, len(cells), names)
+        if gaps:
+            cells = [*cells, *[""] * (len(names) - len(cells))]
+        width = len(cells)
+        if not (width == len(names) if every else max(wanted) < width <= len(names)):
+            expected = f"{len(names)} ({', '.join(names)})"
+            raise fault(
+                file, place, f"found {width} numbers, expected {expected}; complete the row"
+            )
         # convert at once: the cells of a large file as texts would take many times its size
-        found = array("d")
         for column, n in zip(printed, wanted, strict=True):
+            if gaps and str(cells[n]).lower().lstrip("+-") in ("", "nan"):
+                numbers.append(math.nan)
+                continue
             text = numeral(cells[n], sign)
             column.add(text)
-            found.append(_number(file, f"{place}, column {names[n]}", cells[n], text))
-        numbers.append((place, found))
-    if not numbers:
-        raise fault(file, "", f"found column names only, {ROWS}")
+            numbers.append(_number(file, f"{place}, column {names[n]}", cells[n], text))
+        places.append(place)
+    if not places:
+        raise fault(
+            file,
+            "",
+            "found column names only, expected rows of numbers, one for each sample; add them",
+        )
     comments = [*table.comments, *(str(cells[0]) for _, cells in table.sheet)]
     signs = next((said[1] for text in comments if (said := _SIGNS.match(text))), "")
-    columns = [names[n] for n in wanted]
     return Samples(
-        *(file, where, columns, numbers),
-        signs=signs,
-        table=table,
-        first=wanted[0],
-        printed=printed,
+        *(file, where, [names[n] for n in wanted], places),
+        np.array(numbers).reshape(len(places), len(wanted)),
+        *(printed, table, wanted[0], signs),
     )
 
 
@@ -229,11 +254,11 @@ def _number(file: Path, where: str, cell: object, text: str) -> float:
     return number if abs(number) >= SMALLEST else 0.0  # far below any tolerance
 
 
-def inline(file: Path, keys: ReferenceKeys, outputs: Sequence[Quantity]) -> Samples:
-    """Return the samples of the rows in a case file.
+def inline(file: Path, keys: ReferenceKeys, outputs: Sequence[Quantity]) -> Table:
+    """Return the table of the rows in a case file.
 
     Raises:
-        CaseError: there are no rows, or one of another width than the columns.
+        CaseError: there are no rows.
     """
     if keys.rows is None:
         raise fault(
@@ -242,26 +267,9 @@ def inline(file: Path, keys: ReferenceKeys, outputs: Sequence[Quantity]) -> Samp
             "found neither file nor rows, expected one of them; name a CSV file or give the rows",
         )
     own = (output.name for output in outputs if not output.name.endswith(PER_TRAVEL))
-    columns = keys.columns or ["driver", *own]
-    key = "reference.rows"
-    rows = [(f"{key}[{k}]", row) for k, row in enumerate(keys.rows)]
-    printed = [Printed() for _ in columns]
-    for where, row in rows:
-        check_width(file, where, len(row), columns)
-        for column, number in zip(printed, row, strict=True):
-            column.add(repr(number))
-    return Samples(file, "reference.columns", columns, rows, key, printed=printed)
-
-
-def check_width(file: Path, where: str, found: int, columns: Sequence[str]) -> None:
-    """Refuse a row without a number for each column.
-
-    Raises:
-        CaseError: it has more or fewer.
-    """
-    if found != len(columns):
-        expected = f"{len(columns)} ({', '.join(columns)})"
-        raise fault(file, where, f"found {found} numbers, expected {expected}; complete the row")
+    rows = [(f"{ROWS}[{k}]", [*map(repr, row)]) for k, row in enumerate(keys.rows)]
+    head = (COLUMNS, keys.columns or ["driver", *own])
+    return Table(file, delimiter=",", sheet=[head, *rows])
 
 
 @dataclass(frozen=True)

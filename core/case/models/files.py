@@ -9,7 +9,7 @@ from ...errors import with_article
 from ..case import Case
 from ..io.case_file import LARGEST_FILE, load_case
 from ..io.document import fault, parse, read_text
-from ..io.reader_options import NOTHING, Supplied
+from ..io.reader_options import NOTHING, OF_HARDPOINTS, OF_MODELS, Supplied
 from ..io.table import WORKBOOKS
 
 if TYPE_CHECKING:
@@ -32,7 +32,6 @@ CASE, CHRONO, ADAMS, TABLE, TREE, WORKBOOK, MODEL = (
     "workbook of hardpoints",
     "model",
 )
-HARDPOINTS = (CHRONO, ADAMS, TABLE)
 UNREAD = {
     ".constraints.json": "holds the loops of a URDF beside it; give that file, NAME.urdf",
     ".xacro": "holds macros; expand them: xacro FILE > robot.urdf",
@@ -59,26 +58,11 @@ UNREAD = {
     ),
 }
 """Files that people have beside their models, and what to do, by suffix."""
-_OF_HARDPOINTS = (
-    "template",
-    "units",
-    "axes",
-    "travel",
-    "rack",
-    "names",
-    "wheel-radius",
-    "wheelbase",
-    "axle",
-    "position",
-    "cg-height",
-    "brake-share",
-    "drive-share",
-)
 _OPTIONS = {
     CASE: ("closure",),
-    MODEL: ("drive", "hold", "hold-rest", "start", "closure"),
-    **dict.fromkeys(HARDPOINTS, _OF_HARDPOINTS),
-    **dict.fromkeys((WORKBOOK, TREE, TABLE), (*_OF_HARDPOINTS, "sheet")),
+    MODEL: OF_MODELS,
+    **dict.fromkeys((CHRONO, ADAMS), OF_HARDPOINTS),
+    **dict.fromkeys((WORKBOOK, TREE, TABLE), (*OF_HARDPOINTS, "sheet")),
 }
 
 

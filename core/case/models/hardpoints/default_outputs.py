@@ -24,7 +24,7 @@ from ...quantity import with_markers
 from ...suspension import Axle, Convention, Side, SuspensionOutput, Vehicle
 from ...suspension.corner import MARKER_DISTANCE
 from ...suspension.wheel import Place
-from .axle import STROKE, AxleMotion, name_of
+from .axle import STROKE, AxleMotion
 from .table import Axes, HardpointTable
 from .templates import WHEEL_AXIS, WHEEL_CENTER, WHEEL_CONTACT, Template
 
@@ -201,18 +201,19 @@ def with_suspension_outputs(
 
 def _on_side(vehicle: Vehicle, side: Side) -> Vehicle:
     """Return the vehicle with the names of a side of an axle."""
+    prefix = f"{side}_"
     kingpin: Any = tuple(
-        name_of(side, each) if isinstance(each, str) else tuple(name_of(side, end) for end in each)
+        prefix + each if isinstance(each, str) else tuple(prefix + end for end in each)
         for each in vehicle.kingpin or ()
     )
     return replace(
         vehicle,
         side=side,
-        wheel_center=name_of(side, vehicle.wheel_center),
-        wheel_axis=vehicle.wheel_axis and name_of(side, vehicle.wheel_axis),
-        wheel_contact=vehicle.wheel_contact and name_of(side, vehicle.wheel_contact),
+        wheel_center=prefix + vehicle.wheel_center,
+        wheel_axis=vehicle.wheel_axis and prefix + vehicle.wheel_axis,
+        wheel_contact=vehicle.wheel_contact and prefix + vehicle.wheel_contact,
         kingpin=kingpin or None,
-        travel=tuple(name_of(each, STROKE) for each in Side),
+        travel=tuple(f"{each}_{STROKE}" for each in Side),
     )
 
 

@@ -6,7 +6,8 @@ rack move.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,10 +17,12 @@ from ...case import Case, Sweep, Truth
 from ...io.document import explained, fault, parse, read_text, shown, unknown_name
 from ...io.escape import visible
 from ...io.reader_options import LEFT_OUT, Supplied
+from ...notes import SUSPENSIONS
 from ...quantity import with_markers
-from .axle import one_wheel, read_travels, whole_axle
+from ...units import plain
+from .axle import mechanism_of, read_travels
 from .default_outputs import far_out, hardpoints_of, vehicle_of, with_axis, with_suspension_outputs
-from .table import HardpointTable, axes_of, coordinate, placed, require_size, unit_of
+from .table import HardpointTable, axes_of, placed, unit_of
 from .templates import (
     TEMPLATE_NAMES,
     TEMPLATES,
@@ -57,22 +60,29 @@ def case_of_hardpoints(table: HardpointTable, supplied: Supplied) -> Case:
             " take out the others",
         )
     template = _template(table, supplied.template)
-    points = placed(table, supplied.units, supplied.axes)
+    unit, axes = unit_of(table, supplied.units), axes_of(table, supplied.axes)
+    points = placed(table, unit, axes)
     named = _filled(table, template, supplied.names)
     at = {role: points[name] for role, name in named.items()}
-    require_size(table, at, supplied.units)
+    size = max(math.dist(a, b) for a in at.values() for b in at.values())
+    if improbable := SUSPENSIONS.improbable(size, unit):
+        problem = f"the points span {improbable} They are in another unit"
+        raise fault(file, "", f"{problem}; correct --units, or the unit in the file")
     vehicle = vehicle_of(table, template, named, at, supplied)
     travels = read_travels(file, supplied.travel, supplied.rack)
-    _require_left_and_upright(table, template, named, at, supplied)
+
+    def written(role: str, k: int) -> str:
+        column = next(column for column, (axis, _) in enumerate(axes) if axis == k)
+        number = plain(table.points[named[role]].position[column])
+        return f"{'xyz'[column]} = {number} {unit.name}"
+
+    _require_left_and_upright(table, template, named, at, written)
     far = far_out(at)
 
     def design(at: Mapping[str, Vector]) -> tuple[Mechanism, Sweep]:
-        moved = with_axis(at, far)
-        if supplied.axle is None:
-            return one_wheel(file, template, moved, travels)
-        return whole_axle(file, supplied.axle, template, moved, travels)
+        return mechanism_of(file, supplied.axle, template, with_axis(at, far), travels)
 
-    with explained(file, "", unit_of(table, supplied.units)):
+    with explained(file, "", unit):
         mechanism, sweep = design(at)
     others = [*(name for name in points if name not in named.values()), *table.left_out]
     source = (
@@ -83,11 +93,10 @@ def case_of_hardpoints(table: HardpointTable, supplied: Supplied) -> Case:
         source += "; without a wheel's radius (--wheel-radius) no outputs at the road"
     source += f"{LEFT_OUT}{_listed(others)}"
     case = Case(file.stem, source, Truth.CONSENSUS_ONLY, mechanism, sweep, ())
-    case = replace(case, length_unit=unit_of(table, supplied.units).name)
+    case = replace(case, length_unit=unit.name)
     case = with_suspension_outputs(
         case, template, vehicle, at, supplied.axle, steered=supplied.rack is not None
     )
-    axes = axes_of(table, supplied.axes)
     hardpoints = hardpoints_of(
         named, at, axes, lambda at: with_markers(design(at)[0], case.outputs)
     )
@@ -189,13 +198,13 @@ def _require_left_and_upright(
     template: Template,
     named: Mapping[str, str],
     at: Mapping[str, Vector],
-    supplied: Supplied,
+    written: Callable[[str, int], str],
 ) -> None:
-    """Refuse mirrored points and points upside down: the stated axes are wrong."""
+    """Refuse mirrored points and points upside down: the stated axes are wrong.
 
-    def written(role: str, k: int) -> str:
-        return coordinate(table, named[role], k, supplied.units, supplied.axes)
-
+    Args:
+        written: returns x, y or z (0, 1, 2) of a role as in the file: "y = 750 mm".
+    """
     advice = "correct --axes" if table.axes is None else "correct the points"
     if at[WHEEL_CENTER][1] <= 0.0:
         raise fault(

@@ -10,14 +10,13 @@ mcpherson`; the unit may also stand in the head or in a row below.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
 from pathlib import Path
 from typing import TypeAlias
 
 from ....errors import brief
-from ...io.columns import split_head
 from ...io.document import fault, shown
 from ...io.table import (
     DELIMITERS,
@@ -28,11 +27,21 @@ from ...io.table import (
     is_number,
     one_sheet,
     read_sheets,
+    split_head,
     text_table,
     trimmed,
 )
 from ...units import LENGTHS
-from .table import Hardpoint, HardpointTable, length_name, number, one_unit, require_name, twice
+from .table import (
+    Hardpoint,
+    HardpointTable,
+    incomplete,
+    length_name,
+    number,
+    one_unit,
+    require_name,
+    twice,
+)
 from .templates import ROLES, compact
 from .tree import FEWEST, axis_of, fact_of, is_assignments, read_assignments
 
@@ -86,7 +95,7 @@ def read_plain(file: Path, text: str, wanted: str | None = None) -> HardpointTab
     Raises:
         CaseError: no head, or a row at odds with the head.
     """
-    table = text_table(file, text, COMMENTS, _delimiter)
+    table = text_table(file, text.splitlines(), COMMENTS, _delimiter)
     facts: dict[str, str] = {}
     for comment in table.comments:
         bare = comment.strip('" \t\r').lstrip("".join(COMMENTS)).rstrip(f'"{DELIMITERS}')
@@ -203,8 +212,12 @@ def read_rows(table: Table, tool: str, facts: dict[str, str]) -> HardpointTable:
         else:
             left_out.append(_note(where, cells))
     unit = head.unit
-    if unit is None and body and (below := _unit_row(body[0][1], head)):
-        unit, body = below, body[1:]
+    if unit is None and body:
+        below = enumerate(body[0][1])
+        texts = [str(cell) for k, cell in below if cell != "" and k != head.columns[0]]
+        units = {length_name(text.strip("[]() ")) for text in texts}
+        if len(texts) >= 3 and len(units) == 1 and units <= LENGTHS.keys():  # a row of units
+            unit, body = units.pop(), body[1:]
     if unit and length_name(facts.get("unit", unit)) != length_name(unit):
         raise fault(
             file,
@@ -268,13 +281,6 @@ def _written(cells: Sequence[Cell]) -> str:
 
 def _note(where: str, cells: Sequence[Cell]) -> str:
     return f"{where} ({brief(_written(cells).strip(','))})"
-
-
-def _unit_row(cells: Sequence[Cell], head: Head) -> str | None:
-    """Return the unit in a row of units below the head; None if the row is of a point."""
-    texts = [cell for k, cell in enumerate(cells) if cell != "" and k != head.columns[0]]
-    names = {length_name(str(text).strip("[]() ")) for text in texts}
-    return names.pop() if len(texts) >= 3 and len(names) == 1 and names <= LENGTHS.keys() else None
 
 
 def _require_complete(
@@ -398,15 +404,16 @@ def _by_coordinate(file: Path, rows: Sequence[Row]) -> _Parts | None:
     whole = [name for name, place in points.items() if len(place) == 3]
     if len(rows) - len(others) < FEWEST or not whole:
         return None
-    unit = one_unit(file, units) or next(_units_of(others), None)
+    # a head such as `parameter, value [mm]`
+    texts = (cell for _, cells in others for cell in cells if isinstance(cell, str))
+    stated = (unit for text in texts if length_name(unit := split_head(text)[1]) in LENGTHS)
+    unit = one_unit(file, units) or next(stated, None)
     body: list[Row] = []
     for name, place in points.items():
         if name in whole:
             body.append((place["x"][0], [name, *(place[axis][1] for axis in "xyz")]))
         elif compact(name) in ROLES:
-            missing = " and ".join(axis for axis in "xyz" if axis not in place)
-            where, _ = next(iter(place.values()))
-            raise fault(file, where, f"found {name} without {missing}, expected all three; add it")
+            raise incomplete(file, next(iter(place.values()))[0], name, place)
         else:
             others += [(where, [f"{name} {axis}"]) for axis, (where, _) in place.items()]
     return Head("the head", range(4), HEAD, unit), others, body
@@ -429,14 +436,6 @@ def _coordinate(cells: Sequence[Cell]) -> tuple[str, str, list[Cell], str] | Non
     after = rest[len(values)] if len(rest) > len(values) else unit
     unit = after.strip("[]() ") if isinstance(after, str) else ""
     return (*split, values, unit if length_name(unit) in LENGTHS else "")
-
-
-def _units_of(rows: Sequence[Row]) -> Iterator[str]:
-    """Yield the units in heads such as `parameter, value [mm]`."""
-    for _, cells in rows:
-        for cell in cells:
-            if isinstance(cell, str) and length_name(unit := split_head(cell)[1]) in LENGTHS:
-                yield unit
 
 
 def _by_point(file: Path, rows: Sequence[Row]) -> _Parts | None:

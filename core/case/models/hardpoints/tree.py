@@ -23,7 +23,16 @@ from ...io.document import fault, parse, parse_yaml, shown
 from ...io.table import is_number
 from ...units import LENGTHS
 from .programs import without_comments
-from .table import Hardpoint, HardpointTable, is_axes, length_name, number, one_unit, twice
+from .table import (
+    Hardpoint,
+    HardpointTable,
+    incomplete,
+    is_axes,
+    length_name,
+    number,
+    one_unit,
+    twice,
+)
 from .templates import ROLES, TEMPLATE_NAMES, compact, normal
 
 FEWEST = 3
@@ -290,12 +299,7 @@ def _points(file: Path, tree: Sequence[Leaf]) -> tuple[dict[Keys, Hardpoint], li
             values = (number(file, found[axis].where, found[axis].value) for axis in "xyz")
             add(keys, found["x"].where, *values)
         elif compact(".".join(keys[-2:])) in ROLES or compact(keys[-1]) in ROLES:
-            missing = " and ".join(axis for axis in "xyz" if axis not in found)
-            raise fault(
-                file,
-                next(iter(found.values())).where,
-                f"found {'.'.join(keys)} without {missing}, expected all three; add it",
-            )
+            raise incomplete(file, next(iter(found.values())).where, ".".join(keys), found)
         else:
             others += found.values()
     return points, others
