@@ -182,7 +182,7 @@ def test_a_slope_of_a_quotient(tmp_path):
         assert slope[k] == pytest.approx((high - low) / 2e-5, rel=1e-6)
 
 
-def test_without_a_driver_of_travel_the_slope_is_along_the_sweep(tmp_path):
+def test_slope_without_travel_driver(tmp_path):
     """A reference point of the same carrier is no driver of travel unless it is named."""
     data_path = case_of(tmp_path, *SWEEPS["both"])
     assert data_path.outputs[0].vehicle.travel == ("stroke",)

@@ -83,7 +83,7 @@ def test_every_surface_has_the_same_words(tmp_path, kincheck_main, capsys):
         assert "compared with nothing" not in text
 
 
-def test_an_output_that_was_not_judged_is_skipped_beside_those_that_were():
+def test_unjudged_output_is_skipped_in_junit():
     case = crank()
     del case.reference["y"]
     (record,) = run([case], [RIGHT], tol=TOL).records
@@ -132,14 +132,14 @@ def test_a_fault_of_the_whole_pair_fails_every_output():
     ],
     ids=["native", "two", "missing", "unable", "wrong", "two and missing"],
 )
-def test_a_run_that_compares_nothing_has_not_done_its_work(kincheck_main, capsys, engines, status):
+def test_run_without_comparison_has_status_2(kincheck_main, capsys, engines, status):
     assert kincheck_main("run", engines=engines, cases=UNREFERENCED) == status
     assert ("kincheck: nothing was compared (1 not judged" in capsys.readouterr().err) is (
         status == 2
     )
 
 
-def test_a_case_that_is_not_judged_beside_one_that_is_changes_no_status(kincheck_main, capsys):
+def test_unjudged_case_keeps_status_0(kincheck_main, capsys):
     cases = {"crank": crank(), "bare": crank("bare", reference=False)}
     assert kincheck_main("run", engines=[RIGHT], cases=cases) == 0
     assert "1 pass, 1 not judged" in capsys.readouterr().out
@@ -170,7 +170,7 @@ def test_an_engine_that_is_named_is_required(kincheck_main, capsys):
     assert len(told) == 1  # not once for each option
 
 
-def test_native_that_breaks_leaves_the_others_unjudged(kincheck_main, capsys):
+def test_broken_native_leaves_others_unjudged(kincheck_main, capsys):
     def broken(case):
         raise ValueError("no")
 

@@ -80,7 +80,7 @@ def test_json_has_the_keys_of_the_schema_and_every_digit():
     assert from_json(text) == results
 
 
-def test_json_keeps_lists_on_a_line_and_strings_as_they_are():
+def test_json_keeps_lists_on_lines():
     message = 'list [1,2,\t3] of "quoted, [4,5]" numbers'
     results = run([crank()], [Fake(answer=raising(ValueError(message)))], tol=TOL)
     text = to_json(results)
@@ -179,7 +179,7 @@ def test_the_table_names_modes_where_there_are_several(capsys):
     ],
     ids=["nested", "empty", "another schema"],
 )
-def test_a_file_that_holds_no_results_is_refused_in_one_line(tmp_path, capsys, text, said):
+def test_report_refuses_file_without_results(tmp_path, capsys, text, said):
     file = tmp_path / "results.json"
     file.write_text(text)
     assert main.main(["report", str(file)]) == 2

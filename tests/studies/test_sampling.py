@@ -53,9 +53,7 @@ def variation(tmp_path, tables=None, **hardpoints):
 
 @pytest.mark.parametrize("law", TIP)
 @pytest.mark.parametrize("sampling", [Sampling.LATIN, Sampling.SOBOL])
-def test_there_is_one_variant_in_every_interval_of_equal_probability(
-    tmp_path, law, sampling, of_scipy
-):
+def test_stratified_sampling_fills_every_interval(tmp_path, law, sampling, of_scipy):
     """A Latin hypercube has that for any number, a Sobol sequence for powers of two."""
     count = 1000 if sampling is Sampling.LATIN else 1024
     found = variation(tmp_path, tip=TIP[law]).sampled(sampling, count)
@@ -71,7 +69,7 @@ def test_random_draws_have_the_distribution(tmp_path, law, stats, of_scipy):
     assert np.abs(drawn).max() <= {"truncated_normal": 3.0, "triangular": 2.0}[law]
 
 
-def test_random_draws_of_earlier_versions_stay_the_same(tmp_path):
+def test_random_draws_equal_earlier_versions(tmp_path):
     """Equal seeds give equal numbers: normal and uniform coordinates are drawn as ever."""
     found = variation(
         tmp_path, tip=TIP["normal"], pivot={"at": "pivot", "half_width": [3.0, 0.0, 0.0]}
@@ -84,7 +82,7 @@ def test_random_draws_of_earlier_versions_stay_the_same(tmp_path):
 
 
 @pytest.mark.parametrize("sampling", Sampling)
-def test_a_variant_does_not_depend_on_those_drawn_with_it(tmp_path, sampling):
+def test_variant_depends_on_seed_and_index(tmp_path, sampling):
     found = variation(tmp_path, tip=TIP["triangular"], pivot={"at": "pivot", "sigma": 1.0}).sampled(
         sampling, 700
     )
@@ -122,7 +120,7 @@ def test_correlated_normal_coordinates_have_the_correlation(tmp_path, r):
         np.testing.assert_allclose(x, z, rtol=1e-12)
 
 
-def test_correlated_uniform_coordinates_have_the_correlation_of_the_copula(tmp_path):
+def test_correlated_uniform_coordinates_follow_copula(tmp_path):
     x, _, z = correlated(tmp_path, "uniform", 0.8)
     assert np.corrcoef(x, z)[0, 1] == pytest.approx(6.0 / np.pi * np.arcsin(0.4), abs=5e-3)
     assert np.abs([x, z]).max() <= 2e-3
@@ -142,7 +140,7 @@ MATRICES = [
 
 
 @pytest.mark.parametrize(("matrix", "message"), MATRICES)
-def test_a_matrix_that_is_none_of_correlations_is_refused(tmp_path, matrix, message):
+def test_invalid_correlation_matrix_is_refused(tmp_path, matrix, message):
     names = ["tip.x", "tip.y", "tip.z"][: max(2, len(matrix))]
     tables = {"correlations": {"a": {"coordinates": names, "matrix": matrix}}}
     with pytest.raises(CaseError) as error:
@@ -174,7 +172,7 @@ OTHER_FAULTS = [
 
 
 @pytest.mark.parametrize(("tables", "message"), OTHER_FAULTS)
-def test_what_is_wrong_with_correlations_and_limits_is_said(tmp_path, tables, message):
+def test_invalid_correlations_and_limits_are_refused(tmp_path, tables, message):
     keys = {"values": [-1, 1]} if "mode" in tables else {"sigma": 1.0}
     with pytest.raises(CaseError) as error:
         variation(tmp_path, tables, tip={"at": "tip", **keys})
@@ -201,7 +199,7 @@ def test_a_distribution_takes_its_own_keys(tmp_path, keys, message):
     assert message in str(error.value)
 
 
-def test_samplings_that_cannot_be_are_refused(tmp_path):
+def test_impossible_samplings_are_refused(tmp_path):
     found = variation(tmp_path, tip={"at": "tip", "sigma": 1.0})
     with pytest.raises(KincheckError, match="6 GB of memory, expected at most 1; take fewer"):
         found.sampled(Sampling.LATIN, 500_000_000)

@@ -105,7 +105,7 @@ FAULTS = [
 
 
 @pytest.mark.parametrize(("change", "message"), FAULTS)
-def test_what_is_wrong_with_a_file_is_said(tmp_path, change, message):
+def test_invalid_variation_file_is_refused(tmp_path, change, message):
     change = dict(change)
     tables = {**HEAD, "mode": "monte_carlo", "hardpoints": {}}
     tables["hardpoints"] = {name: change.pop(name) for name in ("tip", "same") if name in change}
@@ -119,7 +119,7 @@ def test_what_is_wrong_with_a_file_is_said(tmp_path, change, message):
     assert message in str(error.value)
 
 
-def test_a_name_that_may_be_two_places_is_refused(tmp_path):
+def test_ambiguous_place_is_refused(tmp_path):
     with pytest.raises(
         CaseError,
         match=(
@@ -129,7 +129,7 @@ def test_a_name_that_may_be_two_places_is_refused(tmp_path):
         vary(tmp_path, load("mcpherson_strut"), rod={"at": "tie_rod", "sigma": 1.0})
 
 
-def test_an_absolute_driver_of_a_point_that_varies_is_refused(tmp_path):
+def test_absolute_driver_of_varied_point_is_refused(tmp_path):
     """Its value is another distance from the design for every variant."""
     case = load("mcpherson_strut")
     drivers = [replace(case.mechanism.driver("stroke"), relative=False)]
