@@ -183,7 +183,7 @@ def speed(probe: Probe) -> float:
 
 
 def unbalanced(probe: Probe, name: str) -> Array:
-    """Return what is missing to a body's balance by Newton and Euler, shape (n, 6)."""
+    """Return the wrench missing to a body's balance by Newton and Euler, shape (n, 6)."""
     n = len(probe.motion.solved)
     if probe.mechanism.is_fixed(name):
         return np.zeros((n, 6))
@@ -201,7 +201,7 @@ def unbalanced(probe: Probe, name: str) -> Array:
 
 
 def _pushes(probe: Probe, name: str) -> Iterator[tuple[Array, Array, Array]]:
-    """Yield what joints, drivers and the spring do to a body: force, its place, moment."""
+    """Yield the loads of joints, drivers and the spring on a body: force, its place, moment."""
     mechanism, forces = probe.mechanism, probe.motion.forces
     assert forces is not None
     for joint in mechanism.joints:
@@ -227,7 +227,7 @@ def _pushes(probe: Probe, name: str) -> Iterator[tuple[Array, Array, Array]]:
 def _by_driver(
     probe: Probe, driver: Any, effort: Array, name: str
 ) -> Iterator[tuple[Array, Array, Array]]:
-    """Yield what a driver does: a couple about its joint's axis, or a force along it."""
+    """Yield the load of a driver: a couple about its joint's axis, or a force along it."""
     joint: Any = probe.mechanism.joint(driver.joint)
     if name not in joint.bodies:
         return
