@@ -149,8 +149,6 @@ def solved(case: Case) -> Probe:
 
 # Balance of the bodies, which have their frame at the global origin at design.
 
-# MERGED
-
 
 def _moving(probe: Probe, body: str, point: Any = (0.0, 0.0, 0.0)) -> CarriedPoint:
     """Return a point of a body over the samples."""
@@ -236,9 +234,6 @@ def _by_driver(
     place = _moving(probe, joint.j, joint.point).place
     yield (0.0 * push, place, push) if driver.turns else (push, place, 0.0 * push)
 
-
-# MERGED
-# MERGED
 
 LIMIT = Limit(
     1e-10, "round-off over the squared smallest singular value of the probe, relative to the forces"
