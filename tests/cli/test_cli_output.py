@@ -2,7 +2,6 @@
 fails.
 """
 
-import json
 import os
 import subprocess
 import sys
@@ -16,7 +15,7 @@ from kincheck.core.harness.results_file import read_results
 from kincheck.core.report.caveats import caveats
 from kincheck.core.report.junit import to_junit
 
-from ..support.fakes import Fake, off, raising
+from ..support.fakes import Fake, off
 from .test_cli import BROKEN, MISSING, PARTIAL, RIGHT, UNABLE, WRONG
 
 
@@ -230,14 +229,6 @@ def test_failed_file_keeps_the_others(kincheck_main, capsys, tmp_path):
     assert kincheck_main(*argv, engines=[Fake("native", answer=hostile)]) == 2
     assert "j.xml: cannot be written (Is a directory)" in capsys.readouterr().err
     assert len(from_json((tmp_path / "r.json").read_bytes()).records) == 1
-
-
-def test_an_interrupt_keeps_what_was_made(kincheck_main, capsys):
-    stopped = Fake("stopped", answer=raising(KeyboardInterrupt()))
-    assert kincheck_main("run", "--json", "-", engines=[RIGHT, stopped]) == 130
-    captured = capsys.readouterr()
-    assert [each["engine"] for each in json.loads(captured.out)["records"]] == ["native"]
-    assert "interrupted: 1 of 4 records" in captured.err
 
 
 def test_internal_defect_has_status_2(kincheck_main, capsys, monkeypatch):

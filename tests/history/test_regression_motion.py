@@ -60,16 +60,6 @@ def test_large_forces_do_not_hide_a_small_motion(path, off, kinds):
     assert [each.kind for each in reported(path, against="1").findings] == kinds
 
 
-def test_a_force_that_changes_is_told_with_its_unit(path):
-    for load in (1000.0, 1010.0):
-        force = OutputSeries(position=[load], velocity=None, acceleration=None, unit="N m")
-        outputs, driver = {"load": force}, {"turn": [0.0]}
-        keep(path, changed(records(), driver=driver, outputs=outputs, errors={}))
-    (found,) = reported(path, against="1").findings
-    assert (found.kind, found.output) == (Kind.MOVED, "load")
-    assert "differs by up to 10 N m from its earlier values" in found.message
-
-
 def test_round_off_is_no_other_motion(path):
     kinds, messages, _ = found_after(
         path, position=[0.0, 0.5 + 1e-10, None], velocity=[1.0, None, 2.0]

@@ -27,27 +27,6 @@ def noisy(levels, spread=0.05, seed=3):
     return np.array([level + noise.gauss(0.0, spread) for level in levels])
 
 
-SHAPES = {
-    "comes and goes": ([8, 8, 8, 8], [8, 16, 24]),
-    "three slow runs": ([18, 3, 15], [18, 21]),
-    "three at the end": ([37, 3], [37]),
-    "one step": ([25, 8], [25]),
-}
-
-
-@pytest.mark.parametrize("shape", SHAPES)
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_repeated_steps_are_found_exactly(shape, sign):
-    """Steps of ten standard deviations, a factor of two in time, up first or down first."""
-    lengths, expected = SHAPES[shape]
-    level = sign * math.log(2.0) * np.repeat([k % 2 for k in range(len(lengths))], lengths)
-    found = [
-        change_points(noisy(level, 0.0693, seed), least=math.log(1.5), lasting=3)
-        for seed in range(100)
-    ]
-    assert sum(each == expected for each in found) >= 95
-
-
 def test_a_slow_drift_is_no_step():
     drift = np.linspace(0.0, math.log(4.0), 60)
     for seed in range(20):

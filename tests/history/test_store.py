@@ -95,14 +95,6 @@ def test_equal_references_are_stored_once(path):
         assert len({str(store.results(row.id).references) for row in store.runs()}) == 1
 
 
-def test_records_are_stored_at_once(path):
-    keeping, _ = kept(path, [crank()], ENGINES, stop=2)
-    with Store(path, writable=False) as store:
-        assert [each.engine for each in store.records(keeping.run)] == ["native", "wrong"]
-        assert store.run(keeping.run).status == "running"
-        assert len(store.results(keeping.run).records) == 2
-
-
 def test_pair_is_stored_once(path):
     keeping, results = kept(path, [crank()], ENGINES)
     with Store(path) as store:
@@ -148,6 +140,7 @@ def test_only_the_same_run_without_an_end_is_resumed(path, monkeypatch):
             ENGINES,
         ),
         "engines": ([case], ENGINES[:-1]),
+        "version": ([case], [Fake("native", installed="9"), *ENGINES[1:]]),
     }
     for cases, engines in others.values():
         assert not kept(path, cases, engines, resume=True)[0].resumed
