@@ -15,6 +15,7 @@ from kincheck.core.report.report import headline, write_report
 from kincheck.core.report.table import messages
 from kincheck.core.trajectory import Trajectory
 
+from ..support.engine_faults import changed
 from ..support.engine_forces import force_case
 from ..support.fakes import Fake, crank, off
 from ..support.loaded import loaded
@@ -154,13 +155,7 @@ class OtherMoments(NativeEngine):
             name: replace(each, moment=each.moment + 1e-3 * np.roll(each.force, 1, axis=1))
             for name, each in found.forces.joints.items()
         }
-        return replaced(found, forces=replace(found.forces, joints=joints))
-
-
-def replaced(found, **changes):
-    other = object.__new__(Trajectory)
-    other.__dict__.update(found.__dict__, **changes)
-    return other
+        return changed(found, forces=replace(found.forces, joints=joints))
 
 
 def test_simulators_suspect_native_moments():

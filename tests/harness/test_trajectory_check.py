@@ -10,20 +10,13 @@ from kincheck.core.harness.native_engine import NativeEngine
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.run import run
 from kincheck.core.harness.trajectory_check import BadTrajectoryError, check
-from kincheck.core.trajectory import Trajectory
 
+from ..support.engine_faults import changed
 from ..support.engine_forces import force_case
 from ..support.fakes import SAMPLES, Fake, at, crank, solution
 from ..support.loaded import loaded
 
 NATIVE = NativeEngine(every_body=True)
-
-
-def changed(found, **parts):
-    """The trajectory with other parts."""
-    other = object.__new__(Trajectory)
-    other.__dict__.update(found.__dict__, **parts)
-    return other
 
 
 def with_point(found, **parts):

@@ -15,6 +15,7 @@ from kincheck.core.studies.checks.joint_loops import loops
 from kincheck.core.studies.checks.loaded_probe import driven, loaded, reactions, solved
 from kincheck.core.studies.stress.solving import interpreted
 
+from ..support.engine_faults import changed
 from .test_check_joint_mistakes import mistaken, negative_gamma
 
 pytestmark = pytest.mark.usefixtures("own_joint_types")
@@ -131,9 +132,7 @@ class Wrong:
         found = NATIVE.solve(model, case, tol)
         forces = found.forces
         joints = {k: replace(each, force=1.001 * each.force) for k, each in forces.joints.items()}
-        other = object.__new__(type(found))
-        other.__dict__.update(found.__dict__, forces=replace(forces, joints=joints))
-        return other
+        return changed(found, forces=replace(forces, joints=joints))
 
 
 class Right(Wrong):
