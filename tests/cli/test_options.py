@@ -66,7 +66,7 @@ def here(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(("line", "said"), WITHOUT_EFFECT)
-def test_what_would_have_no_effect_is_refused(line, said, here, capsys):
+def test_options_without_effect_are_refused(line, said, here, capsys):
     assert main(line.split()) == 2
     out, err = capsys.readouterr()
     assert (out, said in err) == ("", True), err
@@ -93,7 +93,7 @@ def test_a_second_file_of_an_export_does_not_go_over_the_json(here, capsys):
     assert not (here / "x.urdf").exists()
 
 
-def test_what_is_no_file_takes_what_several_options_write():
+def test_devices_take_several_outputs():
     assert (
         unwritable(
             [
@@ -109,21 +109,5 @@ def test_what_is_no_file_takes_what_several_options_write():
 
 
 def test_a_limit_that_can_be_counted_is_one(capsys):
-    assert (
-        main(
-            [
-                "run",
-                "rssr",
-                "--engine",
-                "native",
-                "--jobs",
-                "1",
-                "--memory",
-                "1e9",
-                "--timeout",
-                "1e9",
-            ]
-        )
-        == 0
-    )
+    assert main("run rssr --engine native --jobs 1 --memory 1e9 --timeout 1e9".split()) == 0
     assert "1 pass" in capsys.readouterr().out

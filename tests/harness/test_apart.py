@@ -15,7 +15,7 @@ from kincheck.core.harness.unloadable import Unloadable
 from ..support.engines_asked import DEEDS, Foreign, Loading, Ours
 
 
-def test_versions_are_told_in_the_order_of_the_engines(monkeypatch):
+def test_versions_keep_order_of_engines(monkeypatch):
     # where the processes find the engines
     monkeypatch.syspath_prepend(str(Path(__file__).parents[2]))
     found = versions([*map(Loading, DEEDS), Unloadable("gone", "no module", "projection")])
@@ -27,18 +27,18 @@ def test_an_engine_that_hangs_has_no_version(monkeypatch):
     assert versions([Loading("hangs")], patience=1.0) == [None]
 
 
-def test_only_an_engine_that_says_so_is_asked_in_this_process(monkeypatch):
+def test_version_is_read_in_process_on_request(monkeypatch):
     monkeypatch.syspath_prepend(str(Path(__file__).parents[2]))
     ours, foreign = versions([Ours("any"), Foreign("native")])
     assert ours == str(os.getpid())
     assert foreign not in (ours, None)
 
 
-def test_a_run_with_a_history_outlives_simulators_that_cannot_be_loaded(tmp_path):
+def test_run_survives_crashing_simulator_imports(tmp_path):
     (tmp_path / "exudyn.py").write_text("import sys; sys.exit(0)")
     (tmp_path / "mujoco.py").write_text("import os; os.abort()")
-    command = ["run", "rssr", "--engine", "native", "exudyn", "mujoco"]
-    files = ["--history", "h.sqlite", "--json", "r.json"]
+    command = "run rssr --engine native exudyn mujoco".split()
+    files = "--history h.sqlite --json r.json".split()
     code = "import sys; from kincheck.core.cli import main as cli; sys.exit(cli.main(sys.argv[1:]))"
     env = {**os.environ, "PYTHONPATH": str(tmp_path)}
     found = subprocess.run(
@@ -56,7 +56,7 @@ def test_a_run_with_a_history_outlives_simulators_that_cannot_be_loaded(tmp_path
     assert (tmp_path / "h.sqlite").exists()
 
 
-def test_a_command_that_is_ended_from_within_is_no_success(monkeypatch, capsys):
+def test_exit_inside_command_is_failure(monkeypatch, capsys):
     monkeypatch.setattr(main, "registry", lambda: sys.exit(0))
     assert main.main(["list"]) == Status.FAILED
     assert "ended the program with status 0" in capsys.readouterr().err

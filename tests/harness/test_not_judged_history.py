@@ -29,7 +29,7 @@ def as_of_before(results):
     return msgspec.structs.replace(results, records=passed)
 
 
-def test_results_of_before_are_read_as_what_they_are(tmp_path):
+def test_old_results_are_read_as_unjudged(tmp_path):
     file = tmp_path / "old.json"
     file.write_bytes(to_json(as_of_before(unjudged())))
     assert [each.outcome for each in read_results(file).records] == ["unjudged", "pass"]
@@ -46,7 +46,7 @@ def bare(all_records, engine="mujoco", *, outcome=Outcome.UNJUDGED):
     return changed(all_records, engine=engine, outcome=outcome, message=WHY, errors=emptied)
 
 
-def test_a_history_of_before_is_read_as_what_it_is(path, capsys):
+def test_old_history_is_read_as_unjudged(path, capsys):
     keep(
         path,
         [
@@ -66,7 +66,7 @@ def test_a_history_of_before_is_read_as_what_it_is(path, capsys):
         assert faultless(store) == set()
     assert main.main(["history", "--history", str(path)]) == 0
     assert "1 not judged" in capsys.readouterr().out
-    assert main.main(["history", "--history", str(path), "--case", "first"]) == 0
+    assert main.main(f"history --history {path} --case first".split()) == 0
     assert "not judged" in capsys.readouterr().out
 
 
@@ -125,7 +125,7 @@ def test_a_failure_that_is_no_longer_judged_is_not_fixed(path):
     assert not found.steps or all(step.quantity != "outcome" or step.worse for step in found.steps)
 
 
-def test_what_is_judged_again_says_so_and_is_no_regression(path):
+def test_judged_again_is_no_regression(path):
     keep(path, bare(records()))
     keep(path, records())
     found = reported(path, against="1")

@@ -48,7 +48,7 @@ def test_native_efforts_go_from_coarse_to_fine(monkeypatch):
     assert len({json.dumps(dict(each.settings)) for each in found}) == len(found)
 
 
-def test_levels_give_what_is_asked_and_no_more():
+def test_levels_compute_requested_orders_only():
     case = without_forces(cases.load("rssr"))
     found = {
         each.entry.setting: each.entry

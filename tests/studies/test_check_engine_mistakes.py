@@ -50,7 +50,7 @@ def test_a_fault_of_forces_is_found(fault, with_loads):
 
 
 @pytest.mark.parametrize("change", HARMLESS)
-def test_what_harms_nobody_passes(change):
+def test_harmless_engine_changes_pass(change):
     assert failing(change) == []
 
 

@@ -302,7 +302,7 @@ def test_mistakes_are_caught(mistake, few, monkeypatch):
     assert found.message
 
 
-def test_a_joint_without_rows_is_told_what_is_missing():
+def test_joint_without_rows_is_reported():
     assert (
         "has 0 rows, expected one or more; return its primitives"
         in check_joint(MISTAKES["no rows"][1]())["equations"].message

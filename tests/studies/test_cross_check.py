@@ -18,9 +18,7 @@ from .test_sweep_command import POINTS
 from .test_vary import HEAD, vary
 
 
-def test_a_deviating_check_makes_status_1_and_its_variant_is_made_again(
-    tmp_path, capsys, monkeypatch
-):
+def test_sweep_check_deviation_can_be_replayed(tmp_path, capsys, monkeypatch):
     file = tmp_path / "hardpoints.json"
     file.write_text(json.dumps({**HEAD, "mode": "monte_carlo", "hardpoints": POINTS}))
     native = adapters.engine("native")
@@ -35,16 +33,7 @@ def test_a_deviating_check_makes_status_1_and_its_variant_is_made_again(
     monkeypatch.setattr(
         adapters, "engine", lambda name, *mode: liar if name == "native" else known(name, *mode)
     )
-    command = [
-        "sweep",
-        "mcpherson_strut",
-        "--vary",
-        str(file),
-        "--seed",
-        "8",
-        "--check",
-        "native:1.0",
-    ]
+    command = f"sweep mcpherson_strut --vary {file} --seed 8 --check native:1.0".split()
     assert main([*command, "--samples", "6"]) == 1
     told = capsys.readouterr().out
     assert "6 checked with native, 1 deviate" in told
@@ -64,13 +53,13 @@ def test_a_deviating_check_makes_status_1_and_its_variant_is_made_again(
     assert (out / "report.html").exists()
 
 
-def test_a_check_contradicts_variants_that_the_sweep_cannot_solve(tmp_path, capsys, monkeypatch):
+def test_check_contradicts_unsolved_variants(tmp_path, capsys, monkeypatch):
     """An engine with values where the motion ends, and one that has not converged."""
     path = tmp_path / "vary.json"
     rod = {"at": "joints.rod.length", "half_width": 3500.0}
     path.write_text(json.dumps({**HEAD, "mode": "monte_carlo", "hardpoints": {"rod": rod}}))
     native, known = adapters.engine("native"), adapters.engine
-    command = ["sweep", "rssr", "--vary", str(path), "--samples", "12", "--check", "mujoco:1.0"]
+    command = f"sweep rssr --vary {path} --samples 12 --check mujoco:1.0".split()
 
     def checked(change):
         liar = Fake(
@@ -107,7 +96,7 @@ def test_a_check_contradicts_variants_that_the_sweep_cannot_solve(tmp_path, caps
     assert "the residual of samples that the engine calls solved is 0.001" in told
 
 
-def test_a_variant_that_native_passes_by_itself_is_no_contradiction(tmp_path):
+def test_variant_solved_alone_is_no_contradiction(tmp_path):
     """Many variants at once do not pass a singular pose that one alone does: the engine has values
     there, and native too.
     """
@@ -135,7 +124,7 @@ def test_a_variant_that_native_passes_by_itself_is_no_contradiction(tmp_path):
     assert (record.outcome, record.message) == ("pass", "")
 
 
-def test_rows_that_the_engine_does_not_give_are_named(tmp_path):
+def test_check_names_rows_without_values(tmp_path):
     """An engine with positions only passes by them; the message names the rows not judged."""
     case = load("rssr")
     name = next(iter(case.mechanism.points)).name

@@ -267,7 +267,7 @@ def test_sensitivities_of_a_table_name_its_rows(tmp_path, capsys):
     text = sample_table(TEMPLATES["mcpherson"])
     file, out = tmp_path / "car.csv", tmp_path / "found.json"
     file.write_text(text)
-    assert main(["explain", str(file), "--samples", "5", "--json", str(out)]) == 0
+    assert main(f"explain {file} --samples 5 --json {out}".split()) == 0
     found = json.loads(out.read_text())
     by_number = {
         (each["output"], each["number"]): each
@@ -285,8 +285,8 @@ def test_sensitivities_of_a_table_name_its_rows(tmp_path, capsys):
     assert "lca_outer x" in capsys.readouterr().out
 
 
-def test_explain_of_a_case_tells_what_moves_together(capsys):
-    assert main(["explain", "mcpherson_suspension", "--samples", "1"]) == 0
+def test_explain_names_coincident_places(capsys):
+    assert main("explain mcpherson_suspension --samples 1".split()) == 0
     told = capsys.readouterr().out
     assert "moved together: joints.ball.point = points.lower_ball.position, " in told
 

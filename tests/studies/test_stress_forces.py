@@ -106,7 +106,7 @@ def test_mistakes_are_named(made, change, verdict):
     assert found.counts[verdict] == len(found.verdicts)
 
 
-def test_a_term_left_out_of_the_equations_is_found(monkeypatch):
+def test_missing_gyroscopic_moment_is_found(monkeypatch):
     """No gyroscopic moment."""
     monkeypatch.setattr(
         demand,

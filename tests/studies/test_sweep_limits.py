@@ -126,10 +126,10 @@ def file(tmp_path):
     return path
 
 
-def test_limits_of_file_and_option_are_in_the_units_of_the_file(file, tmp_path, capsys):
+def test_limits_use_units_of_the_file(file, tmp_path, capsys):
     out = tmp_path / "out"
-    command = ["sweep", "mcpherson_strut", "--vary", str(file), "--samples", "50"]
-    limits = ["--limit", "wheelbase_change::3.5", "--limit", "half_track_change:-11:1"]
+    command = f"sweep mcpherson_strut --vary {file} --samples 50".split()
+    limits = "--limit wheelbase_change::3.5 --limit half_track_change:-11:1".split()
     assert main([*command, *limits, "--sampling", "latin", "--out", str(out)]) == 0
     found = json.loads((out / "sweep.json").read_text())
     assert found["sampling"] == "latin"
@@ -155,7 +155,7 @@ WRONG = [
     (["--limit", "toe:0:1"], "--limit toe:0:1: there is no output 'toe'"),
     (["--limit", "half_track_change:a:b"], "expected OUTPUT:LOW:HIGH"),
     (
-        ["--sampling", "latin", "--replay", "1"],
+        "--sampling latin --replay 1".split(),
         "a Latin hypercube depends on the number of variants; give --samples",
     ),
 ]

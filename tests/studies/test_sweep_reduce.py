@@ -113,7 +113,7 @@ def test_gradients_are_the_closed_form(tmp_path):
     assert (found.error < 1e-7).all()
 
 
-def test_variants_of_a_coarse_sweep_count_the_turns_of_the_nominal_one(tmp_path):
+def test_coarse_sweep_variants_count_nominal_turns(tmp_path):
     """At the samples and at design, where gradients are read too."""
     output = JointAngle("turned", 1e-9, 0.0, "test", "pivot")
     attitude = Orientation("e0", 1e-9, 0.0, "test", "arm", Component.E0)

@@ -9,16 +9,13 @@ from kincheck.core.cli.main import main
 from .test_vary import HEAD
 
 
-def test_a_hardpoint_that_is_named_like_an_output_has_a_column_of_its_own(tmp_path):
+def test_stored_hardpoint_named_like_output(tmp_path):
     parquet = pytest.importorskip("pyarrow.parquet")
     file, stored = tmp_path / "hardpoints.json", tmp_path / "all.parquet"
     for name in ("rocker_tip_y", "variant"):
         varied = {name: {"at": "joints.rod.length", "half_width": 1.0}}
         file.write_text(json.dumps({**HEAD, "mode": "monte_carlo", "hardpoints": varied}))
-        assert (
-            main(["sweep", "rssr", "--vary", str(file), "--samples", "20", "--store", str(stored)])
-            == 0
-        )
+        assert main(f"sweep rssr --vary {file} --samples 20 --store {stored}".split()) == 0
         table = parquet.read_table(stored)
         assert table.column_names[:2] == ["variant", f"{name}.offset"]
         assert table.column_names.count("rocker_tip_y") == 1

@@ -13,8 +13,8 @@ import numpy as np
 from ...errors import CaseError, with_article
 from ...joints import Coupler, Joint, Polynomial
 from ...mechanism.body import checked_inertia
-from ...mechanism.dimension import ACCELERATION, INERTIA
-from ...mechanism.drivers import Driver, JointAngle, JointDisplacement, JointDriver, PointCoordinate
+from ...mechanism.body import ACCELERATION, INERTIA
+from ...mechanism.motions import Driver, JointAngle, JointDisplacement, JointDriver, PointCoordinate
 from ...mechanism.loads import ELEMENTS
 from ...mechanism.mechanism import Body, Mechanism, Point
 from ...mechanism.motions import ROUNDED_TIME, Absolute, Motion, Table

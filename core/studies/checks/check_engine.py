@@ -93,7 +93,7 @@ def _differences(values: Array, dt: float) -> Array:
 
 
 def faults_of_forces(case: Case, mode: str, attempt: Attempt, native: Attempt) -> Iterator[str]:
-    """Yield what is wrong with the forces of an answer beside their values.
+    """Yield faults in the forces of an answer beside their values.
 
     An engine may leave out the reactions of joints for which it solves others. A simulation need
     not give forces.
@@ -237,7 +237,7 @@ def _compared(name: str, record: Record, faults: str) -> Finding:
     """Return the agreement of a case with its reference and the native engine.
 
     Args:
-        faults: what is wrong with the forces beside their values.
+        faults: of the forces beside their values.
     """
     passed = record.outcome is Outcome.PASS
     message = faults or ("" if passed else f"{record.outcome.shown}: {record.message}")

@@ -17,7 +17,7 @@ from ...trajectory import Array
 
 
 class Verdict(StrEnum):
-    """The outcome of a check. A check that was not run is a row with its reason."""
+    """The outcome of a check. A check without a run is a row with its reason."""
 
     PASS = "pass"
     FAIL = "fail"
@@ -77,7 +77,7 @@ class Finding:
 
 
 def skipped(check: str, why: str) -> Finding:
-    """Return the finding of a check that was not run."""
+    """Return the finding of a check without a run."""
     return Finding(check, Verdict.SKIP, message=why)
 
 

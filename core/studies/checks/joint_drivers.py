@@ -28,7 +28,7 @@ WAY = 6.0
 
 
 def driver(s: Specimen) -> Iterator[Finding]:
-    """Check every coordinate of the joint that can be driven."""
+    """Check every drivable coordinate of the joint."""
     joint = s.joint
     driven = [each for each in joint.freedoms if each in FREEDOMS]
     if not isinstance(joint, AxialJoint) or not driven:

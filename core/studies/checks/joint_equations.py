@@ -34,7 +34,7 @@ AWAY = 1e6
 
 
 def composition(s: Specimen) -> Iterator[Finding]:
-    """Check phi at the design position, and that all its numbers are finite."""
+    """Check phi at the design position: zero, of finite numbers."""
     remedy = (
         "phi must vanish at the design position: check the constants that primitives() makes of the"
         " geometry"

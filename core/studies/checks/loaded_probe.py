@@ -148,8 +148,6 @@ def solved(case: Case) -> Probe:
 
 # Balance of the bodies, which have their frame at the global origin at design.
 
-# MERGED
-
 
 def _moving(probe: Probe, body: str, point: Any = (0.0, 0.0, 0.0)) -> CarriedPoint:
     """Return a point of a body over the samples."""
@@ -182,7 +180,7 @@ def speed(probe: Probe) -> float:
 
 
 def unbalanced(probe: Probe, name: str) -> Array:
-    """Return what is missing to a body's balance by Newton and Euler, shape (n, 6)."""
+    """Return the wrench missing to a body's balance by Newton and Euler, shape (n, 6)."""
     n = len(probe.motion.solved)
     if probe.mechanism.is_fixed(name):
         return np.zeros((n, 6))
@@ -200,7 +198,7 @@ def unbalanced(probe: Probe, name: str) -> Array:
 
 
 def _pushes(probe: Probe, name: str) -> Iterator[tuple[Array, Array, Array]]:
-    """Yield what joints, drivers and the spring do to a body: force, its place, moment."""
+    """Yield the loads of joints, drivers and the spring on a body: force, its place, moment."""
     mechanism, forces = probe.mechanism, probe.motion.forces
     assert forces is not None
     for joint in mechanism.joints:
@@ -226,7 +224,7 @@ def _pushes(probe: Probe, name: str) -> Iterator[tuple[Array, Array, Array]]:
 def _by_driver(
     probe: Probe, driver: Any, effort: Array, name: str
 ) -> Iterator[tuple[Array, Array, Array]]:
-    """Yield what a driver does: a couple about its joint's axis, or a force along it."""
+    """Yield the load of a driver: a couple about its joint's axis, or a force along it."""
     joint: Any = probe.mechanism.joint(driver.joint)
     if name not in joint.bodies:
         return
@@ -235,9 +233,6 @@ def _by_driver(
     place = _moving(probe, joint.j, joint.point).place
     yield (0.0 * push, place, push) if driver.turns else (push, place, 0.0 * push)
 
-
-# MERGED
-# MERGED
 
 LIMIT = Limit(
     1e-10, "round-off over the squared smallest singular value of the probe, relative to the forces"

@@ -405,7 +405,6 @@ def largest(changes: Array) -> Array:
 # output is 5e-12 of a gradient of one. So an output may curve a hundred times as strongly as one
 # of the mechanism's size.
 
-# MERGED
 
 STEP = 2e-4
 # Required accuracy: error relative to the output's largest gradient by a coordinate of the

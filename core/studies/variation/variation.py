@@ -277,9 +277,6 @@ def _orders_of(seed: int, coordinates: int, count: int) -> NDArray[np.uint32]:
     return found
 
 
-# MERGED
-
-
 @dataclass(frozen=True)
 class FileUnits:
     """Names of the units of a study's outputs, for their display and limits."""
