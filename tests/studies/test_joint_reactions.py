@@ -70,7 +70,7 @@ def test_sound_joints_pass(name):
 def traced_anew(monkeypatch):
     """Programs are traced with the mistake of the test, not taken from the cache on disk."""
     monkeypatch.setattr(
-        "kincheck.core.kinematics.compiled.program_cache.kept",
+        "kincheck.core.kinematics.compiled.compiled_model.kept",
         lambda content, make, read: read(make()),
     )
 

@@ -32,8 +32,7 @@ from ...trajectory import Array, BodyMotion
 from ..compiled.programs import Tracer
 from ..compiled.request import CONSISTENT, Request
 from ..formulation.constraints import Style
-from ..formulation.driver_inputs import standing_drives
-from ..formulation.state_vectors import displaced, state_of
+from ..formulation.state_vectors import displaced, standing_drives, state_of
 
 MAX_ITERATIONS = 100
 # mu over |phi|^2: 0.01 to 1 serve alike on the strut; less lets singular Jacobians throw bodies

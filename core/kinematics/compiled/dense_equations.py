@@ -22,12 +22,11 @@ from ...program.llvm.compiler import available
 from ...program.llvm.executor import LlvmExecutor
 from ...program.llvm.jit import LlvmCode
 from ...trajectory import Array
-from ..formulation.driver_inputs import samples
 from ..formulation.formulation import Configuration
+from ..formulation.state_vectors import samples
 from .compiled_model import Model
 from .programs import Tracer
-from .request import FROM, RATE, RATE_T, TIME
-from .sample_rows import kept_forces, kept_motions
+from .request import FROM, RATE, RATE_T, TIME, kept_forces, kept_motions
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,6 @@
-"""Proved samples of a sweep: native solutions, and balls proved to contain the exact ones."""
+"""Proofs: samples of a sweep, with balls proved to contain the exact solutions near the native
+ones, and single poses, from the caller's own state.
+"""
 
 from __future__ import annotations
 
@@ -10,26 +12,87 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
+from ...algebra import Vec3
 from ...mechanism.loads import TorsionSpringDamper
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path, outwards
 from ...program.ball_executor import Ball, flint, precision
 from ...trajectory import Array, Trajectory
 from ..compiled.compiled_model import compile_model
-from ..compiled.motion_start import start_of
 from ..compiled.request import Request
-from ..continuation.row_exchange import chosen_at
+from ..compiled.routes import start_of
+from ..continuation.segments import chosen_at
 from ..continuation.sweep import sweep
-from ..forces.motion_lanes import Follow, MotionLanes
-from ..forces.reactions import with_forces
+from ..forces.reactions import Follow, MotionLanes, with_forces
 from ..forces.wanted import WantedForces, wanted_forces
 from ..formulation.cartesian import Cartesian
 from ..formulation.constraints import frames
 from ..formulation.formulation import row_names
 from ..formulation.state_vectors import displaced, state_of
-from .exact import Reading, exact_mechanism
-from .exact_equations import equations
+from ..structure.degrees_of_freedom import select_rows
+from .exact import Reading, as_double, equations, exact_mechanism
 from .krawczyk import Enclosure, UnprovedError, enclose
+
+
+@dataclass(frozen=True)
+class PoseState:
+    """The scalars that fix a pose of a mechanism.
+
+    Attributes:
+        names: of the vectors in their order: "u BODY" (displacement of its origin), "q BODY" (Euler
+            parameters) and "x JOINT.rotation" or "x JOINT.translation" (a coordinate).
+        unit: of lengths [m].
+        origins: of the moving bodies at the design position [units].
+    """
+
+    names: Sequence[str]
+    unit: float
+    origins: Mapping[str, Vec3]
+
+    @staticmethod
+    def of(mechanism: Mechanism) -> PoseState:
+        """Return the state of a mechanism."""
+        frame = frames(mechanism)
+        names = [*Cartesian.of(mechanism, frame).design]
+        return PoseState(names, frame.unit, frame.origins)
+
+
+def prove_pose(
+    mechanism: Mechanism,
+    points: Sequence[str],
+    pose: Array,
+    drives: Mapping[str, Sequence[Fraction]],
+    bits: int,
+) -> Enclosure:
+    """Prove one pose of a mechanism, its numbers read as doubles.
+
+    Args:
+        mechanism: the mechanism.
+        points: names of the output points.
+        pose: the approximate state, as `PoseState` orders it.
+        drives: value from the design, velocity and acceleration of the moving drivers [SI].
+        bits: working precision.
+
+    Raises:
+        UnprovedError: the pose is singular, or too far from a solution.
+        KincheckError: python-flint is not installed, or the rows cannot be selected.
+    """
+    frame = frames(mechanism)
+    change = {name: float(value) for name, (value, *_) in drives.items()}
+    selected = select_rows(mechanism, frame, Cartesian.of(mechanism, frame)).chosen
+    kept = chosen_at(mechanism, change, pose, selected)
+    with precision(bits):
+        traced = equations(exact_mechanism(mechanism, as_double), tuple(drives), points, kept)
+        unit = Fraction(traced.frame.unit)
+        driven = [
+            [
+                flint().arb(flint().fmpq(x.numerator, x.denominator))
+                for x in (y if mechanism.driver(name).turns else y / unit for y in drive)
+            ]
+            for name, drive in drives.items()
+        ]
+        return enclose(traced, points, pose, driven, bits)
+
 
 Drives = Mapping[str, Sequence[tuple[Fraction, Fraction, Fraction]]]
 """Value from the design, velocity and acceleration [SI] of each moving driver at every sample."""
