@@ -23,10 +23,10 @@ from ..errors import SolveError, number_of
 from ..input_checks import no_such, real
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.motions import Motion, Path
-from ..program import ITERATIONS, Executor
+from ..program import ITERATIONS
 from ..tabular import Tabular
 from ..trajectory import QUANTITIES, Array, PointMotion, as_variables
-from .compiled.compiled_model import Model
+from .compiled.compiled_model import Executor, Model
 from .compiled.request import LARGEST, SIGMA, SMALLEST, accept_by
 from .compiled.routes import SAME_TIME, Route, recent_route
 from .continuation.walk import FINER, ROOM, march

@@ -25,11 +25,11 @@ from ...errors import SolveError
 from ...failures import FailureKind
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path
-from ...program import ITERATIONS, NODES, Executor, NumpyExecutor, Plan, groups_behind
+from ...program import ITERATIONS, NODES, Plan, groups_behind
 from ...program.disk_cache import kept
 from ...program.llvm import compiler
 from ...program.llvm.compiler import available
-from ...program.llvm.executor import LlvmExecutor
+from ...program.llvm.executor import Executor, bind
 from ...program.llvm.jit import LlvmCode, make_loops_ready
 from ...trajectory import Array
 from ..formulation.constraints import Frames
@@ -318,12 +318,7 @@ class Model(Tracing):
         Every caller with the same number of lanes gets the same memory, and sets every slot it
         reads.
         """
-        return self.bound(
-            lanes,
-            lambda: (
-                LlvmExecutor(self._code, lanes) if self._code else NumpyExecutor(self.plan, lanes)
-            ),
-        )
+        return self.bound(lanes, lambda: bind(self.plan, lanes, self._code))
 
     def samples(self, path: Path, times: Array) -> Array:
         """Return the values of the slots `sampled` at times of a path, shape (sampled, n)."""

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from ...algebra import Scalar
 from ...mechanism.motions import Path
 from ...primitives.base import Twist
-from ...program import Executor, NumpyExecutor, Plan, program
+from ...program import Plan, program
 from ...program.llvm.compiler import available
-from ...program.llvm.executor import LlvmExecutor
+from ...program.llvm.executor import Executor, bind
 from ...program.llvm.jit import LlvmCode
 from ...trajectory import Array
 from ..formulation.formulation import Configuration
@@ -244,9 +244,7 @@ class System:
 
     def _executor(self, lanes: int) -> Executor:
         if lanes not in self._executors:  # kept: binding costs more than running
-            self._executors[lanes] = (
-                LlvmExecutor(self._code, lanes) if self._code else NumpyExecutor(self._plan, lanes)
-            )
+            self._executors[lanes] = bind(self._plan, lanes, self._code)
         return self._executors[lanes]
 
     def _at(self, state: Array, sample: Array) -> Executor:

@@ -202,7 +202,7 @@ class March(NamedTuple):
 
     Attributes:
         kept: the kept rows of every sample (`Model.rows`), shape (kept, n); NaN if not reached.
-        worst: see `Track`: the largest residuals of kept and redundant rows, and the smallest
+        worst: see `NumpyTrack`: the largest residuals of kept and redundant rows, and the smallest
             estimate of sigma.
         solved: shape (n,).
         ends: one for each side not followed to its last sample.
@@ -257,7 +257,7 @@ class Grid:
     Attributes:
         parts: how many.
         ends: the route's samples by time among those.
-        sides, track: see `Side` and `Track`.
+        sides, track: see `Side` and `NumpyTrack`.
     """
 
     def __init__(self, route: Route, departure: Array, parts: int) -> None:

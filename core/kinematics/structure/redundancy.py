@@ -290,7 +290,7 @@ def reduce_rows(
         if (holds := held.get(joint.name)) is None:
             continue
         rows = holds.rows(joint, frame, formulation)
-        left, sizes, _ = np.linalg.svd(_beyond(span, rows), full_matrices=True)
+        left, sizes, _ = np.linalg.svd(_without(rows, span), full_matrices=True)
         weak = np.concatenate([sizes <= enough, np.ones(len(rows) - len(sizes), dtype=np.bool_)])
         if weak.any():
             holds, less = holds.parted(left[:, weak].T)
@@ -374,14 +374,7 @@ def _normal(pair: Array) -> Vector:
     return x, y, z
 
 
-def _beyond(span: Array, rows: Array) -> Array:
-    """Return rows less their parts in an orthonormal span; twice, against round-off."""
-    for _ in range(2):
-        rows = rows - (rows @ span.T) @ span
-    return rows
-
-
 def _spanned(span: Array, rows: Array) -> Array:
     """Return an orthonormal basis of a span and further rows."""
-    _, sizes, basis = np.linalg.svd(_beyond(span, rows), full_matrices=False)
+    _, sizes, basis = np.linalg.svd(_without(rows, span), full_matrices=False)
     return np.concatenate([span, basis[sizes > RANK_TOLERANCE]])

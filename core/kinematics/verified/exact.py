@@ -27,7 +27,14 @@ from ...program.tape import jacobian
 from ..forces.wanted import WantedForces
 from ..formulation.cartesian import Cartesian
 from ..formulation.constraints import Frames, constraints, frames
-from .exact_forces import ForceInputs, ForcePrograms, TracedRows, converted, force_programs
+from .exact_forces import (
+    ForceInputs,
+    ForcePrograms,
+    TracedRows,
+    converted,
+    force_programs,
+    numbered,
+)
 
 Reading = Callable[[float], Fraction]
 """Interpretation of a float of a description as a fraction."""
@@ -311,10 +318,10 @@ def equations(
         {name: len(value) for name, value in design.items()},
         tuple(drivers),
         inputs.geometry,
-        _program("residuals", inputs.tape, [*(phi[k] for k in kept), *lengths]),
+        numbered("residuals", inputs.tape, [*(phi[k] for k in kept), *lengths]),
         program("derivative", inputs.tape, entries),
-        _program("points", inputs.tape, moved),
-        _program("tests", inputs.tape, [*(phi[k] for k in left_out), *formulation.branch(at)]),
+        numbered("points", inputs.tape, moved),
+        numbered("tests", inputs.tape, [*(phi[k] for k in left_out), *formulation.branch(at)]),
         kept,
         left_out,
         forces,
@@ -332,7 +339,3 @@ def _lifted(mechanism: Mechanism, inputs: _Inputs) -> Mechanism:
         gravity=inputs.lift(mechanism.gravity),
         forces=inputs.members(mechanism.forces),
     )
-
-
-def _program(name: str, tape: Tape, values: Sequence[Scalar]) -> Program:
-    return program(name, tape, dict(enumerate(values)))

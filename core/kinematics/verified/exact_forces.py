@@ -183,15 +183,16 @@ def force_programs(
         len(traced.gradients),
         len(traced.gradients) - len(mechanism.couplers) - len(mechanism.drivers),
         [*given.angles],
-        _program("half angles", tape, _half_angles(mechanism, traced.at, given.angles)),
-        _program("demand", tape, _by_state(traced, equations.demand)),
-        _program("acting", tape, _by_state(traced, equations.acting(efforts, given.multipliers))),
-        _program("rows left out", tape, left_out),
-        _program("forces", tape, found),
+        numbered("half angles", tape, _half_angles(mechanism, traced.at, given.angles)),
+        numbered("demand", tape, _by_state(traced, equations.demand)),
+        numbered("acting", tape, _by_state(traced, equations.acting(efforts, given.multipliers))),
+        numbered("rows left out", tape, left_out),
+        numbered("forces", tape, found),
     )
 
 
-def _program(name: str, tape: Tape, values: Sequence[Scalar]) -> Program:
+def numbered(name: str, tape: Tape, values: Sequence[Scalar]) -> Program:
+    """Return the program of values, in slots by their number."""
     return program(name, tape, dict(enumerate(values)))
 
 

@@ -83,15 +83,19 @@ def prove_pose(
     kept = chosen_at(mechanism, change, pose, selected)
     with precision(bits):
         traced = equations(exact_mechanism(mechanism, as_double), tuple(drives), points, kept)
-        unit = Fraction(traced.frame.unit)
-        driven = [
-            [
-                flint().arb(flint().fmpq(x.numerator, x.denominator))
-                for x in (y if mechanism.driver(name).turns else y / unit for y in drive)
-            ]
-            for name, drive in drives.items()
-        ]
+        driven = _balls(mechanism, traced.frame.unit, drives)
         return enclose(traced, points, pose, driven, bits)
+
+
+def _balls(
+    mechanism: Mechanism, unit: float, drives: Mapping[str, Sequence[Fraction]]
+) -> list[list[Ball]]:
+    """Return the values of drives [SI] as balls [units or rad]."""
+    per = {name: 1 if mechanism.driver(name).turns else Fraction(unit) for name in drives}
+    return [
+        [flint().arb(flint().fmpq(*(x / per[name]).as_integer_ratio())) for x in drive]
+        for name, drive in drives.items()
+    ]
 
 
 Drives = Mapping[str, Sequence[tuple[Fraction, Fraction, Fraction]]]
@@ -170,13 +174,9 @@ def prove(
         exact, kept = exact_mechanism(mechanism, reading), model.selection.chosen
         traced = {kept: equations(exact, tuple(drives), points, kept, wanted)}
         unit = traced[kept].frame.unit
-        units = [1 if mechanism.driver(name).turns else Fraction(unit) for name in drives]
         for k, reached in enumerate(native.solved):
             started = perf_counter()
-            driven = [
-                [_ball(x / unit) for x in drives[name][k]]
-                for name, unit in zip(drives, units, strict=True)
-            ]
+            driven = _balls(mechanism, unit, {name: each[k] for name, each in drives.items()})
             try:
                 if not reached:
                     raise UnprovedError(
@@ -211,10 +211,6 @@ def _angles(mechanism: Mechanism, path: Path, native: Trajectory, follow: Follow
         lanes = MotionLanes(mechanism, path, native, follow)
         found[native.solved] = np.stack([lanes.angle(name) for name in joints], axis=1)
     return found
-
-
-def _ball(x: Fraction) -> Ball:
-    return flint().arb(flint().fmpq(x.numerator, x.denominator))
 
 
 def _states(mechanism: Mechanism, native: Trajectory, times: Array, start: float = 0.0) -> Array:

@@ -8,9 +8,9 @@ from functools import cache
 import numpy as np
 
 from ...caches import keep_last
-from ...program import Executor, NumpyExecutor, Plan, Tape, maximum, minimum, program, where_larger
+from ...program import Plan, Tape, maximum, minimum, program, where_larger
 from ...program.llvm.compiler import available
-from ...program.llvm.executor import LlvmExecutor
+from ...program.llvm.executor import Executor, bind
 from ...program.llvm.jit import LlvmCode
 from ...trajectory import Array
 from .reduce import Summary
@@ -115,9 +115,8 @@ class Totals:
 
 @keep_last(1, per_thread=True)
 def _executor() -> Executor:
-    return (
-        LlvmExecutor(_code(), _code().width) if available() else NumpyExecutor(plan(), NUMPY_LANES)
-    )
+    code = _code() if available() else None
+    return bind(plan(), code.width if code else NUMPY_LANES, code)
 
 
 @cache
