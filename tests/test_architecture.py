@@ -45,7 +45,7 @@ IMPORTS = {
         "kinematics/forces kinematics/structure"
     ),
     "kinematics/assembly": (
-        ". primitives program joints mechanism kinematics/formulation "
+        ". primitives joints mechanism kinematics/formulation "
         "kinematics/structure kinematics/compiled"
     ),
     "kinematics/continuation": (

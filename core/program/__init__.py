@@ -8,12 +8,12 @@
    of the geometry alone into a program of its own. `lowered` fuses products and sums, so compiled
    and interpreted programs give equal bits; `bytecode` runs without compilation.
 4. `plan`: a `Plan` names the programs of a model, the slots of a lane, and the order of an attempt:
-   predict, iterate Newton, test. An `Executor` binds it to lanes; a `Track` follows one motion.
+   predict, iterate Newton, test. An executor binds it to lanes; a track follows one motion.
 
 Executors:
 
 - `numpy_executor`: one ufunc call per operation over all lanes. No start-up cost; the oracle of the
-  tests.
+  tests. `NumpyExecutor` and `NumpyTrack` describe what every executor does.
 - `llvm.executor`: machine code over vectors of lanes, one call per motion.
 - `ball_executor`: ball arithmetic with proven error bounds; one lane, programs without a plan.
 
@@ -34,7 +34,7 @@ its lanes and holds its `Plan`, `Model` makes code of the plan, and an executor 
 
 from .elimination import Elimination
 from .numpy_executor import NumpyExecutor
-from .plan import DONE, ITERATIONS, MARGIN, Executor, Parts, Plan, Side, Track
+from .plan import DONE, ITERATIONS, MARGIN, Parts, Plan, Side
 from .straight_line import Prepared, Program, program
 from .tape import (
     NODES,
@@ -57,7 +57,6 @@ __all__ = [
     "MARGIN",
     "NODES",
     "Elimination",
-    "Executor",
     "NumpyExecutor",
     "Parts",
     "Plan",
@@ -66,7 +65,6 @@ __all__ = [
     "Side",
     "Tape",
     "Traced",
-    "Track",
     "absolute",
     "before",
     "cos",

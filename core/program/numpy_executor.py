@@ -50,10 +50,13 @@ def _largest(out: Array, values: Array) -> None:
     np.maximum.reduce(values, axis=0, out=out)
 
 
-class NumpyLanes:
-    """A plan bound to a block of lanes, shape (slots, lanes).
+class NumpyExecutor:
+    """A plan bound to a number of lanes, here a block of shape (slots, lanes). Every executor has
+    these methods. Lanes that divide by zero hold inf or nan; no error is raised.
 
     Attributes:
+        lanes, group: number of lanes, and of those that a track attempts together.
+        margin: samples that a track may read beyond the last.
         heads: lanes without a lane before them.
     """
 
@@ -67,27 +70,29 @@ class NumpyLanes:
         self._calls: dict[str, list[Call]] = {}
 
     def clear(self) -> None:
-        """See `Executor`."""
+        """Set all slots of all lanes to zero."""
         self.block[:] = 0.0
 
     def put(self, slots: Sequence[int], values: Array) -> None:
-        """See `Executor`."""
+        """Set slots of all lanes, shape (slots, lanes) or (slots, 1)."""
         self.block[slots] = values
 
     def get(self, slots: Sequence[int]) -> Array:
-        """See `Executor`."""
+        """Return a copy of slots of all lanes, shape (slots, lanes)."""
         return self.block[slots]
 
     def window(self, slots: range) -> Array:
-        """See `Executor`."""
+        """Return a view of slots in memory, shaped as the result of `arranged`."""
         return self.block[slots.start : slots.stop]
 
     def arranged(self, table: Table) -> Table:
-        """See `Executor`."""
+        """Return a table of slots by lanes in memory layout; the last lane fills up the last
+        vector.
+        """
         return table
 
     def run(self, name: str) -> None:
-        """See `Executor`."""
+        """Run one of `Plan.programs` over all lanes."""
         if name not in self._calls:
             self._calls[name] = self._bind(self.plan.programs[name])
         with np.errstate(all="ignore"):
@@ -95,7 +100,7 @@ class NumpyLanes:
                 call(*arguments)
 
     def attempt(self) -> None:
-        """See `Executor`."""
+        """Attempt all lanes, each alone."""
         self.settle("predict", self.plan.alone)
 
     def settle(self, start: str, tests: Sequence[str]) -> None:
@@ -118,7 +123,7 @@ class NumpyLanes:
             self.run(name)
 
     def carry(self) -> None:
-        """See `Executor`."""
+        """Copy `Plan.carried` of all lanes, for the next prediction."""
         source, target = np.array(self.plan.carried).T
         self.block[target] = self.block[source]
 
@@ -194,6 +199,113 @@ class NumpyLanes:
             (write, (block[slot], place[node])) for slot, node in program.outputs.items()
         ]
 
+    def track(self, sides: Sequence[Side], start: Array, n: int) -> NumpyTrack:
+        """Bind the samples of one motion, n in all, and its start: values of the targets in
+        `Plan.carried`, in order.
+        """
+        return NumpyTrack(self, sides, start, n)
+
+    @property
+    def room(self) -> int:
+        """Lanes with those that fill up the last vector."""
+        return self.lanes
+
+    def table(self, columns: int) -> Array:
+        """Return an empty output array of `fan`, shape (kept, columns, room)."""
+        return np.empty((len(self.plan.kept), columns, self.room))
+
+    def fan(self, samples: Array, out: Array, worst: Array, first: int, step: int) -> None:
+        """Follow one motion per lane through the same samples, each lane alone.
+
+        Args:
+            samples: `Plan.sampled`, shape (sampled, n).
+            out: output table of `Plan.kept`; NaN from the first rejected sample of a lane.
+            worst: in and out: the largest of `Plan.largest` and the smallest of `Plan.smallest` per
+                lane, over its previous value and all samples; NaN for a lane with a rejected
+                sample. Shape (largest and smallest, room).
+            first, step: column of the first sample, and the step to the next: 1 or -1.
+        """
+        plan, block = self.plan, self.block
+        kept, remembered = list(plan.kept), list(plan.remembered)
+        source, target = np.array(plan.carried_on).T
+        past = block[plan.past : plan.past + NODES * len(remembered)].reshape(NODES, -1, self.lanes)
+        alive = np.ones(self.lanes, dtype=np.bool_)
+        for k, sample in enumerate(samples.T):
+            accepted = self._accepted("extend", sample) if k >= NODES else ~alive
+            if (alive & ~accepted).any():
+                if k >= NODES:
+                    self.go_back(samples[:, k - 1, None])
+                    self.carry()
+                accepted = self._accepted("predict", sample)
+            alive &= accepted
+            out[:, first + step * k] = np.where(alive, block[kept], np.nan)
+            self._worsen(worst)
+            past[k % NODES] = block[remembered]
+            if k + 1 < NODES:
+                for name in plan.remaining:
+                    self.run(name)
+                self.carry()
+            else:
+                block[target] = block[source]
+        worst[:, ~alive] = np.nan
+
+    def _worsen(self, worst: Array) -> None:
+        largest, smallest = np.split(worst, [len(self.plan.largest)])
+        np.maximum(largest, self.block[list(self.plan.largest)], out=largest)
+        np.minimum(smallest, self.block[list(self.plan.smallest)], out=smallest)
+
+    def _accepted(self, start: str, sample: Array) -> NDArray[np.bool_]:
+        self.block[list(self.plan.sampled)] = sample[:, None]
+        self.settle(start, self.plan.alone)
+        return self.block[self.plan.slots[MARGIN]] > 0.0
+
+    def fold(self, table: Array, totals: Array) -> None:
+        """Reduce numbers into totals, column by column, in the first group of lanes.
+
+        Per column: set `Plan.kept` to the totals; read groups of numbers into `Plan.taken`, as many
+        at a time as it has slots, and run the programs in `after`; at the end write `Plan.kept` to
+        the totals.
+
+        Args:
+            table: shape (columns, room), contiguous; room is a multiple of the numbers read at a
+                time.
+            totals: shape (kept, columns, group), contiguous.
+        """
+        plan, block = self.plan, self.block
+        for column, row in enumerate(table):
+            block[list(plan.kept)] = totals[:, column]
+            for some in row.reshape(-1, len(plan.taken), self.group):
+                block[list(plan.taken)] = some
+                for name in plan.after:
+                    self.run(name)
+            totals[:, column] = block[list(plan.kept)]
+
+    def groups(self, lanes: int) -> int:
+        """Return the number of vector groups that hold so many lanes."""
+        return 1
+
+    def parts(self, parts: Parts) -> Callable[[int], object]:
+        """Return a call that attempts the parts of a large mechanism in order, on the current
+        values of their arrays.
+
+        Its argument is the number of groups; each lane is attempted alone.
+        """
+        plan, block = self.plan, self.block
+
+        def call(groups: int) -> None:
+            for member, sources in zip(parts.members.tolist(), parts.taken, strict=True):
+                block[list(plan.fixed)] = parts.fixed[member, :, None]
+                block[list(plan.sampled)] = parts.samples
+                block[list(plan.taken)] = parts.world[sources]
+                self.attempt()
+                row = parts.base + member * len(plan.kept)
+                parts.world[row : row + len(plan.kept)] = block[list(plan.kept)]
+                self._worsen(parts.worst)
+                for slot, k in plan.left:
+                    parts.ahead[member, k] = block[slot, -1]
+
+        return call
+
 
 def _leading(margins: Array) -> int:
     """Return the number of accepted lanes before the first rejected one."""
@@ -202,21 +314,37 @@ def _leading(margins: Array) -> int:
 
 
 class NumpyTrack:
-    """See `Track`."""
+    """One motion, followed along both sides of its start, through known samples.
 
-    def __init__(self, executor: NumpyLanes, sides: Sequence[Side], start: Array, n: int) -> None:
+    Attributes:
+        anchors: current state of each side: values of the targets in `Plan.carried`, a row per
+            side.
+        worst: the largest of `Plan.largest`, or zero, and the smallest of `Plan.smallest`, over all
+            samples stored since `begin`.
+    """
+
+    def __init__(
+        self, executor: NumpyExecutor, sides: Sequence[Side], start: Array, n: int
+    ) -> None:
         self._executor, self._sides, self._start, self._n = executor, sides, start, n
         self.anchors = np.tile(start, (len(sides), 1))
 
     def begin(self) -> Array:
-        """See `Track`."""
+        """Return an array for `Plan.kept` of all samples, shape (kept, n), filled from now on.
+
+        The caller must hold it during the motion: it may be large, so the track keeps no reference.
+        """
         plan = self._executor.plan
         self.worst = np.repeat([0.0, np.inf], [len(plan.largest), len(plan.smallest)])
         self._kept = np.empty((len(plan.kept), self._n))
         return self._kept
 
     def run(self) -> Sequence[int]:
-        """See `Track`. Both sides share one attempt: a numpy call takes longer than its numbers."""
+        """Follow every side from the start to its end; return the first rejected sample of each, or
+        its count.
+
+        The anchor of a completed side is invalid: no program prepares it for a continuation.
+        """
         executor, counts = self._executor, [side.count for side in self._sides]
         if sum(counts) > executor.lanes:
             return [self.follow(k, 0, count, anew=True) for k, count in enumerate(counts)]
@@ -249,7 +377,16 @@ class NumpyTrack:
         ]
 
     def follow(self, side: int, at: int, stop: int, *, anew: bool) -> int:
-        """See `Track`."""
+        """Attempt the next samples of a side as neighbouring lanes, and go on from the last
+        accepted one.
+
+        Args:
+            at, stop: the next sample, and the one before which to end.
+            anew: begin at the start instead of the side's anchor. The anchor moves along.
+
+        Returns:
+            The first rejected sample, or stop.
+        """
         executor, samples = self._executor, self._sides[side].samples
         plan, block, lanes = executor.plan, executor.block, executor.lanes
         extrapolates = plan.extrapolates(lanes)
@@ -291,89 +428,3 @@ class NumpyTrack:
         largest, smallest = np.split(self.worst, [len(plan.largest)])
         np.maximum(largest, found[list(plan.largest)].max(axis=1), out=largest)
         np.minimum(smallest, found[list(plan.smallest)].min(axis=1), out=smallest)
-
-
-class NumpyExecutor(NumpyLanes):
-    """Loops over the lanes of a plan; see `Executor`."""
-
-    def track(self, sides: Sequence[Side], start: Array, n: int) -> NumpyTrack:
-        """See `Executor`."""
-        return NumpyTrack(self, sides, start, n)
-
-    @property
-    def room(self) -> int:
-        """See `Executor`."""
-        return self.lanes
-
-    def table(self, columns: int) -> Array:
-        """See `Executor`."""
-        return np.empty((len(self.plan.kept), columns, self.room))
-
-    def fan(self, samples: Array, out: Array, worst: Array, first: int, step: int) -> None:
-        """See `Executor`."""
-        plan, block = self.plan, self.block
-        kept, remembered = list(plan.kept), list(plan.remembered)
-        source, target = np.array(plan.carried_on).T
-        past = block[plan.past : plan.past + NODES * len(remembered)].reshape(NODES, -1, self.lanes)
-        alive = np.ones(self.lanes, dtype=np.bool_)
-        for k, sample in enumerate(samples.T):
-            accepted = self._accepted("extend", sample) if k >= NODES else ~alive
-            if (alive & ~accepted).any():
-                if k >= NODES:
-                    self.go_back(samples[:, k - 1, None])
-                    self.carry()
-                accepted = self._accepted("predict", sample)
-            alive &= accepted
-            out[:, first + step * k] = np.where(alive, block[kept], np.nan)
-            self._worsen(worst)
-            past[k % NODES] = block[remembered]
-            if k + 1 < NODES:
-                for name in plan.remaining:
-                    self.run(name)
-                self.carry()
-            else:
-                block[target] = block[source]
-        worst[:, ~alive] = np.nan
-
-    def _worsen(self, worst: Array) -> None:
-        largest, smallest = np.split(worst, [len(self.plan.largest)])
-        np.maximum(largest, self.block[list(self.plan.largest)], out=largest)
-        np.minimum(smallest, self.block[list(self.plan.smallest)], out=smallest)
-
-    def _accepted(self, start: str, sample: Array) -> NDArray[np.bool_]:
-        self.block[list(self.plan.sampled)] = sample[:, None]
-        self.settle(start, self.plan.alone)
-        return self.block[self.plan.slots[MARGIN]] > 0.0
-
-    def fold(self, table: Array, totals: Array) -> None:
-        """See `Executor`."""
-        plan, block = self.plan, self.block
-        for column, row in enumerate(table):
-            block[list(plan.kept)] = totals[:, column]
-            for some in row.reshape(-1, len(plan.taken), self.group):
-                block[list(plan.taken)] = some
-                for name in plan.after:
-                    self.run(name)
-            totals[:, column] = block[list(plan.kept)]
-
-    def groups(self, lanes: int) -> int:
-        """See `Executor`; always one, because programs are bound to all lanes."""
-        return 1
-
-    def parts(self, parts: Parts) -> Callable[[int], object]:
-        """See `Executor`."""
-        plan, block = self.plan, self.block
-
-        def call(groups: int) -> None:
-            for member, sources in zip(parts.members.tolist(), parts.taken, strict=True):
-                block[list(plan.fixed)] = parts.fixed[member, :, None]
-                block[list(plan.sampled)] = parts.samples
-                block[list(plan.taken)] = parts.world[sources]
-                self.attempt()
-                row = parts.base + member * len(plan.kept)
-                parts.world[row : row + len(plan.kept)] = block[list(plan.kept)]
-                self._worsen(parts.worst)
-                for slot, k in plan.left:
-                    parts.ahead[member, k] = block[slot, -1]
-
-        return call

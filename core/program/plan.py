@@ -1,13 +1,13 @@
 """Plans: the programs of a model, the slots of its lanes, and the order in which executors run
-them; the interfaces of executors and of their data.
+them; the data of executors.
 """
 
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -172,154 +172,6 @@ class Parts:
     world: Array
     base: int
     worst: Array
-
-
-class Executor(Protocol):
-    """A plan bound to a number of lanes. Lanes that divide by zero hold inf or nan; no error is
-    raised.
-    """
-
-    @property
-    def lanes(self) -> int: ...
-    @property
-    def group(self) -> int:
-        """Lanes that a track attempts together."""
-        ...
-
-    @property
-    def margin(self) -> int:
-        """Samples that a track may read beyond the last."""
-        ...
-
-    def clear(self) -> None:
-        """Set all slots of all lanes to zero."""
-        ...
-
-    def put(self, slots: Sequence[int], values: Array) -> None:
-        """Set slots of all lanes, shape (slots, lanes) or (slots, 1)."""
-        ...
-
-    def get(self, slots: Sequence[int]) -> Array:
-        """Return a copy of slots of all lanes, shape (slots, lanes)."""
-        ...
-
-    def window(self, slots: range) -> Array:
-        """Return a view of slots in memory, shaped as the result of `arranged`."""
-        ...
-
-    def arranged(self, table: Table) -> Table:
-        """Return a table of slots by lanes in memory layout; the last lane fills up the last
-        vector.
-        """
-        ...
-
-    def run(self, name: str) -> None:
-        """Run one of `Plan.programs` over all lanes."""
-        ...
-
-    def attempt(self) -> None:
-        """Attempt all lanes, each alone."""
-        ...
-
-    def carry(self) -> None:
-        """Copy `Plan.carried` of all lanes, for the next prediction."""
-        ...
-
-    def track(self, sides: Sequence[Side], start: Array, n: int) -> Track:
-        """Bind the samples of one motion, n in all, and its start: values of the targets in
-        `Plan.carried`, in order.
-        """
-        ...
-
-    @property
-    def room(self) -> int:
-        """Lanes with those that fill up the last vector."""
-        ...
-
-    def table(self, columns: int) -> Array:
-        """Return an empty output array of `fan`, shape (kept, columns, room)."""
-        ...
-
-    def fan(self, samples: Array, out: Array, worst: Array, first: int, step: int) -> None:
-        """Follow one motion per lane through the same samples, each lane alone.
-
-        Args:
-            samples: `Plan.sampled`, shape (sampled, n).
-            out: output table of `Plan.kept`; NaN from the first rejected sample of a lane.
-            worst: in and out: the largest of `Plan.largest` and the smallest of `Plan.smallest` per
-                lane, over its previous value and all samples; NaN for a lane with a rejected
-                sample. Shape (largest and smallest, room).
-            first, step: column of the first sample, and the step to the next: 1 or -1.
-        """
-        ...
-
-    def fold(self, table: Array, totals: Array) -> None:
-        """Reduce numbers into totals, column by column, in the first group of lanes.
-
-        Per column: set `Plan.kept` to the totals; read groups of numbers into `Plan.taken`, as many
-        at a time as it has slots, and run the programs in `after`; at the end write `Plan.kept` to
-        the totals.
-
-        Args:
-            table: shape (columns, room), contiguous; room is a multiple of the numbers read at a
-                time.
-            totals: shape (kept, columns, group), contiguous.
-        """
-        ...
-
-    def groups(self, lanes: int) -> int:
-        """Return the number of vector groups that hold so many lanes."""
-        ...
-
-    def parts(self, parts: Parts) -> Callable[[int], object]:
-        """Return a call that attempts the parts of a large mechanism in order, on the current
-        values of their arrays.
-
-        Its argument is the number of groups; each lane is attempted alone.
-        """
-        ...
-
-
-class Track(Protocol):
-    """One motion, followed by an executor along both sides of its start, through known samples.
-
-    Attributes:
-        anchors: current state of each side: values of the targets in `Plan.carried`, a row per
-            side.
-        worst: the largest of `Plan.largest`, or zero, and the smallest of `Plan.smallest`, over all
-            samples stored since `begin`.
-    """
-
-    anchors: Array
-    worst: Array
-
-    def begin(self) -> Array:
-        """Return an array for `Plan.kept` of all samples, shape (kept, n), filled from now on.
-
-        The caller must hold it during the motion: it may be large, so the track keeps no reference.
-        """
-        ...
-
-    def run(self) -> Sequence[int]:
-        """Follow every side from the start to its end; return the first rejected sample of each, or
-        its count.
-
-        The anchor of a completed side is invalid: no program prepares it for a continuation.
-        """
-        ...
-
-    def follow(self, side: int, at: int, stop: int, *, anew: bool) -> int:
-        """Attempt the next samples of a side as neighbouring lanes, and go on from the last
-        accepted one.
-
-        Args:
-            at, stop: the next sample, and the one before which to end.
-            anew: begin at the start instead of the side's anchor. The anchor moves along.
-
-        Returns:
-            The first rejected sample, or stop.
-        """
-        ...
 
 
 BYTES = 8

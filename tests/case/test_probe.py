@@ -14,8 +14,8 @@ from kincheck.core.joints import Coupler, Joint
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.dense_equations import System
 from kincheck.core.kinematics.compiled.request import Request
-from kincheck.core.kinematics.compiled.samples import Route
-from kincheck.core.kinematics.continuation.singularity import solve_closely
+from kincheck.core.kinematics.compiled.routes import Route
+from kincheck.core.kinematics.continuation.singular_poses import solve_closely
 from kincheck.core.kinematics.continuation.walk import march
 
 from ..oracles import naive

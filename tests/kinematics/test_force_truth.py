@@ -22,7 +22,7 @@ from kincheck.core.joints import (
 )
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.forces.reactions import forces_of
-from kincheck.core.kinematics.solver_selection import prepare
+from kincheck.core.kinematics.one_design import prepare
 from kincheck.core.mechanism import motions
 from kincheck.core.mechanism.body import Body
 from kincheck.core.mechanism.loads import Force, SpringDamper, Torque, TorsionSpringDamper

@@ -22,10 +22,10 @@ from kincheck.core import (
 from kincheck.core.kinematics.blocks.sparse_lanes import SparseLanes
 from kincheck.core.kinematics.compiled.compiled_model import recent_model
 from kincheck.core.kinematics.compiled.request import Request
-from kincheck.core.kinematics.compiled.samples import Route
+from kincheck.core.kinematics.compiled.routes import Route
 from kincheck.core.kinematics.continuation.sweep import follow
 from kincheck.core.kinematics.formulation.constraints import frames
-from kincheck.core.kinematics.solver_selection import ONE_PROGRAM
+from kincheck.core.kinematics.one_design import ONE_PROGRAM
 from kincheck.core.kinematics.structure.components import components
 from kincheck.core.mechanism.motions import Path, Ramp, Sine
 from kincheck.core.studies.bench import scaling

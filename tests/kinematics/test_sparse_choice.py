@@ -19,7 +19,7 @@ from kincheck.core import (
 from kincheck.core.kinematics.formulation.cartesian import Cartesian
 from kincheck.core.kinematics.formulation.constraints import frames
 from kincheck.core.kinematics.formulation.state_vectors import jacobian
-from kincheck.core.kinematics.structure.driver_count import NullSpaces
+from kincheck.core.kinematics.structure.degrees_of_freedom import NullSpaces
 from kincheck.core.kinematics.structure.sparse_lu import Blocks
 from kincheck.core.mechanism.motions import Path, Ramp
 from kincheck.core.studies.bench.ring import LEAN, pivot, ring

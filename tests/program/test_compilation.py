@@ -10,13 +10,12 @@ import numpy as np
 import pytest
 from kincheck.core import solve, solve_designs
 from kincheck.core.caches import clear_caches
-from kincheck.core.kinematics.blocks.cascade import Cascade
-from kincheck.core.kinematics.blocks.component_lanes import ComponentLanes
+from kincheck.core.kinematics.blocks.component_lanes import Cascade, ComponentLanes
 from kincheck.core.kinematics.blocks.sweep import BlockSweep
 from kincheck.core.kinematics.compiled import compiled_model as models
 from kincheck.core.kinematics.compiled.compiled_model import Model, compile_model
 from kincheck.core.kinematics.compiled.request import Request
-from kincheck.core.kinematics.compiled.samples import Route
+from kincheck.core.kinematics.compiled.routes import Route
 from kincheck.core.kinematics.continuation.sweep import follow
 from kincheck.core.kinematics.design_batch import solve_variants
 from kincheck.core.kinematics.formulation.constraints import frames

@@ -57,7 +57,7 @@ def failing(joint_type):
 def traced_anew(monkeypatch):
     """Programs are traced with the mistake of the test, not taken from the cache on disk."""
     monkeypatch.setattr(
-        "kincheck.core.kinematics.compiled.program_cache.kept",
+        "kincheck.core.kinematics.compiled.compiled_model.kept",
         lambda content, make, read: read(make()),
     )
 

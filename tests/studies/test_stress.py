@@ -166,7 +166,7 @@ def test_starts_family_finds_rounded_starts(monkeypatch):
     found, _ = stress([FAMILIES["starts"]], [NATIVE], samples=80, seed=1, prove=False)
     assert found.cells[0].samples[Verdict.SILENTLY_WRONG] == 0
     assert found.cells[0].samples[Verdict.RIGHT] > 66
-    monkeypatch.setattr("kincheck.core.kinematics.compiled.motion_start.TYPED", 0.0)
+    monkeypatch.setattr("kincheck.core.kinematics.compiled.routes.TYPED", 0.0)
     clear_caches()
     found, _ = stress([FAMILIES["starts"]], [NATIVE], samples=80, seed=1, prove=False)
     assert found.cells[0].samples[Verdict.SILENTLY_WRONG] > 6

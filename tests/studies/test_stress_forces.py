@@ -19,7 +19,7 @@ from kincheck.core.studies.stress.solving import interpreted, once
 from kincheck.core.studies.stress.verdicts import Verdict, judged
 from kincheck.core.studies.truth.forces import known_forces
 
-demand = importlib.import_module("kincheck.core.kinematics.forces.demand")
+demand = importlib.import_module("kincheck.core.kinematics.forces.equations")
 FORCES = Family.registry["forces"]
 # Numbers of specimens: a hinge twice, a four-bar of four hinges, a fast arm, a driven slide.
 TWICE, FOUR_BAR, SPINNING, SLIDING = 21, 4, 5, 12

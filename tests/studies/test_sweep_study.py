@@ -153,7 +153,7 @@ def test_large_chunks_are_solved_in_parts(tmp_path, monkeypatch):
     variation = vary(tmp_path, case, tip=TIP, pivot=PIVOT)
     study = Study(case, variation, 300, 4)
     whole = Ready.of(study).chunk(0)
-    monkeypatch.setattr("kincheck.core.kinematics.prepared_designs.RECYCLED", 22_000)
+    monkeypatch.setattr("kincheck.core.kinematics.native_solver.RECYCLED", 22_000)
     ready = Ready.of(study)
     assert 8 < ready.lanes < 100
     parts = ready.chunk(0)

@@ -23,30 +23,32 @@ from ...program import before, maximum
 from ...trajectory import Array
 from ..compiled.compiled_model import ASSEMBLING, CLOSED, STILL
 from ..compiled.dense_equations import System
-from ..compiled.predictor import ABOUT
 from ..compiled.programs import Tracer
 from ..compiled.request import ACCEPT, MAX_ITERATIONS, Request
 from ..compiled.solution import Columns
-from ..continuation.failure_reasons import failure_kind
-from ..continuation.row_exchange import BETTER, SEEN
-from ..continuation.singular_crossing import SOUND, Numbers
-from ..formulation.acceptance_criteria import AMPLIFIED, EPSILON, LOW, doubtful
-from ..formulation.constraints import measured
-from ..formulation.driver_inputs import turns
-from ..formulation.formulation import row_names
-from ..formulation.margins import (
+from ..compiled.step_programs import ABOUT
+from ..continuation.segments import BETTER, SEEN
+from ..continuation.singular_poses import SOUND, Numbers
+from ..continuation.walk import failure_kind
+from ..formulation.acceptance_criteria import (
+    AMPLIFIED,
+    EPSILON,
+    LOW,
     Block,
     Candidate,
     Limits,
+    doubtful,
     known_slope,
     least_slope,
     margins,
     slope_between,
 )
-from ..structure.degrees_of_freedom import counted
-from ..structure.driver_count import NullSpaces, locked_drivers, require_driven
+from ..formulation.constraints import measured
+from ..formulation.formulation import row_names
+from ..formulation.state_vectors import turns
+from ..structure.degrees_of_freedom import NullSpaces, counted, locked_drivers, require_driven
 from ..structure.sparse_lu import Blocks, Factors, Pattern, SingularError
-from .lanes import CLOSURES, MARGINS, SIGMAS, WORST, Anchor, Indices, Lanes
+from .sweep import CLOSURES, MARGINS, SIGMAS, WORST, Anchor, Indices, Lanes
 
 POSES = 8
 """Poses evaluated together: samples that are so far from the last one are still predicted well."""

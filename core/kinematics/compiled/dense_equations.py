@@ -17,17 +17,16 @@ from numpy.typing import NDArray
 from ...algebra import Scalar
 from ...mechanism.motions import Path
 from ...primitives.base import Twist
-from ...program import Executor, NumpyExecutor, Plan, program
+from ...program import Plan, program
 from ...program.llvm.compiler import available
-from ...program.llvm.executor import LlvmExecutor
+from ...program.llvm.executor import Executor, bind
 from ...program.llvm.jit import LlvmCode
 from ...trajectory import Array
-from ..formulation.driver_inputs import samples
 from ..formulation.formulation import Configuration
+from ..formulation.state_vectors import samples
 from .compiled_model import Model
 from .programs import Tracer
-from .request import FROM, RATE, RATE_T, TIME
-from .sample_rows import kept_forces, kept_motions
+from .request import FROM, RATE, RATE_T, TIME, kept_forces, kept_motions
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,9 +244,7 @@ class System:
 
     def _executor(self, lanes: int) -> Executor:
         if lanes not in self._executors:  # kept: binding costs more than running
-            self._executors[lanes] = (
-                LlvmExecutor(self._code, lanes) if self._code else NumpyExecutor(self._plan, lanes)
-            )
+            self._executors[lanes] = bind(self._plan, lanes, self._code)
         return self._executors[lanes]
 
     def _at(self, state: Array, sample: Array) -> Executor:

@@ -23,15 +23,21 @@ from ...mechanism.mechanism import Mechanism, Vector
 from ...primitives.base import GROUND_POSE, GROUND_TWIST, Drive, Pose, Twist
 from ...program import Elimination, Prepared, Program, Tape, absolute, maximum, minimum, program
 from ...trajectory import QUANTITIES
-from ..forces.demand import BodyStates
+from ..forces.equations import BodyStates
 from ..formulation.acceptance_criteria import EPSILON
-from ..formulation.body_kinematics import motion_of_frame, motion_of_point
 from ..formulation.cartesian import Cartesian, PrescribedBody
 from ..formulation.constraints import Frames, Style, constraints, frames
-from ..formulation.driver_inputs import turns
-from ..formulation.formulation import GROUND_ACCELERATION, Acceleration, Formulation, State
+from ..formulation.formulation import (
+    GROUND_ACCELERATION,
+    Acceleration,
+    Formulation,
+    State,
+    motion_of_frame,
+    motion_of_point,
+)
 from ..formulation.parameters import every_place, placed
 from ..formulation.relative import Relative
+from ..formulation.state_vectors import turns
 from ..structure.components import Section, select_section
 from ..structure.degrees_of_freedom import Selection, select_rows
 from .request import (

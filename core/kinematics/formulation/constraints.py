@@ -22,7 +22,7 @@ from ...joints.base import unit
 from ...mechanism.mechanism import GROUND, Mechanism, spanning_tree
 from ...mechanism.motions import Driver, JointDriver, PointCoordinate
 from ...primitives.base import Drive
-from .relation import Relation as Relation
+from .formulation import Relation as Relation
 
 
 @dataclass(frozen=True)

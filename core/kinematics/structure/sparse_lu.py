@@ -15,7 +15,7 @@ import numpy as np
 
 from ...caches import keep_last
 from ...trajectory import Array
-from .driver_count import NARROW, Indices
+from .degrees_of_freedom import NARROW, Indices
 
 
 class SingularError(ArithmeticError):

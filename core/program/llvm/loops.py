@@ -86,7 +86,7 @@ end:
 
 
 def parts(width: int) -> str:
-    """Return the LLVM functions of `Executor.parts`."""
+    """Return the LLVM functions of `parts` of an executor."""
     source = Rows(width)
     row = source.let(f"load i64, ptr {source.number('%rows', '%row')}, align 8")
     place = source.number("%world", source.product("%room", row))
@@ -170,8 +170,8 @@ the number of samples it reached.
 
 
 def follow(width: int) -> str:
-    """Return the LLVM functions of `Track.follow`: W samples at a time, on from the last accepted
-    one. An anchor remains at the end only if the motion stays there.
+    """Return the LLVM functions of `follow` of a track: W samples at a time, on from the last
+    accepted one. An anchor remains at the end only if the motion stays there.
 
     Extrapolated groups begin at a multiple of W: the group after a fully accepted one ends there.
     With few lanes, several such groups must precede.
@@ -380,8 +380,8 @@ def _worst(width: int) -> str:
 
 
 def fan(width: int) -> str:
-    """Return the LLVM functions of `Executor.fan`: a group of W motions passes all samples while
-    its slots are in the L1 cache.
+    """Return the LLVM functions of `fan` of an executor: a group of W motions passes all samples
+    while its slots are in the L1 cache.
 
     After `NODES` samples a group is predicted by `extend`. If this fails for a live motion, the
     group goes back and is predicted by its rates.
@@ -516,8 +516,8 @@ def _kept(width: int) -> str:
 
 
 def fold(width: int) -> str:
-    """Return the LLVM function of `Executor.fold`: totals stay in the L1 cache, inputs are read
-    once.
+    """Return the LLVM function of `fold` of an executor: totals stay in the L1 cache, inputs are
+    read once.
     """
     body = f"""%all = mul i64 %columns, {width}
   %step = mul i64 %plan_taken_count, {width}

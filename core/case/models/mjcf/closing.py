@@ -14,7 +14,7 @@ from .digits import Digits
 from .equalities import Connect, Equality, Relation
 from .pose import Pose
 
-# Gaps of several joints add up, and arms lengthen them; see kinematics.structure.reduction.
+# Gaps of several joints add up, and arms lengthen them; see kinematics.structure.redundancy.
 ADDED_UP = 10.0
 # Rows are of size one: a smaller singular value is round-off of a redundant row.
 ROUND_OFF = 1e-9

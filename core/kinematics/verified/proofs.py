@@ -1,4 +1,6 @@
-"""Proved samples of a sweep: native solutions, and balls proved to contain the exact ones."""
+"""Proofs: samples of a sweep, with balls proved to contain the exact solutions near the native
+ones, and single poses, from the caller's own state.
+"""
 
 from __future__ import annotations
 
@@ -10,26 +12,91 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
+from ...algebra import Vec3
 from ...mechanism.loads import TorsionSpringDamper
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path, outwards
 from ...program.ball_executor import Ball, flint, precision
 from ...trajectory import Array, Trajectory
 from ..compiled.compiled_model import compile_model
-from ..compiled.motion_start import start_of
 from ..compiled.request import Request
-from ..continuation.row_exchange import chosen_at
+from ..compiled.routes import start_of
+from ..continuation.segments import chosen_at
 from ..continuation.sweep import sweep
-from ..forces.motion_lanes import Follow, MotionLanes
-from ..forces.reactions import with_forces
+from ..forces.reactions import Follow, MotionLanes, with_forces
 from ..forces.wanted import WantedForces, wanted_forces
 from ..formulation.cartesian import Cartesian
 from ..formulation.constraints import frames
 from ..formulation.formulation import row_names
 from ..formulation.state_vectors import displaced, state_of
-from .exact import Reading, exact_mechanism
-from .exact_equations import equations
+from ..structure.degrees_of_freedom import select_rows
+from .exact import Reading, as_double, equations, exact_mechanism
 from .krawczyk import Enclosure, UnprovedError, enclose
+
+
+@dataclass(frozen=True)
+class PoseState:
+    """The scalars that fix a pose of a mechanism.
+
+    Attributes:
+        names: of the vectors in their order: "u BODY" (displacement of its origin), "q BODY" (Euler
+            parameters) and "x JOINT.rotation" or "x JOINT.translation" (a coordinate).
+        unit: of lengths [m].
+        origins: of the moving bodies at the design position [units].
+    """
+
+    names: Sequence[str]
+    unit: float
+    origins: Mapping[str, Vec3]
+
+    @staticmethod
+    def of(mechanism: Mechanism) -> PoseState:
+        """Return the state of a mechanism."""
+        frame = frames(mechanism)
+        names = [*Cartesian.of(mechanism, frame).design]
+        return PoseState(names, frame.unit, frame.origins)
+
+
+def prove_pose(
+    mechanism: Mechanism,
+    points: Sequence[str],
+    pose: Array,
+    drives: Mapping[str, Sequence[Fraction]],
+    bits: int,
+) -> Enclosure:
+    """Prove one pose of a mechanism, its numbers read as doubles.
+
+    Args:
+        mechanism: the mechanism.
+        points: names of the output points.
+        pose: the approximate state, as `PoseState` orders it.
+        drives: value from the design, velocity and acceleration of the moving drivers [SI].
+        bits: working precision.
+
+    Raises:
+        UnprovedError: the pose is singular, or too far from a solution.
+        KincheckError: python-flint is not installed, or the rows cannot be selected.
+    """
+    frame = frames(mechanism)
+    change = {name: float(value) for name, (value, *_) in drives.items()}
+    selected = select_rows(mechanism, frame, Cartesian.of(mechanism, frame)).chosen
+    kept = chosen_at(mechanism, change, pose, selected)
+    with precision(bits):
+        traced = equations(exact_mechanism(mechanism, as_double), tuple(drives), points, kept)
+        driven = _balls(mechanism, traced.frame.unit, drives)
+        return enclose(traced, points, pose, driven, bits)
+
+
+def _balls(
+    mechanism: Mechanism, unit: float, drives: Mapping[str, Sequence[Fraction]]
+) -> list[list[Ball]]:
+    """Return the values of drives [SI] as balls [units or rad]."""
+    per = {name: 1 if mechanism.driver(name).turns else Fraction(unit) for name in drives}
+    return [
+        [flint().arb(flint().fmpq(*(x / per[name]).as_integer_ratio())) for x in drive]
+        for name, drive in drives.items()
+    ]
+
 
 Drives = Mapping[str, Sequence[tuple[Fraction, Fraction, Fraction]]]
 """Value from the design, velocity and acceleration [SI] of each moving driver at every sample."""
@@ -107,13 +174,9 @@ def prove(
         exact, kept = exact_mechanism(mechanism, reading), model.selection.chosen
         traced = {kept: equations(exact, tuple(drives), points, kept, wanted)}
         unit = traced[kept].frame.unit
-        units = [1 if mechanism.driver(name).turns else Fraction(unit) for name in drives]
         for k, reached in enumerate(native.solved):
             started = perf_counter()
-            driven = [
-                [_ball(x / unit) for x in drives[name][k]]
-                for name, unit in zip(drives, units, strict=True)
-            ]
+            driven = _balls(mechanism, unit, {name: each[k] for name, each in drives.items()})
             try:
                 if not reached:
                     raise UnprovedError(
@@ -148,10 +211,6 @@ def _angles(mechanism: Mechanism, path: Path, native: Trajectory, follow: Follow
         lanes = MotionLanes(mechanism, path, native, follow)
         found[native.solved] = np.stack([lanes.angle(name) for name in joints], axis=1)
     return found
-
-
-def _ball(x: Fraction) -> Ball:
-    return flint().arb(flint().fmpq(x.numerator, x.denominator))
 
 
 def _states(mechanism: Mechanism, native: Trajectory, times: Array, start: float = 0.0) -> Array:
