@@ -133,7 +133,10 @@ def _model(file: Path, text: str, supplied: Supplied) -> Case:
 
             robot = read_sdf(root)
         case _:
-            return read_mjcf(file, root, supplied)
+            from .trees.case import case_of as tree_case
+            from .trees.mjcf import read_mjcf as read_tree
+            from .trees.element import parse_xml as parse_tree
+            return tree_case(read_tree(file, parse_tree(file, text)), supplied)
     from .robots.as_mjcf import as_mjcf
 
     name = root.attributes.get("name", file.stem)
