@@ -82,9 +82,8 @@ IMPORTS = {
         ". joints mechanism kinematics case/models/hardpoints/templates case case/suspension "
         "case/io"
     ),
-    "case/models/mjcf": ". joints mechanism kinematics case case/io",
-    "case/models/robots": ". joints mechanism case/io case/models/mjcf",
-    "case/models": ". case case/io case/models/hardpoints case/models/mjcf case/models/robots",
+    "case/models/trees": ". joints mechanism kinematics case case/io",
+    "case/models": ". case case/io case/models/hardpoints case/models/trees",
     "harness": (
         ". program/llvm joints mechanism kinematics case case/suspension case/measures case/io"
     ),

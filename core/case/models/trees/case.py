@@ -58,14 +58,22 @@ def case_of(tree: Tree, supplied: Supplied) -> Case:
         CaseError: the options do not say how it moves, its start does not close, or there is no
             joint for one of its ties.
     """
+    return _Parts(*posed(tree, supplied)).case()
+
+
+def posed(tree: Tree, supplied: Supplied) -> tuple[Assembled, Driving, Mapping[str, Spin]]:
+    """Return a tree in its closed start, its driven and held moves, and its links that spin.
+
+    Raises:
+        CaseError: see `case_of`.
+    """
     driving = read_driving(tree, supplied)
     _require_coupled(tree)
     start = read_start(tree, supplied.start)
     model = assemble(start, supplied.closure, driving.moves)
     spins = find_spins(model.tree, driving.fixed)
     axes = {name: spin.axis for name, spin in spins.items()}
-    driving = choose_held(model, driving, axes, hold_rest=supplied.hold_rest)
-    return _Parts(model, driving, spins).case()
+    return model, choose_held(model, driving, axes, hold_rest=supplied.hold_rest), spins
 
 
 def _require_coupled(tree: Tree) -> None:

@@ -249,8 +249,7 @@ class Freedom:
     def sizes(self, move: str) -> Array:
         """Return how much of a move's unknowns the motions have, the most first."""
         rows = self._free[:, [*self._columns[move]]]
-        found: Array = np.linalg.svd(rows, compute_uv=False) if rows.size else np.zeros(0)
-        return found
+        return np.linalg.svd(rows, full_matrices=False)[1] if rows.size else np.zeros(0)
 
     def count(self, move: str) -> int:
         """Return how many of a move's motions are left."""

@@ -168,6 +168,30 @@ class Element:
             return tuple(default)
         return self._parsed(self.text, counts, "", "correct the text")
 
+    def value(self, tag: str, count: int) -> tuple[float, ...]:
+        """Return the numbers of the child of a tag, in its text or its attribute; zeros without
+        one.
+
+        Raises:
+            CaseError: a wrong count, or an unusable number.
+        """
+        child = self.child(tag)
+        if child is None:
+            return (0.0,) * count
+        if "value" in child.attributes:
+            return child.numbers("value", count)
+        return child.text_numbers(count, default=(0.0,) * count)
+
+    def required(self, name: str) -> str:
+        """Return an attribute.
+
+        Raises:
+            CaseError: it is missing or empty.
+        """
+        if not (found := self.attributes.get(name)):
+            raise self.fault(f"{name}: missing, expected a name; add the attribute")
+        return found
+
     def _parsed(
         self, text: str, counts: Sequence[int], before: str, advice: str
     ) -> tuple[float, ...]:

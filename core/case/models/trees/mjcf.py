@@ -396,7 +396,7 @@ class _Reader:
                 except CaseError:
                     tree.count(f"tendon: {tendon.tag}")
                 else:
-                    tree.add_strut(tendon, strut)
+                    tree.add_strut(strut)
 
     def _law(self, element: Element) -> tuple[float, float]:
         """Return stiffness and damping."""
@@ -423,8 +423,6 @@ class _Reader:
         sites = [str(child.attributes.get("site")) for child in tendon.children]
         if tendon.tag != "spatial" or len(sites) != 2 or not {*sites} <= tree.sites.keys():
             raise tendon.fault("goes elsewhere than between two sites")
-        if not stiffness and not damping:
-            raise tendon.fault("is no spring")
         (i, here), (j, there) = (tree.sites[site] for site in sites)
         shortest, longest = (2 * tendon.numbers("springlength", 1, 2, default=(-1.0,)))[:2]
         if shortest != longest:
@@ -435,7 +433,8 @@ class _Reader:
                 raise tendon.fault("has the length of a rest pose of its own")
             shortest = math.dist(coordinates(here.at), coordinates(there.at))
         name, spring = tendon.attributes.get("name", "tendon"), Spring(stiffness, damping, shortest)
-        return Strut(name, (i, j), (here.at, there.at), spring, "tendon: spatial")
+        points = here.at, there.at
+        return Strut(name, (i, j), points, spring, tendon, "tendon: spatial")
 
     def _gravity(self) -> Vector:
         """Return the gravity [m/s^2]; the last option counts."""

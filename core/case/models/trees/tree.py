@@ -158,6 +158,7 @@ class Strut:
     links: tuple[str, str]
     points: tuple[Vec3, Vec3]
     spring: Spring
+    element: Element
     described: str
 
 
@@ -356,14 +357,17 @@ class Tree:
             )
         self.ties.append(tie)
 
-    def add_strut(self, element: Element, strut: Strut) -> None:
-        """Add a strut.
+    def add_strut(self, strut: Strut) -> None:
+        """Add a strut; one without a law is counted.
 
         Raises:
             CaseError: there are too many.
         """
+        if not (strut.spring.stiffness or strut.spring.damping):
+            self.count(strut.described)
+            return
         if len(self.struts) >= MOST_TIES:
-            raise element.fault(
+            raise strut.element.fault(
                 f"found more than the {MOST_TIES} springs that are read, expected fewer; take out"
                 " those that are not looked at"
             )

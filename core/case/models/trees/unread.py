@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from ...io.document import decimal, shown
-from ..mjcf.elements import Element
+from .element import Element
 
 # What is seen, touched or measured joins nothing.
 APART = (
@@ -37,7 +37,7 @@ class Unread:
     Attributes:
         links: links by their names, and by those of frames on them.
         joints: joints by what they are called.
-        followers: joints that mimic another one, and this one.
+        followers: joints that follow another one, and this one.
         advice: what to write in place of a joint that is not read.
     """
 
