@@ -214,7 +214,7 @@ def _add_pairs(file: Path, pairs: PairsFile, graph: Graph) -> None:
         moves = [Move(title, "ball", places[0].at, X, element)] if kind.lower() == "3d" else []
         graph.loops.append(Loop(Joint(title, (first, second), moves, element), places))
     coordinates = {move.name for joint in graph.joints for move in joint.moves}
-    graph.actuated |= coordinates & {*pairs.name_mot}
+    graph.tree.actuated |= coordinates & {*pairs.name_mot}
 
 
 def _add_constraints(file: Path, found: ConstraintsFile, graph: Graph) -> None:

@@ -286,10 +286,12 @@ class _Parts:
     def _springs(self) -> Iterator[ForceElement]:
         """Yield the springs and dampers; those that are no force elements are counted."""
         names = Names()
-        for name, spring in self.tree.springs.items():
+        for name, move in self.tree.moves.items():
+            if (spring := self.tree.springs.get(name)) is None:
+                continue
             law = {"stiffness": spring.stiffness, "damping": spring.damping}
             try:
-                if element := self._spring_of(self.tree.moves[name], spring, law):
+                if element := self._spring_of(move, spring, law):
                     names.add(name)
                     yield element
             except MechanismError:

@@ -27,6 +27,11 @@ MOST_ELEMENTS = 200_000
 ALIKE = 0.75
 
 
+def words(text: str) -> tuple[str, ...]:
+    """Return the words of a text, for tables of names."""
+    return tuple(text.split())
+
+
 @dataclass(frozen=True, eq=False)
 class Element:
     """An element, or a place in a file beside that is no XML.
@@ -305,10 +310,7 @@ def _without_declaration(text: str) -> str:
 
 # What prints numbers writes six digits and more; fewer are a designer's own numbers.
 _FEWEST = 6
-_PLACES = (
-    *("pos", "axis", "anchor", "relpose", "fromto", "xyz", "rpy"),
-    *("quat", "axisangle", "xyaxes", "zaxis", "euler"),
-)
+_PLACES = words("pos axis anchor relpose fromto xyz rpy quat axisangle xyaxes zaxis euler")
 # Elements of SDF, whose texts are places.
 _TEXTS = ("pose", "xyz")
 _NUMBER = re.compile(r"[-+]?0*\.?0*([0-9][0-9.]*)(?:[eE][-+]?[0-9]+)?")

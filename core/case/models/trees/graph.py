@@ -12,11 +12,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 from ....algebra import X
-from ....mechanism.mechanism import GROUND, Vector
+from ....mechanism.mechanism import GROUND
 from ...io.document import SMALLEST
 from .element import Element, significant_digits
 from .place import HERE, Place
-from .tree import WORLD, Closure, Coupling, Mass, Move, Spring, Strut, Tree
+from .tree import WORLD, Closure, Coupling, Mass, Move, Strut, Tree
 
 FIXED = (WORLD, GROUND)
 """Names of a fixed link at the origin, which is the world."""
@@ -61,6 +61,7 @@ class Graph:
     """Links and joints of a file, global in its zero pose; a reader fills it.
 
     Attributes:
+        tree: takes what is no link, joint or tie; links, joints and ties when they are hung.
         places: of the links.
         elements: of the links, for messages.
         fixed: links of the world.
@@ -68,12 +69,9 @@ class Graph:
         frames: names of places on links, for outputs: link and place.
         rods: distances between points of links.
         struts: springs and dampers between points of links.
-        springs: by move.
-        actuated: moves with a motor.
-        gravity: [m/s^2].
-        left_out: how many there are of what is omitted, by what it is called.
     """
 
+    tree: Tree
     root: Element
     places: dict[str, Place] = field(default_factory=dict[str, Place])
     elements: dict[str, Element] = field(default_factory=dict[str, Element])
@@ -85,14 +83,12 @@ class Graph:
     rods: list[Closure] = field(default_factory=list[Closure])
     couplings: list[Coupling] = field(default_factory=list[Coupling])
     struts: list[Strut] = field(default_factory=list[Strut])
-    springs: dict[str, Spring] = field(default_factory=dict[str, Spring])
-    actuated: set[str] = field(default_factory=set[str])
-    gravity: Vector = (0.0, 0.0, -9.81)
-    left_out: dict[str, int] = field(default_factory=dict[str, int])
 
-    def count(self, what: str) -> None:
-        """Count one more omitted item."""
-        self.left_out[what] = self.left_out.get(what, 0) + 1
+    @staticmethod
+    def of(root: Element, described: str, *, closes: bool = True) -> Graph:
+        """Return a graph without links; see `Tree`."""
+        digits = significant_digits(root)
+        return Graph(Tree(root.file, described, "its zero pose", closes, digits), root)
 
     @property
     def followers(self) -> list[tuple[str, str]]:
@@ -100,22 +96,16 @@ class Graph:
         pairs = [(*each.driven, *each.driving) for each in self.couplings if each.driving]
         return [(follower, leader) for follower, leader in pairs]
 
-    def tree(self, described: str, *, closes: bool = True) -> Tree:
-        """Return the tree; see `Tree`.
+    def hang(self) -> Tree:
+        """Hang all links, and tie them; return the tree.
 
         Raises:
             CaseError: a name is taken, nothing moves, or there are too many links or ties.
         """
-        tree = Tree(self.root.file, described, "its zero pose", closes, gravity=self.gravity)
-        tree.names.update(self.places, self.frames)
-        _Hanging(self, tree).hang()
-        tree.require_moving(self.root)
-        tree.actuated.update(self.actuated)
-        tree.left_out.update(self.left_out)
-        tree.springs.update(
-            (name, self.springs[name]) for name in tree.moves if name in self.springs
-        )
-        return replace(tree, digits=significant_digits(self.root))
+        self.tree.names.update(self.places, self.frames)
+        _Hanging(self).hang()
+        self.tree.require_moving(self.root)
+        return self.tree
 
     def spanned(self) -> tuple[list[Joint], list[Loop]]:
         """Return the joints of a spanning tree, outer ones first, and the loops.
@@ -172,8 +162,8 @@ class _Hanging:
         closures: what closes the loops, between links of the graph or copies.
     """
 
-    def __init__(self, graph: Graph, tree: Tree) -> None:
-        self.graph, self.tree = graph, tree
+    def __init__(self, graph: Graph) -> None:
+        self.graph, self.tree = graph, graph.tree
         self.inside: dict[str, list[_Part]] = {WORLD: []}
         self.closures: list[Closure] = []
 

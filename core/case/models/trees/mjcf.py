@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 from typing import cast
@@ -14,7 +13,7 @@ from typing import cast
 from ....algebra import X, quat, vec
 from ....errors import MOST_NAMED, CaseError, remedy, shortened
 from ....mechanism.mechanism import GROUND, Vector
-from .element import Element, significant_digits
+from .element import Element, significant_digits, words
 from .mjcf_language import (
     DYNAMIC,
     EXPANDED,
@@ -34,9 +33,7 @@ from .place import HERE, Place, coordinates, unit_quaternion
 from .tree import MOST_MOVING, UNKNOWNS, WORLD, Closure, Coupling, Kind, Move, Spring, Strut, Tree
 
 # What these hold is for looks, actuators and measurements.
-_LEFT_OUT = (
-    *("contact", "actuator", "sensor", "keyframe", "custom", "extension", "deformable", "asset"),
-)
+_LEFT_OUT = words("contact actuator sensor keyframe custom extension deformable asset")
 OTHERS = {
     "mujocoinclude": "is a part of a model; give the file that includes it",
     "OpenSimDocument": (
@@ -48,10 +45,7 @@ OTHERS = {
 }
 """Other documents in XML, and what to do, by their root."""
 _EQUALITIES = ("connect", "weld", "joint", "tendon")
-_ACTUATORS = (
-    *("general", "motor", "position", "velocity", "intvelocity"),
-    *("damper", "cylinder", "muscle", "dcmotor"),
-)
+_ACTUATORS = words("general motor position velocity intvelocity damper cylinder muscle dcmotor")
 
 
 def read_mjcf(file: Path, root: Element) -> Tree:
@@ -109,7 +103,8 @@ class _Reader:
     def __init__(self, file: Path, root: Element) -> None:
         self.root, self.classes, self.compiler = root, Classes(root), read_compiler(root)
         model = root.attributes.get("model", file.stem)
-        self.tree = Tree(file, f"MJCF model {model!r} of {file.name}", "its pose qpos0")
+        described = f"MJCF model {model!r} of {file.name}"
+        self.tree = Tree(file, described, "its pose qpos0", digits=significant_digits(root))
         flags = [flag for option in root.only("option") for flag in option.only("flag")]
         self.disabled = {
             key for flag in flags for key, value in flag.attributes.items() if value == "disable"
@@ -145,8 +140,9 @@ class _Reader:
             tree.keyframes[key.attributes.get("name", str(k))] = key, numbers
         driven = [each.attributes.get("joint") for each in root.below() if each.tag in _ACTUATORS]
         tree.actuated.update(filter(None, driven))
-        gravity = self._gravity() if tree.masses else tree.gravity
-        return replace(tree, gravity=gravity, digits=significant_digits(root))
+        if tree.masses:
+            tree.gravity = self._gravity()
+        return tree
 
     def _inside(self, around: Element, place: Place, link: str, childclass: str) -> None:
         """Read what is in a body, or in a frame of it, at a place."""

@@ -15,102 +15,38 @@ from pathlib import Path
 from ....algebra import IDENTITY, ZERO, Quat, Vec3, X, Y, Z, cross, quat, vec
 from ...io.case_file import LARGEST_FILE
 from ...io.document import read_text, shown
-from .element import DEEPEST, MOST_ELEMENTS, Element, parse_xml
+from .element import DEEPEST, MOST_ELEMENTS, Element, parse_xml, words
 from .place import Place, turn_about, turn_of_axes, turn_to, unit_quaternion, unit_vector
 
-ORIENTATION = ("quat", "axisangle", "xyaxes", "zaxis", "euler")
+ORIENTATION = words("quat axisangle xyaxes zaxis euler")
 _FRAME = ("name", "childclass", "pos", *ORIENTATION)
-_SOFT = ("solref", "solimp", "class", "active", "name")
-_FORCES = (
-    "springdamper",
-    "springyield",
-    "stiffness",
-    "springref",
-    "armature",
-    "damping",
-    "frictionloss",
+_SOFT = words("solref solimp class active name")
+_FORCES = words("springdamper springyield stiffness springref armature damping frictionloss")
+_LIMITS = words(
+    "range limited actuatorfrcrange actuatorfrclimited actuatorgravcomp margin "
+    "solreflimit solimplimit"
 )
-_LIMITS = (
-    "range",
-    "limited",
-    "actuatorfrcrange",
-    "actuatorfrclimited",
-    "actuatorgravcomp",
-    "margin",
-    "solreflimit",
-    "solimplimit",
-)
-_JOINT = (
-    "type",
-    "group",
-    "pos",
-    "axis",
-    "ref",
-    "user",
-    "solreffriction",
-    "solimpfriction",
-    *_FORCES,
-    *_LIMITS,
-)
+_JOINT = (*_FORCES, *_LIMITS, *words("type group pos axis ref user solreffriction solimpfriction"))
 
-_COMPILER = (
-    *(
-        "alignfree",
-        "angle",
-        "assetdir",
-        "autolimits",
-        "balanceinertia",
-        "boundinertia",
-        "boundmass",
-        "conflict",
-        "coordinate",
-    ),
-    *(
-        "discardvisual",
-        "eulerseq",
-        "fitaabb",
-        "fusestatic",
-        "inertiafromgeom",
-        "inertiagrouprange",
-        "meshdir",
-        "passthrough",
-    ),
-    *(
-        "savecanonical",
-        "savecompiled",
-        "saveinertial",
-        "settotalmass",
-        "strippath",
-        "texturedir",
-        "usethread",
-    ),
+_COMPILER = words(
+    "alignfree angle assetdir autolimits balanceinertia boundinertia boundmass conflict "
+    "coordinate discardvisual eulerseq fitaabb fusestatic inertiafromgeom "
+    "inertiagrouprange meshdir passthrough savecanonical savecompiled saveinertial "
+    "settotalmass strippath texturedir usethread"
 )
 
 KNOWN = {
     "compiler": _COMPILER,
     "worldbody": (),
-    "body": (*_FRAME, "mocap", "gravcomp", "user", "sleep", "fuse", "simple"),
+    "body": (*_FRAME, *words("mocap gravcomp user sleep fuse simple")),
     "frame": _FRAME,
-    "replicate": ("count", "sep", "offset", "euler", "childclass"),
-    "key": ("name", "time", "qpos", "qvel", "act", "mpos", "mquat", "ctrl"),
+    "replicate": words("count sep offset euler childclass"),
+    "key": words("name time qpos qvel act mpos mquat ctrl"),
     "joint": ("name", "class", *_JOINT),
     "freejoint": ("name", "group", "align"),
-    "site": (
-        "name",
-        "class",
-        "type",
-        "group",
-        "pos",
-        *ORIENTATION,
-        "material",
-        "mesh",
-        "size",
-        "fromto",
-        "rgba",
-        "user",
-    ),
-    "connect": (*_SOFT, "body1", "body2", "anchor", "site1", "site2"),
-    "weld": (*_SOFT, "body1", "body2", "relpose", "anchor", "torquescale", "site1", "site2"),
+    "site": (*ORIENTATION, *words("name class type group pos material mesh size fromto rgba user")),
+    "connect": (*_SOFT, *words("body1 body2 anchor site1 site2")),
+    "weld": (*_SOFT, *words("body1 body2 relpose anchor torquescale site1 site2")),
     "equality joint": (*_SOFT, "joint1", "joint2", "polycoef"),
     "equality tendon": (*_SOFT, "tendon1", "tendon2", "polycoef"),
     "default equality": _SOFT,
@@ -120,39 +56,27 @@ KNOWN = {
     "pulley": ("divisor",),
     "fixed joint": ("joint", "coef"),
 }
-_TENDON = ("name", "class", "stiffness", "damping", "springlength")
+_TENDON = words("name class stiffness damping springlength")
 _OPEN = {
     "geom": (
-        *("name", "class", "type", "size", "fromto", "pos", *ORIENTATION),
-        *("mass", "density", "group", "shellinertia", "mesh"),
+        *ORIENTATION,
+        *words("name class type size fromto pos mass density group shellinertia mesh"),
     ),
     "option": ("gravity",),
-    "flag": ("gravity", "equality", "spring", "damper", "passive"),
+    "flag": words("gravity equality spring damper passive"),
     **dict.fromkeys(("spatial", "fixed", "default tendon"), _TENDON),
 }
 """Attributes that are read of elements with many others, and more in other releases of MuJoCo."""
 _ALL = KNOWN | _OPEN
 
-_READ = ("compiler", "option", "default", "worldbody", "tendon", "equality")
-_NOT_READ = (
-    *("size", "statistic", "visual", "extension", "asset", "deformable"),
-    *("contact", "actuator", "sensor", "custom", "keyframe"),
+_READ = words("compiler option default worldbody tendon equality")
+_NOT_READ = words(
+    "size statistic visual extension asset deformable contact actuator sensor custom keyframe"
 )
 ROOT = (*_READ, *_NOT_READ)
 """What <mujoco> can hold: sections that are read, and those that are not."""
 
-IN_BODY = (
-    "body",
-    "frame",
-    "joint",
-    "freejoint",
-    "site",
-    "inertial",
-    "geom",
-    "camera",
-    "light",
-    "plugin",
-)
+IN_BODY = words("body frame joint freejoint site inertial geom camera light plugin")
 """What a body can hold, besides elements that make bodies."""
 
 MAKE_BODIES = {
@@ -202,7 +126,7 @@ def _require_known(element: Element, around: str) -> None:
 
 
 MAIN = "main"
-_IN_CLASSES = ("joint", "site", "equality", "geom", "tendon")
+_IN_CLASSES = words("joint site equality geom tendon")
 
 
 class Classes:

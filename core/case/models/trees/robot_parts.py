@@ -71,14 +71,14 @@ def add_spring(graph: Graph, move: str, values: Mapping[str, str]) -> None:
 
     try:
         if any(map(number, FRICTION)):
-            graph.count("friction and rotors of joints")
+            graph.tree.count("friction and rotors of joints")
         law = number("spring_stiffness"), number("damping")
         if min(law) < 0.0:
             raise ValueError(move)
         if any(law):
-            graph.springs[move] = Spring(*law, number("spring_reference"))
+            graph.tree.springs[move] = Spring(*law, number("spring_reference"))
     except ValueError:
-        graph.count("dynamics of joints")
+        graph.tree.count("dynamics of joints")
 
 
 def screw(graph: Graph, name: str, lead: float, place: Place, axis: Vec3, element: Element):
@@ -116,7 +116,7 @@ def add_ties(graph: Graph, elements: Iterable[tuple[Element, LinkOf]]) -> None:
             try:
                 graph.struts.append(_strut(graph, element, link_of))
             except CaseError:
-                graph.count(STRUT)
+                graph.tree.count(STRUT)
     names = Names()
 
     def add(element: Element, links: tuple[str, str], ends: Sequence[Place], kind: str) -> None:

@@ -16,7 +16,7 @@ from pathlib import Path
 from ....algebra import Vec3, X, quat, vec
 from ....errors import CaseError, remedy
 from ...io.document import shown
-from .element import DEEPEST, Element
+from .element import DEEPEST, Element, words
 from .graph import Graph, Joint
 from .place import HERE, Place, roll_pitch_yaw, unit_quaternion
 from .robot_parts import (
@@ -40,32 +40,25 @@ MODEL = "__model__"
 SCOPE = "::"
 # Three for each body that other models may have.
 MOST_FRAMES = 6_000
-TYPES = (
-    *("revolute", "continuous", "prismatic", "fixed", "ball"),
-    *("universal", "revolute2", "screw"),
-)
+TYPES = words("revolute continuous prismatic fixed ball universal revolute2 screw")
 TWO_AXES = ("universal", "revolute2")
-IN_MODEL = (
-    *("link", "joint", "frame", "model", "pose", "static", "include", "plugin", "gripper"),
-    *("self_collide", "allow_auto_disable", "enable_wind"),
+IN_MODEL = words(
+    "link joint frame model pose static include plugin gripper self_collide "
+    "allow_auto_disable enable_wind"
 )
-IN_LINK = (
-    *("pose", "inertial", "visual", "collision", "sensor", "light", "gravity", "kinematic"),
-    *("self_collide", "enable_wind", "velocity_decay", "must_be_base_link", "projector"),
-    *("audio_sink", "audio_source", "battery", "particle_emitter", "plugin", "frame"),
-    "contact",  # of Bullet
+IN_LINK = words(
+    "pose inertial visual collision sensor light gravity kinematic self_collide "
+    "enable_wind velocity_decay must_be_base_link projector audio_sink audio_source "
+    "battery particle_emitter plugin frame contact"
 )
 IN_JOINT = (
-    *("parent", "child", "pose", "axis", "axis2", "physics", "sensor", "thread_pitch"),
+    *words("parent child pose axis axis2 physics sensor thread_pitch"),
     *("screw_thread_pitch", "gearbox_ratio", "gearbox_reference_body", "frame", MIMIC),
 )
-IN_AXIS = ("xyz", "limit", "dynamics", "mimic", "use_parent_model_frame", "initial_position")
-IN_INERTIAL = (
-    *("mass", "density", "pose", "inertia", "frame"),
-    *("auto_inertia_params", "fluid_added_mass"),
-)
+IN_AXIS = words("xyz limit dynamics mimic use_parent_model_frame initial_position")
+IN_INERTIAL = words("mass density pose inertia frame auto_inertia_params fluid_added_mass")
 _READ = ("model", "world", "link", "joint", "frame", "pose", "static", BALL, STRUT)
-_COUNTED = ("visual", "collision", "sensor", "light", "plugin")
+_COUNTED = words("visual collision sensor light plugin")
 GRAVITY = (0.0, 0.0, -9.8)
 """Gravity of a world unless given [m/s^2]."""
 UNIT = (1.0, 1.0, 1.0, 0.0, 0.0, 0.0)
@@ -275,12 +268,8 @@ def read_sdf(file: Path, root: Element) -> Tree:
         CaseError: included models, unknown frames, or an unknown joint.
     """
     name = root.attributes.get("name", file.stem)
-    return read_graph(root).tree(f"SDF model {name!r} of {file.name}")
-
-
-def read_graph(root: Element) -> Graph:
-    """Return the links and joints of all models in a document; see `read_sdf`."""
-    graph, frames = Graph(root, gravity=GRAVITY), Frames()
+    graph, frames = Graph.of(root, f"SDF model {name!r} of {file.name}"), Frames()
+    graph.tree.gravity = GRAVITY
     worlds = [*root.only("world")]
     if not (worlds or any(root.only("model"))):
         raise root.fault("has no model, expected one; give a model that moves")
@@ -302,12 +291,12 @@ def read_graph(root: Element) -> Graph:
         framed.element.require_children(IN_MODEL)
         for child in framed.element.children:
             if child.tag in _COUNTED or (":" in child.tag and child.tag not in _READ):
-                graph.count(child.tag)
+                graph.tree.count(child.tag)
         frames.place(framed.element, full)
     for world in worlds:
         if (gravity := world.child("gravity")) is not None:
             x, y, z = gravity.text_numbers(3, default=GRAVITY)
-            graph.gravity = x, y, z
+            graph.tree.gravity = x, y, z
     graph.joints += joints_of(graph, frames, _version(root))
     in_models = [
         (child, partial(_link, frames, full))
@@ -320,7 +309,7 @@ def read_graph(root: Element) -> Graph:
         if framed.element.tag == "frame" and (link := frames.link(framed.element, framed.attached)):
             place = frames.place(framed.element, full)
             graph.frames[frames.short(full)] = frames.short(link), place
-    return graph
+    return graph.hang()
 
 
 def _add_links(graph: Graph, frames: Frames) -> None:
@@ -334,14 +323,14 @@ def _add_links(graph: Graph, frames: Frames) -> None:
         for inertial in [*framed.element.only("inertial")][:1]:
             graph.masses[name] = _mass(inertial)
         for child in framed.element.only(*_COUNTED):
-            graph.count(child.tag)
+            graph.tree.count(child.tag)
     if not graph.places:
         raise graph.root.fault("has no link, expected a mechanism; give a model that moves")
     if graph.masses:
         for name in graph.places:
             if name not in graph.masses and name not in graph.fixed:
                 graph.masses[name] = mass_in(HERE, 1.0, UNIT)
-                graph.count("masses of links without one, 1 kg each as in SDF")
+                graph.tree.count("masses of links without one, 1 kg each as in SDF")
 
 
 def _mass(element: Element) -> Mass | None:
@@ -434,7 +423,7 @@ def joints_of(graph: Graph, frames: Frames, version: tuple[int, ...]) -> list[Jo
                 f"joins {ends[0]!r} with itself, expected two links; correct parent or child"
             )
         if {*ends} <= graph.fixed:
-            graph.count("joints of what stands still")
+            graph.tree.count("joints of what stands still")
         else:
             moves = _Joint(graph, frames, full, version).moves()
             joints.append(Joint(frames.short(full), (ends[0], ends[1]), moves, element))
@@ -514,7 +503,7 @@ class _Joint:
     def _add_spring(self, move: Move, axis: Element) -> None:
         for dynamics in axis.only("dynamics"):
             if self.kind == "screw":  # of the turn or of the shift
-                self.graph.count("dynamics of screw joints")
+                self.graph.tree.count("dynamics of screw joints")
                 return
             dynamics.require_children((*LAW, *FRICTION), closed=True)
             add_spring(self.graph, move.name, {each.tag: each.text for each in dynamics.children})

@@ -201,9 +201,9 @@ def together(masses: Sequence[Mass]) -> Mass:
     return Mass(total, center, inertia)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Tree:
-    """The links of a model; a reader fills it.
+    """The links of a model, global in its zero pose, until it is posed; a reader fills it.
 
     Attributes:
         described: the model and its file, for the source of the case.
@@ -221,7 +221,7 @@ class Tree:
         masses: of moving links with a mass, in the frame of each; several of links that move as
             one.
         unweighed: moving links whose masses cannot be read.
-        springs: by move.
+        springs: by move; others are of no move that the tree has.
         actuated: moves with a motor.
         keyframes: by name.
         left_out: how many there are of what has no meaning for kinematics, by what it is called.

@@ -18,8 +18,8 @@ from ....algebra import IDENTITY, Quat, Vec3, X, Y, Z, vec
 from ....errors import CaseError
 from ....joints.base import triad
 from ...io.document import shown
-from .beside import Beside, read_beside
-from .element import Element
+from .beside import read_beside
+from .element import Element, words
 from .graph import Graph, Joint, Loop
 from .place import HERE, Place, roll_pitch_yaw, unit_quaternion
 from .robot_parts import (
@@ -46,18 +46,14 @@ IN_ROBOT = (*READ, "material", "transmission", "gazebo")
 IN_LINK = ("inertial", "visual", "collision")
 IN_GAZEBO = ("joint", "frame")
 IN_JOINT = (
-    *("origin", "parent", "child", "axis", "mimic", "limit"),
+    *words("origin parent child axis mimic limit"),
     *("calibration", "dynamics", "safety_controller", PITCH, "joint_properties"),
 )
-IN_CONSTRAINT = (
-    *("parent", "child", "parent_origin", "child_origin", "parent_axis", "child_axis"),
-    *("predecessor", "successor"),
+IN_CONSTRAINT = words(
+    "parent child parent_origin child_origin parent_axis child_axis predecessor successor"
 )
 POSE = ("xyz", "rpy")
-TYPES = (
-    *("revolute", "continuous", "prismatic", "fixed", "floating", "planar"),
-    *("spherical", "ball"),
-)
+TYPES = words("revolute continuous prismatic fixed floating planar spherical ball")
 """Types of joints; balls are no part of URDF, and several simulators read them."""
 DRAKE_TYPES = ("ball", "planar", "screw", "universal")
 # Of the axes of SDF in <gazebo>: those in the joint's own frame.
@@ -85,27 +81,21 @@ def read_urdf(file: Path, root: Element) -> Tree:
     Raises:
         CaseError: no tree of links, or an unknown joint or condition.
     """
-    graph, beside = read_graph(file, root)
-    name = root.attributes.get("name", file.stem)
-    others = f" with {', '.join(beside.names)}" if beside.names else ""
-    described = f"URDF robot {name!r} of {file.name}{others}"
-    return graph.tree(described, closes=beside.pairs is None)
-
-
-def read_graph(file: Path, root: Element) -> tuple[Graph, Beside]:
-    """Return the links and joints of a robot, and what is beside it; see `read_urdf`."""
     robot = _Robot(file, root)
     robot.read()
-    return robot.graph, robot.beside
+    return robot.graph.hang()
 
 
 class _Robot:
     """A robot during its reading."""
 
     def __init__(self, file: Path, root: Element) -> None:
-        self.file, self.root, self.graph = file, root, Graph(root)
+        self.root, self.beside = root, read_beside(file, root)
+        name, beside = root.attributes.get("name", file.stem), self.beside.names
+        others = f" with {', '.join(beside)}" if beside else ""
+        described = f"URDF robot {name!r} of {file.name}{others}"
+        self.graph = Graph.of(root, described, closes=self.beside.pairs is None)
         self.joints: dict[str, Element] = {}
-        self.beside = Beside()
 
     def read(self) -> None:
         """Read everything."""
@@ -116,10 +106,9 @@ class _Robot:
                     "is a macro, expected plain URDF; expand the file: xacro FILE > robot.urdf"
                 )
             if child.tag not in READ and not any(_joints_of_sdf(child)):
-                graph.count(child.tag)
+                graph.tree.count(child.tag)
         root.require_children(IN_ROBOT)
         self._links()
-        self.beside = read_beside(self.file, root)
         self._hang()
         for name, element in self.joints.items():
             graph.joints.append(self._joint(name, element))
@@ -139,7 +128,7 @@ class _Robot:
         self._require_apart(frames)
         for each in root.only("transmission"):
             names = (joint.attributes.get("name", "") for joint in each.only("joint"))
-            graph.actuated.update(name for name in names if name in self.joints)
+            graph.tree.actuated.update(name for name in names if name in self.joints)
 
     def _links(self) -> None:
         root, graph = self.root, self.graph
@@ -159,7 +148,7 @@ class _Robot:
                 graph.masses[name] = _mass(each)
             for child in element.children:
                 if child.tag != "inertial":
-                    graph.count(child.tag)
+                    graph.tree.count(child.tag)
         parents = [each for joint in root.only(*JOINTS) for each in joint.only("parent")]
         if any(each.attributes.get("link") == WORLD for each in parents):
             graph.elements.setdefault(WORLD, root)  # as in Drake, which has it without a link
@@ -188,7 +177,7 @@ class _Robot:
             self._damper(name, element)
             for each in ("limit", "calibration", "safety_controller", "joint_properties"):
                 if any(element.only(each)):
-                    graph.count(f"{each} of joints")
+                    graph.tree.count(f"{each} of joints")
         roots = [name for name in graph.elements if name not in above]
         if len(roots) != 1:
             listed = ", ".join(roots[:5]) or "none"
@@ -216,7 +205,7 @@ class _Robot:
             if element.attributes.get("type") in ("revolute", "continuous", "prismatic"):
                 add_spring(self.graph, name, dynamics.attributes)
             else:
-                self.graph.count("dynamics of joints")
+                self.graph.tree.count("dynamics of joints")
 
     def _named(self, element: Element, name: str, key: str = "name") -> str:
         """Return a name of a link."""
