@@ -14,7 +14,7 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Mapping, Sequence
 
 from ...core.algebra import vec
-from ...core.case.models.trees.mjcf_masses import STAND_INS
+from ...core.case.models.trees.mjcf import STAND_INS
 from ...core.errors import KincheckError
 from ...core.joints import Coupler, Distance, Joint
 from ...core.mechanism.loads import ForceElement, SpringDamper, TorsionSpringDamper

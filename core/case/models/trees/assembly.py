@@ -21,7 +21,7 @@ from ....errors import CaseError, shortened
 from ....mechanism.mechanism import GROUND
 from ....trajectory import Array
 from ...io.document import fault
-from .place import HERE, Place, rotation_vector, turn_about, turn_by
+from .place import ORIGIN, Place, rotation_vector, turn_about, turn_by
 from .tree import UNKNOWNS, Closure, Coupling, Move, Tie, Tree
 
 MAX_ITERATIONS = 100
@@ -41,7 +41,7 @@ ADDED_UP = 10.0
 ROUND_OFF = 1e-9
 # Tolerances that the digits of a file leave, relative to the size: six digits, and all.
 COARSEST, FINEST = 1e-5, 1e-12
-MOST_TOLD = 12
+MOST_SHOWN = 12
 
 Value: TypeAlias = float | Place
 """Change of a move since the pose of the tree: a coordinate [rad or m]; of a ball or a free link,
@@ -63,7 +63,7 @@ class Pose:
     @staticmethod
     def of(tree: Tree) -> Pose:
         """Return the pose of the tree itself."""
-        return Pose(tree, [0.0 if move.is_axial else HERE for move in tree.moves.values()])
+        return Pose(tree, [0.0 if move.is_axial else ORIGIN for move in tree.moves.values()])
 
     @cached_property
     def columns(self) -> Mapping[str, range]:
@@ -86,7 +86,7 @@ class Pose:
     @cached_property
     def carried(self) -> Mapping[str, Place]:
         """Displacement of each moving link since the pose of the tree."""
-        found: dict[str, Place] = {GROUND: HERE}
+        found: dict[str, Place] = {GROUND: ORIGIN}
         for move, value in zip(self.tree.moves.values(), self.values, strict=True):
             if not isinstance(value, Place):
                 value = (
@@ -460,13 +460,13 @@ def _descended(closing: Closing, pose: Pose, moving: Array) -> Pose:
 def _open(closing: Closing, start: Start, pose: Pose, opened: float, left: float) -> CaseError:
     """Return the error of a model that does not close."""
     gaps = sorted(((_gap(each, pose), each.name) for each in closing.ties), reverse=True)
-    told = [f"{name} by {gap:.2g}" for gap, name in gaps if gap > closing.limit]
+    texts = [f"{name} by {gap:.2g}" for gap, name in gaps if gap > closing.limit]
     return fault(
         pose.tree.file,
         str(closing.widest(pose).element),
         f"is open: the start ({start.text}) by {opened:.4g} m or rad, and the nearest pose that was"
         f" found by {left:.4g}, expected {closing.tolerance:.3g} m at most ({closing.why}); still"
-        f" open are {shortened(told, MOST_TOLD)}; give a start that can be closed by --start,"
+        f" open are {shortened(texts, MOST_SHOWN)}; give a start that can be closed by --start,"
         " another tolerance by --closure, or correct the model",
     )
 
@@ -474,14 +474,14 @@ def _open(closing: Closing, start: Start, pose: Pose, opened: float, left: float
 def _note(closing: Closing, start: Start, pose: Pose, opened: float, left: float) -> str:
     """Return the note on the assembly: the gap, and how far each move went."""
     moved = sorted(_moved(start.pose, pose), key=lambda each: -each[0])
-    told = [text for size, text in moved if size > 1e-3 * moved[0][0]]
+    texts = [text for size, text in moved if size > 1e-3 * moved[0][0]]
     kept = f", of which {left:.2g} m are left, within {closing.why}" * (
         left > CLOSED * closing.size
     )
     return (
         f"the start ({start.text}) is assembled: {closing.widest(start.pose).element} was open by"
         f" {opened:.3g} m or rad{kept};"
-        f" {f'moved were {shortened(told, MOST_TOLD)}' if told else 'no joint moved'}"
+        f" {f'moved were {shortened(texts, MOST_SHOWN)}' if texts else 'no joint moved'}"
     )
 
 

@@ -15,7 +15,7 @@ from ....algebra import X
 from ....mechanism.mechanism import GROUND
 from ...io.document import SMALLEST
 from .element import Element, significant_digits
-from .place import HERE, Place
+from .place import ORIGIN, Place
 from .tree import WORLD, Closure, Coupling, Mass, Move, Strut, Tree
 
 FIXED = (WORLD, GROUND)
@@ -204,11 +204,11 @@ class _Hanging:
     def _add(self, part: _Part) -> bool:
         """Add a link; return false for one that is the world by another name."""
         world = self.inside[WORLD]
-        is_world = part.name in FIXED and part.place == HERE and not part.moves
+        is_world = part.name in FIXED and part.place == ORIGIN and not part.moves
         if is_world and self.inside[part.outer] is world:
             self.inside[part.name] = world
             if part.name != WORLD:
-                self.tree.hang(part.element, part.name, WORLD, HERE)
+                self.tree.hang(part.element, part.name, WORLD, ORIGIN)
             return False
         if part.name in self.inside:
             raise part.element.repeated_name(part.name, "the bodies")

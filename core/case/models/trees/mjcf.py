@@ -5,14 +5,17 @@ kinematics are counted, not read.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import islice
 from pathlib import Path
 from typing import cast
 
-from ....algebra import X, quat, vec
+import numpy as np
+
+from ....algebra import ZERO, X, quat, vec
 from ....errors import MOST_NAMED, CaseError, remedy, shortened
 from ....mechanism.mechanism import GROUND, Vector
+from ...io.document import usable
 from .element import Element, significant_digits, words
 from .mjcf_language import (
     DYNAMIC,
@@ -23,14 +26,27 @@ from .mjcf_language import (
     ROOT,
     WRITE_OUT,
     Classes,
+    Compiler,
     direction,
     expanded,
     read_compiler,
     require_known_attributes,
 )
-from .mjcf_masses import STAND_INS, mass_of
-from .place import HERE, Place, coordinates, unit_quaternion
-from .tree import MOST_MOVING, UNKNOWNS, WORLD, Closure, Coupling, Kind, Move, Spring, Strut, Tree
+from .place import ORIGIN, Place, coordinates, unit_quaternion
+from .tree import (
+    MOST_MOVING,
+    UNKNOWNS,
+    WORLD,
+    Closure,
+    Coupling,
+    Kind,
+    Mass,
+    Move,
+    Spring,
+    Strut,
+    Tree,
+    together,
+)
 
 # What these hold is for looks, actuators and measurements.
 _LEFT_OUT = words("contact actuator sensor keyframe custom extension deformable asset")
@@ -126,7 +142,7 @@ class _Reader:
             tree.names.update(
                 each.attributes["name"] for each in bodies if "name" in each.attributes
             )
-            self._inside(world, HERE, WORLD, MAIN)
+            self._inside(world, ORIGIN, WORLD, MAIN)
         tree.require_moving(root)
         for section in root.only(*_LEFT_OUT):
             for element in section.children:
@@ -189,7 +205,7 @@ class _Reader:
         if self.stand_ins:
             return
         try:
-            parts = [*self._in_frames(element, HERE, childclass)]
+            parts = [*self._in_frames(element, ORIGIN, childclass)]
             if (mass := mass_of(element, parts, self.classes, self.compiler)) is not None:
                 self.tree.weigh(name, mass)
         except CaseError:
@@ -277,10 +293,10 @@ class _Reader:
             )
         holds = "frame" if welded else "point"
         if "site1" in element.attributes:
-            (i, here), (j, there) = (self._site(element, key) for key in ("site1", "site2"))
+            (i, first), (j, second) = (self._site(element, key) for key in ("site1", "site2"))
             if welded:
-                here = here.then(HERE)
-            return Closure(name, (i, j), (here, there), element, holds)
+                first = first.then(ORIGIN)
+            return Closure(name, (i, j), (first, second), element, holds)
         if "body1" not in element.attributes:
             raise element.fault(
                 "body1: missing, expected two bodies or two sites; add body1 and body2, or site1"
@@ -291,16 +307,16 @@ class _Reader:
             if body not in tree.places:
                 raise element.unknown_name(key, body, tree.places, "a body")
         links = tree.carriers[names[0]], tree.carriers[names[1]]
-        here, there = tree.places[names[0]], tree.places[names[1]]
+        first, second = tree.places[names[0]], tree.places[names[1]]
         if not welded:
-            point = Place(here.point(vec(element.numbers("anchor", 3))))
+            point = Place(first.point(vec(element.numbers("anchor", 3))))
             return Closure(name, links, (point, point), element, holds)
         relpose = element.numbers("relpose", 7, default=(0.0,) * 7)
         # zeros for the quaternion mean: as in qpos0
-        wanted = there.seen_from(here)
+        wanted = second.seen_from(first)
         if any(relpose[3:]):
             wanted = Place(vec(relpose[:3]), unit_quaternion(quat(relpose[3:])))
-        return Closure(name, links, (here.then(wanted), there), element, holds)
+        return Closure(name, links, (first.then(wanted), second), element, holds)
 
     def _site(self, element: Element, key: str) -> tuple[str, Place]:
         name = element.attributes.get(key, "")
@@ -353,8 +369,8 @@ class _Reader:
                 f"tendon1: {tendon} goes over {way}, expected two sites; there is no joint for"
                 " others"
             )
-        (i, here), (j, there) = (self._site(child, "site") for child in tendon.children)
-        apart = there.at - here.at
+        (i, first), (j, second) = (self._site(child, "site") for child in tendon.children)
+        apart = second.at - first.at
         length = math.sqrt(apart @ apart) + _coefficients(element)[0]
         if i == j or not (apart @ apart > 0.0 and length > 0.0):
             what = (
@@ -366,7 +382,7 @@ class _Reader:
                 f"tendon1: {tendon} {what}, expected two points of two bodies; remove the equality,"
                 " or write <connect>"
             )
-        return Closure(name, (i, j), (here, there), element, "distance", length)
+        return Closure(name, (i, j), (first, second), element, "distance", length)
 
     def _springs(self) -> None:
         """Read springs and dampers of joints and tendons; a law that is not linear, or that
@@ -396,8 +412,8 @@ class _Reader:
 
     def _law(self, element: Element) -> tuple[float, float]:
         """Return stiffness and damping."""
-        first, second = element.numbers("springdamper", 2, default=(0.0, 0.0))
-        if first > 0.0 and second > 0.0:
+        frequency, ratio = element.numbers("springdamper", 2, default=(0.0, 0.0))
+        if frequency > 0.0 and ratio > 0.0:
             raise element.fault("springdamper: is tuned by MuJoCo, expected stiffness and damping")
         found: list[float] = []
         for key, switch in (("stiffness", "spring"), ("damping", "damper")):
@@ -419,7 +435,7 @@ class _Reader:
         sites = [str(child.attributes.get("site")) for child in tendon.children]
         if tendon.tag != "spatial" or len(sites) != 2 or not {*sites} <= tree.sites.keys():
             raise tendon.fault("goes elsewhere than between two sites")
-        (i, here), (j, there) = (tree.sites[site] for site in sites)
+        (i, first), (j, second) = (tree.sites[site] for site in sites)
         shortest, longest = (2 * tendon.numbers("springlength", 1, 2, default=(-1.0,)))[:2]
         if shortest != longest:
             raise tendon.fault("springlength: is a dead band, expected one length")
@@ -427,9 +443,9 @@ class _Reader:
             rests = {key for move in tree.moves.values() for key in move.element.attributes}
             if stiffness and rests & {"ref", "springref"}:
                 raise tendon.fault("has the length of a rest pose of its own")
-            shortest = math.dist(coordinates(here.at), coordinates(there.at))
+            shortest = math.dist(coordinates(first.at), coordinates(second.at))
         name, spring = tendon.attributes.get("name", "tendon"), Spring(stiffness, damping, shortest)
-        points = here.at, there.at
+        points = first.at, second.at
         return Strut(name, (i, j), points, spring, tendon, "tendon: spatial")
 
     def _gravity(self) -> Vector:
@@ -451,3 +467,125 @@ def _coefficients(element: Element) -> tuple[float, ...]:
     """Return five coefficients; omitted ones of polycoef have their defaults."""
     found = element.numbers("polycoef", 1, 2, 3, 4, 5, default=(0.0, 1.0))
     return (*found, *(0.0, 1.0, 0.0, 0.0, 0.0)[len(found) :])
+
+
+WATER = 1000.0
+"""Density of geoms unless given, that of water [kg/m^3]."""
+SHAPES = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}
+"""Geoms with a volume, and how many sizes they have."""
+MASSLESS = ("plane", "hfield")
+STAND_INS = "kincheck.stand_ins"
+"""Name of the custom text of a model that kincheck wrote without masses."""
+
+
+def mass_of(
+    body: Element,
+    parts: Sequence[tuple[Element, Place, str]],
+    classes: Classes,
+    compiler: Compiler,
+) -> Mass | None:
+    """Return the mass of a body in its frame; None without one.
+
+    Args:
+        parts: what is in it, with the places and the default classes of the frames it is given in.
+
+    Raises:
+        CaseError: a number or shape makes no sense, or a mesh has the mass.
+    """
+    if compiler.total > 0.0:
+        raise body.fault("settotalmass: scales all masses, expected masses; write them out")
+    inertials = [each for each in parts if each[0].tag == "inertial"]
+    geoms = [each for each in parts if each[0].tag == "geom"]
+    if inertials and not (compiler.from_geoms == "true" and geoms):
+        element, at, _ = inertials[-1]
+        found = _inertial(element)
+        place = at.then(compiler.place(element))
+        return None if found.is_stand_in else _bounded(found.seen_in(place), compiler)
+    masses: list[Mass] = []
+    for element, at, within in geoms if compiler.from_geoms != "false" else ():
+        complete = classes.complete(element, "geom", within)
+        if (found := _geom(complete, compiler)) is not None:
+            masses.append(found.seen_in(at.then(compiler.place(complete))))
+    if not masses and any(compiler.least):
+        # the least mass is at the body's own `pos`, in its own axes (measured: MuJoCo 4.0)
+        masses.append(Mass(0.0, compiler.place(body).at, np.zeros((3, 3))))
+    return _bounded(together(masses), compiler) if masses else None
+
+
+def _inertial(element: Element) -> Mass:
+    """Return the mass of an <inertial> in its own frame."""
+    mass = element.number("mass")
+    if mass < 0.0:
+        raise element.fault("mass: is negative, expected a positive number of kg; correct it")
+    if "fullinertia" in element.attributes:
+        xx, yy, zz, xy, xz, yz = element.numbers("fullinertia", 6)
+        return Mass(mass, ZERO, np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+    moments = element.numbers("diaginertia", 3, default=(0.0, 0.0, 0.0))
+    return Mass(mass, ZERO, np.diag(moments))
+
+
+def _geom(element: Element, compiler: Compiler) -> Mass | None:
+    """Return the mass of a geom in its own frame; None without one."""
+    kind = element.attributes.get("type", "sphere")
+    first, last = map(int, compiler.groups)
+    group, density = element.number("group", 0.0), element.number("density", WATER)
+    mass = element.number("mass", math.nan)
+    heavy = (density if math.isnan(mass) else mass) != 0.0
+    if kind in MASSLESS or not first <= group <= last or not heavy:
+        return None
+    if kind not in SHAPES or "mesh" in element.attributes:
+        raise element.fault("is a mesh, expected a simple shape; give <inertial>")
+    if element.attributes.get("shellinertia") == "true":
+        raise element.fault("shellinertia: is a shell, expected a solid; give <inertial>")
+    volume, moments = _solid(kind, _sizes(element, kind))
+    mass = density * volume if math.isnan(mass) else mass
+    if not (mass > 0.0 and volume > 0.0 and usable(mass)):
+        raise element.fault("has a mass or size that is not positive or huge; correct it")
+    return Mass(mass, ZERO, mass * np.diag(moments))
+
+
+def _bounded(found: Mass, compiler: Compiler) -> Mass:
+    """Return a mass within the bounds of the compiler."""
+    if not (any(compiler.least) or compiler.balanced):
+        return found
+    moments, axes = np.linalg.eigh(found.inertia)
+    moments = np.maximum(moments, compiler.least[1])
+    if compiler.balanced and moments[2] > moments[0] + moments[1]:
+        moments[:] = moments.mean()
+    return Mass(max(found.mass, compiler.least[0]), found.center, (axes * moments) @ axes.T)
+
+
+def _sizes(element: Element, kind: str) -> Sequence[float]:
+    """Return the sizes of a shape: radius and half length, or three half lengths [m]."""
+    sizes = [*element.numbers("size", 1, 2, 3, default=(0.0,))]
+    if "fromto" in element.attributes and kind != "sphere":  # two radii alike, then the half length
+        ends = np.array(element.numbers("fromto", 6), dtype=np.float64).reshape(2, 3)
+        return [
+            *[sizes[0]] * (SHAPES[kind] - 1),
+            0.5 * float(np.linalg.norm(np.diff(ends, axis=0))),
+        ]
+    if len(sizes) < SHAPES[kind]:
+        raise element.fault(f"size: found {len(sizes)} numbers, expected {SHAPES[kind]}; add them")
+    return sizes[: SHAPES[kind]]
+
+
+def _solid(kind: str, sizes: Sequence[float]) -> tuple[float, Sequence[float]]:
+    """Return the volume [m^3] and the principal moments over the mass [m^2] of a solid."""
+    a, b, c = (*sizes, 0.0, 0.0)[:3]
+    match kind:
+        case "box":
+            return 8.0 * a * b * c, [(x * x + y * y) / 3.0 for x, y in ((b, c), (a, c), (a, b))]
+        case "cylinder":
+            across = (3.0 * a * a + 4.0 * b * b) / 12.0
+            return 2.0 * math.pi * a * a * b, [across, across, 0.5 * a * a]
+        case "capsule":
+            round_, straight = 4.0 / 3.0 * math.pi * a**3, 2.0 * math.pi * a * a * b
+            share = round_ / (round_ + straight) if round_ else 0.0
+            # two half balls, each with its centre 3/8 of the radius outside the cylinder
+            ends = 0.4 * a * a + b * b + 0.75 * a * b
+            across = (1.0 - share) * (3.0 * a * a + 4.0 * b * b) / 12.0 + share * ends
+            return round_ + straight, [across, across, (0.5 - 0.1 * share) * a * a]
+        case _:
+            a, b, c = (a, a, a) if kind == "sphere" else (a, b, c)
+            moments = [(x * x + y * y) / 5.0 for x, y in ((b, c), (a, c), (a, b))]
+            return 4.0 / 3.0 * math.pi * a * b * c, moments

@@ -52,7 +52,7 @@ class Place:
         return Place(Place(ZERO, back).direction(self.at - outer.at), back * self.turn)
 
 
-HERE = Place()
+ORIGIN = Place()
 
 
 def unit_quaternion(q: Quat) -> Quat:

@@ -18,14 +18,15 @@ from ....errors import CaseError, remedy
 from ...io.document import shown
 from .element import DEEPEST, Element, words
 from .graph import Graph, Joint
-from .place import HERE, Place, roll_pitch_yaw, unit_quaternion
-from .robot_parts import (
+from .place import ORIGIN, Place, roll_pitch_yaw, unit_quaternion
+from .robot_elements import (
     BALL,
     ENTRIES,
     FRICTION,
     LAW,
     MIMIC,
     STRUT,
+    Unread,
     add_spring,
     add_ties,
     direction,
@@ -34,7 +35,6 @@ from .robot_parts import (
     screw,
 )
 from .tree import WORLD, Coupling, Kind, Mass, Move, Tree
-from .unread import Unread
 
 MODEL = "__model__"
 SCOPE = "::"
@@ -92,7 +92,7 @@ class Frames:
     joints: dict[str, Framed] = field(default_factory=dict[str, Framed])
     models: dict[str, Framed] = field(default_factory=dict[str, Framed])
     static: set[str] = field(default_factory=set[str])
-    _places: dict[str, Place] = field(default_factory=lambda: {"": HERE})
+    _places: dict[str, Place] = field(default_factory=lambda: {"": ORIGIN})
 
     def read(self, around: Element, scope: str, depth: int = 0) -> None:
         """Take the frames of a model or world.
@@ -329,7 +329,7 @@ def _add_links(graph: Graph, frames: Frames) -> None:
     if graph.masses:
         for name in graph.places:
             if name not in graph.masses and name not in graph.fixed:
-                graph.masses[name] = mass_in(HERE, 1.0, UNIT)
+                graph.masses[name] = mass_in(ORIGIN, 1.0, UNIT)
                 graph.tree.count("masses of links without one, 1 kg each as in SDF")
 
 
@@ -386,13 +386,9 @@ def _require_apart(graph: Graph, frames: Frames) -> None:
     around += [("", each.element) for each in frames.models.values()]
     around += [(full, each.element) for full, each in frames.links.items()]
     for link, element in around:
-        for child in element.children:
-            if child.tag not in _READ:
-                unread.require_apart(child, link)
+        unread.require_all_apart(element.children, _READ, link)
     for framed in frames.joints.values():
-        for child in framed.element.children:
-            if child.tag not in IN_JOINT:
-                unread.require_apart(child)
+        unread.require_all_apart(framed.element.children, IN_JOINT)
 
 
 def joints_of(graph: Graph, frames: Frames, version: tuple[int, ...]) -> list[Joint]:
@@ -415,7 +411,7 @@ def joints_of(graph: Graph, frames: Frames, version: tuple[int, ...]) -> list[Jo
         for tag in ("parent", "child"):
             link = frames.link(element, within(framed.scope, _text(element, tag)))
             if not link and world not in graph.places:
-                graph.places[world], graph.elements[world] = HERE, graph.root
+                graph.places[world], graph.elements[world] = ORIGIN, graph.root
                 graph.fixed.add(world)
             ends.append(frames.short(link) if link else world)
         if ends[0] == ends[1]:
@@ -566,7 +562,7 @@ def _flag(element: Element | None) -> bool:
 def _pose(element: Element | None) -> Place:
     """Return the place of a <pose>; the frame itself without one."""
     if element is None:
-        return HERE
+        return ORIGIN
     element.require_known(("relative_to", "degrees", "rotation_format", "frame"), "SDF")
     if element.attributes.get("frame"):
         raise element.fault(

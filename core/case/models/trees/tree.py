@@ -21,7 +21,7 @@ from ....mechanism.mechanism import GROUND, Vector
 from ....trajectory import Array
 from ...io.document import LARGEST, shown
 from .element import Element, Names
-from .place import HERE, Place
+from .place import ORIGIN, Place
 
 WORLD = "world"
 # Scenes have many links, robots and hands at most some tens that move, a joint each; the freedom
@@ -233,7 +233,7 @@ class Tree:
     closes: bool = True
     digits: int = 0
     gravity: Vector = (0.0, 0.0, -9.81)
-    places: dict[str, Place] = field(default_factory=lambda: {WORLD: HERE})
+    places: dict[str, Place] = field(default_factory=lambda: {WORLD: ORIGIN})
     carriers: dict[str, str] = field(default_factory=lambda: {WORLD: GROUND})
     moving: dict[str, Place] = field(default_factory=dict[str, Place])
     massless: set[str] = field(default_factory=set[str])

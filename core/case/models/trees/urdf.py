@@ -21,13 +21,14 @@ from ...io.document import shown
 from .beside import read_beside
 from .element import Element, words
 from .graph import Graph, Joint, Loop
-from .place import HERE, Place, roll_pitch_yaw, unit_quaternion
-from .robot_parts import (
+from .place import ORIGIN, Place, roll_pitch_yaw, unit_quaternion
+from .robot_elements import (
     BALL,
     ENTRIES,
     FRICTION,
     LAW,
     STRUT,
+    Unread,
     add_spring,
     add_ties,
     direction,
@@ -37,7 +38,6 @@ from .robot_parts import (
 )
 from .sdf import Frames, joints_of
 from .tree import MOST_LINKS, WORLD, Kind, Mass, Move, Tree
-from .unread import Unread
 
 GAZEBO, DRAKE_JOINT, PITCH = "gazebo", "drake:joint", "drake:screw_thread_pitch"
 JOINTS = ("joint", DRAKE_JOINT)
@@ -186,7 +186,7 @@ class _Robot:
                 " base; join the others to it"
             )
         graph.fixed.add(roots[0])
-        graph.places[roots[0]] = HERE
+        graph.places[roots[0]] = ORIGIN
         waiting = roots
         while waiting:
             link = waiting.pop()
@@ -342,14 +342,11 @@ class _Robot:
             link = element.attributes["name"] if element.tag == "link" else ""
             if link:
                 unread.require_apart(replace(element, children=[]), link)
-            for child in element.children:
-                if child.tag not in (*READ, *IN_LINK, GAZEBO):
-                    unread.require_apart(child, link)
+            unread.require_all_apart(element.children, (*READ, *IN_LINK, GAZEBO), link)
         for gazebo in self.root.only(GAZEBO):
-            read = [*_joints_of_sdf(gazebo)]
-            for child in gazebo.children:
-                if child not in read:
-                    unread.require_apart(child, gazebo.attributes.get("reference", ""))
+            read = IN_GAZEBO if any(_joints_of_sdf(gazebo)) else ()
+            link = gazebo.attributes.get("reference", "")
+            unread.require_all_apart(gazebo.children, read, link)
 
 
 def _mass(element: Element) -> Mass | None:
@@ -375,7 +372,7 @@ def _joints_of_sdf(element: Element) -> Iterator[Element]:
 
 def _origin(element: Element | None) -> Place:
     if element is None:
-        return HERE
+        return ORIGIN
     element.require_known(POSE, "URDF")
     return _pose(element)
 
