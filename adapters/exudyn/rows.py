@@ -20,8 +20,8 @@ from numpy.polynomial import Polynomial
 
 from ...core import joints
 from ...core.joints.base import unit
-from ...core.mechanism.motions import Driver, JointDriver, PointCoordinate
 from ...core.mechanism.mechanism import GROUND, Body, Mechanism
+from ...core.mechanism.motions import Driver, JointDriver, PointCoordinate
 from ...core.trajectory import Array
 from ..shared.exudyn_joints import ABOUT_Z, X, objects_of
 from ..shared.poses import frame_along

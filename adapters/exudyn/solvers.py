@@ -18,8 +18,8 @@ from ...core import joints
 from ...core.case.case import Case
 from ...core.joints.base import unit
 from ...core.kinematics import start_of as where_from
-from ...core.mechanism.motions import Driver, JointDriver, PointCoordinate
 from ...core.mechanism.mechanism import GROUND
+from ...core.mechanism.motions import Driver, JointDriver, PointCoordinate
 from ...core.trajectory import Array
 from ..shared.simulation import (
     Leg,

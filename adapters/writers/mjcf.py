@@ -14,7 +14,7 @@ import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
 
 from ...core.algebra import vec
-from ...core.case.models.mjcf.masses import STAND_INS
+from ...core.case.models.trees.mjcf import STAND_INS
 from ...core.joints import Distance, Spherical
 from ...core.mechanism.loads import ForceElement, SpringDamper, TorsionSpringDamper
 from ...core.mechanism.mechanism import GROUND, Body, Mechanism

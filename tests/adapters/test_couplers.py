@@ -19,8 +19,7 @@ from kincheck.core.joints import (
     Translational,
     Universal,
 )
-from kincheck.core.mechanism.motions import JointAngle, JointDisplacement
-from kincheck.core.mechanism.motions import Sine
+from kincheck.core.mechanism.motions import JointAngle, JointDisplacement, Sine
 
 from ..support.engine_motion import (
     ENGINES,

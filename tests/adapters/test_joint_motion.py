@@ -18,8 +18,7 @@ from kincheck.core.joints import (
     Spherical,
     Universal,
 )
-from kincheck.core.mechanism.motions import JointAngle, JointDisplacement, PointCoordinate
-from kincheck.core.mechanism.motions import Sine
+from kincheck.core.mechanism.motions import JointAngle, JointDisplacement, PointCoordinate, Sine
 
 from ..support.engine_motion import (
     ENGINES,

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from kincheck.core.joints import Distance, Fixed, Revolute, Spherical, Translational
-from kincheck.core.mechanism.motions import JointAngle, JointDisplacement, PointCoordinate
 from kincheck.core.mechanism.mechanism import Body
+from kincheck.core.mechanism.motions import JointAngle, JointDisplacement, PointCoordinate
 from numpy.polynomial import Chebyshev
 
 from ..support.engine_motion import (

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from kincheck.adapters.mujoco import mujoco as adapter
 from kincheck.core.joints import Distance, Fixed, Inline, Screw, Spherical, Translational
-from kincheck.core.mechanism.motions import JointDisplacement, PointCoordinate
 from kincheck.core.mechanism.mechanism import Body
+from kincheck.core.mechanism.motions import JointDisplacement, PointCoordinate
 
 from ..support.engine_motion import (
     B0,

@@ -12,8 +12,8 @@ from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.io.reference_samples import read_table, samples_of
 from kincheck.core.case.models.files import load
 from kincheck.core.case.models.hardpoints.rows import MOST_LINES
-from kincheck.core.case.models.mjcf.elements import MOST_ELEMENTS, parse_xml
-from kincheck.core.case.models.mjcf.equalities import MOST_EQUALITIES
+from kincheck.core.case.models.trees.element import MOST_ELEMENTS, parse_xml
+from kincheck.core.case.models.trees.tree import MOST_TIES
 from kincheck.core.errors import CaseError
 
 openpyxl = pytest.importorskip("openpyxl")
@@ -155,8 +155,8 @@ TIE = {
 @pytest.mark.parametrize("name", TIES)
 def test_closures_are_read_up_to_a_number(name: str, tmp_path: Path):
     file = tmp_path / name
-    file.write_text(TIES[name].format(TIE[name] * (MOST_EQUALITIES + 1)))
-    with pytest.raises(CaseError, match=rf"line {MOST_EQUALITIES + 3}: .*found more than"):
+    file.write_text(TIES[name].format(TIE[name] * (MOST_TIES + 1)))
+    with pytest.raises(CaseError, match=rf"line {MOST_TIES + 3}: .*found more than"):
         load(file, Supplied(drive=("j:0:1",)))
 
 

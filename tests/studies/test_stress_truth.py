@@ -118,7 +118,7 @@ def test_the_motion_followed_is_the_closed_form(name):
             assert np.abs(along - getattr(case.reference[output.name], quantity)).max() < 1e-11
 
 
-def test_a_joint_type_that_it_does_not_know_is_named():
+def test_unknown_joint_type_is_named():
     @dataclass(frozen=True)
     class Odd(Spherical):
         type = "odd"
@@ -187,7 +187,7 @@ def test_a_gap_narrower_than_the_grid_is_not_jumped(off):
 
 
 @pytest.mark.parametrize("off", [-1e-9, -1e-3])
-def test_what_cannot_pass_is_beyond(off):
+def test_samples_past_a_gap_are_beyond(off):
     case, motion = parallelogram(off)
     truth, known = followed(case), closed(case, motion)
     assert list(truth.reach) == list(known.reach)
@@ -206,7 +206,7 @@ def test_the_end_of_a_stroke_is_found_to_the_last_digits():
 
 
 @pytest.mark.parametrize(("off", "told"), [(1e-8, True), (1e-3, False)])
-def test_an_engine_may_give_up_behind_what_is_singular_to_rounding_only(off, told):
+def test_sample_behind_rounding_singularity_may_fail(off, told):
     """A kite's crank passes the rocker's pivot by a little, between two samples."""
     plane, b, d = any_plane(np.random.default_rng(1)), (0.0, 0.4 * (1.0 - off)), (0.4, 0.0)
     c = (0.2 + 0.9 / 2**0.5, 0.2 + 0.9 / 2**0.5)
@@ -217,7 +217,7 @@ def test_an_engine_may_give_up_behind_what_is_singular_to_rounding_only(off, tol
     assert truth.singular.tolist() == [told, False, False, False]
 
 
-def test_what_is_round_off_grows_with_size_and_condition():
+def test_round_off_bound_grows_with_condition():
     near, far = (parallelogram(off, samples=2)[0] for off in (1e-1, 1e-3))
     bounds = [
         followed(replace(case, sweep=replace(case.sweep, values=np.array([-1.2])))).bounds["C"][
@@ -228,7 +228,7 @@ def test_what_is_round_off_grows_with_size_and_condition():
     assert ROUND_OFF < bounds[0] < 0.3 * bounds[1] < 1e-10
 
 
-def test_a_closed_form_that_is_wrong_is_a_defect_of_ours():
+def test_wrong_closed_form_is_a_defect():
     case, motion = parallelogram(1e-3)
     wrong = replace(
         case.mechanism,
@@ -253,7 +253,7 @@ def test_the_truth_is_proved(name):
     assert distance_from_proof(replace(truth, points=off), 3) > 1e-2
 
 
-def test_a_proof_is_about_rows_that_are_good_at_the_sample():
+def test_proof_chooses_rows_at_the_sample():
     """The Bennett loop after a quarter turn, where those chosen at the design depend on each
     other.
     """
@@ -282,7 +282,7 @@ def failures(make):
 
 
 @pytest.mark.parametrize(("make", "reasons"), WRONG, ids=[make.__name__ for make, _ in WRONG])
-def test_what_is_no_mechanism_is_refused_by_its_reason(make, reasons):
+def test_degenerate_mechanisms_name_their_failure(make, reasons):
     assert reasons.intersection(failures(make))
 
 

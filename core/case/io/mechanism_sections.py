@@ -12,12 +12,20 @@ import numpy as np
 
 from ...errors import CaseError, with_article
 from ...joints import Coupler, Joint, Polynomial
-from ...mechanism.body import checked_inertia
-from ...mechanism.body import ACCELERATION, INERTIA
-from ...mechanism.motions import Driver, JointAngle, JointDisplacement, JointDriver, PointCoordinate
+from ...mechanism.body import ACCELERATION, INERTIA, checked_inertia
 from ...mechanism.loads import ELEMENTS
 from ...mechanism.mechanism import Body, Mechanism, Point
-from ...mechanism.motions import ROUNDED_TIME, Absolute, Motion, Table
+from ...mechanism.motions import (
+    ROUNDED_TIME,
+    Absolute,
+    Driver,
+    JointAngle,
+    JointDisplacement,
+    JointDriver,
+    Motion,
+    PointCoordinate,
+    Table,
+)
 from ...trajectory import Array
 from ..case import MARKER, TIME, Case, Sweep
 from ..units import RADIAN, SECOND, FileUnits, Unit, plain

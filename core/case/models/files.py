@@ -14,6 +14,7 @@ from ..io.table import WORKBOOKS
 
 if TYPE_CHECKING:
     from .hardpoints.table import HardpointTable
+    from .trees.tree import Tree
 
 CASE_FILES = (".toml", ".json")
 TABLES = (".csv", ".tsv", ".tab", ".dat", ".prn", ".m", ".hpts")
@@ -95,37 +96,31 @@ def load(file: Path, supplied: Supplied = NOTHING) -> Case:
             "found a file name with control characters, expected printable ones; rename the file",
         )
     if kind == MODEL:
-        return _model(file, _text(file), supplied)
+        from .trees.case import case_of
+
+        return case_of(read_tree(file), supplied)
     from .hardpoints.read import case_of_hardpoints
 
     return case_of_hardpoints(_hardpoints(file, kind, supplied), supplied)
 
 
-def _model(file: Path, text: str, supplied: Supplied) -> Case:
-    """Return the case of a model in XML: MJCF, URDF or SDF, whatever the file is called."""
-    from .mjcf.elements import parse_xml
-    from .mjcf.read import Document, case_of, read_mjcf
+def read_tree(file: Path) -> Tree:
+    """Return the links of a model in XML: MJCF, URDF or SDF, whatever the file is called.
 
-    root = parse_xml(file, text)
+    Raises:
+        CaseError: it is no such model, or something in it makes no sense.
+    """
+    from .trees.element import parse_xml
+
+    root = parse_xml(file, _text(file))
     match root.tag:
         case "robot":
-            from .robots.urdf import read_urdf
-
-            robot = read_urdf(file, root)
+            from .trees.urdf import read_urdf as read
         case "sdf":
-            from .robots.sdf import read_sdf
-
-            robot = read_sdf(root)
+            from .trees.sdf import read_sdf as read
         case _:
-            return read_mjcf(file, root, supplied)
-    from .robots.as_mjcf import as_mjcf
-
-    name = root.attributes.get("name", file.stem)
-    beside = f" with {', '.join(robot.beside)}" if robot.beside else ""
-    described = f"{robot.format} {name!r} of {file.name}{beside}"
-    zero, closed = "its zero pose", not robot.paired
-    document = Document(described, as_mjcf(robot), root, robot.left_out, zero, closed)
-    return case_of(file, document, supplied)
+            from .trees.mjcf import read_mjcf as read
+    return read(file, root)
 
 
 def _hardpoints(file: Path, kind: str, supplied: Supplied) -> HardpointTable:
