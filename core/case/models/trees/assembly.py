@@ -35,7 +35,7 @@ FAR = 0.1
 SMALLEST_MODEL = 1e-9
 # Rounding of composed frames, relative to the size: not worth an assembly.
 CLOSED = 1e-12
-# Gaps of several joints add up, and arms lengthen them; see kinematics.structure.reduction.
+# Gaps of several joints add up, and arms lengthen them; see kinematics.structure.redundancy.
 ADDED_UP = 10.0
 # Rows are of size one: a smaller singular value is round-off of a redundant row.
 ROUND_OFF = 1e-9
