@@ -19,14 +19,16 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal
 
 import msgspec
 
 from ....algebra import Vec3, X, Y, Z, cross, vec
 from ....errors import CaseError, remedy
 from ....joints.base import triad
-from ...io.document import LARGEST, fault, parse, read_text, shown, unknown_name
+from ....joints.polynomial import HIGHEST
+from ....mechanism.mechanism import Vector
+from ...io.document import fault, parse, read_text, shown, unknown_name
 from ...io.yaml_document import parse_yaml
 from .element import Element
 from .graph import Freedom, Graph, Joint, Loop
@@ -42,22 +44,19 @@ OPEN = 1e-9
 _UNIVERSAL = re.compile(r"UJOINT_([XYZ])([XYZ])")
 _TYPES = {"SPHERICAL": "spherical", "FIXED": "fixed"}
 
-Number: TypeAlias = Annotated[float, msgspec.Meta(ge=-LARGEST, le=LARGEST)]
-Numbers: TypeAlias = tuple[Number, Number, Number]
-
 
 class End(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A point of a link, in its axes [m]."""
 
     link: str
-    point: Numbers
+    point: Vector
 
 
 class Along(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A direction of a link, in its axes [-]."""
 
     link: str
-    direction: Numbers
+    direction: Vector
 
 
 class Condition(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -69,11 +68,11 @@ class Condition(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     j: End | None = None
     x: Along | None = None
     y: Along | None = None
-    value: Number = 0.0
-    weights: dict[str, Number] = {}
+    value: float = 0.0
+    weights: dict[str, float] = {}
     driven: str = ""
     driving: str = ""
-    coefficients: list[Number] = []
+    coefficients: Annotated[list[float], msgspec.Meta(max_length=HIGHEST + 1)] = []
 
 
 class ConstraintsFile(msgspec.Struct, frozen=True):
@@ -231,11 +230,15 @@ def _add_constraints(file: Path, found: ConstraintsFile, graph: Graph) -> None:
             continue
         name = each.joint if each.joint not in names else f"{each.joint}.{k}"
         names.add(name)
-        driven, driving = each.weights, dict[str, float]()
-        if each.kind == "polynomial":
-            driven, driving = {each.driven: 1.0}, {each.driving: 1.0}
-        coefficients, element = each.coefficients or (0.0,), _element(file, each.joint)
-        graph.couplings.append(Coupling(name, driven, driving, coefficients, element))
+        element = _element(file, each.joint)
+        if each.kind == "linear":
+            coupling = Coupling(name, each.weights, {}, (0.0,), element)
+        elif each.coefficients:
+            pair = {each.driven: 1.0}, {each.driving: 1.0}
+            coupling = Coupling(name, *pair, each.coefficients, element)
+        else:
+            raise element.fault("found no coefficients, expected some; export the case anew")
+        graph.couplings.append(coupling)
 
 
 def _element(file: Path, joint: str) -> Element:
