@@ -83,7 +83,7 @@ IMPORTS = {
     "studies/variation": ". joints mechanism kinematics case case/io",
     "studies/truth": ". program mechanism kinematics case",
     "studies/stress/families": ". joints mechanism case case/io studies/truth",
-    "studies": ". program joints kinematics case case/io harness report",
+    "studies": ". program joints kinematics case case/io harness",
     "studies/checks": (
         ". primitives program joints mechanism kinematics case case/io "
         "harness harness/workers report"

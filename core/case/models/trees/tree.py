@@ -269,18 +269,8 @@ class Tree:
         """
         if name in self.places:
             raise element.repeated_name(name, "the bodies")
-        for most, count, what in (
-            (MOST_LINKS, len(self.places), "bodies; take out what does not move"),
-            (
-                MOST_MOVING,
-                len(self.moving) + len(moves),
-                "joints; take out those that are not looked at",
-            ),
-        ):
-            if count > most:
-                raise element.fault(
-                    f"found more than the {most} that are read, expected fewer {what}"
-                )
+        _require_few(element, MOST_LINKS, len(self.places), "bodies; take out what does not move")
+        _require_few(element, MOST_MOVING, len(self.moving) + len(moves), f"joints; {_TAKE_OUT}")
         carrier = self.carriers[outer]
         if name == GROUND and (moves or carrier != GROUND):
             raise element.fault(
@@ -342,11 +332,7 @@ class Tree:
         Raises:
             CaseError: it ties a link to itself, or there are too many.
         """
-        if len(self.ties) >= MOST_TIES:
-            raise tie.element.fault(
-                f"found more than the {MOST_TIES} equalities that are read, expected fewer; take"
-                " out those that are not looked at"
-            )
+        _require_few(tie.element, MOST_TIES, len(self.ties) + 1, f"equalities; {_TAKE_OUT}")
         if isinstance(tie, Closure) and tie.links[0] == tie.links[1]:
             if tie.links[0] == GROUND:
                 self.count("equalities of what stands still")
@@ -366,11 +352,7 @@ class Tree:
         if not (strut.spring.stiffness or strut.spring.damping):
             self.count(strut.described)
             return
-        if len(self.struts) >= MOST_TIES:
-            raise strut.element.fault(
-                f"found more than the {MOST_TIES} springs that are read, expected fewer; take out"
-                " those that are not looked at"
-            )
+        _require_few(strut.element, MOST_TIES, len(self.struts) + 1, f"springs; {_TAKE_OUT}")
         self.struts.append(strut)
 
     def axial(self, element: Element, key: str, name: str | None) -> str:
@@ -386,6 +368,15 @@ class Tree:
                 f"{key}: {name!r} is a ball joint, expected a hinge or a slide; couple one of those"
             )
         return name
+
+
+_TAKE_OUT = "take out those that are not looked at"
+
+
+def _require_few(element: Element, most: int, count: int, what: str) -> None:
+    """Refuse more than can be read in some seconds."""
+    if count > most:
+        raise element.fault(f"found more than the {most} that are read, expected fewer {what}")
 
 
 def _require_within(element: Element, point: Vec3) -> None:
