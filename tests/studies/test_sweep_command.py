@@ -139,43 +139,6 @@ def test_variants_without_a_solution_make_status_1(tmp_path, capsys):
     assert "Variants without a solution" in (tmp_path / "out" / "sweep.html").read_text()
 
 
-WRONG = [
-    (["--samples", "0"], "'0' is not a whole number of 1 or more"),
-    ([], "monte_carlo draws as many variants as it is told; give --samples"),
-    (
-        "--samples 5 --check mujocco".split(),
-        "there is no engine 'mujocco'; did you mean 'mujoco'?",
-    ),
-    (
-        "--samples 5 --check native:2".split(),
-        "--check native:2: found the share '2', expected a fraction",
-    ),
-    (
-        "--samples 5 --output toe".split(),
-        "there is no output 'toe'; known: half_track_change, wheelbase_change",
-    ),
-    (
-        "--samples 5 --replay 3".split(),
-        "--replay: seed and index identify a variant; leave out --samples",
-    ),
-    ("--replay 3 --store x.parquet".split(), "in this process and stores nothing"),
-    (
-        "--samples 5 --jobs 2 --scheduler tcp://127.0.0.1:1".split(),
-        "the cluster decides the number of threads",
-    ),
-    (
-        "--samples 5 --store no/such/folder.parquet".split(),
-        "cannot be written; give a file in a folder that exists",
-    ),
-]
-
-
-@pytest.mark.parametrize(("options", "message"), WRONG)
-def test_sweep_refuses_invalid_options(file, capsys, options, message):
-    assert main(["sweep", "mcpherson_strut", "--vary", str(file), *options]) == 2
-    assert message in capsys.readouterr().err
-
-
 def test_without_pyarrow_there_is_a_message(file, tmp_path, capsys, monkeypatch):
     real = importlib.import_module
 

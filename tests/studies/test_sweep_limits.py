@@ -148,21 +148,3 @@ def test_limits_use_units_of_the_file(file, tmp_path, capsys):
     told = capsys.readouterr().out
     assert "Specification limits" in told
     assert "95 % interval" in told
-
-
-WRONG = [
-    (["--limit", "half_track_change:1"], "--limit: found 'half_track_change:1', expected OUTPUT:"),
-    (["--limit", "toe:0:1"], "--limit toe:0:1: there is no output 'toe'"),
-    (["--limit", "half_track_change:a:b"], "expected OUTPUT:LOW:HIGH"),
-    (
-        "--sampling latin --replay 1".split(),
-        "a Latin hypercube depends on the number of variants; give --samples",
-    ),
-]
-
-
-@pytest.mark.parametrize(("options", "message"), WRONG)
-def test_wrong_options_are_status_2_and_a_message(file, capsys, options, message):
-    samples = [] if "--replay" in options else ["--samples", "5"]
-    assert main(["sweep", "mcpherson_strut", "--vary", str(file), *samples, *options]) == 2
-    assert message in capsys.readouterr().err
