@@ -20,7 +20,7 @@ from kincheck.core.trajectory import QUANTITIES
 from ..support.fakes import Fake, crank
 from .test_sweep_command import POINTS
 from .test_sweep_study import PIVOT, STRUT, TIP
-from .test_vary import HEAD, vary
+from .test_vary import vary, vary_file
 
 
 def deviating(at):
@@ -85,8 +85,7 @@ def test_a_check_with_a_simulator_agrees(tmp_path):
 
 
 def test_sweep_check_deviation_can_be_replayed(tmp_path, capsys, monkeypatch):
-    file = tmp_path / "hardpoints.json"
-    file.write_text(json.dumps({**HEAD, "mode": "monte_carlo", "hardpoints": POINTS}))
+    file = vary_file(tmp_path, POINTS)
     native = adapters.engine("native")
 
     def answer(case):
@@ -121,9 +120,7 @@ def test_sweep_check_deviation_can_be_replayed(tmp_path, capsys, monkeypatch):
 
 def test_check_contradicts_unsolved_variants(tmp_path, capsys, monkeypatch):
     """An engine with values where the motion ends, and one that has not converged."""
-    path = tmp_path / "vary.json"
-    rod = {"at": "joints.rod.length", "half_width": 3500.0}
-    path.write_text(json.dumps({**HEAD, "mode": "monte_carlo", "hardpoints": {"rod": rod}}))
+    path = vary_file(tmp_path, {"rod": {"at": "joints.rod.length", "half_width": 3500.0}})
     native, known = adapters.engine("native"), adapters.engine
     command = f"sweep rssr --vary {path} --samples 12 --check mujoco:1.0".split()
 

@@ -16,7 +16,7 @@ from kincheck.core.cli.main import main
 from kincheck.core.studies.tolerance.page import page
 from kincheck.core.studies.tolerance.sweep import sweep_designs
 
-from .test_vary import HEAD, vary
+from .test_vary import vary, vary_file
 
 POINTS = {
     "ball": {"at": "ball", "sigma": 1.0},
@@ -26,9 +26,7 @@ POINTS = {
 
 @pytest.fixture
 def file(tmp_path):
-    path = tmp_path / "hardpoints.json"
-    path.write_text(json.dumps({**HEAD, "mode": "monte_carlo", "hardpoints": POINTS}))
-    return path
+    return vary_file(tmp_path, POINTS)
 
 
 def read(path: Path):
@@ -127,9 +125,7 @@ def test_json_goes_to_standard_output_alone(file, capsys):
 
 
 def test_variants_without_a_solution_make_status_1(tmp_path, capsys):
-    path = tmp_path / "rod.json"
-    rod = {"at": "joints.rod.length", "half_width": 3500.0}
-    path.write_text(json.dumps({**HEAD, "mode": "monte_carlo", "hardpoints": {"rod": rod}}))
+    path = vary_file(tmp_path, {"rod": {"at": "joints.rod.length", "half_width": 3500.0}})
     assert main(f"sweep rssr --vary {path} --samples 30 --out {tmp_path / 'out'}".split()) == 1
     told = capsys.readouterr().out
     assert re.search(r"30 variants of rssr, \d+ without a solution somewhere", told)
@@ -174,10 +170,9 @@ def test_sweep_files_survive_closed_output(file, tmp_path, monkeypatch):
 
 def test_stored_hardpoint_named_like_output(tmp_path):
     parquet = pytest.importorskip("pyarrow.parquet")
-    file, stored = tmp_path / "hardpoints.json", tmp_path / "all.parquet"
+    stored = tmp_path / "all.parquet"
     for name in ("rocker_tip_y", "variant"):
-        varied = {name: {"at": "joints.rod.length", "half_width": 1.0}}
-        file.write_text(json.dumps({**HEAD, "mode": "monte_carlo", "hardpoints": varied}))
+        file = vary_file(tmp_path, {name: {"at": "joints.rod.length", "half_width": 1.0}})
         assert main(f"sweep rssr --vary {file} --samples 20 --store {stored}".split()) == 0
         table = parquet.read_table(stored)
         assert table.column_names[:2] == ["variant", f"{name}.offset"]

@@ -16,7 +16,7 @@ from kincheck.core.studies.variation.study_choices import Sampling
 from kincheck.core.studies.variation.variation import Limit
 
 from ..support.fakes import crank
-from .test_vary import HEAD, vary
+from .test_vary import vary, vary_file
 
 TIP = {"at": "tip", "sigma": [0.0, 1.0, 0.0]}
 
@@ -115,15 +115,8 @@ def test_limits_of_a_rate_take_its_order(tmp_path):
 
 @pytest.fixture
 def file(tmp_path):
-    tables = {
-        **HEAD,
-        "mode": "monte_carlo",
-        "hardpoints": {"ball": {"at": "ball", "sigma": 1.0}},
-        "limits": {"half_track_change": {"low": -12.0, "high": 1.0}},
-    }
-    path = tmp_path / "vary.json"
-    path.write_text(json.dumps(tables))
-    return path
+    limits = {"half_track_change": {"low": -12.0, "high": 1.0}}
+    return vary_file(tmp_path, {"ball": {"at": "ball", "sigma": 1.0}}, limits=limits)
 
 
 def test_limits_use_units_of_the_file(file, tmp_path, capsys):
