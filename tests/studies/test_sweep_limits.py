@@ -5,6 +5,7 @@ import json
 from dataclasses import replace
 from importlib import import_module
 
+import msgspec
 import numpy as np
 import pytest
 from kincheck.core.cli.main import main
@@ -12,6 +13,7 @@ from kincheck.core.errors import KincheckError
 from kincheck.core.studies.tolerance.conformance import sparkline
 from kincheck.core.studies.tolerance.page import page
 from kincheck.core.studies.tolerance.sweep import sweep_designs
+from kincheck.core.studies.tolerance.tables import limit_notes, remarks
 from kincheck.core.studies.variation.study_choices import Sampling
 from kincheck.core.studies.variation.variation import Limit
 
@@ -87,6 +89,24 @@ def test_the_page_has_limits_histograms_and_legends(found):
         assert f"</svg> {words}" in text
     assert "Sobol" not in text
     assert "--sampling sobol --replay" in text
+
+
+@pytest.mark.parametrize(
+    ("changes", "said", "told"),
+    [
+        ({}, "a Sobol sequence is balanced", False),
+        ({"asked": 4097}, "4097 is none, so the means converge more slowly: 8192 would be", True),
+        ({"asked": 4097, "sampling": "random"}, "Sobol", False),
+        ({"unsolved": 10}, "in all", False),
+        ({"unsolved": 11}, "unsolved: 11 in all, the first 0 in the results", True),
+        ({}, "assumes independent variants; for sobol sampling it is usually too wide", True),
+        ({"sampling": "random"}, "assumes independent variants", False),
+    ],
+)
+def test_remarks_of_a_study(found, changes, said, told):
+    results = msgspec.structs.replace(found, **changes)
+    lines = [*remarks(results), *limit_notes(results)]
+    assert any(said in line for line in lines) is told, lines
 
 
 def test_counts_do_not_depend_on_chunks_and_jobs(tmp_path):
