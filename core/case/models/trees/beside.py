@@ -26,14 +26,9 @@ import msgspec
 from ....algebra import Vec3, X, Y, Z, cross, vec
 from ....errors import CaseError, remedy
 from ....joints.base import triad
-<<<<<<< HEAD
-from ...io.document import LARGEST, fault, parse, parse_yaml, read_text, shown, unknown_name
-=======
 from ....joints.polynomial import HIGHEST
 from ....mechanism.mechanism import Vector
-from ...io.document import fault, parse, read_text, shown, unknown_name
-from ...io.yaml_document import parse_yaml
->>>>>>> h-models
+from ...io.document import fault, parse, parse_yaml, read_text, shown, unknown_name
 from .element import Element
 from .graph import Freedom, Graph, Joint, Loop
 from .place import Place, unit_vector
