@@ -67,7 +67,7 @@ IMPORTS = {
         ". primitives program joints mechanism kinematics/formulation kinematics/forces "
         "kinematics/structure kinematics/compiled kinematics/assembly "
         "kinematics/continuation kinematics/verified kinematics/blocks "
-        "kinematics/diagnosis"
+        "kinematics/diagnosis program/llvm"
     ),
     "case": ". joints mechanism kinematics",
     "case/suspension": ". mechanism case",
@@ -110,7 +110,7 @@ IMPORTS = {
         "studies/paper studies/diagnosis studies/bench"
     ),
     "__init__": ". joints mechanism kinematics case case/io harness studies/checks",
-    "kincheck": "case case/io harness harness/workers studies/checks cli __init__",
+    "kincheck": "case case/io harness harness/workers studies studies/checks cli __init__",
 }
 """Folder of core: the folders it imports besides itself, whenever the import runs."""
 

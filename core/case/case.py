@@ -116,6 +116,21 @@ class Sweep:
         return {self.driver: self.values, **further}
 
 
+@dataclass(frozen=True)
+class Free:
+    """The start and the samples of a free motion, without drivers.
+
+    Attributes:
+        duration: of the motion from the design position [s].
+        samples: number of samples, both ends included.
+        rates: at the start by driver or joint [m/s or rad/s]; see `kinematics.free_motion`.
+    """
+
+    duration: float
+    samples: int
+    rates: Mapping[str, float] = field(default_factory=dict[str, float])
+
+
 @dataclass(frozen=True, eq=False)
 class Series:
     """One output over the samples: value [unit], and time derivatives if known, each of shape (n,).
@@ -188,6 +203,7 @@ class Case:
         assembly: notes on how the start was closed, and on rows left out.
         closure: of rows left out; None if all rows hold.
         hardpoints: rows of the table of hardpoints that the case is of; empty for another file.
+        free: its free motion; None for the default.
     """
 
     name: str
@@ -203,6 +219,7 @@ class Case:
     assembly: tuple[str, ...] = ()
     closure: Closure | None = None
     hardpoints: tuple[Hardpoint, ...] = ()
+    free: Free | None = None
 
     def __repr__(self) -> str:
         """Return name, truth, sweep and outputs in one line."""

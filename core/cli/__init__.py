@@ -19,6 +19,7 @@ COMMANDS = (
     "explain",
     "assemblies",
     "trace",
+    "free",
     "doctor",
     "history",
     "report",

@@ -1,11 +1,12 @@
 """Functions on cases and engines by name, as on the command line."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar, cast
 
 from kincheck.core import KincheckError
-from kincheck.core.case.case import Case
+from kincheck.core.case.case import Case, Free
 from kincheck.core.case.io.reader_options import NOTHING, Supplied
 from kincheck.core.cli.check_engine import examined
 from kincheck.core.cli.engine_loading import made
@@ -17,6 +18,7 @@ from kincheck.core.harness.record import Results
 from kincheck.core.harness.scene import with_scenes
 from kincheck.core.harness.workers.pool import solver_for
 from kincheck.core.studies.checks.findings import Report
+from kincheck.core.studies.free import FreeResult, free_of
 
 _One = TypeVar("_One")
 
@@ -74,6 +76,39 @@ def run(
     solver, _ = solver_for(team, jobs)
     results = running.run(found, team, tol=tol, baseline=known.baseline(team), solver=solver)
     return with_scenes(results, found)
+
+
+def free(
+    case: str | Path | Case,
+    *,
+    duration: float | None = None,
+    samples: int | None = None,
+    rates: Mapping[str, float] | None = None,
+) -> FreeResult:
+    """Integrate the motion of a case without its drivers, as the command `kincheck free` does.
+
+    Args:
+        case: a case, its name, or path; masses, loads and the rates at the start move it.
+        duration: of the motion [s]; by default that of the case's [free].
+        samples: number of samples, both ends included; by default that of [free].
+        rates: at the start by driver or joint [m/s or rad/s]; by default those of [free].
+
+    Raises:
+        KincheckError: duration or samples are missing, or the mechanism has no free motion.
+    """
+    found = case if isinstance(case, Case) else load(case)
+    own = found.free
+    if (duration is None or samples is None) and own is None:
+        raise KincheckError(
+            f"case {found.name!r} says no duration of its free motion; give duration and samples"
+        )
+    given = own or Free(1.0, 2)
+    asked = Free(
+        given.duration if duration is None else duration,
+        given.samples if samples is None else samples,
+        given.rates if rates is None else rates,
+    )
+    return free_of(replace(found, free=asked))
 
 
 def check_engine(engine: str | Engine) -> Report:

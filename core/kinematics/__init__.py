@@ -7,6 +7,7 @@ Solve:
     solve              one design over a sweep
     solve_designs      many designs over a sweep, each with its own geometry
     forces_of          reactions of joints and efforts of drivers of a solved motion
+    free_motion        the motion without drivers, by masses and loads
     trace              a motion by its arc length, beyond lock-ups of a driver
     assemble           a closed pose from an estimate
     find_assemblies    all closed poses
@@ -77,6 +78,7 @@ if TYPE_CHECKING:
     from .formulation.cartesian import COLUMNS, Cartesian
     from .formulation.constraints import Frames, Relation, Style, constraints, unit_near
     from .formulation.parameters import LoadPlace, kinds, load_places, placed, places
+    from .free_dynamics import FreeMotion, free_motion
     from .native_solver import Method, NativeSolver, PreparedDesigns, ProgramSize
     from .one_design import Solver, followed_angle, followed_attitude, follower, solve
     from .structure.degrees_of_freedom import degrees_of_freedom, require_driven
@@ -103,6 +105,7 @@ _NAMES = {
     "formulation.cartesian": "COLUMNS Cartesian",
     "formulation.constraints": "Frames Relation Style constraints unit_near",
     "formulation.parameters": "LoadPlace kinds load_places placed places",
+    "free_dynamics": "FreeMotion free_motion",
     "native_solver": "Method NativeSolver PreparedDesigns ProgramSize",
     "one_design": "Solver followed_angle followed_attitude follower solve",
     "structure.degrees_of_freedom": "degrees_of_freedom require_driven",

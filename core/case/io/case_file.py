@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any, cast
 
 from ...errors import MechanismError, unknown
 from ..case import Case, Truth, size
@@ -14,7 +15,9 @@ from ..quantity import with_markers
 from ..units import ANGLES, LENGTHS, FileUnits
 from .document import LONGEST_TEXT, Section, explained, read_tables, shown, toml_table
 from .mechanism_sections import (
+    free_lines,
     mechanism_lines,
+    read_free,
     read_mechanism,
     read_sweep,
     sweep_lines,
@@ -45,7 +48,7 @@ def load_case(path: str | Path, closure: float | None = None) -> Case:
     """
     file = Path(path)
     advice = "a case holds hardpoints; samples belong into a reference file"
-    root = Section(file, "", read_tables(file, LARGEST_FILE, advice, SCHEMA))
+    root = Section(file, "", _with_free(read_tables(file, LARGEST_FILE, advice, SCHEMA)))
     keys = root.typed(CaseKeys)
     for what in _PARTS:
         if (count := len(getattr(keys, what))) > MOST_PARTS:
@@ -59,11 +62,13 @@ def load_case(path: str | Path, closure: float | None = None) -> Case:
     columns = None
     if keys.reference is not None:
         columns = root.at("reference").typed(ReferenceKeys)
+    free = read_free(root, mechanism, units)
     sweep, driver, own_grid = read_sweep(root, mechanism, units, columns)
     case = Case(
         *(keys.name, keys.source, Truth.CONSENSUS_ONLY, mechanism, sweep, ()),
         length_unit=units.length.name,
         angle_unit=units.angle.name,
+        free=free,
     )
     case = _with_outputs(root, case, units)
     with explained(file, "closure", units.length):
@@ -81,6 +86,16 @@ def load_case(path: str | Path, closure: float | None = None) -> Case:
     convention = str(root.at("suspension").at("convention").value or "")
     case = replace(case, truth=keys.truth)
     return read_reference(file, columns, driver, units, case, convention, own_grid=own_grid)
+
+
+def _with_free(tables: dict[str, Any]) -> dict[str, Any]:
+    """Return the tables of a file; beside [free], those of a driven motion may be left out."""
+    free = tables.get("free")
+    if not isinstance(free, dict):
+        return tables
+    free = cast("dict[str, Any]", free)
+    sweep = {"start": 0.0, "stop": free.get("duration"), "steps": free.get("samples")}
+    return {"drivers": {}, "sweep": sweep, **tables}
 
 
 def _within_digits(case: Case, keys: ClosureKeys, closure: float | None) -> Case:
@@ -145,6 +160,7 @@ def case_text(case: Case, comments: Sequence[str] = ()) -> str:
         lines += toml_table({"gravity": case.mechanism.gravity})
     lines += mechanism_lines(case)
     lines += sweep_lines(case, values, own_grid=bool(reference))
+    lines += free_lines(case)
     lines += _closure_lines(case)
     lines += suspension_lines(case)
     lines += output_lines(case)

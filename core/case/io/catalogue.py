@@ -27,6 +27,7 @@ from .schema import (
     CaseKeys,
     ClosureKeys,
     Described,
+    FreeKeys,
     OutputKeys,
     PointKeys,
     ReferenceKeys,
@@ -206,6 +207,7 @@ def case_schema() -> dict[str, Any]:
         "units": UnitsKeys,
         "closure": ClosureKeys,
         "sweep": SweepKeys,
+        "free": FreeKeys,
         "suspension": SuspensionKeys,
         "reference": ReferenceKeys,
     }
