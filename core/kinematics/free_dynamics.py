@@ -2,8 +2,8 @@
 
 `free_equations` has the equations. DOP853 integrates them (Hairer, Norsett, Wanner: Solving
 Ordinary Differential Equations I, II.5), or Radau where loads are stiff. Poses and velocities are
-projected onto the rows at every sample and between. A second run with all steps halved gives the
-result and, by the difference, its error.
+projected onto the rows at every sample and between. All steps are then halved twice: the last run
+is the result, and its difference from the one before is its error.
 
 It makes truth for time steppers, for smooth loads: no contact, no friction, no events.
 """
@@ -27,7 +27,9 @@ from ..trajectory import Array, Trajectory
 from .forces.reactions import forces_of
 from .free_equations import VANISHING, FreeEquations, start_velocities
 
-RTOL, ATOL = 1e-13, 1e-14
+# The error of a step: of what the step adds, and of the largest number. The first is the smallest
+# that scipy takes; the second is near round-off, because errors of many steps add up.
+RTOL, ATOL, LEAST = 2.3e-14, 1e-15, 1e-3
 # A minimum between steps is looked for where the value at a step is below this part of the largest.
 NEAR = 0.1
 # DOP853 is stable for steps up to 6 over the fastest decay. Accuracy of 1e-13 asks for a tenth of
@@ -102,9 +104,10 @@ def free_motion(
     """
     equations = FreeEquations(mechanism)
     start = equations.start(start_velocities(mechanism, equations, rates or {}))
-    first = _Run(equations, times, start, {})
-    reached = times[: len(first.samples)]
-    second = _Run(equations, reached, start, first.counts, stiff=first.stiff)
+    free = _Run(equations, times, start, {})
+    reached = times[: len(free.samples)]
+    first = _Run(equations, reached, start, free.counts, stiff=free.stiff)
+    second = _Run(equations, reached, start, first.counts, stiff=free.stiff)
     count = len(second.samples)
     both = [np.array(run.states)[run.samples[:count]] for run in (first, second)]
     places, turns = equations.differences(*both)
@@ -130,7 +133,7 @@ def free_motion(
         equations.count - equations.rank,
         equations.evaluations,
         "Radau" if second.stiff else "DOP853",
-        second.message or first.message,
+        second.message or first.message or free.message,
     )
 
 
@@ -224,10 +227,18 @@ class _Run:
             np.zeros_like(high),
             end,
             rtol=RTOL,
-            atol=ATOL + RTOL * np.abs(high),
+            atol=self._allowed(high),
             max_step=min(most, end - begin),
             **first,
         )
+
+    def _allowed(self, high: Array) -> Array:
+        """Return the error allowed in a step: of the largest number of poses, rates and work."""
+        allowed, ends = np.empty_like(high), (0, len(self._equations.design), len(high) - 1, None)
+        for first, last in pairwise(ends):
+            part = slice(first, last)
+            allowed[part] = ATOL * max(float(np.abs(high[part]).max()), LEAST)
+        return allowed
 
     def _find_change_point(self, high: Array, change: Any) -> None:
         """Raise if a change point is in the last step or in the one before."""

@@ -132,7 +132,7 @@ def test_andrews_squeezer_reaches_its_known_angles():
     for body, start in starts.items():
         p = found.motion.bodies[body].p
         angle = start + np.unwrap(2.0 * np.arctan2(p[:, 3], p[:, 0]))[-1]
-        assert angle == pytest.approx(ends[body], abs=3e-14)
+        assert angle == pytest.approx(ends[body], abs=2e-14)
     assert found.motion.bodies["K1"].a[0, 5] == pytest.approx(14222.4439199541138, rel=1e-14)
     assert found.redundant == 9
 
