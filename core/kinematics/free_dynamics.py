@@ -29,12 +29,14 @@ from .free_equations import VANISHING, FreeEquations, start_velocities
 
 # The error of a step: of what the step adds, and of the largest number. The first is the smallest
 # that scipy takes; the second is near round-off, because errors of many steps add up.
-RTOL, ATOL, LEAST = 2.3e-14, 1e-15, 1e-3
+RTOL, ATOL = 2.3e-14, 1e-15
+# Radau solves its stages by iteration, which ends at round-off. Steps are controlled above it.
+LOOSER = 100.0
 # A minimum between steps is looked for where the value at a step is below this part of the largest.
 NEAR = 0.1
-# DOP853 is stable for steps up to 6 over the fastest decay. Accuracy of 1e-13 asks for a tenth of
-# that; a step near the limit says that decay sets it, not accuracy. Looked at once in so many
-# steps.
+# DOP853 is stable for steps up to 6 over the fastest rate. Accuracy asks for a twentieth of that
+# where this rate shows in the motion; longer steps say that it has died out, and limits them only
+# by stability. Looked at once in so many steps.
 STABLE, OFTEN = 3.0, 250
 # After so many steps what they add is taken into the large part of the state.
 PART = 5
@@ -163,7 +165,7 @@ class _Run:
         # States are sums of two doubles, and a step adds to a small part: rounding the large one at
         # each step would lose some ten digits of units in the last place.
         self._low = np.zeros_like(start)
-        self._step = np.inf
+        self._step, self._span = np.inf, float(times[-1] - times[0])
         self._regular = [equations.regular(start)]
         self._largest = self._regular[0]
         self._pieces = list[Any]()
@@ -187,7 +189,7 @@ class _Run:
 
     def _advance(self, begin: float, end: float, most: float) -> int:
         """Integrate between two samples; return the number of steps."""
-        count = 0
+        count, longest = 0, 0.0
         while begin < end:
             solver, high, low = self._solver(begin, end, most), self.states[-1], self._low
             first = len(self.times)
@@ -203,9 +205,10 @@ class _Run:
                 self._low = low
                 self._add(solver.y)
                 self._find_change_point(high, solver.dense_output())
-                if not self.stiff and len(self.times) % OFTEN == 0:
-                    step = solver.t - solver.t_old
-                    self.stiff = step * self._equations.decay(self.states[-1]) > STABLE
+                longest = max(longest, solver.t - solver.t_old)
+                if most == np.inf and not self.stiff and len(self.times) % OFTEN == 0:
+                    self.stiff = longest * self._equations.fastest(self.states[-1]) > STABLE
+                    longest = 0.0
                     if self.stiff:
                         break
             begin, self._step = float(solver.t), float(solver.h_abs)
@@ -219,6 +222,7 @@ class _Run:
         def rate(t: float, change: Array) -> Array:
             return self._equations.rate(t, high + (low + change))
 
+        looser = LOOSER if self.stiff else 1.0
         step = most if most < np.inf else self._step
         first = {"first_step": min(step, end - begin)} if step < np.inf else {}
         return (methods.Radau if self.stiff else methods.DOP853)(
@@ -226,18 +230,22 @@ class _Run:
             begin,
             np.zeros_like(high),
             end,
-            rtol=RTOL,
-            atol=self._allowed(high),
+            rtol=looser * RTOL,
+            atol=looser * self._allowed(high),
             max_step=min(most, end - begin),
             **first,
         )
 
     def _allowed(self, high: Array) -> Array:
-        """Return the error allowed in a step: of the largest number of poses, rates and work."""
-        allowed, ends = np.empty_like(high), (0, len(self._equations.design), len(high) - 1, None)
-        for first, last in pairwise(ends):
+        """Return the error allowed in a step: of the largest number of poses, rates and work, and
+        at least of a motion of the mechanism's size in the whole time.
+        """
+        poses, inertia = len(self._equations.design), self._equations.scale.min() ** -2
+        least = (1.0, 1.0 / self._span, inertia / self._span**2)
+        allowed = np.empty_like(high)
+        for first, last, low in zip((0, poses, -1), (poses, -1, None), least, strict=True):
             part = slice(first, last)
-            allowed[part] = ATOL * max(float(np.abs(high[part]).max()), LEAST)
+            allowed[part] = ATOL * max(float(np.abs(high[part]).max()), low)
         return allowed
 
     def _find_change_point(self, high: Array, change: Any) -> None:

@@ -1,5 +1,6 @@
 """Free motion against closed forms, third-party values, and laws of motion."""
 
+import cmath
 import csv
 import math
 from dataclasses import replace
@@ -95,19 +96,24 @@ def slider(mass=2.0, **load):
     )
 
 
-def test_stiff_damper_takes_the_implicit_method():
-    k, c, mass, ahead = 40.0, 4000.0, 2.0, -0.1
+@pytest.mark.parametrize(
+    ("k", "c", "method"),
+    [(40.0, 4000.0, "Radau"), (4e4, 200.0, "DOP853")],
+    ids=["creeps", "comes to rest"],
+)
+def test_damped_block_follows_its_closed_form(k, c, method):
+    mass, ahead = 2.0, -0.1
     found = free_motion(
         slider(mass, stiffness=k, damping=c, free_length=2.0 + ahead), np.linspace(0.0, 5.0, 6)
     )
-    root = math.sqrt((c / mass) ** 2 - 4.0 * k / mass)
+    root = cmath.sqrt((c / mass) ** 2 - 4.0 * k / mass)
     slow, fast = -(2.0 * k / mass) / (c / mass + root), -(c / mass + root) / 2.0
     t = found.times
     expected = ahead + (-ahead) * (fast * np.exp(slow * t) - slow * np.exp(fast * t)) / (
         fast - slow
     )
-    assert found.method == "Radau"
-    assert np.abs(found.motion.points["p"].position[found.samples, 0] - expected).max() < 1e-11
+    assert found.method == method
+    assert np.abs(found.motion.points["p"].position[found.samples, 0] - expected.real).max() < 1e-13
 
 
 def test_torsional_spring_swings_beyond_whole_turns():
@@ -132,7 +138,8 @@ def test_andrews_squeezer_reaches_its_known_angles():
     for body, start in starts.items():
         p = found.motion.bodies[body].p
         angle = start + np.unwrap(2.0 * np.arctan2(p[:, 3], p[:, 0]))[-1]
-        assert angle == pytest.approx(ends[body], abs=2e-14)
+        # round-off of accelerations of 1e6 rad/s^2: 1e-14 to 4e-14, by the grid of the samples
+        assert angle == pytest.approx(ends[body], abs=1e-13)
     assert found.motion.bodies["K1"].a[0, 5] == pytest.approx(14222.4439199541138, rel=1e-14)
     assert found.redundant == 9
 
