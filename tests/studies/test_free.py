@@ -58,6 +58,23 @@ def test_pendulum_tension_follows_from_its_speed():
     assert (force * along).sum(axis=1) == pytest.approx(tension, abs=1e-10)
 
 
+def test_reactions_with_redundant_rows_obey_newton():
+    linkage = kincheck.load("four_bar").mechanism
+    coupler = linkage.body("coupler")
+    center = Point("center", "coupler", coupler.center_of_mass)
+    found = free_motion(replace(linkage, points=[center]), np.linspace(0.0, 0.2, 3))
+    forces = found.forces(["crank_pin", "coupler_pin"])
+    pins = (forces.joints[name] for name in ("crank_pin", "coupler_pin"))
+    accelerations = found.motion.points["center"].acceleration
+    first, second = pins
+    for way in ((1.0, 2.0, 0.0), (0.0, 2.0, 1.0)):  # in the plane, where they are determined
+        unit = np.array(way) / np.linalg.norm(way)
+        left = (first.along(unit) - second.along(unit)) / coupler.mass + linkage.gravity @ unit
+        assert left == pytest.approx(accelerations @ unit, abs=1e-9)
+    assert found.redundant == 3
+    assert np.abs(forces.power).max() < 1e-10
+
+
 def test_free_body_turns_by_jacobi_functions():
     # Landau & Lifshitz, Mechanics, section 37: M^2 > 2 E I2, started where w2 = 0
     I1, I2, I3 = 0.3, 0.5, 0.7
