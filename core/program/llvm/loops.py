@@ -11,8 +11,8 @@ from collections.abc import Sequence
 
 from ..plan import LINE
 from ..tape import NODES
-from .ir_writer import Lines
 from .plan import TOGETHER, Rows, call, function, over
+from .programs import Lines
 
 
 def settle(width: int) -> str:
