@@ -21,7 +21,7 @@ from .. import disk_cache, plan, straight_line, tape
 from ..plan import Plan
 from ..straight_line import Bytecode, bytecode, packed, unpacked
 from . import compiler
-from .loops import fan, fold, follow, parts, run, settle
+from .loops import fan, follow, parts, run, settle
 from .plan import PlanInMemory, rows
 from .programs import declarations, function, interpret
 
@@ -91,7 +91,6 @@ LOOPS: Mapping[str, tuple[Sequence[Callable[[int], str]], Mapping[str, int]]] = 
         {"run_program": 4, "attempt": 3, "carry": 3, "follow": 6, "run": 3},
     ),
     "fan": ([*_NEEDED, fan], {"fan": 12}),
-    "fold": ([rows, fold], {"fold": 6}),
     "parts": ([*_NEEDED, parts], {"parts": 13}),
 }
 """Modules of loops: their writers, and their functions with the number of arguments."""
