@@ -12,8 +12,8 @@ from kincheck.core.case.io.model_writer import written
 from kincheck.core.case.io.reader_options import LEFT_OUT, Supplied
 from kincheck.core.case.models.files import load, read_tree
 from kincheck.core.joints import Polynomial, Revolute
-from kincheck.core.mechanism.drivers import JointAngle
 from kincheck.core.mechanism.mechanism import Body, Mechanism
+from kincheck.core.mechanism.motions import JointAngle
 
 from ..fuzz import urdf as seeds
 from ..support.exported_again import same_motion

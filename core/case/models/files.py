@@ -9,8 +9,8 @@ from ...errors import with_article
 from ..case import Case
 from ..io.case_file import LARGEST_FILE, load_case
 from ..io.document import fault, parse, read_text
-from ..io.reader_options import NOTHING, Supplied
-from ..io.workbook import WORKBOOKS
+from ..io.reader_options import NOTHING, OF_HARDPOINTS, OF_MODELS, Supplied
+from ..io.table import WORKBOOKS
 
 if TYPE_CHECKING:
     from .hardpoints.table import HardpointTable
@@ -33,7 +33,6 @@ CASE, CHRONO, ADAMS, TABLE, TREE, WORKBOOK, MODEL = (
     "workbook of hardpoints",
     "model",
 )
-HARDPOINTS = (CHRONO, ADAMS, TABLE)
 UNREAD = {
     ".constraints.json": "holds the loops of a URDF beside it; give that file, NAME.urdf",
     ".xacro": "holds macros; expand them: xacro FILE > robot.urdf",
@@ -60,26 +59,11 @@ UNREAD = {
     ),
 }
 """Files that people have beside their models, and what to do, by suffix."""
-_OF_HARDPOINTS = (
-    "template",
-    "units",
-    "axes",
-    "travel",
-    "rack",
-    "names",
-    "wheel-radius",
-    "wheelbase",
-    "axle",
-    "position",
-    "cg-height",
-    "brake-share",
-    "drive-share",
-)
 _OPTIONS = {
     CASE: ("closure",),
-    MODEL: ("drive", "hold", "hold-rest", "start", "closure"),
-    **dict.fromkeys(HARDPOINTS, _OF_HARDPOINTS),
-    **dict.fromkeys((WORKBOOK, TREE, TABLE), (*_OF_HARDPOINTS, "sheet")),
+    MODEL: OF_MODELS,
+    **dict.fromkeys((CHRONO, ADAMS), OF_HARDPOINTS),
+    **dict.fromkeys((WORKBOOK, TREE, TABLE), (*OF_HARDPOINTS, "sheet")),
 }
 
 
@@ -141,10 +125,8 @@ def read_tree(file: Path) -> Tree:
 
 def _hardpoints(file: Path, kind: str, supplied: Supplied) -> HardpointTable:
     """Return the table of hardpoints of a file."""
-    from .hardpoints.adams import read_adams
-    from .hardpoints.chrono import read_chrono
-    from .hardpoints.plain import read_plain
-    from .hardpoints.rows import read_spreadsheet
+    from .hardpoints.programs import read_adams, read_chrono
+    from .hardpoints.rows import read_plain, read_spreadsheet
     from .hardpoints.tree import read_tree
 
     if kind == WORKBOOK:
@@ -184,7 +166,7 @@ def kind_of(file: Path, supplied: Supplied = NOTHING) -> str:
 
 
 def _kind_of_json(file: Path, supplied: Supplied) -> str:
-    from .hardpoints.chrono import is_chrono, without_comments
+    from .hardpoints.programs import is_chrono, without_comments
     from .hardpoints.tree import has_points, json_tree
 
     text = without_comments(_text(file))

@@ -35,7 +35,7 @@ FAR = 0.1
 SMALLEST_MODEL = 1e-9
 # Rounding of composed frames, relative to the size: not worth an assembly.
 CLOSED = 1e-12
-# Gaps of several joints add up, and arms lengthen them; see kinematics.structure.reduction.
+# Gaps of several joints add up, and arms lengthen them; see kinematics.structure.redundancy.
 ADDED_UP = 10.0
 # Rows are of size one: a smaller singular value is round-off of a redundant row.
 ROUND_OFF = 1e-9
@@ -203,7 +203,7 @@ class Start:
     Attributes:
         given: moves whose values the user gave; they stay if the closures let them.
         text: its source, for notes and messages.
-        closes: whether it is meant to close, so that it is refused far from that.
+        closes: whether it is meant to close; it is then refused far from closed.
     """
 
     pose: Pose
@@ -387,7 +387,7 @@ def assemble(start: Start, closure: float | None, driven: Sequence[str] = ()) ->
     """Return a model in its start, closed.
 
     Args:
-        closure: tolerance of the closures [m]; that of the file's digits unless given.
+        closure: tolerance of the closures [m]; by the file's digits unless given.
         driven: driven and held moves; they stay if the closures let them.
 
     Raises:

@@ -28,8 +28,7 @@ from ....errors import CaseError, remedy
 from ....joints.base import triad
 from ....joints.polynomial import HIGHEST
 from ....mechanism.mechanism import Vector
-from ...io.document import fault, parse, read_text, shown, unknown_name
-from ...io.yaml_document import parse_yaml
+from ...io.document import fault, parse, parse_yaml, read_text, shown, unknown_name
 from .element import Element
 from .graph import Freedom, Graph, Joint, Loop
 from .place import Place, unit_vector

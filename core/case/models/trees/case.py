@@ -27,15 +27,14 @@ from ....joints import (
 from ....joints.base import triad
 from ....kinematics import degrees_of_freedom
 from ....mechanism.body import Body, Inertia, checked_inertia
-from ....mechanism.drivers import JointAngle, JointDisplacement
 from ....mechanism.loads import ForceElement, SpringDamper, TorsionSpringDamper
 from ....mechanism.mechanism import GROUND, Mechanism, Point
-from ....mechanism.motions import Absolute, Motion, Table
+from ....mechanism.motions import Absolute, JointAngle, JointDisplacement, Motion, Table
 from ....trajectory import Array
 from ...case import Case, Sweep, Truth
 from ...closing import within_digits
-from ...io.coordinates import with_all_motions
 from ...io.document import SMALLEST, explained, fault, usable
+from ...io.outputs import with_all_motions
 from ...io.reader_options import LEFT_OUT, Supplied
 from .assembly import Assembled, assemble
 from .driving import Driving, choose_held, read_driving, read_start

@@ -24,7 +24,7 @@ FIXED = (WORLD, GROUND)
 
 
 Freedom: TypeAlias = tuple[str, Kind, Vec3]
-"""End of a move's name, after that of its joint, its kind and its axis."""
+"""A move: the end of its name, which begins with its joint's, its kind and its axis."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class Graph:
     """Links and joints of a file, global in its zero pose; a reader fills it.
 
     Attributes:
-        tree: takes what is no link, joint or tie; links, joints and ties when they are hung.
+        tree: takes all but links, joints and ties; links, joints and ties when they are hung.
         places: of the links.
         elements: of the links, for messages.
         fixed: links of the world.
@@ -171,8 +171,8 @@ class _Hanging:
     """The tree of a graph during its making.
 
     Attributes:
-        inside: what hangs on each link, in order.
-        closures: what closes the loops, between links of the graph or copies.
+        inside: parts that hang on each link, in order.
+        closures: joints that close the loops, between links of the graph or copies.
     """
 
     def __init__(self, graph: Graph) -> None:

@@ -1,4 +1,4 @@
-"""Elements that URDF and SDF have alike: masses, springs, Drake's own, and those that are not read.
+"""Elements that URDF and SDF have alike: masses, springs, Drake's own, and unread ones.
 
 Motion needs neither masses nor springs: what makes no sense of them is counted and left out. Three
 ball constraints of two links hold them together as a whole; `kincheck export --to sdf` closes its
@@ -37,7 +37,7 @@ FRICTION = ("friction", "drake:rotor_inertia", "drake:gear_ratio")
 LAW = ("damping", "spring_stiffness", "spring_reference")
 """Those that have one."""
 STRUT_LAW = ("stiffness", "damping", "free_length")
-"""What Drake's element between two points has of its own."""
+"""Own keys of Drake's element between two points."""
 
 # What is seen, touched or measured joins nothing.
 _APART = words(
@@ -217,9 +217,9 @@ class Unread:
 
     Attributes:
         links: links by their names, and by those of frames on them.
-        joints: joints by what they are called.
-        followers: joints that follow another one, and this one.
-        advice: what to write in place of a joint that is not read.
+        joints: joints by name.
+        followers: joints with the one they follow.
+        advice: the remedy for a joint of an unknown type.
     """
 
     links: Mapping[str, str]
@@ -239,7 +239,7 @@ class Unread:
         """Refuse an element that names two links, or couples joints.
 
         Args:
-            around: the link or joint that the element around it names.
+            around: the link or joint named by the element around it.
 
         Raises:
             CaseError: it does.
