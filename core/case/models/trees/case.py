@@ -60,10 +60,10 @@ def case_of(tree: Tree, supplied: Supplied) -> Case:
         CaseError: the options do not say how it moves, its start does not close, or there is no
             joint for one of its ties.
     """
-    return _Parts(*posed(tree, supplied)).case()
+    return _Parts(*model_of(tree, supplied)).case()
 
 
-def posed(tree: Tree, supplied: Supplied) -> tuple[Assembled, Driving, Mapping[str, Spin]]:
+def model_of(tree: Tree, supplied: Supplied) -> tuple[Assembled, Driving, Mapping[str, Spin]]:
     """Return a tree in its closed start, its driven and held moves, and its links that spin.
 
     Raises:
@@ -119,7 +119,7 @@ class _Parts:
     def case(self) -> Case:
         """Return the case, without rows that are redundant within the digits."""
         tree, model, closing = self.tree, self.model, self.model.closing
-        bodies = [*self._weighed()]
+        bodies = [*self._bodies()]
         weighed = any(body.mass for body in bodies)
         with explained(tree.file):
             drivers = [
@@ -194,7 +194,7 @@ class _Parts:
                 self._couple(each)
             elif id(each) not in replaced:
                 name = self._unused(each.name)
-                self.joints[name] = _closed(each, name)
+                self.joints[name] = _joint_of(each, name)
         for spin in self.spins.values():
             if not spin.is_rod:
                 name = self._unused(f"{spin.move.inner}: no spin")
@@ -246,7 +246,7 @@ class _Parts:
             if body in moving:
                 yield Point(f"site {site}" if site in named else site, body, coordinates(place.at))
 
-    def _weighed(self) -> Iterator[Body]:
+    def _bodies(self) -> Iterator[Body]:
         """Yield the bodies with their masses.
 
         A rod that is a distance has its mass at its ends, which is right for its weight and not for
@@ -271,7 +271,7 @@ class _Parts:
             e0, e1, e2, e3 = (float(x) if abs(x) >= SMALLEST else 0.0 for x in place.turn)
             body = Body(name, coordinates(place.at), (e0, e1, e2, e3), name in self.fixed)
             if masses[name] and not body.fixed:
-                heavy = _weighed(body, together(masses[name]))
+                heavy = _with_mass(body, together(masses[name]))
                 if heavy is None:
                     unknown.add(name)
                 body = heavy or body
@@ -358,7 +358,7 @@ def _locked(tree: Tree) -> set[str]:
     return found
 
 
-def _closed(closure: Closure, name: str) -> Joint:
+def _joint_of(closure: Closure, name: str) -> Joint:
     """Return the joint of a closure; a remaining gap is divided."""
     p, q = (place.at for place in closure.places)
     if closure.holds == "distance":
@@ -381,7 +381,7 @@ def _lump(rod: Mass, spin: Spin, masses: Mapping[str, list[Mass]]) -> bool:
     return True
 
 
-def _weighed(body: Body, mass: Mass) -> Body | None:
+def _with_mass(body: Body, mass: Mass) -> Body | None:
     """Return a body with a mass given in global axes; None if no rigid body has it, as no one has a
     moment of inertia alone.
     """

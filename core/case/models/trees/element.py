@@ -152,7 +152,7 @@ class Element:
         text = self.attributes.get(name)
         if text is not None:
             advice = "expand its macros: xacro FILE" if "${" in text else "correct the attribute"
-            return self._parsed(text, counts, f"{name}: ", advice)
+            return self._parse(text, counts, f"{name}: ", advice)
         if default is None:
             raise self.fault(f"{name}: missing, expected {_numbers(counts)}; add the attribute")
         return tuple(default)
@@ -171,7 +171,7 @@ class Element:
         """
         if not self.text and default is not None:
             return tuple(default)
-        return self._parsed(self.text, counts, "", "correct the text")
+        return self._parse(self.text, counts, "", "correct the text")
 
     def value(self, tag: str, count: int) -> tuple[float, ...]:
         """Return the numbers of the child of a tag, in its text or its attribute; zeros without
@@ -197,7 +197,7 @@ class Element:
             raise self.fault(f"{name}: missing, expected a name; add the attribute")
         return found
 
-    def _parsed(
+    def _parse(
         self, text: str, counts: Sequence[int], before: str, advice: str
     ) -> tuple[float, ...]:
         try:
