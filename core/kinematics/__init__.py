@@ -12,6 +12,7 @@ Solve:
     find_assemblies    all closed poses
     followed_angle     the angle of a joint with its turns, followed from the design
     followed_attitude  the attitude of a body with its turns, followed from the design
+    count_turns        an angle known up to whole turns, from sample to sample
     residuals          what poses from elsewhere leave of the rows, and what their digits allow
     NativeSolver       settings of the solver; makes a mechanism ready for a path (`prepare`) or for
                        many designs (`prepare_designs`), and tells the size of its programs
@@ -108,6 +109,7 @@ if TYPE_CHECKING:
     from .program_size import ProgramSize as ProgramSize
     from .replay import Residuals as Residuals
     from .replay import Worst as Worst
+    from .replay import count_turns as count_turns
     from .replay import judged_part as judged_part
     from .replay import replayed as replayed
     from .replay import residuals as residuals
@@ -161,7 +163,7 @@ _NAMES = {
     "one_design": "solve",
     "prepared_designs": "PreparedDesigns",
     "program_size": "ProgramSize",
-    "replay": "Residuals Worst judged_part replayed residuals",
+    "replay": "Residuals Worst count_turns judged_part replayed residuals",
     "solver_selection": "Solver followed_angle followed_attitude follower",
     "structure.driver_count": "degrees_of_freedom require_driven",
     "structure.reduction": "largest_residual reduce_rows",
