@@ -41,11 +41,9 @@ def measured(measure: Measure, **options: Any) -> Any:
 
 @dataclass(frozen=True)
 class Motion(ABC):
-    """Base of the motions. Declaring one with a type registers it; case files name it. Those of
-    recordings have none.
-    """
+    """Base of the motions. Declaring one with a type registers it; case files name it."""
 
-    type: ClassVar[str] = ""
+    type: ClassVar[str]
     registry: ClassVar[dict[str, type[Motion]]] = {}
 
     def __init_subclass__(cls) -> None:
