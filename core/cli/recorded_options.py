@@ -32,8 +32,31 @@ def add_options(run: argparse.ArgumentParser) -> None:
         ),
     )
     group.add_argument(
+        "--engine-command",
+        action="append",
+        default=[],
+        metavar="COMMAND",
+        help=(
+            'a program as an engine: "prog {case} {samples} {out}" reads the case (TOML) and its'
+            " samples (CSV), and writes outputs or poses (CSV)"
+        ),
+    )
+    group.add_argument(
         "--analysis", metavar="NAME", help="one of several analyses of results of Adams"
     )
+
+
+def program_engines(options: argparse.Namespace) -> list[Engine]:
+    """Return the programs of --engine-command as engines.
+
+    Raises:
+        KincheckError: a command has another form.
+    """
+    if not options.engine_command:
+        return []
+    from ..recorded.program import ProgramEngine
+
+    return [ProgramEngine(command) for command in options.engine_command]
 
 
 def recorded_engines(options: argparse.Namespace, case: Case) -> tuple[Case, list[Engine]]:

@@ -162,7 +162,16 @@ def _planned(options: argparse.Namespace, registry: Registry, to: Destinations) 
         except KincheckError as error:
             problems += str(error).splitlines()
     engines, baseline = _engines(options, registry, problems)
-    engines += recorded
+    try:
+        engines += [*recorded_options.program_engines(options), *recorded]
+    except KincheckError as error:
+        problems += str(error).splitlines()
+    keys = [(engine.name, engine.mode) for engine in engines]
+    problems += [
+        f"engine {name}: found twice; rename one"
+        for name, mode in keys
+        if keys.count((name, mode)) > 1
+    ][:1]
     problems += to.problems(history=options.history)
     problems = problems or execution_options.unreachable(options)
     # With output files or a history, a run without readable cases is recorded too, so that it does

@@ -10,6 +10,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..case.case import Case, Quantity, Series, Sweep
 from ..case.measures import ForceMeasure
@@ -44,7 +45,7 @@ class RecordedEngine:
     accuracy: Accuracy
     mode = RECORDED
     loop = "none"
-    in_process = True
+    in_process = untimed = True
 
     @property
     def settings(self) -> Mapping[str, Any]:
@@ -75,6 +76,17 @@ class RecordedEngine:
 
     def solve(self, model: None, case: Case, tol: float) -> Reported:
         """Return the recorded outputs, judged by the rows if poses are recorded."""
+        return self.report(case)
+
+    def report(
+        self, case: Case, solved: NDArray[np.bool_] | None = None, message: str = ""
+    ) -> Reported:
+        """Return the outputs and the verdict of the rows.
+
+        Args:
+            solved: samples with values, shape (n,); all by default.
+            message: on the others.
+        """
         outputs = {output.name: self._series(case, output) for output in case.outputs}
         judged = judge_rows(case, self.samples, self.accuracy)
         standard = {**self._native, **case.reference}
@@ -99,6 +111,8 @@ class RecordedEngine:
             faults=judged.faults,
             judged=bool(judged.largest),
             details=details,
+            solved=solved,
+            message=message,
         )
 
     def _series(self, case: Case, output: Quantity) -> Series:
@@ -115,7 +129,7 @@ class RecordedEngine:
             values, halves = self._of_poses(case, output)
         position = values[0]
         if position is None:
-            lack = "the recording has no column of it, and no poses of its bodies"
+            lack = "there is no column of it, and no poses of its bodies"
             return Series(np.full(count, np.nan), possible=False, reason=lack)
         if not self.resampled.rated:
             values = [position, None, None]

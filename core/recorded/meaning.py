@@ -108,14 +108,19 @@ class Meaning:
         return [*self.numbers.values(), *poses]
 
 
-def targets_of(case: Case) -> dict[str, str]:
-    """Return the possible names of a column, with their SI units."""
+def inputs_of(case: Case) -> dict[str, str]:
+    """Return the possible names of columns of time and drivers, with their SI units."""
     units = {TIME: "s"}
     for driver in case.mechanism.drivers:
         si = "rad" if driver.turns else "m"
         rates = zip(("", *DERIVATIVES), ("", "/s", "/s^2"), strict=True)
         units |= {driver.name + ending: si + per for ending, per in rates}
-    return units | known_columns(case.outputs)
+    return units
+
+
+def targets_of(case: Case) -> dict[str, str]:
+    """Return the possible names of a column, with their SI units."""
+    return inputs_of(case) | known_columns(case.outputs)
 
 
 @dataclass
