@@ -153,7 +153,7 @@ def _planned(options: argparse.Namespace, registry: Registry, to: Destinations) 
         except KincheckError as error:
             problems += str(error).splitlines()
     curve = curve_options(options)
-    if not options.reference and not options.recorded and curve != type(curve)():
+    if not (options.reference or options.recorded or options.fmu) and curve != type(curve)():
         problems.append("options for measured curves need a curve: give --reference FILE")
     if options.reference and not problems:
         try:
@@ -163,7 +163,7 @@ def _planned(options: argparse.Namespace, registry: Registry, to: Destinations) 
             problems += str(error).splitlines()
     engines, baseline = _engines(options, registry, problems)
     try:
-        engines += [*recorded_options.program_engines(options), *recorded]
+        engines += [*recorded_options.foreign_engines(options, cases), *recorded]
     except KincheckError as error:
         problems += str(error).splitlines()
     keys = [(engine.name, engine.mode) for engine in engines]

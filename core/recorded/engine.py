@@ -182,8 +182,8 @@ class RecordedEngine:
         found: dict[str, Stated] = {}
         for name, use in self.samples.meaning.numbers.items():
             column = self.samples.recording.columns[use.column]
-            unit, size = unit_of(self.samples.recording, use)
-            offset = use.offset * size
+            recording = self.samples.recording
+            unit, size, offset = unit_of(recording.file, column.head, use, recording.angle)
             found[name] = Stated(column.head.name, use.sign, offset, unit, size, use.si)
         return found
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
@@ -259,13 +260,18 @@ class _Change:
         own, sweep = self.stated[self.lead], self.sweep
         rate = sweep.rate if self.lead == TIME != sweep.driver else 1.0
         size = own.size * abs(factor)
-        for decimals in range(13):
-            offset = (factor * own.offset + zero / rate) / size
+        exact = (factor * own.offset + zero / rate) / size
+        turn = 2.0 * math.pi / size
+        # the angle of a driver without its whole turns, if they do not matter
+        places = [math.remainder(exact, turn)] * (own.si == "rad") + [exact]
+        for offset, decimals in product(dict.fromkeys(places), range(13)):
             short = round(offset, decimals)
             rest = self._rest(factor, rate * (short * size - factor * own.offset))
             if rest is None:
                 continue
             maps = [_map(own, self.lead, factor * own.sign, short, unit)]
+            if short and unit != own.unit:  # a unit beside an offset is that of the offset
+                maps = [f"column {own.column} in {unit} and", *maps]
             fits, largest = True, (0.0, "")
             for each, sign, middle, left, _ in rest:
                 total = 0.0

@@ -58,8 +58,7 @@ class Use:
 
     Attributes:
         si: SI unit of the quantity.
-        unit: of the column as the user states it; empty for the unit of the head.
-        offset: in the unit of the column.
+        unit: as the user states it, of the offset and of a column without a unit.
     """
 
     column: int
@@ -328,21 +327,33 @@ def _term(text: str, known: Collection[str]) -> tuple[str, float, float] | None:
     return None
 
 
-def unit_of(recording: Recording, use: Use) -> tuple[str, float]:
-    """Return the unit of a column, and its size in SI.
+def unit_of(file: Path, head: Head, use: Use, angle: str = "") -> tuple[str, float, float]:
+    """Return the unit of a column and its size in SI, and the offset in SI.
+
+    A stated unit is that of the offset, and of a column without one; without an offset it replaces
+    the column's.
+
+    Args:
+        angle: unit of angles without one.
 
     Raises:
-        CaseError: the unit is unknown, or of something else.
+        CaseError: a unit is unknown, or of something else.
     """
-    head = recording.columns[use.column].head
-    unit = use.unit or head.unit or use.si.replace("rad", recording.angle or "rad")
-    return unit, required_unit(recording.file, "", head.name, unit, use.si).convert(1.0)
+
+    def size_of(unit: str) -> float:
+        return required_unit(file, "", head.name, unit, use.si).convert(1.0)
+
+    own = head.unit or use.si.replace("rad", angle or "rad")
+    stated = use.unit or own
+    unit = own if head.unit and use.offset else stated
+    return unit, size_of(unit), use.offset * size_of(stated)
 
 
 def si_values(recording: Recording, use: Use) -> Column:
     """Return a column as its quantity, in SI; see `unit_of`."""
-    column, (_, size) = recording.columns[use.column], unit_of(recording, use)
-    values = (use.sign * column.values + use.offset) * size
+    column = recording.columns[use.column]
+    _, size, offset = unit_of(recording.file, column.head, use, recording.angle)
+    values = use.sign * size * column.values + offset
     return Column(column.head, values, column.half * abs(use.sign) * size)
 
 

@@ -29,7 +29,7 @@ from ..mechanism.mechanism import Mechanism
 from ..primitives.base import Pose as Placed
 from ..primitives.base import Twist
 from ..trajectory import Array, BodyMotion, PointMotion
-from .meaning import EVENT, MAP, Meaning, Pose, si_values
+from .meaning import EVENT, MAP, Meaning, Pose, si_values, unit_of
 from .recording import Column, Recording
 
 # Two steps may be equal by chance.
@@ -135,6 +135,12 @@ def _assumed(recording: Recording, meaning: Meaning) -> Iterator[str]:
         if not (use.unit or recording.columns[use.column].head.unit or use.si == "1")
         and not ("rad" in use.si and recording.angle)
     }
+    for use in meaning.uses:
+        head = recording.columns[use.column].head
+        unit, *_ = unit_of(recording.file, head, use)
+        if head.unit and unit != head.unit:
+            text = f"column {head.name} is taken in {unit}, as stated, and not in {head.unit}"
+            yield f"{recording.file}: {text}"
     if bare:
         units = " and ".join(dict.fromkeys(bare.values()))
         names = shortened([*bare], MOST_NAMED)
