@@ -12,6 +12,7 @@ from itertools import product
 import numpy as np
 
 from ..case.case import TIME, Case, Quantity, Series, Sweep
+from ..case.io.reference_columns import DERIVATIVES
 from ..errors import shortened
 from ..harness.compare import deviation
 from ..harness.slips import Held, Uncertain, slips
@@ -136,7 +137,8 @@ def explained(
     if not off or lead not in stated:
         return sentences
     free = not all_known
-    readings = [*dict.fromkeys(_of_driver(case, off, stated, lead, sweep, solve, free=free))]
+    phrases = dict.fromkeys(_of_driver(case, off, stated, lead, sweep, solve, free=free))
+    readings = sorted(phrases, key=lambda text: (text.count(MAP), len(text)))  # the simplest first
     if not readings:
         return sentences
     return [*sentences * all_known, f"{' or '.join(readings[:_NAMED])}: say so if it is meant"]
@@ -176,12 +178,13 @@ def _of_driver(
                 dense = np.linspace(*ends, _DENSE)
                 curves = change.curves(dense)
                 left = [change.left(curves, dense, factor * x + zero) for zero in grid.tolist()]
-                best = [k for k in np.argsort(left).tolist() if left[k] < math.inf]
+                around = [math.inf, *left, math.inf]
+                lowest = [k for k, x in enumerate(left) if math.inf > x <= min(around[k : k + 3])]
+                best = sorted(lowest, key=left.__getitem__)
                 zeros = [float(grid[k]) for k in best[:_TRIED]]
             for zero in zeros:
                 if found := change.refined(unit, factor, zero):
                     yield found
-                    break
 
 
 @dataclass(frozen=True, eq=False)
@@ -284,6 +287,9 @@ class _Change:
                     if sign < 0.0 or total != column.offset / column.size:
                         part = each.output.name, sign * column.sign, total, column.unit
                         maps.append(_map(column, *part))
+                    for key in (f"{each.output.name}{ending}" for ending in DERIVATIVES):
+                        if sign < 0.0 and (rate := self.stated.get(key)):
+                            maps.append(_map(rate, key, -rate.sign, 0.0, rate.unit))
                 fits = fits and each.fits(left - middle)
                 largest = max(largest, (float(np.abs(left - middle).max()), each.output.unit))
             if fits:

@@ -67,8 +67,9 @@ class ProgramEngine:
 
     @property
     def name(self) -> str:
-        """The program's name."""
-        return Path(shlex.split(self.command)[0]).stem
+        """The stem of the program, or of its script: the last word that is a file."""
+        first, *others = shlex.split(self.command)
+        return Path(next((word for word in others[::-1] if Path(word).is_file()), first)).stem
 
     @property
     def settings(self) -> Mapping[str, str]:
@@ -76,9 +77,12 @@ class ProgramEngine:
         return {"command": self.command}
 
     def version(self) -> str | None:
-        """Return the digest of the program, or None if there is none."""
-        found = shutil.which(shlex.split(self.command)[0])
-        return found and hashlib.sha256(Path(found).read_bytes()).hexdigest()[:12]
+        """Return the digest of the program and its scripts, or None if there is none."""
+        first, *others = shlex.split(self.command)
+        if (found := shutil.which(first)) is None:
+            return None
+        files = [Path(found), *(Path(word) for word in others if Path(word).is_file())]
+        return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()[:12]
 
     def unsupported(self, case: Case) -> str | None:
         """Return a reason if no case file can express the case; the program itself has its say

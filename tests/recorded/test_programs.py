@@ -114,7 +114,7 @@ assert [float(x) for x in rows[1]] == [-0.5, -1.0, 2.0, 0.0]
 sys.exit(3)
 """
     _, record = judged(program, "{case} {samples} {out}")
-    assert (record["outcome"], record["message"]) == ("unsupported", "python refuses the case")
+    assert (record["outcome"], record["message"]) == ("unsupported", "crank refuses the case")
 
 
 @pytest.mark.parametrize(

@@ -167,10 +167,15 @@ ANGLES = ["--map", "MOTION_1=crank", "--map", "JOINT_4.angle=rocker"]
 
 
 def test_other_zeros_are_explained_and_then_pass(judged):
-    status, record = judged(DATA / "fourbar_angles.csv", *ANGLES)
+    rate = ["--map", "JOINT_4.angle.velocity=rocker rate"]
+    status, record = judged(DATA / "fourbar_angles.csv", *ANGLES, *rate)
     stated = re.findall(r'--map "([^"]*)"', record["message"])
     assert status == 1
-    assert stated == ["MOTION_1=crank-50 [deg]", "JOINT_4.angle=-rocker+90 [deg]"]
+    assert stated == [
+        "MOTION_1=crank-50 [deg]",
+        "JOINT_4.angle=-rocker+90 [deg]",
+        "JOINT_4.angle.velocity=-rocker rate [deg/s]",
+    ]
     options = [word for text in stated for word in ("--map", text)]
     status, record = judged(DATA / "fourbar_angles.csv", *options)
     assert status == 0
