@@ -1,23 +1,101 @@
 """Forces of a solved motion by a simulator's own inverse dynamics: J^T lambda = M a + h - Q.
 
 J has the rows of the projection, for joints, relations and drivers. Messages name forces that
-redundant rows leave undetermined by joint and direction, as in the native engine.
+redundant rows leave undetermined by joint and direction, as in the native engine. Force elements
+act on frames of simulators without such elements, or with elements of another meaning. No engine
+solves rows that are left out within the digits of a case; they count where forces are undetermined.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
 from ...core.case.case import Case
 from ...core.forces import Forces, Multipliers, Reaction, in_wrenches
-from ...core.mechanism.loads import Torque, TorsionSpringDamper
+from ...core.joints import Joint
+from ...core.joints.base import unit
+from ...core.mechanism.loads import (
+    Axes,
+    Force,
+    ForceElement,
+    SpringDamper,
+    Torque,
+    TorsionSpringDamper,
+)
+from ...core.mechanism.mechanism import Mechanism, Vector
 from ...core.trajectory import Array
-from .pose_solver import Sample
-from .projection_model import ProjectionModel
+from .constraints import CLOSURES, BodyFrame, FrameOnBody, by_frame
+from .pose_solver import ProjectionModel, Sample
+from .tree_plan import ends_of
+
+
+def places(each: ForceElement, mechanism: Mechanism) -> Sequence[tuple[str, Vector]]:
+    """Return the bodies of an element, and its points on them, global at design [m]."""
+    if isinstance(each, SpringDamper):
+        return list(zip(each.bodies, each.points, strict=True))
+    if isinstance(each, TorsionSpringDamper):
+        joint: Any = mechanism.joint(each.joint)
+        return [(body, joint.point) for body in joint.bodies]
+    if isinstance(each, Force):
+        return [(each.body, each.point)]
+    assert isinstance(each, Torque)
+    body = each.body
+    return [(body, (0.0, 0.0, 0.0) if mechanism.is_fixed(body) else mechanism.body(body).origin)]
+
+
+@dataclass(frozen=True, eq=False)
+class Element:
+    """A force element on frames of a simulator.
+
+    Attributes:
+        frames: one frame on each body of the element, at its point.
+        axis: unit vector of the joint of a torsional spring-damper, at design.
+        angle: returns the angle of this joint [rad].
+    """
+
+    given: ForceElement
+    frames: Sequence[FrameOnBody]
+    axis: Array
+    angle: Callable[[], float]
+
+    def at_work(self) -> tuple[float, Sequence[Array]]:
+        """Return the amount (see `core.forces.Forces.elements`), and the wrench on the body of each
+        frame, force over moment about its point.
+        """
+        each = self.given
+        if isinstance(each, SpringDamper):
+            i, j = self.frames
+            d = j.position - i.position
+            length = float(np.sqrt(d @ d))
+            along = d / length
+            rate = float(along @ (j.velocity - i.velocity)[:3])
+            tension = each.stiffness * (length - (each.free_length or 0.0)) + each.damping * rate
+            pull = np.concatenate([tension * along, np.zeros(3)])
+            return tension, (pull, -pull)
+        if isinstance(each, TorsionSpringDamper):
+            i, j = self.frames
+            axis = i.rotation @ self.axis
+            rate = float(axis @ (j.velocity - i.velocity)[3:])
+            amount = -(each.stiffness * (self.angle() - each.free_angle) + each.damping * rate)
+            twist = np.concatenate([np.zeros(3), amount * axis])
+            return amount, (-twist, twist)
+        assert isinstance(each, Force | Torque)
+        vector = np.array(each.vector)
+        turned = vector if each.frame is Axes.GLOBAL else self.frames[0].rotation @ vector
+        parts = (np.zeros(3), turned) if isinstance(each, Torque) else (turned, np.zeros(3))
+        return float(np.linalg.norm(vector)), (np.concatenate(parts),)
+
+
+def axis_of(each: ForceElement, mechanism: Mechanism) -> Array:
+    """Return the unit axis of a torsional spring-damper's joint; for other elements, zero."""
+    if not isinstance(each, TorsionSpringDamper):
+        return np.zeros(3)
+    joint: Any = mechanism.joint(each.joint)
+    return np.array([*unit(joint.axis)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,3 +231,68 @@ def _multipliers(given: Sequence[_Given]) -> Multipliers:
         np.flatnonzero(given[0].columns.any(axis=1)).tolist(),
         len(given[0].dynamics.left_out),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class RowWrench:
+    """Wrenches of unit multipliers on a body.
+
+    Attributes:
+        rows: indices of the rows.
+        body: number of the body.
+        point: point of the body, global.
+        wrenches: wrench of each row, force over moment about the point, shape (rows, 6).
+    """
+
+    rows: slice
+    body: int
+    point: Array
+    wrenches: Array
+
+
+@dataclass(frozen=True, eq=False)
+class LeftOut:
+    """Conditions that are left out.
+
+    Attributes:
+        of: name of the joint that they belong to, as given.
+        joint: a joint with these conditions.
+        frames: of a simulator on its bodies; see `constraints.Frame`.
+    """
+
+    of: str
+    joint: Joint
+    frames: Sequence[Any]
+
+    def rows(self, first: int) -> tuple[Array, list[RowWrench]]:
+        """Return the rows of the conditions, and what unit multipliers exert on the bodies.
+
+        Args:
+            first: index of the first row.
+        """
+        i, j = (
+            BodyFrame(each.body, None, each.position, each.rotation, each.jacobian)
+            for each in self.frames
+        )
+        found, exerted = list[Array](), list[RowWrench]()
+        for condition in CLOSURES[type(self.joint)].conditions(self.joint, i, j):
+            found.append(np.atleast_2d(condition.rows()[1]))
+            rows = slice(first, first := first + len(found[-1]))
+            exerted += [
+                RowWrench(rows, frame.body, frame.position, wrenches)
+                for frame, wrenches in zip((i, j), by_frame(condition, (i, j)), strict=True)
+            ]
+        return np.vstack(found), exerted
+
+
+def left_out_of(mechanism: Mechanism, frame: Callable[[str, Vector], Any]) -> list[LeftOut]:
+    """Return the conditions left out of a mechanism.
+
+    Args:
+        frame: returns a frame on a body, at a point, global at design.
+    """
+    return [
+        LeftOut(each.joint.name, joint, [*map(frame, joint.bodies, ends_of(mechanism, joint))])
+        for each in mechanism.reduced
+        for joint in each.left_out
+    ]

@@ -14,11 +14,27 @@ from ..kinematics import places
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.motions import Absolute, Motion, Path, Ramp
 from ..trajectory import Array
-from .hardpoint import Hardpoint
 from .quantity import MARKER as MARKER
 from .quantity import ORDERS as ORDERS
 from .quantity import Output as Output
 from .quantity import Quantity
+
+
+@dataclass(frozen=True, eq=False)
+class Hardpoint:
+    """A row of a table of hardpoints. Joints, axes and points follow it, on both sides of an axle.
+
+    Attributes:
+        name: as in the table.
+        roles: names in the template of the suspension.
+        moves: derivatives of the numbers of each following place, see `kinematics.places`, by x, y
+            and z of the table [m/m], shape (numbers, 3). They are constant.
+    """
+
+    name: str
+    roles: tuple[str, ...]
+    moves: Mapping[str, Array]
+
 
 TIME = "time"
 """Name of the driver in a sweep of time."""

@@ -13,10 +13,10 @@ from ..errors import SolveError, UnknownNameError
 from ..mechanism.mechanism import GROUND, Mechanism
 from ..mechanism.motions import Path
 from ..trajectory import QUANTITIES, Array, BodyMotion, Trajectory
-from .forces.force_rows import ForceRows
-from .forces.motion_lanes import MotionLanes
+from .forces.reactions import ForceRows, MotionLanes
 from .formulation.cartesian import Cartesian
-from .formulation.constraints import Constraint, Relation, frames
+from .formulation.constraints import Constraint, frames
+from .formulation.formulation import Relation
 
 WIDTHS = {"poses": 7, "velocities": 6, "accelerations": 6}
 """Numbers of a body, by argument of `residuals`."""

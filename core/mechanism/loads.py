@@ -15,7 +15,7 @@ from typing import Any, ClassVar, Self, cast
 from ..errors import MechanismError, Phrase
 from ..input_checks import finite, held, plain, require_finite, triple
 from ..joints.base import Joint, Kind, position, positions
-from .dimension import (
+from .body import (
     ANGLE,
     DAMPING,
     FORCE,

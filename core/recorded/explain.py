@@ -12,7 +12,7 @@ from itertools import product
 import numpy as np
 
 from ..case.case import TIME, Case, Quantity, Series, Sweep
-from ..case.io.reference_columns import DERIVATIVES
+from ..case.io.reference_samples import DERIVATIVES
 from ..errors import shortened
 from ..harness.compare import deviation
 from ..harness.slips import Held, Uncertain, slips
@@ -288,8 +288,8 @@ class _Change:
                         part = each.output.name, sign * column.sign, total, column.unit
                         maps.append(_map(column, *part))
                     for key in (f"{each.output.name}{ending}" for ending in DERIVATIVES):
-                        if sign < 0.0 and (rate := self.stated.get(key)):
-                            maps.append(_map(rate, key, -rate.sign, 0.0, rate.unit))
+                        if sign < 0.0 and (own_rate := self.stated.get(key)):
+                            maps.append(_map(own_rate, key, -own_rate.sign, 0.0, own_rate.unit))
                 fits = fits and each.fits(left - middle)
                 largest = max(largest, (float(np.abs(left - middle).max()), each.output.unit))
             if fits:

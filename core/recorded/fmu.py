@@ -21,7 +21,7 @@ import numpy as np
 
 from ..case.case import TIME, Case
 from ..case.io.document import fault, read_bytes
-from ..case.models.mjcf.elements import Element, parse_xml
+from ..case.models.trees.element import Element, parse_xml
 from ..errors import MOST_NAMED, KincheckError, shortened
 from ..extras import how_to_install, installed_version
 from ..harness.reported import Reported

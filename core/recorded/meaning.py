@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ..case.case import TIME, Case
-from ..case.io.column_units import required_unit
 from ..case.io.document import decimal, fault, shown, unknown_name
-from ..case.io.reference_columns import DERIVATIVES, known_columns
+from ..case.io.reference_samples import DERIVATIVES, known_columns
+from ..case.io.table import required_unit
 from ..errors import MOST_NAMED, brief, shortened
 from ..trajectory import QUANTITIES
 from .attitudes import ORDERS, SEQUENCES, Reading

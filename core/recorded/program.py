@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from ..case.case import TIME, Case, Truth
-from ..case.io.case_writer import case_text
+from ..case.io.case_file import case_text
 from ..case.io.document import fault
 from ..errors import CaseError, KincheckError, SolveError, UnsupportedError, number_of
 from ..harness.reported import Reported

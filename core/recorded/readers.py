@@ -6,17 +6,17 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..case.io.column_units import unit_of_head
 from ..case.io.document import fault, read_bytes, read_text, shown
-from ..case.io.reference_table import from_table
-from ..case.models.mjcf.elements import Element, parse_xml
+from ..case.io.reference_samples import head_of, read_table, samples_of
+from ..case.io.table import unit_of_head
+from ..case.models.trees.element import Element, parse_xml
 from ..errors import CaseError, brief, remedy
 from ..trajectory import Array
 from .recording import Choose, Column, Head, Recording, column_of
@@ -69,23 +69,16 @@ def read_recording(
 
 
 def _of_table(file: Path, choose: Choose, sheet: str | None) -> Recording:
-    heads: list[Head] = []
-    chosen: list[int] = []
-
-    def choose_heads(file: Path, where: str, texts: Sequence[str]) -> Sequence[int]:
-        heads[:] = [Head(*unit_of_head(file, where, text)) for text in texts]
-        chosen[:] = choose(heads)
-        return chosen
-
     opensim = file.suffix.lower() in _OPENSIM
-    above = _END if opensim else ""
-    samples = from_table(file, sheet, "--sheet NAME", choose_heads, gaps=True, above=above)
-    numbers = np.array([row for _, row in samples.rows])
+    table = read_table(file, sheet, "--sheet NAME", _END if opensim else "")
+    where, texts = head_of(table)
+    chosen = choose([Head(*unit_of_head(file, where, text)) for text in texts])
+    samples = samples_of(table, chosen, gaps=True)
     columns: dict[int, Column] = {}
     for k, values, printed, text in zip(
-        chosen, numbers.T, samples.printed, samples.columns, strict=True
+        chosen, samples.numbers.T, samples.printed, samples.columns, strict=True
     ):
-        head = Head(*unit_of_head(file, samples.header, text))  # with the unit of a row of units
+        head = Head(*unit_of_head(file, where, text))  # with the unit of a row of units
         columns[k] = Column(head, values, printed.half(np.nan_to_num(values)))
     if not opensim:
         return Recording(file, columns)

@@ -9,8 +9,8 @@ from typing import TypeAlias
 
 import numpy as np
 
+from ..case.curves import Printed
 from ..case.io.document import decimal, fault, shown
-from ..case.printed import Printed
 from ..trajectory import Array
 
 

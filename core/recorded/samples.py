@@ -15,17 +15,17 @@ from numpy.typing import NDArray
 
 from ..algebra import ZERO, Vec3, cross, quat, triple, vec
 from ..case.case import TIME, Case, Quantity
+from ..case.curves import even_steps, multiples
 from ..case.io.document import fault, shown
 from ..case.measures import JointAngle, JointDisplacement
-from ..case.printed import even_steps, multiples
 from ..case.quantity import Output, with_markers
 from ..errors import MOST_NAMED, number_of, shortened
 from ..jet import Jet
 from ..joints.base import unit
 from ..kinematics import count_turns
 from ..mechanism.body import Body
-from ..mechanism.drivers import Driver, JointDriver, PointCoordinate
 from ..mechanism.mechanism import Mechanism
+from ..mechanism.motions import Driver, JointDriver, PointCoordinate
 from ..primitives.base import Pose as Placed
 from ..primitives.base import Twist
 from ..trajectory import Array, BodyMotion, PointMotion

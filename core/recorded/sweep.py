@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..case.case import TIME, Case, Series, Sweep, Truth
-from ..case.interpolation import matched
+from ..case.curves import matched
 from ..case.io.document import fault, shown
 from ..case.io.schema import MOST_SAMPLES
 from ..mechanism.motions import Absolute, Motion, Table

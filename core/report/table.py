@@ -17,6 +17,7 @@ from ..harness.record import Deviation, Outcome, Record, Results
 from ..trajectory import QUANTITIES
 from ..unit_text import motion_word
 from . import terminal
+from .travel_table import print_travel
 
 COLOURS = {
     Outcome.PASS: "green",
@@ -49,6 +50,7 @@ def print_table(results: Results, file: TextIO) -> None:
         console.print(table)
     elif rows:
         _print_by_case(rows, console)
+    print_travel(results, console)
     print_messages(results, console)
 
 
