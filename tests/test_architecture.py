@@ -20,6 +20,7 @@ LAYERS = (
     ("kinematics",),
     ("case",),
     ("harness",),
+    ("recorded",),
     ("history",),
     ("report",),
     ("studies",),
@@ -78,6 +79,7 @@ IMPORTS = {
     "harness": (". program/llvm joints mechanism kinematics case case/suspension case/io"),
     "harness/workers": ". harness",
     "harness/reporting": "",
+    "recorded": (". primitives joints mechanism kinematics case case/io case/models/trees harness"),
     "history": ". case case/io harness",
     "report": ". joints mechanism case case/io harness history",
     "studies/variation": ". joints mechanism kinematics case case/io",
@@ -105,7 +107,7 @@ IMPORTS = {
     "cli": (
         ". program program/llvm joints kinematics case "
         "case/io case/models/hardpoints case/models harness harness/workers history "
-        "report studies/variation studies/stress/families studies "
+        "recorded report studies/variation studies/stress/families studies "
         "studies/checks studies/tolerance studies/stress "
         "studies/paper studies/diagnosis studies/bench"
     ),

@@ -12,6 +12,8 @@ Solve:
     find_assemblies    all closed poses
     followed_angle     the angle of a joint with its turns, followed from the design
     followed_attitude  the attitude of a body with its turns, followed from the design
+    count_turns        an angle known up to whole turns, from sample to sample
+    residuals          what poses from elsewhere leave of the rows, and what their digits allow
     NativeSolver       settings of the solver; makes a mechanism ready for a path (`prepare`) or for
                        many designs (`prepare_designs`), and tells the size of its programs
 
@@ -80,6 +82,7 @@ if TYPE_CHECKING:
     from .formulation.parameters import LoadPlace, kinds, load_places, placed, places
     from .native_solver import Method, NativeSolver, PreparedDesigns, ProgramSize
     from .one_design import Solver, followed_angle, followed_attitude, follower, solve
+    from .replay import Residuals, Worst, count_turns, judged_part, replayed, residuals
     from .structure.degrees_of_freedom import degrees_of_freedom, require_driven
     from .structure.redundancy import largest_residual, reduce_rows
     from .verified.exact import Exact, Reading, as_decimal, as_double
@@ -107,6 +110,7 @@ _NAMES = {
     "formulation.parameters": "LoadPlace kinds load_places placed places",
     "native_solver": "Method NativeSolver PreparedDesigns ProgramSize",
     "one_design": "Solver followed_angle followed_attitude follower solve",
+    "replay": "Residuals Worst count_turns judged_part replayed residuals",
     "structure.degrees_of_freedom": "degrees_of_freedom require_driven",
     "structure.redundancy": "largest_residual reduce_rows",
     "verified.exact": "Exact Reading as_decimal as_double",
