@@ -38,7 +38,7 @@ IMPORTS = {
     "joints": ". primitives",
     "mechanism": ". joints",
     "kinematics/formulation": ". primitives program joints mechanism",
-    "kinematics/forces": ". primitives joints mechanism kinematics/formulation",
+    "kinematics/forces": ". primitives program joints mechanism kinematics/formulation",
     "kinematics/structure": ". primitives joints mechanism kinematics/formulation",
     "kinematics/compiled": (
         ". primitives program program/llvm joints mechanism kinematics/formulation "

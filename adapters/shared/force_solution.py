@@ -14,7 +14,7 @@ import numpy as np
 
 from ...core.case.case import Case
 from ...core.forces import Forces, Multipliers, Reaction, in_wrenches
-from ...core.mechanism.loads import Torque, TorsionSpringDamper
+from ...core.mechanism.loads import Bushing, Torque, TorsionSpringDamper
 from ...core.trajectory import Array
 from .pose_solver import Sample
 from .projection_model import ProjectionModel
@@ -89,7 +89,11 @@ def solved_forces(
     names = [each.name for each in mechanism.drivers]
     joints = reacting(case)
     scales = np.array([torque if each.turns else force for each in mechanism.drivers])
-    turning = {f.name for f in mechanism.forces if isinstance(f, TorsionSpringDamper | Torque)}
+    turning = {
+        f.name
+        for f in mechanism.forces
+        if isinstance(f, TorsionSpringDamper | Torque) or (isinstance(f, Bushing) and f.turns_only)
+    }
     efforts, power, largest = np.full((n, len(names)), np.nan), *np.full((2, n), np.nan)
     amounts = {each.name: np.full(n, np.nan) for each in mechanism.forces if each.name in wanted}
     solved = sorted(samples)

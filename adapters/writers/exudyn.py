@@ -95,7 +95,9 @@ class _Script:
                 self.relate(joint.name, relation)
         for coupler in self.mechanism.couplers:
             self.relate(coupler.name, coupler.terms)
-        for force in self.mechanism.forces:
+        if strange := [str(f) for f in self.mechanism.forces if not exudyn_loads.known(f)]:
+            self.lines.append(f"# Left out: {', '.join(strange)}")
+        for force in filter(exudyn_loads.known, self.mechanism.forces):
             self.load(force)
         for point in self.mechanism.points:
             self.lines.append(

@@ -9,6 +9,7 @@ import numpy as np
 from ...core.mechanism.body import Body
 from ...core.mechanism.loads import (
     Axes,
+    Bushing,
     Force,
     ForceElement,
     SpringDamper,
@@ -25,6 +26,13 @@ def inertial(body: Body) -> tuple[float, list[float], list[float]]:
     xx, yy, zz, xy, xz, yz = loads.six(loads.inertia_at_origin(body))
     center = np.subtract(loads.center_of(body), body.origin)
     return loads.mass_of(body), center.tolist(), [xx, yy, zz, yz, xz, xy]
+
+
+def known(element: ForceElement) -> bool:
+    """Return whether a script has the element: Exudyn's own bushing has a law of other angles, and
+    its springs have no curve.
+    """
+    return not isinstance(element, Bushing) and not getattr(element, "curve", None)
 
 
 def options(element: ForceElement) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from .document import explained, fault, join, shown
 from .driving import read_drivers, read_sweep
 from .in_si import geometry_in_si, load_in_si
 from .joints import read_joints
-from .loads import inertia_in_si, read_forces
+from .loads import inertia_in_si, read_bushings, read_forces
 from .outputs import read_outputs
 from .reference import read_reference
 from .reference_columns import Convert
@@ -147,10 +147,14 @@ def _mechanism(file: Path, keys: CaseKeys, length: Unit, angle: Unit) -> Mechani
     joints, couplers = read_joints(file, keys, length, angle)
     drivers = read_drivers(file, keys.drivers)
     forces = read_forces(file, keys.forces, length, angle)
+    bushings = read_bushings(file, keys.joints, joints, length, angle)
     gravity = load_in_si(ACCELERATION, keys.gravity, length, angle)
     with explained(file, "", length):
         return Mechanism(
-            *(keys.name, bodies, joints, points, drivers, couplers), gravity=gravity, forces=forces
+            *(keys.name, bodies, joints, points, drivers, couplers),
+            gravity=gravity,
+            forces=forces,
+            bushings=bushings,
         )
 
 

@@ -68,6 +68,10 @@ def case_text(case: Case, comments: Sequence[str] = ()) -> str:
     for joint in (*mechanism.given_joints, *mechanism.grounded, *mechanism.couplers):
         what = {"joints": joint.joints} if isinstance(joint, Coupler) else {"bodies": joint.bodies}
         lines += _table("joints", joint.name, {"type": joint.type, **what, **_own(joint)})
+        for each in mechanism.bushings:
+            if each.joint == joint.name:
+                own = each.name.removeprefix(f"{joint.name}.")
+                lines += _table(f"joints.{_key(joint.name)}.bushings", own, _own(each))
     for point in mechanism.points:
         if not point.name.startswith(MARKER):  # the reader of the file creates markers anew
             lines += _table("points", point.name, {"body": point.body, "position": point.position})

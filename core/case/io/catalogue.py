@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 from ...errors import MechanismError
 from ...joints import Coupler, Joint, Kind
 from ...mechanism.dimension import dimension_of
-from ...mechanism.loads import ELEMENTS, SpringDamper
+from ...mechanism.loads import ELEMENTS, Bushing, SpringDamper
 from ...mechanism.motions import Motion
 from .. import measures
 from ..measures import Measure
@@ -83,7 +83,7 @@ def type_tables() -> dict[str, Rows]:
             (
                 name,
                 f'bodies = ["first", "second"], {_keys(cls)}'
-                if issubclass(cls, SpringDamper)
+                if issubclass(cls, SpringDamper | Bushing)
                 else _keys(cls),
                 _meaning(cls),
             )

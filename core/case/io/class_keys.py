@@ -72,7 +72,11 @@ def motion_keys(cls: type[Motion]) -> type[msgspec.Struct]:
 
 def own_fields(cls: type[Described]) -> list[Field[Any]]:
     """Return the fields of a class itself, without the fields of its kind; case files give them."""
-    return [each for each in fields(cls) if each.name not in _INHERITED]
+    return [
+        each
+        for each in fields(cls)
+        if each.name not in _INHERITED and not each.metadata.get("hidden")
+    ]
 
 
 def kind_of(each: Field[Any]) -> Kind | None:

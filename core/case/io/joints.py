@@ -13,7 +13,7 @@ from .class_keys import joint_keys, kind_of, own_fields
 from .document import explained, fault, join
 from .in_si import geometry_in_si
 from .schema import CaseKeys
-from .typed_tables import class_of, typed
+from .typed_tables import as_table, class_of, typed
 
 
 def read_joints(
@@ -66,7 +66,10 @@ def _polynomial(
 
 
 def _made(file: Path, key: str, name: str, value: object, cls: Any, length: Unit) -> Any:
-    keys: Any = typed(file, key, value, joint_keys(cls))
+    own = as_table(file, key, value)
+    if issubclass(cls, Joint):  # they are read with the forces
+        own = {name: each for name, each in own.items() if name != "bushings"}
+    keys: Any = typed(file, key, own, joint_keys(cls))
     given = {
         each.name: geometry_in_si(kind_of(each), getattr(keys, each.name), length)
         for each in own_fields(cls)

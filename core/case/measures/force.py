@@ -19,7 +19,7 @@ from ...errors import MechanismError, SolveError
 from ...forces import Forces
 from ...jet import Jet
 from ...mechanism.drivers import JointDriver, PointCoordinate
-from ...mechanism.loads import Force, SpringDamper, Torque, TorsionSpringDamper
+from ...mechanism.loads import Bushing, Force, SpringDamper, Torque, TorsionSpringDamper
 from ...mechanism.mechanism import Mechanism, Point, Vector
 from ...trajectory import Array
 from ..quantity import HIDDEN, MARKER
@@ -240,7 +240,8 @@ class DriverEffort(ForceMeasure):
 @dataclass(frozen=True)
 class ElementForce(ForceMeasure):
     """Force of a force element: tension of a spring-damper; torque of a torsional one on the
-    joint's second body; amount of a constant force or torque.
+    joint's second body; amount of a constant force or torque, or of a bushing's force, or of its
+    torque if it gives no force.
     """
 
     type = "element_force"
@@ -251,7 +252,9 @@ class ElementForce(ForceMeasure):
     def bound(self, mechanism: Mechanism) -> Self:
         """Return the measure with the unit of the element's force."""
         element = mechanism.force(self.force)
-        return replace(self, turns=isinstance(element, TorsionSpringDamper | Torque))
+        turns = isinstance(element, TorsionSpringDamper | Torque)
+        turns |= isinstance(element, Bushing) and element.turns_only
+        return replace(self, turns=turns)
 
     @property
     def read(self) -> str:
@@ -266,7 +269,7 @@ class ElementForce(ForceMeasure):
         body = element.bodies[-1]
         if isinstance(element, SpringDamper):
             return body, element.points[1]
-        if isinstance(element, Force):
+        if isinstance(element, Force | Bushing):
             return body, element.point
         return body, triple(place_on(mechanism, body))
 

@@ -17,7 +17,8 @@ from ...mechanism.loads import TorsionSpringDamper
 from ...mechanism.mechanism import Mechanism
 from ...primitives.base import Drive
 from ...program import Elimination, absolute, maximum
-from ..forces.demand import BodyStates, at_work
+from ..forces.demand import BodyStates
+from ..forces.elements import at_work
 from ..forces.equations import ForceEquations
 from ..forces.power import powers
 from ..forces.wanted import WantedForces

@@ -5,16 +5,11 @@ M a + h - Q   for one body: force, and torque about the body's internal origin, 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
-from ...algebra import ZERO, Mat3, Scalar, Vec3, cross, root, vec
-from ...errors import SolveError
-from ...joints.base import unit
+from ...algebra import ZERO, Mat3, Quat, Vec3, cross, vec
 from ...mechanism.body import Body
-from ...mechanism.loads import Axes, Force, SpringDamper, Torque, TorsionSpringDamper
-from ...mechanism.mechanism import Mechanism
 from ...primitives.base import GROUND_POSE, GROUND_TWIST, Pose, Twist
 from ..formulation.constraints import Frames
 from ..formulation.formulation import Acceleration
@@ -73,6 +68,10 @@ class BodyStates:
         """Return a vector fixed in a body, given at design, in its current direction."""
         return self._pose(body).turn(vec(vector))
 
+    def turn_of(self, body: str) -> Quat:
+        """Return the rotation of a body since design."""
+        return self._pose(body).q
+
     def _pose(self, body: str) -> Pose:
         return self.poses.get(body, GROUND_POSE)
 
@@ -121,84 +120,3 @@ def inertia_of(body: Body) -> Mat3 | None:
         return None
     xx, yy, zz, xy, yz, xz = body.inertia
     return Mat3(Vec3(xx, xy, xz), Vec3(xy, yy, yz), Vec3(xz, yz, zz))
-
-
-@dataclass(frozen=True, slots=True)
-class Applied:
-    """A force element at work.
-
-    Attributes:
-        amount: tension of a spring [N], torque on the joint's second body [N m], or the amount of a
-            constant force [N] or torque [N m].
-        wrenches: wrench on each body of the element, by body.
-        stored: rate of its stored energy [W].
-        lost: dissipated power, less the power of a constant force or torque [W].
-    """
-
-    amount: Scalar
-    wrenches: Mapping[str, Wrench]
-    stored: Scalar
-    lost: Scalar
-
-
-def at_work(
-    mechanism: Mechanism, at: BodyStates, angle: Callable[[str], Scalar]
-) -> dict[str, Applied]:
-    """Return all force elements at work, by name.
-
-    Args:
-        angle: function from a joint's name to its angle [rad], continuous, zero at design.
-
-    Raises:
-        SolveError: the native solver does not know an element's type.
-    """
-
-    def at_work_now(each: Any) -> Applied:
-        if isinstance(each, SpringDamper):
-            return spring(each, at)
-        if isinstance(each, TorsionSpringDamper):
-            return torsion(each, mechanism, at, angle(each.joint))
-        if isinstance(each, Force | Torque):
-            return constant(each, at)
-        raise SolveError(f"{each}: the native engine knows no force element of this kind")
-
-    return {each.name: at_work_now(each) for each in mechanism.forces}
-
-
-def spring(each: SpringDamper, at: BodyStates) -> Applied:
-    """Return a spring-damper at work; a positive tension draws its ends together."""
-    (i, P), (j, Q) = zip((each.i, each.j), each.points, strict=True)
-    d = (vec(Q) - vec(P)) + (at.place(j, Q) - at.place(i, P))
-    length = root(d @ d)
-    along = (1.0 / length) * d
-    rate = along @ (at.velocity(j, Q) - at.velocity(i, P))
-    elastic = each.stiffness * (length - (each.free_length or 0.0))
-    tension = elastic + each.damping * rate
-    pull = tension * along
-    wrenches = {i: Wrench.at(at.arm(i, P), pull), j: Wrench.at(at.arm(j, Q), -pull)}
-    return Applied(tension, wrenches, elastic * rate, each.damping * rate * rate)
-
-
-def torsion(
-    each: TorsionSpringDamper, mechanism: Mechanism, at: BodyStates, angle: Scalar
-) -> Applied:
-    """Return a torsional spring-damper at work at its joint's angle."""
-    joint: Any = mechanism.joint(each.joint)
-    axis = at.turned(joint.i, [*unit(joint.axis)])
-    rate = axis @ (at.spin(joint.j) - at.spin(joint.i))
-    elastic = each.stiffness * (angle - each.free_angle)
-    amount = -(elastic + each.damping * rate)
-    torque = amount * axis
-    wrenches = {joint.i: Wrench(ZERO, -torque), joint.j: Wrench(ZERO, torque)}
-    return Applied(amount, wrenches, elastic * rate, each.damping * rate * rate)
-
-
-def constant(each: Force | Torque, at: BodyStates) -> Applied:
-    """Return a constant force or torque at work."""
-    body = each.body
-    vector = vec(each.vector) if each.frame is Axes.GLOBAL else at.turned(body, each.vector)
-    amount = root(sum(x * x for x in each.vector))
-    if isinstance(each, Torque):
-        return Applied(amount, {body: Wrench(ZERO, vector)}, 0.0, -(vector @ at.spin(body)))
-    on_body = Wrench.at(at.arm(body, each.point), vector)
-    return Applied(amount, {body: on_body}, 0.0, -(vector @ at.velocity(body, each.point)))

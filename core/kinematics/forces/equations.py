@@ -20,7 +20,8 @@ from ...primitives.base import GROUND_POSE
 from ..formulation.cartesian import COLUMNS, Cartesian
 from ..formulation.constraints import Constraint, Relation
 from ..formulation.formulation import Configuration, Rows
-from .demand import NO_WRENCH, Applied, BodyStates, Wrench, inertial
+from .demand import NO_WRENCH, BodyStates, Wrench, inertial
+from .elements import Applied
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,8 @@ from ...trajectory import Array, Trajectory
 from ..formulation.constraints import frames
 from ..formulation.formulation import Acceleration
 from ..formulation.state_vectors import displaced
-from .demand import Applied, BodyStates, at_work
+from .demand import BodyStates
+from .elements import Applied, at_work
 
 Follow: TypeAlias = Callable[[str, Array, Array], Array]
 """Returns the angle of a joint with all its turns, of its name, its angle counted by rates and its

@@ -7,13 +7,13 @@ from collections.abc import Mapping
 from ...algebra import Scalar, is_literal_zero, vec
 from ...mechanism.mechanism import Mechanism
 from .demand import (
-    Applied,
     BodyStates,
     acceleration_of_center,
     arm_of_center,
     inertia_of,
     spin_of,
 )
+from .elements import Applied
 
 
 def powers(

@@ -15,6 +15,8 @@ from fractions import Fraction
 from typing import Any
 
 from ...algebra import Vec3
+from ...errors import SolveError
+from ...mechanism.loads import Law
 from ...mechanism.mechanism import Mechanism
 from ...program.ball_executor import Ball, flint
 from .exact_forces import converted
@@ -134,7 +136,17 @@ def _value(b: Any) -> Any:
 
 
 def exact_mechanism(mechanism: Mechanism, reading: Reading) -> Mechanism:
-    """Return the mechanism with `Exact` numbers."""
+    """Return the mechanism with `Exact` numbers.
+
+    Raises:
+        SolveError: a force element has a law without an enclosure.
+    """
+    for force in mechanism.forces:
+        if getattr(force, "curve", None) or getattr(force, "law", None) is Law.CARDAN:
+            raise SolveError(
+                f"{force} has a curve or Cardan angles, and proofs know neither; give a stiffness"
+                " and the law 'euler_parameters'"
+            )
 
     def read(value: Any) -> Any:
         if isinstance(value, float):

@@ -28,7 +28,8 @@ from ...mechanism.mechanism import Mechanism
 from ...primitives.base import GROUND_POSE, Drive, Twist
 from ...program import Program, Tape, Traced, program
 from ...program.derivative import Gradient
-from ..forces.demand import NO_WRENCH, BodyStates, Wrench, at_work
+from ..forces.demand import NO_WRENCH, BodyStates, Wrench
+from ..forces.elements import at_work
 from ..forces.equations import ForceEquations
 from ..forces.power import powers
 from ..forces.wanted import WantedForces
