@@ -44,6 +44,10 @@ IMPORTS = {
         ". primitives program program/llvm joints mechanism kinematics/formulation "
         "kinematics/forces kinematics/structure"
     ),
+    "kinematics/statics": (
+        ". primitives program program/llvm joints mechanism kinematics/formulation "
+        "kinematics/forces kinematics/structure kinematics/compiled"
+    ),
     "kinematics/assembly": (
         ". primitives program joints mechanism kinematics/formulation "
         "kinematics/structure kinematics/compiled"
@@ -71,7 +75,7 @@ IMPORTS = {
         ". primitives program joints mechanism kinematics/formulation kinematics/forces "
         "kinematics/structure kinematics/compiled kinematics/assembly "
         "kinematics/continuation kinematics/verified kinematics/blocks "
-        "kinematics/sparse kinematics/diagnosis"
+        "kinematics/sparse kinematics/statics kinematics/diagnosis"
     ),
     "case/models/hardpoints/templates": "joints mechanism",
     "case": ". joints mechanism kinematics",

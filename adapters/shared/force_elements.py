@@ -126,7 +126,7 @@ def bushing_at_work(
     torque += np.array(each.turning_damping) * (axes.T @ (j.velocity[3:] - w))
     moment = axes @ torque
     size = float(np.linalg.norm(moment if each.turns_only else force))
-    on_first: Array = np.concatenate([force, moment + np.cross(d, force)])
+    on_first: Any = np.concatenate([force, moment + np.cross(d, force)])
     return size, (on_first, -np.concatenate([force, moment]))
 
 
@@ -148,7 +148,7 @@ def elastic_torque(each: Bushing, turn: Array) -> Array:
                 [np.sin(b), -np.sin(a) * np.cos(b), np.cos(a) * np.cos(b)],
             ]
         )
-        torque: Array = np.linalg.solve(of_turns, k * np.array([a, b, c]))
+        torque: Any = np.linalg.solve(of_turns, k * np.array([a, b, c]))
         return torque
     e0 = 0.5 * np.sqrt(max(0.0, 1.0 + np.trace(turn)))
     if e0 < 0.5:  # near a half turn e is the axis, by the largest column

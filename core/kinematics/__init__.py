@@ -6,6 +6,7 @@ Solve:
 
     solve              one design over a sweep
     solve_designs      many designs over a sweep, each with its own geometry
+    StaticModel        equilibria of a mechanism whose drivers are held, and its compliance
     forces_of          reactions of joints and efforts of drivers of a solved motion
     trace              a motion by its arc length, beyond lock-ups of a driver
     assemble           a closed pose from an estimate
@@ -36,6 +37,7 @@ The folders:
     continuation     the walk along a path, step halving, singular poses, curves by arc length
     blocks           large mechanisms as lists of blocks: components, or one sparse system
     forces           the equations of forces, and the forces of a solved motion
+    statics          equilibria with springs, bushings and loads, and their compliance
     sparse           the equations of large mechanisms as a sparse system
     assembly         closed poses from estimates and random starts
     diagnosis        rank, conditioning and screws at a pose
@@ -109,6 +111,9 @@ if TYPE_CHECKING:
     from .solver_selection import followed_angle as followed_angle
     from .solver_selection import followed_attitude as followed_attitude
     from .solver_selection import follower as follower
+    from .statics.equations import LoadPoint as LoadPoint
+    from .statics.equilibrium import Equilibria as Equilibria
+    from .statics.equilibrium import StaticModel as StaticModel
     from .structure.driver_count import degrees_of_freedom as degrees_of_freedom
     from .structure.driver_count import require_driven as require_driven
     from .structure.reduction import largest_residual as largest_residual
@@ -156,6 +161,8 @@ _NAMES = {
     "prepared_designs": "PreparedDesigns",
     "program_size": "ProgramSize",
     "solver_selection": "Solver followed_angle followed_attitude follower",
+    "statics.equations": "LoadPoint",
+    "statics.equilibrium": "Equilibria StaticModel",
     "structure.driver_count": "degrees_of_freedom require_driven",
     "structure.reduction": "largest_residual reduce_rows",
     "verified.exact": "Exact Reading as_decimal as_double",

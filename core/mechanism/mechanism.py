@@ -204,6 +204,8 @@ class Mechanism:
         for bushing in self.bushings:
             key = f"joints.{bushing.joint}.bushings"
             _known(str(bushing), "joint", bushing.joint, self._named["joints"], key)
+            for name in bushing.bodies:
+                _known(str(bushing), "body", name, bodies, key)
 
     def released(self) -> Mechanism:
         """Return the mechanism with the bushings of joints as force elements in their place.

@@ -8,8 +8,8 @@ prove bounds of the result.
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TypeAlias
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, TypeAlias
 
 from ..algebra import Scalar, root
 from .tape import Tape, Traced, absolute, cos, maximum, minimum, operands, sin, where_larger
@@ -18,9 +18,7 @@ Gradient: TypeAlias = dict[int, Scalar]
 """Derivatives by position of the input; zero derivatives are left out."""
 
 
-def _weights(
-    smooth: bool, op: str, y: Traced, a: Scalar, b: Scalar = 0.0
-) -> tuple[Scalar, ...]:
+def _weights(smooth: bool, op: str, y: Traced, a: Scalar, b: Scalar = 0.0) -> tuple[Scalar, ...]:
     """Return the derivatives of an operation by its operands a and b; y is its value."""
     match op:
         case "+":
@@ -68,7 +66,9 @@ def jacobian(
     for number, node in enumerate(tuple(tape.nodes)):
         read = operands(node)
         if any(gradients.get(k) for k in read):
-            weights = _weights(smooth, node[0], tape.scalars[number], *(tape.scalars[k] for k in read))
+            weights = _weights(
+                smooth, node[0], tape.scalars[number], *(tape.scalars[k] for k in read)
+            )
             gradients[number] = _sum(
                 zip(weights, (gradients.get(k, {}) for k in read), strict=True)
             )
@@ -86,9 +86,7 @@ def _sum(terms: Iterable[tuple[Scalar, Gradient]]) -> Gradient:
     return {k: value for k, value in total.items() if isinstance(value, Traced) or value != 0.0}
 
 
-def folded(
-    tape: Tape, values: Sequence[Scalar], known: Mapping[int, float]
-) -> list[Scalar]:
+def folded(tape: Tape, values: Sequence[Scalar], known: Mapping[int, float]) -> list[Scalar]:
     """Return scalars with numbers in place of some inputs, by slot: all operations fold again."""
     new: dict[int, Scalar] = {}
     waiting = [each.number for each in values if isinstance(each, Traced)]
@@ -111,11 +109,15 @@ def folded(
     return [new[each.number] if isinstance(each, Traced) else each for each in values]
 
 
-_AGAIN: Mapping[str, Callable[..., Scalar]] = {
+def _over(a: Scalar, b: Scalar) -> Scalar:
+    return a / b
+
+
+_AGAIN: Mapping[str, Any] = {
     "+": operator.add,
     "-": operator.sub,
     "*": operator.mul,
-    "/": operator.truediv,
+    "/": _over,
     "neg": operator.neg,
     "sqrt": root,
     "sin": sin,

@@ -71,7 +71,8 @@ def case_text(case: Case, comments: Sequence[str] = ()) -> str:
         for each in mechanism.bushings:
             if each.joint == joint.name:
                 own = each.name.removeprefix(f"{joint.name}.")
-                lines += _table(f"joints.{_key(joint.name)}.bushings", own, _own(each))
+                keys = {"bodies": each.bodies, **_own(each)}
+                lines += _table(f"joints.{_key(joint.name)}.bushings", own, keys)
     for point in mechanism.points:
         if not point.name.startswith(MARKER):  # the reader of the file creates markers anew
             lines += _table("points", point.name, {"body": point.body, "position": point.position})

@@ -13,7 +13,7 @@ Earth). Points and vectors are global, at the design position. Results are alway
                          (inertia) = [Ixx, Iyy, Izz, Ixy, Iyz, Ixz], entries of the matrix about the
                          centre of mass, global axes at design [kg length^2]; the products have the
                          sign of the matrix entry, Ixy = -sum of m x y; default: zero, a point mass
-    [joints.NAME.bushings.X]   keys of a bushing; its point is the joint's unless given; the joint
+    [joints.NAME.bushings.X]   keys of a bushing; bodies and point are the joint's unless given; it
                          stands for its bushings in `run`, and they for it in `kc` and at rest
     [forces.NAME]        type = "spring_damper": bodies = [first, second], points = [on first, on
                          second], stiffness [N/length], (damping) = 0 [N s/length],
@@ -146,14 +146,15 @@ def read_bushings(
         for own, value in as_table(file, f"{join('joints', joint.name)}.bushings", given).items():
             key = join(f"{join('joints', joint.name)}.bushings", own)
             keys: Any = typed(file, key, value, bushing_keys())
-            numbers = _in_si(Bushing, keys, length, angle)
+            numbers: dict[str, Any] = _in_si(Bushing, keys, length, angle)
             places = joint.points_on()
             if numbers["point"] is None and not places:
                 raise fault(file, join(key, "point"), "missing, expected a point [x, y, z]; add it")
             numbers["point"] = numbers["point"] or places[0]
             with explained(file, key, length, value):
                 name = f"{joint.name}.{own}"
-                found.append(Bushing(name, *joint.bodies, joint=joint.name, **numbers))
+                i, j = keys.bodies or joint.bodies
+                found.append(Bushing(name, i, j, joint=joint.name, **numbers))
     return found
 
 
@@ -191,6 +192,8 @@ def bushing_keys() -> type[msgspec.Struct]:
     keys = [key_of(each, _shape(Bushing, each)) for each in own_fields(Bushing)]
     point = Annotated[Vector | None, Meta(description="a point [x, y, z]")]
     keys = [("point", point, None) if each[0] == "point" else each for each in keys]
+    bodies = Annotated[Bodies | None, Meta(description="two names of bodies")]
+    keys.append(("bodies", bodies, None))
     return msgspec.defstruct("BushingKeys", keys, forbid_unknown_fields=True)
 
 

@@ -141,18 +141,11 @@ class _Tracer:
         matrix = rows_at(at_rest)
         held = len(mechanism.drivers)
         self.chosen = tuple(independent_rows(matrix, held, at_rest.conditions))
-        if lost := [k for k in range(len(matrix) - held, len(matrix)) if k not in self.chosen]:
-            name = at_rest.owners[lost[0]][0]
-            raise SolveError(
-                f"driver {name!r} holds nothing at the design position: joints or other drivers"
-                " hold its coordinate already; leave it out"
-            )
+        self._require_free(matrix, held)
         self.dropped = tuple(k for k in range(len(matrix)) if k not in self.chosen)
         self.matrix = matrix[list(self.chosen)]
         inputs = {name: self._vector(f"{DRIVE}{name}", 3) for name in drives}
-        self.drives = {
-            name: Drive(c, 0.0, 0.0, cos, sin) for name, (c, cos, sin) in inputs.items()
-        }
+        self.drives = {name: Drive(c, 0.0, 0.0, cos, sin) for name, (c, cos, sin) in inputs.items()}
         self.formulation = self._formulate(self.drives)
         self.state = {
             name: self._vector(name, len(value)) for name, value in self.formulation.design.items()
@@ -166,6 +159,16 @@ class _Tracer:
         still = {name: Twist(ZERO, ZERO) for name in self.formulation.bodies}
         rests = dict.fromkeys(self.formulation.bodies, GROUND_ACCELERATION)
         self.states = BodyStates(self.frame, self.at.poses, still, rests)
+
+    def _require_free(self, matrix: Array, held: int) -> None:
+        """Raise SolveError if joints or other drivers hold the coordinate of a driver already."""
+        first, rank = len(matrix) - held, len(independent_rows(matrix[: len(matrix) - held], 0))
+        for k, driver in enumerate(self.mechanism.drivers, 1):
+            if len(independent_rows(matrix[: first + k], 0)) < rank + k:
+                raise SolveError(
+                    f"driver {driver.name!r} holds nothing at the design position: joints or other"
+                    " held drivers hold its coordinate already; leave it out"
+                )
 
     def _formulate(self, drives: Mapping[str, Drive]) -> Cartesian:
         found = constraints(self.mechanism, self.frame, drives, named=angles(self.mechanism))
@@ -184,9 +187,7 @@ class _Tracer:
         slopes = jacobian(self.tape, [*forces, *gaps, *efforts], inputs, smooth=True)
         values, slopes = self._now([*forces, *gaps, *efforts], slopes)
         balance, efforts = values[: self.order], values[self.order :]
-        tangent = [
-            {k: x for k, x in row.items() if k < self.order} for row in slopes[: self.order]
-        ]
+        tangent = [{k: x for k, x in row.items() if k < self.order} for row in slopes[: self.order]]
         at_design = self._at_design(tangent, balance[: self.n])
         scale = at_design.scale
         rest = self._vector(REST, self.n)
@@ -295,7 +296,8 @@ class _Tracer:
         stiffness = matrix[: self.n, : self.n]
         largest = float(np.abs(stiffness).max(initial=0.0))
         self._require_held(stiffness, largest)
-        return _AtDesign(found, 2.0 ** round(np.log2(largest)), executor.get(out)[:, 0])
+        scale = 2.0 ** round(np.log2(largest)) if largest else 1.0
+        return _AtDesign(found, scale, executor.get(out)[:, 0])
 
     def _require_held(self, stiffness: Array, largest: float) -> None:
         free = null_space(self.matrix, self.n)
@@ -421,5 +423,6 @@ def motion_of(columns: Mapping[str, int], motion: Array) -> str:
     name, own = moved_most(columns, motion)
     turning = np.linalg.norm(own[3:]) > TURNS * np.linalg.norm(own[:3])
     along = own[3:] if turning else own[:3]
-    axis = ", ".join(f"{x:.3g}" for x in np.round(along / np.abs(along).max(), 6) + 0.0)
+    parts: list[float] = (np.round(along / np.abs(along).max(), 6) + 0.0).tolist()
+    axis = ", ".join(f"{x:.3g}" for x in parts)
     return f"body {name!r} {'turns about' if turning else 'moves along'} [{axis}]"

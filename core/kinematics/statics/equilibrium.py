@@ -2,9 +2,14 @@
 
 Two walks lead to an equilibrium, all lanes together and each with its own steps. The first takes
 away what is out of balance at design (weight, springs, preload); the second brings loads and travel
-in proportion. A step is accepted if Newton's corrections contract as Kantorovich's theorem asks, and
-if the determinant of the tangent keeps the signs of its blocks. Otherwise it is halved. So no walk
-leaps over a turning point of the load to an equilibrium far away.
+in proportion. A step is accepted if
+
+- Newton's corrections contract as Kantorovich's theorem asks,
+- the determinant of the tangent keeps the signs of its blocks, and
+- points between its ends are near the path too, with the same signs.
+
+Otherwise it is halved. So no walk leaps over a turning point of the load to an equilibrium far
+away: there the stiffness has another sign between the ends.
 """
 
 from __future__ import annotations
@@ -36,7 +41,6 @@ from .equations import (
     SIGNS,
     STEP,
     LoadPoint,
-    StaticEquations,
     motion_of,
     null_space,
     put_design,
@@ -51,8 +55,10 @@ CONTRACTION = 0.25
 # Corrections are in units of the mechanism's size and in radians. Below the first number the next
 # one is round-off, as it is the square; stiff bushings beside soft ones raise the round-off.
 SETTLED, ROUND_OFF = 1e-8, 1e-13
+# Steps of larger corrections are looked at in three places, others in their middle.
+LONG = 1e-2
 MOST_ITERATIONS = 12
-# Steps are halved to this part of the way. A turning point is then known to eleven digits.
+# Steps are halved to this part of the way so far. A turning point is then known to eleven digits.
 SHORTEST = 2.0**-36
 # The round-off of eigenvalues, as a part of the largest.
 NEGATIVE = 1e-11
@@ -230,28 +236,40 @@ class StaticModel:
         executor.run("newton")  # for the signs at the start, where its correction is round-off
         signs = executor.get(self._tests)[1]
         executor.put(self._state, state)
-        while (active := (share < 1.0) & (step >= SHORTEST)).any():
+        while (active := (share < 1.0) & (step >= SHORTEST * np.maximum(share, SHORTEST))).any():
             target = np.where(active, np.minimum(1.0, share + step), share)
             put(target)
-            accepted, used = self._newton(executor, signs)
+            accepted, used, first = self._newton(executor, signs)
             accepted &= active
+            found = executor.get(self._state)
+            longest = first[accepted].max(initial=0.0)
+            for part in (0.5, 0.25, 0.75)[: 3 if longest > LONG else 1 if longest > SETTLED else 0]:
+                put(share + part * (target - share))
+                executor.put(self._state, state + part * (found - state))
+                executor.run("newton")
+                size, at_part = executor.get(self._tests)
+                accepted &= (size <= CONTRACTION * first + SETTLED) & (at_part == signs)
+                used += 1
             count += np.where(active, used, 0)
-            state = np.where(accepted, executor.get(self._state), state)
-            if not accepted.all():
-                executor.put(self._state, state)
+            state = np.where(accepted, found, state)
+            executor.put(self._state, state)
             share = np.where(accepted, target, share)
             step = np.where(accepted, 2.0 * step, 0.5 * step)
         put(share)
         return share, count
 
-    def _newton(self, executor: Executor, signs: Array) -> tuple[Lanes, NDArray[np.int64]]:
-        """Return the lanes with an equilibrium by contracting corrections, and the iterations."""
+    def _newton(self, executor: Executor, signs: Array) -> tuple[Lanes, NDArray[np.int64], Array]:
+        """Return the lanes with an equilibrium by contracting corrections, the iterations, and the
+        size of the first correction.
+        """
         n = executor.lanes
+        first = np.full(n, np.nan)
         last, used = np.full(n, np.inf), np.zeros(n, np.int64)
         good, settled = np.ones(n, np.bool_), np.zeros(n, np.bool_)
         for _ in range(MOST_ITERATIONS):
             executor.run("newton")
             size, found = executor.get(self._tests)
+            first = np.where(np.isnan(first), size, first)
             used += good & ~settled
             slow = ~(size <= CONTRACTION * last)
             settled |= good & (size <= SETTLED) & (slow | (size <= ROUND_OFF)) & (found == signs)
@@ -259,13 +277,16 @@ class StaticModel:
             last = size
             if (settled | ~good).all():
                 break
-        return good & settled, used
+        return good & settled, used, first
 
     def _read(
         self, executor: Executor, share: Array, iterations: NDArray[np.int64], slopes: bool
     ) -> Equilibria:
         equations, n = self.equations, len(share)
-        get: Callable[[str], Array] = lambda name: executor.get(equations.vectors[name])
+
+        def get(name: str) -> Array:
+            return executor.get(equations.vectors[name])
+
         states = {name: get(name) for name in equations.design}
         m = len(self.drivers)
         efforts = get(EFFORTS) if m else np.empty((0, n))
