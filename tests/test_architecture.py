@@ -119,6 +119,7 @@ IMPORTS = {
     ),
     "studies/paper": ". primitives program joints mechanism kinematics case harness report",
     "studies/diagnosis": ". joints kinematics case harness report studies/variation",
+    "studies/compliance": (". mechanism kinematics case case/suspension report"),
     "studies/bench": (
         ". program/llvm joints mechanism kinematics case case/io harness report "
         "studies/variation studies studies/tolerance studies/paper"
@@ -128,10 +129,10 @@ IMPORTS = {
         "case/io case/models/hardpoints case/models harness harness/workers history "
         "history/regression report studies/variation studies/stress/families studies "
         "studies/joint_check studies/engine_check studies/tolerance studies/stress "
-        "studies/paper studies/diagnosis studies/bench"
+        "studies/paper studies/diagnosis studies/bench studies/compliance"
     ),
     "__init__": ". joints mechanism kinematics case case/io harness studies/joint_check",
-    "kincheck": "case case/io harness harness/workers studies cli __init__",
+    "kincheck": "case case/io harness harness/workers studies studies/compliance cli __init__",
 }
 """Folder of core: the folders it imports besides itself, whenever the import runs."""
 

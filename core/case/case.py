@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +15,7 @@ from ..kinematics import places
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.motions import Absolute, Motion, Path, Ramp
 from ..trajectory import Array
+from .compliance import Rig
 from .hardpoint import Hardpoint
 from .quantity import MARKER as MARKER
 from .quantity import ORDERS as ORDERS
@@ -172,6 +174,8 @@ class Case:
         assembly: notes on how the start was closed, and on rows left out.
         closure: of rows left out; None if all rows hold.
         hardpoints: rows of the table of hardpoints that the case is of; empty for another file.
+        rig: of compliance studies, if the case has one.
+        wheels: each `Vehicle` of [suspension], whether outputs read it or not.
     """
 
     name: str
@@ -187,6 +191,8 @@ class Case:
     assembly: tuple[str, ...] = ()
     closure: Closure | None = None
     hardpoints: tuple[Hardpoint, ...] = ()
+    rig: Rig | None = None
+    wheels: tuple[Any, ...] = ()
 
     def __repr__(self) -> str:
         """Return name, truth, sweep and outputs in one line."""

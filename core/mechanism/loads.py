@@ -285,7 +285,7 @@ class Law(StrEnum):
 class Bushing(ForceElement):
     """A block of rubber between two bodies: springs and dampers along and about three axes.
 
-    The axes are fixed in the first body, which carries the element. A displacement is that of the
+    The axes are fixed in the first body, which carries the element. A displacement is the way of the
     second body's point from the first body's, along these axes. The force acts at the second body's
     point, on the first body in the sense of the displacement.
 
@@ -302,7 +302,7 @@ class Bushing(ForceElement):
         curve: force over displacement [m, N], for all axes, or one for each; an axis with an empty
             one has none. It adds to the stiffness.
         law: law of the torque.
-        joint: the joint that stands in the bushing's place in rigid studies; empty without one.
+        joint: the joint in the bushing's place in rigid studies; empty without one.
     """
 
     type: ClassVar[str] = "bushing"

@@ -13,6 +13,7 @@ from ...mechanism.mechanism import Body, Mechanism, Point
 from ..case import Case, Truth, size
 from ..quantity import with_markers
 from ..units import ANGLES, LENGTHS, Unit
+from .compliance import read_rig
 from .coordinates import with_all_coordinates
 from .document import explained, fault, join, shown
 from .driving import read_drivers, read_sweep
@@ -74,6 +75,8 @@ def load_case(path: str | Path, closure: float | None = None) -> Case:
     case = _with_outputs(
         file, keys, replace(case, length_unit=length.name, angle_unit=angle.name), length, by_unit
     )
+    if keys.compliance is not None:
+        case = replace(case, rig=read_rig(file, keys.compliance, case.mechanism, length))
     with explained(file, "closure", length):
         case = _within_digits(case, typed(file, "closure", keys.closure, ClosureKeys), closure)
     if columns is None:
@@ -179,6 +182,7 @@ def _with_outputs(
     from .suspension_table import read_suspension
 
     table = read_suspension(file, keys.suspension, case, length, units["rad"])
+    case = replace(case, wheels=tuple(each for each in (table.vehicle, table.other) if each))
     outputs = read_outputs(file, keys, table, case, units) or with_all_coordinates(case).outputs
     case = replace(case, mechanism=with_markers(mechanism, outputs), outputs=outputs)
     return (

@@ -90,6 +90,10 @@ def case_text(case: Case, comments: Sequence[str] = ()) -> str:
     lines += ["", "[sweep]", *_keys(_sweep(case, values, own_grid=bool(reference)))]
     if closing := _closing(case):
         lines += ["", "[closure]", *_keys(closing)]
+    if case.rig is not None:
+        given = {f.name: getattr(case.rig, f.name) for f in fields(case.rig)}
+        lines += ["", "[compliance]"]
+        lines += _keys({key: value for key, value in given.items() if value is not None})
     for name, keys in suspension_tables(case).items():
         lines += ["", f"[{name}]", *_keys(keys)]
     for output in case.outputs:

@@ -13,6 +13,7 @@ from ...mechanism.motions import Motion
 from ..measures import Measure
 from ..suspension import SuspensionOutput
 from .class_keys import driver_keys, joint_keys, motion_keys
+from .compliance import RigKeys
 from .driving import DRIVERS
 from .loads import force_keys
 from .measures import measure_keys
@@ -59,6 +60,7 @@ def case_schema() -> dict[str, Any]:
         "sweep": SweepKeys,
         "suspension": SuspensionKeys,
         "reference": ReferenceKeys,
+        "compliance": RigKeys,
     }
     motions = {name: motion_keys(cls) for name, cls in Motion.registry.items()}
     found = document_schema(SCHEMA, CaseKeys, tables, single, {"motion": motions})

@@ -104,6 +104,11 @@ left out. `kincheck list --joints` prints all types with their keys.
                          (static_toe), (static_camber), (wheel_axis), (wheel_contact), (travel);
                          the rest is as in [suspension];
                          outputs of one wheel may then have (side)
+    [compliance]         of `kincheck kc`: (wheel), the body that carries the wheel; (contact), the
+                         point where it touches the road; (held) = [DRIVER, ...], which keep their
+                         values, others are free, default: all; (loads) = ["longitudinal",
+                         "lateral", "braking", "aligning"]; (tire_stiffness) [N/length], vertical,
+                         for the ride rate
     [reference]          true values: file, the name of a CSV file beside the case file, or rows,
                          with (columns)
                          beside: in its folder or below, also after following links; a foreign case
@@ -180,6 +185,7 @@ class CaseKeys(msgspec.Struct, forbid_unknown_fields=True):
     reference: Table | None = None
     gravity: Numbers3 = (0.0, 0.0, 0.0)
     forces: Table = {}
+    compliance: Table | None = None
 
 
 class BodyKeys(msgspec.Struct, forbid_unknown_fields=True):

@@ -1,11 +1,11 @@
-"""The equations of equilibrium of a mechanism, their exact tangent, and programs that solve them.
+"""The equations of equilibrium of a mechanism, their exact tangent, and programs to solve them.
 
     F(x) - J(x)^T lambda = rest,    Phi(x) = 0        F = -(gravity, force elements, loads)
 
 The unknowns are a step (dr, dpi) of every body, and the multipliers lambda of independent rows. The
 equations are traced at the state after the step, differentiated by the chain rule, and then the
-step is set to zero, so that all terms fold as in other programs. The tangent is exact for the
-equations that are solved. `rest` is what is out of balance and is taken away little by little.
+step is set to zero, so that all terms fold as in other programs. The tangent is exact for these
+equations. `rest` is the unbalance at design, taken away little by little.
 
     newton       one iteration: state, multipliers, size of the step, signs of the determinant
     compliance   derivatives of the step and of the drivers' efforts by loads and drivers
@@ -58,7 +58,7 @@ LOAD = "load "
 DRIVE = "drive "
 """Before the name of a held driver: its value from design, and cosine and sine of its half."""
 REST = "rest"
-"""The vector of what is out of balance, by the unknowns, over the scale."""
+"""The vector of the unbalance that is left, by the unknowns [J]."""
 MULTIPLIERS = "multipliers"
 BY = "by "
 """Before the name of a load's component or a driver: derivatives of step and efforts by it."""
@@ -72,7 +72,7 @@ TURNS = 1e-3
 
 @dataclass(frozen=True)
 class LoadPoint:
-    """A place where loads act: a force at a point that a body carries, and a torque."""
+    """A place of loads: a force at a point carried by a body, and a torque."""
 
     name: str
     body: str
@@ -91,8 +91,8 @@ class StaticEquations:
         tangent: row and column of each slot of the tangent; rows of constraints come last.
         unknowns: number of the step's components.
         scale: of forces [J].
-        chosen, dropped: rows that are solved, and redundant ones.
-        rest: what is out of balance at design, over the scale, shape (unknowns,).
+        chosen, dropped: independent rows, and redundant ones.
+        rest: the unbalance at design [J], shape (unknowns,).
     """
 
     mechanism: Mechanism
@@ -404,14 +404,14 @@ def put_design(
 
 
 def null_space(rows: Array, unknowns: int) -> Array:
-    """Return an orthonormal basis of the motions that independent rows leave, as columns."""
+    """Return an orthonormal basis of the motions left by independent rows, as columns."""
     if not len(rows):
         return np.eye(unknowns)
     return np.linalg.qr(rows.T, mode="complete")[0][:, len(rows) :]
 
 
 def moved_most(columns: Mapping[str, int], motion: Array) -> tuple[str, Array]:
-    """Return the body that a motion of the unknowns moves most, and its part (dr, dpi)."""
+    """Return the body moved most by a motion of the unknowns, and its part (dr, dpi)."""
     name, first = max(
         columns.items(), key=lambda each: float(np.linalg.norm(motion[each[1] : each[1] + COLUMNS]))
     )
@@ -419,10 +419,10 @@ def moved_most(columns: Mapping[str, int], motion: Array) -> tuple[str, Array]:
 
 
 def motion_of(columns: Mapping[str, int], motion: Array) -> str:
-    """Return a motion of the unknowns in words, by the body that it moves most."""
+    """Return a motion of the unknowns in words, by the body moved most."""
     name, own = moved_most(columns, motion)
     turning = np.linalg.norm(own[3:]) > TURNS * np.linalg.norm(own[:3])
     along = own[3:] if turning else own[:3]
-    parts: list[float] = (np.round(along / np.abs(along).max(), 6) + 0.0).tolist()
-    axis = ", ".join(f"{x:.3g}" for x in parts)
+    size = float(np.abs(along).max())
+    axis = ", ".join(f"{round(float(x) / size, 6) + 0.0:.3g}" for x in along)
     return f"body {name!r} {'turns about' if turning else 'moves along'} [{axis}]"

@@ -1,7 +1,7 @@
 """Equilibria along a path of loads and travel, from the design position.
 
 Two walks lead to an equilibrium, all lanes together and each with its own steps. The first takes
-away what is out of balance at design (weight, springs, preload); the second brings loads and travel
+away the unbalance at design (weight, springs, preload); the second brings loads and travel
 in proportion. A step is accepted if
 
 - Newton's corrections contract as Kantorovich's theorem asks,
@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -66,7 +67,7 @@ NEGATIVE = 1e-11
 
 @dataclass(frozen=True, eq=False)
 class Equilibria:
-    """Equilibria at n samples; NaN where none was reached.
+    """Equilibria at n samples, or the last ones on the way.
 
     Attributes:
         reached: whether the walk came to the end, shape (n,).
@@ -77,7 +78,7 @@ class Equilibria:
             origin [m/N, rad/N, ...], shape (n, unknowns, 6), and of efforts, shape (n, drivers, 6).
         by_driver: the same by each held driver, shape (n, unknowns) and (n, drivers).
         least: smallest eigenvalue of the reduced stiffness over the largest, shape (n,).
-        unstable: what moves away by itself, by sample; empty where the equilibrium is stable.
+        unstable: the motion away by itself, by sample; empty for a stable equilibrium.
         iterations: Newton iterations, shape (n,).
     """
 
@@ -131,7 +132,7 @@ class Equilibria:
         return Pose.of(vec([*u]), quat([*q]))
 
     def require_reached(self, what: Callable[[int, float], str]) -> None:
-        """Raise SolveError with the last equilibrium of the first sample that was not reached.
+        """Raise SolveError with the last equilibrium of the first sample out of reach.
 
         Args:
             what: describes a sample's loads and travel, at a share of them.
@@ -164,7 +165,6 @@ class StaticModel:
         if compiled := available():
             make_loops_ready()
         self._code = LlvmCode(self.equations.plan) if compiled else None
-        self._rest: Array | None = None
 
     def executor(self, lanes: int) -> Executor:
         """Return the programs bound to lanes at design."""
@@ -175,25 +175,18 @@ class StaticModel:
         put_design(made, self.equations.vectors, self.equations.design, self.drivers)
         return made
 
-    @property
-    def rest(self) -> Array:
-        """State and multipliers in equilibrium without loads and travel."""
-        if self._rest is None:
-            executor, left = self.executor(1), self.equations.rest
-            slots = self.equations.vectors[REST]
+    @cached_property
+    def rest(self) -> tuple[Array, float]:
+        """State and multipliers in equilibrium without loads and travel, and the share of weight
+        and springs at the end of the walk: one, unless there is no such equilibrium.
+        """
+        executor = self.executor(1)
+        share, _ = self._walk(executor, partial(self._put_rest, executor))
+        return executor.get(self._state), float(share[0])
 
-            def put(share: Array) -> None:
-                executor.put(slots, (1.0 - share) * left[:, None])
-
-            share, _ = self._walk(executor, put)
-            if share[0] < 1.0:
-                raise SolveError(
-                    f"mechanism {self.mechanism.name!r}: no equilibrium at rest; from the design"
-                    f" position it follows {float(share[0]):.3g} of its weight and of the forces of"
-                    " its springs; correct free lengths and preloads, or hold a driver"
-                )
-            self._rest = executor.get(self._state)
-        return self._rest
+    def _put_rest(self, executor: Executor, share: Array) -> None:
+        left = self.equations.rest[:, None]
+        executor.put(self.equations.vectors[REST], (1.0 - share) * left)
 
     def solve(
         self, loads: Mapping[str, Array], travel: Mapping[str, Array], *, slopes: bool = True
@@ -207,9 +200,19 @@ class StaticModel:
         """
         n = len(next(iter((*loads.values(), *travel.values()))))
         executor, vectors = self.executor(n), self.equations.vectors
-        executor.put(self._state, self.rest)
+        state, settled = self.rest
+        if settled == 1.0:
+            executor.put(self._state, state)
+        elif not any(np.any(values) for values in loads.values()):
+            raise SolveError(
+                f"mechanism {self.mechanism.name!r}: no equilibrium at rest; from the design"
+                f" position it follows {settled:.3g} of its weight and of its springs' forces;"
+                " correct free lengths and preloads, hold a driver, or give loads"
+            )
 
         def put(share: Array) -> None:
+            if settled < 1.0:  # only loads hold it: they come with weight and springs
+                self._put_rest(executor, share)
             for name, values in loads.items():
                 executor.put(vectors[f"{LOAD}{name}"], share * np.asarray(values).T)
             for name, values in travel.items():
@@ -332,8 +335,8 @@ class StaticModel:
         return found
 
     def _stability(self, entries: Array) -> tuple[Array, list[str]]:
-        """Return the smallest eigenvalue of the reduced stiffness over the largest, and what moves
-        where it is negative.
+        """Return the smallest eigenvalue of the reduced stiffness over the largest, and the motion
+        of a negative one.
         """
         n, unknowns = entries.shape[1], self.equations.unknowns
         order = self.equations.order
