@@ -80,7 +80,7 @@ IMPORTS = {
     "case/models/hardpoints/templates": "joints mechanism",
     "case": ". joints mechanism kinematics",
     "case/suspension": ". mechanism case",
-    "case/measures": ". joints mechanism kinematics case",
+    "case/measures": ". primitives joints mechanism kinematics case",
     "case/io": ". joints mechanism kinematics case case/suspension case/measures",
     "case/models/hardpoints": (
         ". joints mechanism kinematics case/models/hardpoints/templates case case/suspension "
@@ -100,7 +100,7 @@ IMPORTS = {
     "studies/variation": ". joints mechanism kinematics case case/io",
     "studies/stress/truth": ". program joints mechanism kinematics case case/measures",
     "studies/stress/families": ". joints mechanism case case/measures case/io studies/stress/truth",
-    "studies": ". program joints kinematics case case/measures case/io harness report",
+    "studies": ". program joints mechanism kinematics case case/measures case/io harness report",
     "studies/joint_check": (
         ". primitives program joints mechanism kinematics case case/measures case/io "
         "harness studies"

@@ -16,6 +16,17 @@ class Load(StrEnum):
 
 
 @dataclass(frozen=True)
+class Resting:
+    """The table [equilibrium].
+
+    Attributes:
+        held: drivers with values; all others are free.
+    """
+
+    held: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class Rig:
     """The table [compliance]; None follows from the other tables.
 

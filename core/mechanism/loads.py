@@ -285,7 +285,7 @@ class Law(StrEnum):
 class Bushing(ForceElement):
     """A block of rubber between two bodies: springs and dampers along and about three axes.
 
-    The axes are fixed in the first body, which carries the element. A displacement is the way of the
+    The axes are fixed in the first body, which carries the element. A displacement is that of the
     second body's point from the first body's, along these axes. The force acts at the second body's
     point, on the first body in the sense of the displacement.
 

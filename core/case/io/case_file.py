@@ -13,7 +13,7 @@ from ...mechanism.mechanism import Body, Mechanism, Point
 from ..case import Case, Truth, size
 from ..quantity import with_markers
 from ..units import ANGLES, LENGTHS, Unit
-from .compliance import read_rig
+from .compliance import read_resting, read_rig
 from .coordinates import with_all_coordinates
 from .document import explained, fault, join, shown
 from .driving import read_drivers, read_sweep
@@ -72,6 +72,12 @@ def load_case(path: str | Path, closure: float | None = None) -> Case:
     sweep, driver_unit, own_grid = read_sweep(file, keys, mechanism, length, angle, columns)
     by_unit: dict[str, Convert] = {"m": length, "rad": angle, "1": float, "N": float, "N m": length}
     case = Case(keys.name, keys.source, Truth.CONSENSUS_ONLY, mechanism, sweep, ())
+    if keys.equilibrium is not None:
+        from .resting import at_rest  # it takes the solver, and few cases need it
+
+        resting = read_resting(file, keys.equilibrium, mechanism)
+        with explained(file, "equilibrium", length):
+            case = at_rest(case, resting)
     case = _with_outputs(
         file, keys, replace(case, length_unit=length.name, angle_unit=angle.name), length, by_unit
     )
@@ -111,7 +117,7 @@ def load_case(path: str | Path, closure: float | None = None) -> Case:
 
 def _within_digits(case: Case, keys: ClosureKeys, closure: float | None) -> Case:
     """Return the case without rows redundant within its tolerance, if it has a tolerance."""
-    case, why = replace(case, assembly=keys.notes), "--closure"
+    case, why = replace(case, assembly=(*keys.notes, *case.assembly)), "--closure"
     if closure is None and keys.tolerance is not None:
         closure, why = LENGTHS[case.length_unit](keys.tolerance), "[closure] tolerance"
     known = [joint.name for joint in case.mechanism.joints]

@@ -154,7 +154,7 @@ def _sweep(case: Case, values: Array, *, own_grid: bool) -> Mapping[str, Any]:
         own_grid: the case has a reference; an uneven grid can then be the reference's samples.
     """
     sweep, start, stop = case.sweep, float(values[0]), float(values[-1])
-    rate = {} if sweep.driver == TIME else {"rate": sweep.rate}
+    rate = {} if sweep.driver == TIME and not sweep.static else {"rate": sweep.rate}
     # round-off of start + k * step, once in the file's units and once here
     rounding = 4.0 * np.spacing(np.abs([*sweep.values, *values]).max())
     if (np.abs(np.linspace(start, stop, len(values)) - values) <= rounding).all():

@@ -10,7 +10,7 @@ from msgspec import Meta
 
 from ...mechanism.dimension import STIFFNESS
 from ...mechanism.mechanism import Mechanism
-from ..compliance import Load, Rig
+from ..compliance import Load, Resting, Rig
 from ..units import RADIAN, Unit
 from .document import unknown_name
 from .in_si import load_in_si
@@ -32,6 +32,25 @@ class RigKeys(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
     held: Names = None
     loads: Loads = tuple(Load)
     tire_stiffness: Stiffness = None
+
+
+class RestingKeys(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
+    """[equilibrium]."""
+
+    held: Annotated[tuple[str, ...], Meta(description="a list of names")] = ()
+
+
+def read_resting(file: Path, value: object, mechanism: Mechanism) -> Resting:
+    """Return the table [equilibrium].
+
+    Raises:
+        CaseError: unknown keys or names.
+    """
+    keys, known = typed(file, "equilibrium", value, RestingKeys), mechanism.drivers
+    for name in keys.held:
+        if name not in (names := [driver.name for driver in known]):
+            raise unknown_name(file, "equilibrium.held", name, names, "a driver")
+    return Resting(keys.held)
 
 
 def read_rig(file: Path, value: object, mechanism: Mechanism, length: Unit) -> Rig:

@@ -13,7 +13,7 @@ from ...mechanism.drivers import Driver, JointAngle, JointDisplacement, JointDri
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import ROUNDED_TIME, Absolute, Measure, Motion
 from ...trajectory import Array
-from ..case import TIME, Sweep
+from ..case import SLOW, TIME, Sweep
 from ..units import SECOND, Unit, plain
 from .class_keys import driver_keys, motion_keys, own_fields
 from .document import explained, fault, join, shown, unknown_name
@@ -89,6 +89,10 @@ def read_sweep(
         The sweep, the unit of the swept values, and whether the sweep has the samples of the
         reference.
     """
+    if keys.sweep is None:
+        if keys.equilibrium is None:
+            raise fault(file, "sweep", "missing, expected a table; add the key 'sweep'")
+        return Sweep(TIME, np.ones(1), 0.0), SECOND, False
     sweep = typed(file, "sweep", keys.sweep, SweepKeys)
     moved = {
         name: value["motion"]
@@ -107,8 +111,9 @@ def read_sweep(
     found = Sweep(
         sweep.driver, grid, convert(1.0 if sweep.rate is None else sweep.rate), design, motions
     )
+    times = found.path.times / (SLOW if found.static else 1.0)
     for name, motion in motions.items():
-        _check_motion(file, join(join("drivers", name), "motion"), motion, found.path.times)
+        _check_motion(file, join(join("drivers", name), "motion"), motion, times)
     return found, convert, sweep.at is not None
 
 
@@ -164,10 +169,10 @@ def _check(
                 "sweep.driver",
                 f"{problem}; name the driver to sweep, or add [drivers.NAME.motion]",
             )
-        if sweep.rate is not None:
+        if sweep.rate:
             problem = (
                 f"found {written['rate']!r} in a sweep of time, expected none, for the motions have"
-                " rates of their own"
+                " rates of their own, or 0 for rest"
             )
             raise fault(file, "sweep.rate", f"{problem}; remove it, or name the driver to sweep")
     elif sweep.driver not in drivers:
@@ -177,13 +182,6 @@ def _check(
         problem = "found a motion of the swept driver, expected the sweep alone to move it"
         advice = f'remove it, or sweep time: driver = "{TIME}", start and stop in seconds'
         raise fault(file, join(join("drivers", sweep.driver), "motion"), f"{problem}; {advice}")
-    if sweep.rate == 0.0:
-        raise fault(
-            file,
-            "sweep.rate",
-            "found 0, expected driver units per second; give 1 to differentiate by the driver's"
-            " value",
-        )
 
 
 def _check_even(file: Path, sweep: SweepKeys, written: Mapping[str, Any]) -> None:

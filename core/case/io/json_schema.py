@@ -13,7 +13,7 @@ from ...mechanism.motions import Motion
 from ..measures import Measure
 from ..suspension import SuspensionOutput
 from .class_keys import driver_keys, joint_keys, motion_keys
-from .compliance import RigKeys
+from .compliance import RestingKeys, RigKeys
 from .driving import DRIVERS
 from .loads import force_keys
 from .measures import measure_keys
@@ -61,6 +61,7 @@ def case_schema() -> dict[str, Any]:
         "suspension": SuspensionKeys,
         "reference": ReferenceKeys,
         "compliance": RigKeys,
+        "equilibrium": RestingKeys,
     }
     motions = {name: motion_keys(cls) for name, cls in Motion.registry.items()}
     found = document_schema(SCHEMA, CaseKeys, tables, single, {"motion": motions})

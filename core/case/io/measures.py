@@ -56,6 +56,7 @@ def _shape_of(key: str, hint: Any) -> Any:
     ]
     known: Mapping[Any, Any] = {
         str: Text,
+        str | None: Annotated[str | None, Meta(description="a name")],
         bool: Flag,
         tuple[str, str]: pair,
         Vector | None: _DIRECTION,
@@ -96,7 +97,7 @@ def read_measure(
     unit = output.unit
     scale = size(case)
     if isinstance(output, ForceMeasure):
-        loads = _largest_load(case.mechanism, scale, pace(case))
+        loads = largest_load(case.mechanism, scale, pace(case))
         scale = loads * scale if output.turns else loads
     atol, rtol, why = tolerance(file, key, keys, units[unit], scale, unit)
     return replace(output, atol=atol, rtol=rtol, why=why)
@@ -115,7 +116,7 @@ def _steepest(each: ForceElement) -> float:
     return float(max(slopes, default=0.0))
 
 
-def _largest_load(mechanism: Mechanism, size: float, pace: float) -> float:
+def largest_load(mechanism: Mechanism, size: float, pace: float) -> float:
     """Return an estimate of the largest force of a mechanism [N], the scale of errors.
 
     It counts the weights, the inertia forces at a pace [1/s], springs stretched by their own

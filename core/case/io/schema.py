@@ -45,7 +45,8 @@ left out. `kincheck list --joints` prints all types with their keys.
                          type = "table": times [s], values: the natural cubic spline through them;
                          the times must cover the sweep
     [sweep]              (driver), start, stop, steps: samples with both ends, 1 if they are equal;
-                         (rate) = 1, in driver units per second
+                         (rate) = 1, in driver units per second; 0: at rest at every sample, for
+                         static efforts and reactions; times are then those of rate 1
                          driver: its samples from start to stop; it has its design value at time
                          zero, and moves at the rate; the sign of the rate gives the direction
                          at = "reference", in place of start, stop and steps: the samples of the
@@ -104,6 +105,9 @@ left out. `kincheck list --joints` prints all types with their keys.
                          (static_toe), (static_camber), (wheel_axis), (wheel_contact), (travel);
                          the rest is as in [suspension];
                          outputs of one wheel may then have (side)
+    [equilibrium]        the case rests with gravity and springs: (held) = [DRIVER, ...], which keep
+                         their values or are swept; the others are free, and their efforts vanish;
+                         [sweep] may be left out
     [compliance]         of `kincheck kc`: (wheel), the body that carries the wheel; (contact), the
                          point where it touches the road; (held) = [DRIVER, ...], which keep their
                          values, others are free, default: all; (loads) = ["longitudinal",
@@ -173,7 +177,7 @@ class CaseKeys(msgspec.Struct, forbid_unknown_fields=True):
     ]
     bodies: Table
     drivers: Table
-    sweep: Table
+    sweep: Table | None = None
     truth: Truths | None = None
     units: Table = {}
     joints: Table = {}
@@ -186,6 +190,7 @@ class CaseKeys(msgspec.Struct, forbid_unknown_fields=True):
     gravity: Numbers3 = (0.0, 0.0, 0.0)
     forces: Table = {}
     compliance: Table | None = None
+    equilibrium: Table | None = None
 
 
 class BodyKeys(msgspec.Struct, forbid_unknown_fields=True):

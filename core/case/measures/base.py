@@ -31,6 +31,8 @@ NAMES: Mapping[str, str] = {
     "body": "body",
     "bodies": "body",
     "driver": "driver",
+    "about": "point",
+    "at": "joint",
     "force": "force",
 }
 """Keys that hold names, and the kind of what they name."""
@@ -74,8 +76,8 @@ class Measure(TypedQuantity):
         for each in own_keys(type(self)):
             if (kind := NAMES.get(key_of(each))) is None:
                 continue
-            found: str | tuple[str, ...] = getattr(self, each.name)
-            for name in (found,) if isinstance(found, str) else found:
+            found: str | tuple[str, ...] | None = getattr(self, each.name)
+            for name in (found,) if isinstance(found, str) else found or ():
                 if name not in known[kind]:
                     raise MechanismError(
                         unknown(kind, name, known[kind]), f"outputs.{self.name}.{key_of(each)}"

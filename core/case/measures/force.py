@@ -10,26 +10,44 @@ from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
-from ...algebra import Vec3, triple
+from ...algebra import ZERO, Vec3, quat, triple, vec
 from ...errors import MechanismError, SolveError
 from ...forces import Forces
 from ...jet import Jet
+from ...joints.base import triad, unit
 from ...mechanism.drivers import JointDriver, PointCoordinate
 from ...mechanism.loads import Bushing, Force, SpringDamper, Torque, TorsionSpringDamper
-from ...mechanism.mechanism import Mechanism, Point, Vector
+from ...mechanism.mechanism import GROUND, Mechanism, Point, Vector
+from ...primitives.base import Pose
 from ...trajectory import Array
-from ..quantity import HIDDEN, MARKER
+from ..case import HELD_BUT
+from ..quantity import HIDDEN, MARKER, Output, Quantity
 from .base import Measure, place_on
+from .joint import JointAngle, JointDisplacement
 
 NEWTON, NEWTON_METRE = "N", "N m"
+# A coordinate that moves by less than this part of the driver's does not determine the motion
+# there [rad or m by rad or m]: the effort at it would have lost all digits.
+DEAD_CENTRE = 1e-9
+_COORDINATES: Mapping[str, Any] = {"rotation": JointAngle, "translation": JointDisplacement}
+
+
+class Frame(StrEnum):
+    """Axes of a reaction's components: global; those of the second body, as its Euler parameters
+    have them; or of the joint, z along its axis, carried by the second body.
+    """
+
+    GLOBAL = "global"
+    BODY = "body"
+    JOINT = "joint"
 
 
 class Axis(StrEnum):
-    """A global axis."""
+    """An axis of the frame."""
 
     X = "x"
     Y = "y"
@@ -66,6 +84,19 @@ class ForceMeasure(Measure):
     @abstractmethod
     def place(self, mechanism: Mechanism) -> tuple[str, Vector]:
         """Return the body it acts on, and the body's point, global at design [m]."""
+
+    @property
+    def placed(self) -> bool:
+        """Whether the value needs the places of points at the samples; see `located`."""
+        return False
+
+    def located(self, at: Mapping[str, Vec3]) -> Self:
+        """Return the measure at samples.
+
+        Args:
+            at: positions of its points as jets [m].
+        """
+        return self
 
     @property
     def forces(self) -> tuple[str, ...]:
@@ -110,7 +141,18 @@ class _JointReaction(ForceMeasure):
     joint: str
     component: Axis | None = None
     direction: Vector | None = None
+    frame: Frame = Frame.GLOBAL
+    about: str | None = None
     bodies: tuple[str, str] = field(default=("", ""), kw_only=True, metadata=HIDDEN)
+    tip: Vector | None = field(default=None, kw_only=True, metadata=HIDDEN)
+    now: Array | None = field(default=None, kw_only=True, metadata=HIDDEN, compare=False)
+    arm: Array | None = field(default=None, kw_only=True, metadata=HIDDEN, compare=False)
+
+    @property
+    def facts(self) -> Mapping[str, Any]:
+        """All keys and the unit, without what belongs to samples."""
+        hidden = ("tip", "now", "arm")
+        return {key: value for key, value in super().facts.items() if key not in hidden}
 
     def check(self, mechanism: Mechanism) -> None:
         """Raise MechanismError unless the joint exists and one direction is given."""
@@ -135,9 +177,62 @@ class _JointReaction(ForceMeasure):
                 f"{key}.joint",
             )
 
+        if self.about is not None and not self.turns:
+            raise MechanismError(
+                "found about for a force, which is the same about any point; remove it, or give"
+                " type = 'joint_moment'",
+                f"{key}.about",
+            )
+        if self.frame == Frame.JOINT and not hasattr(mechanism.joint(self.joint), "axis"):
+            raise MechanismError(
+                f"joint {self.joint!r} is {mechanism.joint(self.joint).type} and has no axis, which"
+                ' its frame needs; give frame = "body" or "global"',
+                f"{key}.frame",
+            )
+
     def bound(self, mechanism: Mechanism) -> Self:
-        """Return the measure with the joint's bodies, which its sense names."""
-        return replace(self, bodies=mechanism.joint(self.joint).bodies)
+        """Return the measure with the joint's bodies, which its sense names, and the tip of its
+        direction on the second body.
+        """
+        joint: Any = mechanism.joint(self.joint)
+        bodies: tuple[str, str] = joint.bodies
+        if self.frame == Frame.GLOBAL:
+            return replace(self, bodies=bodies)
+        axes = np.eye(3)
+        if self.frame == Frame.JOINT:
+            axes = np.array([[*each] for each in triad(joint.axis)])
+        elif bodies[1] != GROUND:
+            frame = Pose.of(ZERO, quat(mechanism.body(bodies[1]).euler_parameters))
+            axes = np.array([[*frame.turn(vec(each))] for each in np.eye(3).tolist()])
+        x, y, z = (np.array(self.place(mechanism)[1]) + self.along @ axes).tolist()
+        return replace(self, bodies=bodies, tip=(x, y, z))
+
+    @property
+    def points(self) -> tuple[str, ...]:
+        """The point of action, the tip of the direction, and the point of the moment."""
+        tip = (f"{super().points[0]} along {self.name}",) if self.frame != Frame.GLOBAL else ()
+        return (*super().points, *tip, *((self.about,) if self.about is not None else ()))
+
+    def markers(self, mechanism: Mechanism) -> Sequence[Point]:
+        """Return the point of action, and the tip of the direction."""
+        found = super().markers(mechanism)
+        if self.tip is None:
+            return found
+        return [*found, Point(self.points[1], self.place(mechanism)[0], self.tip)]
+
+    @property
+    def placed(self) -> bool:
+        """Whether direction or point move."""
+        return self.frame != Frame.GLOBAL or self.about is not None
+
+    def located(self, at: Mapping[str, Vec3]) -> Self:
+        """Return the measure with its direction and its moment's arm at the samples."""
+        if not self.placed:
+            return self
+        places = [np.stack([jet.x for jet in at[name]], axis=1) for name in self.points]
+        now = places[1] - places[0] if self.frame != Frame.GLOBAL else None
+        arm = places[0] - places[-1] if self.about is not None else None
+        return replace(self, now=now, arm=arm)
 
     @property
     def read(self) -> str:
@@ -164,11 +259,27 @@ class _JointReaction(ForceMeasure):
         """Which body exerts it on which, about which point, along which direction."""
         along = self.component or f"[{', '.join(f'{x:.6g}' for x in self.along)}]"
         first, second = self.bodies
-        return f"{self.positive}, by {first!r} on {second!r}, along global {along}"
+        where = {
+            Frame.GLOBAL: "global",
+            Frame.BODY: f"{second!r}'s own",
+            Frame.JOINT: "the joint's own",
+        }[self.frame]
+        positive = self.positive
+        if self.about is not None:
+            positive = f"moment about {self.about!r}"
+        return f"{positive}, by {first!r} on {second!r}, along {where} {along}"
 
     def values(self, forces: Forces) -> Array:
         """Return the component of the reaction [N or N m]."""
-        return forces.joints[self.joint].along(self.along, moment=self.turns)
+        reaction = forces.joints[self.joint]
+        if self.placed and self.now is None and self.arm is None:
+            raise SolveError(
+                f"output {self.name!r} turns with a body or is about a point, which this study does"
+                ' not follow; give frame = "global" without about'
+            )
+        if self.arm is not None:
+            reaction = reaction.about(self.arm)
+        return reaction.along(self.along if self.now is None else self.now, moment=self.turns)
 
     def undetermined(self, forces: Forces) -> str:
         """Return a message if redundant rows leave the component undetermined, or nothing."""
@@ -186,7 +297,9 @@ class _JointReaction(ForceMeasure):
 
 @dataclass(frozen=True)
 class JointForce(_JointReaction):
-    """Force of a joint's first body on its second, along a global axis or direction."""
+    """Force of a joint's first body on its second, along an axis or direction of the frame:
+    "global", or of the second "body" or the "joint" (z along its axis), both turning along.
+    """
 
     type = "joint_force"
     positive = "force"
@@ -194,7 +307,9 @@ class JointForce(_JointReaction):
 
 @dataclass(frozen=True)
 class JointMoment(_JointReaction):
-    """Moment of a joint's first body on its second, about the joint's point on the second body."""
+    """Moment of a joint's first body on its second, about the joint's point on the second body, or
+    a point named by `about`; frame as of a force.
+    """
 
     type = "joint_moment"
     measure = NEWTON_METRE
@@ -206,17 +321,85 @@ class JointMoment(_JointReaction):
 @dataclass(frozen=True)
 class DriverEffort(ForceMeasure):
     """Force or torque of a driver, in the positive sense of its coordinate: effort times rate is
-    the power it puts in.
+    the power it puts in. With `at`, that of an actuator at this joint in the driver's place, by
+    virtual work; other drivers hold.
     """
 
     type = "driver_effort"
     positive = "along the driver's coordinate, so that effort times rate is the power put in"
 
     driver: str
+    at: str | None = None
+    rates: tuple[Quantity, ...] = field(default=(), kw_only=True, metadata=HIDDEN)
+    alone: tuple[str, ...] = field(default=(), kw_only=True, metadata=HIDDEN)
+    ratio: Array | None = field(default=None, kw_only=True, metadata=HIDDEN, compare=False)
+
+    @property
+    def facts(self) -> Mapping[str, Any]:
+        """All keys and the unit; the driver whose motion alone counts, if there are others."""
+        hidden = ("rates", "alone", "ratio")
+        found = {key: value for key, value in super().facts.items() if key not in hidden}
+        return found | ({HELD_BUT: [*self.alone]} if self.alone else {})
+
+    @property
+    def sense(self) -> str:
+        """The coordinate of the effort."""
+        if self.at is None:
+            return super().sense
+        return f"positive: along the coordinate of joint {self.at!r}, in place of {self.driver!r}"
+
+    def check(self, mechanism: Mechanism) -> None:
+        """Raise MechanismError unless the joint of `at`, if any, has a coordinate to drive."""
+        super().check(mechanism)
+        if self.at is not None:
+            joint = mechanism.joint(self.at)
+            if not _COORDINATES.keys() & {*joint.freedoms}:
+                raise MechanismError(
+                    f"joint {self.at!r} is {joint.type} and has no rotation or translation for an"
+                    " effort; name another joint",
+                    f"outputs.{self.name}.at",
+                )
 
     def bound(self, mechanism: Mechanism) -> Self:
-        """Return the measure with the unit of the driver's effort."""
-        return replace(self, turns=mechanism.driver(self.driver).turns)
+        """Return the measure with the unit of the effort, and the rates of both coordinates."""
+        driver: Any = mechanism.driver(self.driver)
+        if self.at is None:
+            return replace(self, turns=driver.turns)
+        joint = mechanism.joint(self.at)
+        there = next(each for each in _COORDINATES if each in joint.freedoms)
+        if isinstance(driver, JointDriver):
+            own: Quantity = _COORDINATES[driver.freedom](self.name, 0, 0, "", joint=driver.joint)
+        else:
+            x, y, z = unit(driver.direction)
+            own = Output(self.name, driver.point, (x, y, z), False, 0.0, 0.0, "")
+        rates = _COORDINATES[there](self.name, 0, 0, "", joint=self.at), own
+        alone = (self.driver,) if len(mechanism.drivers) > 1 else ()
+        return replace(self, turns=there == "rotation", rates=rates, alone=alone)
+
+    @property
+    def points(self) -> tuple[str, ...]:
+        """The point of action, and those of both coordinates."""
+        every = [name for rate in self.rates for name in rate.points]
+        return tuple(dict.fromkeys((*super().points, *every)))
+
+    def markers(self, mechanism: Mechanism) -> Sequence[Point]:
+        """Return the point of action, and the markers of both coordinates."""
+        own = [point for rate in self.rates for point in rate.markers(mechanism)]
+        return [*super().markers(mechanism), *own]
+
+    @property
+    def placed(self) -> bool:
+        """Whether rates convert the effort."""
+        return self.at is not None
+
+    def located(self, at: Mapping[str, Vec3]) -> Self:
+        """Return the measure with the ratio of rates at the samples; NaN at a dead centre."""
+        if not self.rates:
+            return self
+        there, own = (rate.of(at, at).v for rate in self.rates)
+        with np.errstate(all="ignore"):
+            still = np.abs(there) <= DEAD_CENTRE * np.abs(own)
+            return replace(self, ratio=np.where(still, np.nan, own / there))
 
     @property
     def read(self) -> str:
@@ -234,7 +417,14 @@ class DriverEffort(ForceMeasure):
 
     def values(self, forces: Forces) -> Array:
         """Return the effort [N or N m]."""
-        return forces.drivers[self.driver]
+        if self.at is None:
+            return forces.drivers[self.driver]
+        if self.ratio is None:
+            raise SolveError(
+                f"output {self.name!r} is an effort at another joint, which this study does not"
+                " follow; leave out at"
+            )
+        return forces.drivers[self.driver] * self.ratio
 
 
 @dataclass(frozen=True)

@@ -93,6 +93,7 @@ class StaticEquations:
         scale: of forces [J].
         chosen, dropped: independent rows, and redundant ones.
         rest: the unbalance at design [J], shape (unknowns,).
+        multipliers: of the chosen rows at design, which carry the other forces [J].
     """
 
     mechanism: Mechanism
@@ -107,6 +108,7 @@ class StaticEquations:
     chosen: tuple[int, ...]
     dropped: tuple[int, ...]
     rest: Array
+    multipliers: Array
     frame: Frames
 
     @property
@@ -216,6 +218,7 @@ class _Tracer:
             self.chosen,
             self.dropped,
             at_design.unbalanced,
+            at_design.multipliers,
             self.frame,
         )
 
@@ -289,6 +292,10 @@ class _Tracer:
         executor = NumpyExecutor(Plan(both, dict(self.layout.slots)), 1)
         executor.clear()
         put_design(executor, self.layout.vectors, self.formulation.design, self.drives)
+        executor.run("unbalanced")
+        # joints carry what they can, which changes the stiffness; the rest is out of balance
+        carried: Any = np.linalg.lstsq(self.matrix.T, executor.get(out)[:, 0], rcond=None)[0]
+        executor.put(self.layout.vectors[MULTIPLIERS], carried[:, None])
         for name in both:
             executor.run(name)
         matrix = np.zeros((self.order, self.order))
@@ -297,7 +304,7 @@ class _Tracer:
         largest = float(np.abs(stiffness).max(initial=0.0))
         self._require_held(stiffness, largest)
         scale = 2.0 ** round(np.log2(largest)) if largest else 1.0
-        return _AtDesign(found, scale, executor.get(out)[:, 0])
+        return _AtDesign(found, scale, carried, executor.get(out)[:, 0])
 
     def _require_held(self, stiffness: Array, largest: float) -> None:
         free = null_space(self.matrix, self.n)
@@ -379,10 +386,13 @@ class _Tracer:
 
 @dataclass(frozen=True, eq=False)
 class _AtDesign:
-    """The program of the tangent, the scale of its stiffness, and the forces out of balance."""
+    """The program of the tangent, the scale of its stiffness, the multipliers that carry most of
+    the forces, and the rest of them.
+    """
 
     program: Program
     scale: float
+    multipliers: Array
     unbalanced: Array
 
 

@@ -173,6 +173,7 @@ class StaticModel:
             LlvmExecutor(self._code, lanes) if self._code else NumpyExecutor(plan, lanes)
         )
         put_design(made, self.equations.vectors, self.equations.design, self.drivers)
+        made.put(self.equations.vectors[MULTIPLIERS], self.equations.multipliers[:, None])
         return made
 
     @cached_property
@@ -195,10 +196,11 @@ class StaticModel:
 
         Args:
             loads: force and torque by load point [N, N m], shape (n, 6).
-            travel: values of held drivers from design [m or rad], shape (n,).
+            travel: values of held drivers from design [m or rad], shape (n,). Without loads and
+                travel there is one sample.
             slopes: whether to compute compliance and stability.
         """
-        n = len(next(iter((*loads.values(), *travel.values()))))
+        n = next((len(each) for each in (*loads.values(), *travel.values())), 1)
         executor, vectors = self.executor(n), self.equations.vectors
         state, settled = self.rest
         if settled == 1.0:

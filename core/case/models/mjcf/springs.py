@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -71,7 +72,7 @@ def springs_of(
     return [*found.values()]
 
 
-def _law(element: Element, acting: Mapping[str, bool]) -> dict[str, float]:
+def _law(element: Element, acting: Mapping[str, bool]) -> dict[str, Any]:
     """Return stiffness and damping."""
     first, second = element.numbers("springdamper", (2,), (0.0, 0.0))
     if first > 0.0 and second > 0.0:
@@ -91,7 +92,7 @@ def _of_joint(
     parts: Parts,
     driving: Driving,
     joint: ModelJoint,
-    law: Mapping[str, float],
+    law: Mapping[str, Any],
     size: float,
 ) -> ForceElement | None:
     """Return the force element of a joint; None of a locked one, whose spring does nothing."""
