@@ -6,7 +6,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 UV := $(shell command -v uv 2>/dev/null)
 
-.PHONY: run test docs lock sizes house mutants fuzz clean
+.PHONY: run test nightly docs lock sizes house mutants fuzz clean
 
 run: .venv/ready
 	$(BIN)/kincheck run mcpherson_strut --out report
@@ -16,6 +16,10 @@ test: .venv/ready
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright --pythonpath $(BIN)/python
 	$(BIN)/pytest --numprocesses auto --dist worksteal
+
+# The dear tests, which the nightly workflow runs.
+nightly: .venv/ready
+	$(BIN)/pytest -m nightly --numprocesses auto --dist worksteal
 
 # Pages, figures and reference pages; a warning is an error.
 docs: .venv/docs

@@ -20,13 +20,13 @@ SIMULATIONS = {
     "mujoco": ("mujoco.steps", "stiff"),
     "mujoco-default": ("mujoco.steps", "default"),
     "mujoco-projecting": ("mujoco.steps", "projecting"),
-    "pinocchio": ("pinocchio.dynamics", "Dynamics"),
+    "pinocchio": ("pinocchio.pinocchio", "Dynamics"),
     "exudyn": ("exudyn.solvers", "trapezoidal"),
     "exudyn-alpha": ("exudyn.solvers", "generalized_alpha"),
     "exudyn-static": ("exudyn.solvers", "static"),
     "exudyn-static-modified": ("exudyn.solvers", "static_modified"),
-    "drake": ("drake.steps", "Steps"),
-    "dart": ("dart.steps", "Steps"),
+    "drake": ("drake.drake", "Steps"),
+    "dart": ("dart.dart", "Steps"),
     "simbody": ("simbody.assembly", "Assembly"),
 }
 """Engines in simulate mode: name on the command line -> module and maker of the engine. A

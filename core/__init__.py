@@ -47,10 +47,9 @@ if TYPE_CHECKING:
         solve_designs,
         trace,
     )
-    from .mechanism.drivers import JointAngle, JointDisplacement, PointCoordinate
     from .mechanism.mechanism import GROUND, Body, Mechanism, Point
-    from .mechanism.motions import Ramp, Sine, Table
-    from .studies.joint_check.check_joint import check_joint
+    from .mechanism.motions import JointAngle, JointDisplacement, PointCoordinate, Ramp, Sine, Table
+    from .studies.checks.check_joint import check_joint
     from .trajectory import BodyMotion, PointMotion, Trajectory
 
 __version__ = VERSION
@@ -121,8 +120,7 @@ _NAMES = {
     "errors": "CaseError KincheckError MechanismError SolveError UnknownNameError",
     "trajectory": "BodyMotion PointMotion Trajectory",
     "mechanism.mechanism": "GROUND Body Mechanism Point",
-    "mechanism.drivers": "JointAngle JointDisplacement PointCoordinate",
-    "mechanism.motions": "Ramp Sine Table",
+    "mechanism.motions": "JointAngle JointDisplacement PointCoordinate Ramp Sine Table",
     "joints": (
         "ConstantVelocity Cylindrical Distance Fixed Gear Inline InPlane "
         "Joint OrientationLock ParallelAxes PerpendicularAxes Planar Polynomial RackPinion "
@@ -136,7 +134,7 @@ _NAMES = {
     ),
     "harness.engine": "Engine",
     "harness.record": "Outcome Record Results",
-    "studies.joint_check.check_joint": "check_joint",
+    "studies.checks.check_joint": "check_joint",
 }
 """Public names by the module that defines them, as for type checkers above."""
 _MODULES = {name: module for module, names in _NAMES.items() for name in names.split()}

@@ -100,7 +100,6 @@ class PoseFailure:
         redundant: names of the redundant rows.
         where: the failing part of the mechanism; empty for all of it.
         sigma: smallest singular value at the last pose, an estimate; None if not known.
-        pivot: smallest pivot there; None if not known.
     """
 
     kind: FailureKind
@@ -111,13 +110,10 @@ class PoseFailure:
     redundant: Sequence[str] = ()
     where: str = ""
     sigma: float | None = None
-    pivot: float | None = None
 
     def __str__(self) -> str:
         numbers = {**vars(self), "redundant": ", ".join(self.redundant)}
         text = self.where + TEXTS[self.kind].format_map(numbers)
         if self.sigma is not None:
             text += f"; smallest singular value there about {self.sigma:.3g} ({ZERO})"
-        if self.pivot is not None:
-            text += f"; smallest pivot there {self.pivot:.3g} ({ZERO})"
         return text

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, TypeAlias
+import math
+from collections.abc import Mapping
+from typing import Any, TypeAlias, cast
 
-from .dataset import Dataset
+from .dataset import Dataset, Variable
+from .errors import KincheckError, unknown
+from .extras import library
 
 # These libraries are optional, and a type checker may not find them.
 DataFrame: TypeAlias = Any
@@ -38,9 +42,27 @@ class Tabular:
         """Return plain data, ready for JSON: the content of a file as in the file, any other result
         as `xarray.Dataset.to_dict` has it. Missing numbers are null.
         """
-        from .conversions import to_dict
+        import msgspec
 
-        return to_dict(self, self.dataset)
+        if isinstance(self, msgspec.Struct):
+            return cast("dict[str, Any]", msgspec.to_builtins(self))
+
+        def arrays(variables: Mapping[str, Variable]) -> dict[str, Any]:
+            return {
+                name: {
+                    "dims": each.dims,
+                    "attrs": _units(each),
+                    "data": _plain(each.values.tolist()),
+                }
+                for name, each in variables.items()
+            }
+
+        data = self.dataset()
+        return {
+            "dims": data.sizes,
+            "coords": arrays(data.coords),
+            "data_vars": arrays(data.variables),
+        }
 
     def to_dataframe(self) -> DataFrame:
         """Return a pandas table. The units of its columns are in `attrs["units"]`.
@@ -48,9 +70,10 @@ class Tabular:
         Raises:
             KincheckError: pandas is not installed.
         """
-        from .conversions import to_dataframe
-
-        return to_dataframe(self.dataset())
+        data = self.dataset()
+        frame = library("to_dataframe", "pandas", "pandas").DataFrame(data.table())
+        frame.attrs["units"] = {name: each.unit for name, each in data.columns().items()}
+        return frame
 
     def to_xarray(self) -> XarrayDataset:
         """Return an xarray dataset. The unit of a variable is in its `attrs["units"]`.
@@ -58,9 +81,16 @@ class Tabular:
         Raises:
             KincheckError: xarray is not installed.
         """
-        from .conversions import to_xarray
+        found = library("to_xarray", "xarray", "xarray")
 
-        return to_xarray(self.dataset(), self.summary())
+        def arrays(variables: Mapping[str, Variable]) -> dict[str, Any]:
+            return {
+                name: (each.dims, each.values, _units(each)) for name, each in variables.items()
+            }
+
+        data = self.dataset()
+        title = {"title": self.summary()}
+        return found.Dataset(arrays(data.variables), arrays(data.coords), attrs=title)
 
     def plot(self, *names: str) -> Figure:
         """Draw the curves with matplotlib, one diagram for each variable, and return the figure.
@@ -71,6 +101,38 @@ class Tabular:
         Raises:
             KincheckError: matplotlib is not installed, or there are no such curves.
         """
-        from .conversions import to_figure
+        data = self.dataset()
+        curves = data.curves()
+        for name in names:
+            if name not in curves:
+                raise KincheckError(unknown("curve", name, curves))
+        figures = library("plot", "matplotlib.figure", "matplotlib")
+        shown = names or tuple(curves)
+        figure = figures.Figure(figsize=(7.0, 2.4 * len(shown)), layout="constrained")
+        axes = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
+        x = data.coords[data.x]
+        for each, name in zip(axes, shown, strict=True):
+            for column, values in curves[name].items():
+                across = values.reshape(len(values), math.prod(values.shape[1:]))
+                lines = each.plot(x.values, across, label=column.removeprefix(f"{name}."))
+                for line in lines[1:]:  # one colour and one entry in the legend for all of a column
+                    line.set(color=lines[0].get_color(), label=None)
+            unit = data.variables[name].unit
+            each.set_ylabel(f"{name} [{unit}]" if unit else name)
+            each.grid(visible=True, alpha=0.3)
+            if len(curves[name]) > 1:
+                each.legend(fontsize="small", ncols=max(1, round(math.sqrt(len(curves[name])))))
+        axes[-1].set_xlabel(f"{data.x} [{x.unit}]" if x.unit else data.x)
+        axes[0].set_title(self.summary())
+        return figure
 
-        return to_figure(self.dataset(), names, self.summary())
+
+def _units(variable: Variable) -> dict[str, str]:
+    return {"units": variable.unit} if variable.unit else {}
+
+
+def _plain(values: Any) -> Any:
+    """Return nested lists with null for infinite and missing numbers."""
+    if isinstance(values, list):
+        return [_plain(each) for each in cast("list[Any]", values)]
+    return None if isinstance(values, float) and not math.isfinite(values) else values

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from functools import cache
 from pathlib import Path
 
-from kincheck.core.case.io import loads, schema
+from kincheck.core.case.io import schema
 from kincheck.core.case.io.catalogue import output_tables, type_tables
 from kincheck.core.cli.main import parser as parser_of
 from kincheck.core.studies.variation import variation_schema
@@ -100,12 +100,16 @@ def case_file() -> str:
         "and name it in the first line of a case file, for editors with the Even Better TOML"
         " extension or `taplo`: `#:schema ./kincheck-case.json`.",
     ]
-    for title, module in (
-        ("All keys", schema),
+    _, _, cases = (schema.__doc__ or "").partition("Reference. ")
+    sections, _, loads = cases.partition(
+        "Masses and loads of a case file: their keys, and their numbers in SI.\n\n"
+    )
+    _, _, variations = (variation_schema.__doc__ or "").partition("Reference. ")
+    for title, text in (
+        ("All keys", sections),
         ("Masses, gravity and forces", loads),
-        ("Variation files", variation_schema),
+        ("Variation files", variations),
     ):
-        _, _, text = (module.__doc__ or "").partition("Reference. ")
         prose, _, keys = text.partition("\n\n    ")
         parts += [f"## {title}", " ".join(prose.split()), f"```text\n{_dedented(keys)}\n```"]
     return "\n\n".join(parts) + "\n"

@@ -49,7 +49,7 @@ IMPORTS = {
         "kinematics/forces kinematics/structure kinematics/compiled"
     ),
     "kinematics/assembly": (
-        ". primitives program joints mechanism kinematics/formulation "
+        ". primitives joints mechanism kinematics/formulation "
         "kinematics/structure kinematics/compiled"
     ),
     "kinematics/continuation": (
@@ -59,13 +59,9 @@ IMPORTS = {
         ". primitives program joints mechanism kinematics/formulation kinematics/forces "
         "kinematics/structure kinematics/compiled kinematics/continuation"
     ),
-    "kinematics/sparse": (
-        ". primitives program program/llvm mechanism kinematics/formulation "
-        "kinematics/structure kinematics/compiled"
-    ),
     "kinematics/blocks": (
         ". program mechanism kinematics/formulation kinematics/structure "
-        "kinematics/compiled kinematics/continuation kinematics/sparse"
+        "kinematics/compiled kinematics/continuation"
     ),
     "kinematics/diagnosis": (
         ". primitives mechanism kinematics/formulation kinematics/structure "
@@ -75,47 +71,34 @@ IMPORTS = {
         ". primitives program joints mechanism kinematics/formulation kinematics/forces "
         "kinematics/structure kinematics/compiled kinematics/assembly "
         "kinematics/continuation kinematics/verified kinematics/blocks "
-        "kinematics/sparse kinematics/statics kinematics/diagnosis"
+        "kinematics/statics kinematics/diagnosis"
     ),
-    "case/models/hardpoints/templates": "joints mechanism",
-    "case": ". joints mechanism kinematics",
+    "case": ". primitives joints mechanism kinematics",
     "case/suspension": ". mechanism case",
-    "case/measures": ". primitives joints mechanism kinematics case",
-    "case/io": ". joints mechanism kinematics case case/suspension case/measures",
-    "case/models/hardpoints": (
-        ". joints mechanism kinematics case/models/hardpoints/templates case case/suspension "
-        "case/io"
-    ),
-    "case/models/mjcf": ". joints mechanism kinematics case case/io",
-    "case/models/robots": ". joints mechanism case/io case/models/mjcf",
-    "case/models": ". case case/io case/models/hardpoints case/models/mjcf case/models/robots",
-    "harness": (
-        ". program/llvm joints mechanism kinematics case case/suspension case/measures case/io"
-    ),
+    "case/io": ". joints mechanism kinematics case case/suspension",
+    "case/models/hardpoints": (". joints mechanism kinematics case case/suspension case/io"),
+    "case/models/trees": ". joints mechanism kinematics case case/io",
+    "case/models": ". case case/io case/models/hardpoints case/models/trees",
+    "harness": (". program/llvm joints mechanism kinematics case case/suspension case/io"),
     "harness/workers": ". harness",
     "harness/reporting": "",
     "history": ". case case/io harness",
-    "history/regression": ". case case/io harness history",
-    "report": ". joints mechanism case case/io harness history history/regression",
+    "report": ". joints mechanism case case/io harness history",
     "studies/variation": ". joints mechanism kinematics case case/io",
-    "studies/stress/truth": ". program joints mechanism kinematics case case/measures",
-    "studies/stress/families": ". joints mechanism case case/measures case/io studies/stress/truth",
-    "studies": ". program joints mechanism kinematics case case/measures case/io harness report",
-    "studies/joint_check": (
-        ". primitives program joints mechanism kinematics case case/measures case/io "
-        "harness studies"
-    ),
-    "studies/engine_check": (
-        ". primitives joints mechanism case case/measures case/io harness harness/workers "
-        "studies studies/joint_check"
+    "studies/truth": ". program mechanism kinematics case",
+    "studies/stress/families": ". joints mechanism case case/io studies/truth",
+    "studies": ". program joints mechanism kinematics case case/io harness",
+    "studies/checks": (
+        ". primitives program joints mechanism kinematics case case/io "
+        "harness harness/workers report"
     ),
     "studies/tolerance": (
-        ". program program/llvm mechanism kinematics case case/measures case/io harness "
+        ". mechanism kinematics case case/io harness "
         "harness/workers history report studies/variation"
     ),
     "studies/stress": (
         ". joints mechanism kinematics case case/io harness harness/workers report "
-        "studies/stress/truth studies/stress/families"
+        "studies/truth studies/stress/families"
     ),
     "studies/paper": ". primitives program joints mechanism kinematics case harness report",
     "studies/diagnosis": ". joints kinematics case harness report studies/variation",
@@ -125,14 +108,16 @@ IMPORTS = {
         "studies/variation studies studies/tolerance studies/paper"
     ),
     "cli": (
-        ". program program/llvm joints kinematics case/models/hardpoints/templates case "
+        ". program program/llvm joints kinematics case "
         "case/io case/models/hardpoints case/models harness harness/workers history "
-        "history/regression report studies/variation studies/stress/families studies "
-        "studies/joint_check studies/engine_check studies/tolerance studies/stress "
+        "report studies/variation studies/stress/families studies "
+        "studies/checks studies/tolerance studies/stress "
         "studies/paper studies/diagnosis studies/bench studies/compliance"
     ),
-    "__init__": ". joints mechanism kinematics case case/io harness studies/joint_check",
-    "kincheck": "case case/io harness harness/workers studies studies/compliance cli __init__",
+    "__init__": ". joints mechanism kinematics case case/io harness studies/checks",
+    "kincheck": (
+        "case case/io harness harness/workers studies/checks studies/compliance cli __init__"
+    ),
 }
 """Folder of core: the folders it imports besides itself, whenever the import runs."""
 
@@ -178,7 +163,7 @@ def test_sources_import_by_the_table():
 
 
 OFFENDERS = [
-    ("core/algebra.py", "from .mechanism.drivers import JointAngle"),
+    ("core/algebra.py", "from .mechanism.motions import JointAngle"),
     ("core/primitives/new.py", "from ..joints.base import Joint"),
     ("core/kinematics/new.py", "from ..harness import record"),
     ("core/kinematics/new.py", "def f():\n    from .. import harness"),
@@ -186,7 +171,7 @@ OFFENDERS = [
         "core/kinematics/formulation/new.py",
         "from ..structure.components import Section",
     ),
-    ("core/kinematics/sparse/new.py", "from .. import blocks"),
+    ("core/kinematics/continuation/new.py", "from .. import blocks"),
     ("core/harness/run.py", "from ... import adapters"),
     ("core/kincheck/new.py", "from kincheck.adapters import engine"),
     ("core/kincheck/new.py", "from kincheck.core.program import Tape"),
@@ -198,7 +183,7 @@ OFFENDERS = [
         "adapters/mujoco/new.py",
         "from ..pinocchio.dynamics import Dynamics",
     ),
-    ("adapters/shared/new.py", "from ..mujoco.spec import Sketch"),
+    ("adapters/shared/new.py", "from ..mujoco.mujoco import MuJoCo"),
     ("adapters/mujoco/new.py", "from ...cases import load"),
     ("cases/rssr.py", "from ..adapters import engine"),
 ]

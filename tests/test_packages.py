@@ -50,7 +50,7 @@ def test_no_layer_is_too_large():
 def test_the_door_has_the_names_that_type_checkers_see():
     """And none of a module, which would take its place once imported."""
     seen = {
-        alias.asname: node.module
+        alias.name: node.module
         for node in ast.walk(tree(DOOR))
         if isinstance(node, ast.ImportFrom) and node.level
         for alias in node.names

@@ -8,7 +8,6 @@ import sys
 import kincheck
 import numpy as np
 import pytest
-from kincheck.core.conversions import to_figure
 from kincheck.core.dataset import Dataset, Variable
 from kincheck.core.tabular import Tabular
 
@@ -198,7 +197,7 @@ def test_nothing_solved_is_shown_too():
     assert "<polyline" not in found._repr_html_()
     assert found.to_dict()["data_vars"]["y"]["data"] == [None] * 3
     pytest.importorskip("matplotlib")
-    assert to_figure(found.data, (), "").axes
+    assert found.plot().axes
 
 
 def test_a_motion_without_samples_tells_itself():

@@ -88,7 +88,7 @@ def test_tests_use_the_installed_package():
 
 
 OFFENDERS = [
-    (past_the_door, "core/case/new.py", "from ..kinematics.solver_selection import prepare"),
+    (past_the_door, "core/case/new.py", "from ..kinematics.one_design import prepare"),
     (past_the_door, "core/case/io/new.py", "from ...kinematics import compiled"),
     (past_the_door, "core/cli/new.py", "def f():\n    from ..kinematics.one_design import solve"),
     (past_the_door, "core/kincheck/new.py", "import kincheck.core.kinematics.blocks.sweep"),

@@ -2,14 +2,19 @@
 residual and Jacobian.
 
 Every moving body has one node with Euler parameters, so that closed loops and chains are alike.
-`rows` and `joint_objects` create the objects for joints and drivers; a row may follow a driver's
+`rows` creates the objects for joints and drivers; a row may follow a driver's
 value or an unknown besides Exudyn's coordinates.
+
+Exudyn computes the mass matrix, the right-hand side with its own loads and connectors, and the
+Jacobian of all rows, which are joints. A torsional spring-damper has an additional unknown that
+follows any number of turns, and acts by two torques that the adapter sets.
 """
 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -18,25 +23,240 @@ import numpy as np
 from ...core.case.case import Case
 from ...core.errors import SolveError
 from ...core.harness.engine import Floor
+from ...core.joints import Joint
+from ...core.joints.base import unit
+from ...core.mechanism.loads import (
+    Axes,
+    Bushing,
+    Force,
+    SpringDamper,
+    Torque,
+    TorsionSpringDamper,
+)
+from ...core.mechanism.mechanism import Vector
 from ...core.trajectory import Array
-from ..shared.compiled_floor import floor_of
-from ..shared.force_solution import Dynamics
-from ..shared.projection_engine import ProjectionEngine
-from .equations import NO_ROTATION, turned
-from .joint_objects import JOINTS
-from .loads import COMPUTED_BY, Loads
-from .rows import Rows
+from ..shared.constraints import BodyFrame, skew
+from ..shared.exudyn_joints import JOINTS
+from ..shared.force_solution import Dynamics, Element, curve_force, left_out_of, places, reacting
+from ..shared.projection_engine import ProjectionEngine, floor_of
+from .rows import NO_ROTATION, Rows, turned
 
-# Steps of the finite differences of the Jacobian at unit speed [units of length or -]. Round-off is
-# 1e-16 over the step. Truncation is the sixth power of the step times the seventh derivative of the
-# rows; it matters where the path curves within a hundred steps, as near a fold.
+COMPUTED_BY = {
+    "inverse dynamics": "ComputeMassMatrix, ComputeODE2RHS with LoadMassProportional",
+    "reactions of joints": "rows of ComputeNewtonJacobian",
+    "force elements": (
+        "ObjectConnectorSpringDamper, LoadForceVector, LoadTorqueVector; torques of torsional"
+        " springs are set by the adapter; bushings and curves are the adapter's, by Exudyn's bodies"
+    ),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Twister:
+    """A torsional spring-damper: the index of its angle among the unknowns of the rows, a marker on
+    the joint's first body with z along the axis, and its torques on both bodies.
+    """
+
+    given: TorsionSpringDamper
+    value: int
+    marker: int
+    torques: Sequence[tuple[int, float]]
+
+
+class Loads:
+    """The loads of a case in an Exudyn system, added before the system is assembled."""
+
+    def __init__(self, rows: Rows, case: Case, kinds: Any) -> None:
+        self.rows, self.mbs, self.items, self.kinds = rows, rows.mbs, rows.items, kinds
+        self.case, self.mechanism = case, case.mechanism
+        self.springs: dict[str, int] = {}
+        self.twisters: list[Twister] = []
+        self.amounts: dict[str, float] = {}
+        self.framed: list[Bushing | SpringDamper] = []
+        for body in self.mechanism.moving:
+            marker = self.items.MarkerBodyMass(bodyNumber=rows.bodies[body.name][0])
+            self.mbs.AddLoad(
+                self.items.LoadMassProportional(
+                    markerNumber=self.mbs.AddMarker(marker), loadVector=[*self.mechanism.gravity]
+                )
+            )
+        for each in self.mechanism.forces:
+            self._add(each)
+
+    def _add(self, each: Any) -> None:
+        rows, items = self.rows, self.items
+        if isinstance(each, Bushing) or (isinstance(each, SpringDamper) and each.curve):
+            self.framed.append(each)
+        elif isinstance(each, SpringDamper):
+            ends = [rows.marker(*end) for end in zip(each.bodies, each.points, strict=True)]
+            spring = items.ObjectConnectorSpringDamper(
+                markerNumbers=ends,
+                referenceLength=each.free_length,
+                stiffness=each.stiffness,
+                damping=each.damping,
+            )
+            self.springs[each.name] = int(self.mbs.AddObject(spring))
+        elif isinstance(each, TorsionSpringDamper):
+            self.twisters.append(self._twister(each))
+        else:
+            assert isinstance(each, Force | Torque)
+            self.amounts[each.name] = float(np.linalg.norm(each.vector))
+            if self.mechanism.is_fixed(each.body):
+                return
+            _, origin = rows.bodies[each.body]
+            point, kind = (
+                (each.point, items.LoadForceVector)
+                if isinstance(each, Force)
+                else (origin, items.LoadTorqueVector)
+            )
+            self.mbs.AddLoad(
+                kind(
+                    markerNumber=rows.marker(each.body, point),
+                    loadVector=[*each.vector],
+                    bodyFixed=each.frame is Axes.BODY,
+                )
+            )
+
+    def _twister(self, each: TorsionSpringDamper) -> Twister:
+        rows, joint = self.rows, self.mechanism.joint(each.joint)
+        place: Any = joint
+        value = rows.unknown()
+        rows.follow(rows.coordinate(each.joint, "rotation"), value)
+        torques = [
+            (int(self.mbs.AddLoad(self.items.LoadTorqueVector(markerNumber=marker))), sign)
+            for body, marker, sign in zip(
+                joint.bodies, rows.markers(joint, place.point), (-1.0, 1.0), strict=True
+            )
+            if not self.mechanism.is_fixed(body)
+        ]
+        return Twister(each, value, rows.marker(joint.i, place.point), torques)
+
+    def dynamics(self, model: Any, J: Array, v: Array, a: Array) -> Dynamics:
+        """Return the forces; see `force_solution.ForceModel`.
+
+        Args:
+            model: the model in Exudyn; see `exudyn.ExudynModel`.
+            J: Jacobian of all rows.
+        """
+        n, solver = model.coordinates, model.solver
+        model.state.SetODE2Coordinates_t(v[:n])
+        amounts = dict(self.amounts)
+        for each in self.twisters:
+            amounts[each.given.name] = self._twist(each, model, v)
+        solver.ComputeMassMatrix(self.mbs)
+        mass = np.array(solver.GetSystemMassMatrix())[:n, :n]
+        solver.ComputeODE2RHS(self.mbs)
+        demand = np.zeros(len(v))
+        demand[:n] = mass @ a[:n] - np.array(solver.GetSystemResidual())[:n]
+        for each in self.framed:
+            amounts[each.name] = self._by_frames(each, v, demand)
+        for name, number in self.springs.items():
+            force = self.mbs.GetObjectOutput(number, self.kinds.ForceLocal)
+            amounts[name] = float(np.atleast_1d(force)[0])
+        rows, owners = [J], [""] * len(J)
+        for each in left_out_of(self.mechanism, partial(self._frame, len(v))):
+            rows.append(each.rows(len(owners))[0])
+            owners += [each.of] * len(rows[-1])
+        every = np.vstack(rows)
+        reactions = {
+            name: (np.zeros(6), self._on_second(self.mechanism.joint(name), every, owners))
+            for name in reacting(self.case)
+        }
+        return Dynamics(demand, reactions, amounts, every[len(J) :])
+
+    def _by_frames(self, each: Bushing | SpringDamper, v: Array, demand: Array) -> float:
+        """Take the wrenches of an element out of the demand; return its amount."""
+        frames = [self._frame(len(v), *end) for end in places(each, self.mechanism)]
+        for frame in frames:
+            frame.velocity = frame.jacobian @ v
+        amount, wrenches = Element(each, frames, np.zeros(3), lambda: 0.0).at_work()
+        for frame, wrench in zip(frames, wrenches, strict=True):
+            demand -= frame.jacobian.T @ wrench
+        return amount
+
+    def _twist(self, each: Twister, model: Any, v: Array) -> float:
+        """Set the torques of a torsional spring-damper; return the torque on the second body."""
+        given, place = each.given, model.coordinates + each.value - len(self.mechanism.drivers)
+        joint: Any = self.mechanism.joint(given.joint)
+        deflection = float(model.x[place]) - given.free_angle
+        elastic = given.stiffness * deflection + curve_force(given.curve, deflection)
+        amount = -(elastic + given.damping * float(v[place]))
+        A = np.array(self.mbs.GetMarkerOutput(each.marker, self.kinds.RotationMatrix))
+        axis = A.reshape(3, 3) @ np.array([*unit(joint.axis)])
+        for load, sign in each.torques:
+            self.mbs.SetLoadParameter(load, "loadVector", [*(sign * amount * axis)])
+        return amount
+
+    def _on_second(self, joint: Joint, J: Array, owners: Sequence[str]) -> Array:
+        """Return the wrenches of unit multipliers of a joint's own rows on its second body, about
+        the joint's point, shape (6, rows).
+
+        Args:
+            owners: the given joint of each row that is left out, else empty.
+        """
+        number, origin = self.rows.bodies[joint.j]
+        arm = np.array(self.mechanism.reaction_point(joint)) - origin
+        point = self._position(number, arm)
+        fixed = self.mechanism.is_fixed(joint.j)
+        body, sign = (joint.i, -1.0) if fixed else (joint.j, 1.0)
+        k = [each.name for each in self.mechanism.moving].index(body)
+        found, own = np.zeros((6, len(J))), [k for k, of in enumerate(owners) if of == joint.name]
+        for part in self.mechanism.parts_of(joint.name):
+            own += range(len(J))[self.rows.owned[part]]
+        columns = J[own, 7 * k : 7 * k + 7]
+        found[:, own] = sign * (columns @ self._rates(body, point)).T
+        return found
+
+    def _frame(self, unknowns: int, body: str, at: Vector) -> BodyFrame:
+        """Return a frame of a body, at a point, global at design."""
+        number, origin = self.rows.bodies[body]
+        moving = [each.name for each in self.mechanism.moving]
+        frame = BodyFrame(number, None, self._position(number, np.array(at) - origin))
+        frame.jacobian = np.zeros((6, unknowns))
+        if body in moving:
+            k = 7 * moving.index(body)
+            frame.jacobian[:, k : k + 7] = np.linalg.pinv(self._rates(body, frame.position))
+            turned = self.mbs.GetObjectOutputBody(number, self.kinds.RotationMatrix)
+            frame.rotation = np.array(turned).reshape(3, 3)
+        return frame
+
+    def _position(self, number: int, arm: Array) -> Array:
+        if number == self.rows.ground:
+            return arm
+        return np.array(self.mbs.GetObjectOutputBody(number, self.kinds.Position, arm))
+
+    def _rates(self, body: str, point: Array) -> Array:
+        """Return the rates of a body's node by its twist at a point, shape (7, 6)."""
+        number, _ = self.rows.bodies[body]
+        node = self.mbs.GetObject(number)["nodeNumber"]
+        x = np.array(self.mbs.GetNodeOutput(node, self.kinds.Coordinates)) + np.array(
+            self.mbs.GetNodeParameter(node, "referenceCoordinates")
+        )
+        e0, e = x[3], x[4:]
+        found = np.zeros((7, 6))
+        found[:3, :3] = np.eye(3)
+        found[:3, 3:] = skew(point - x[:3])  # w x (origin - point)
+        found[3, 3:] = -0.5 * e
+        found[4:, 3:] = 0.5 * (e0 * np.eye(3) - skew(e))  # w x e
+        return found
+
+
+# Steps of the finite differences of the rows' rates at unit speed [units of length or -]. Round-off
+# is 1e-16 over the step. Truncation is the sixth power of the step times the seventh derivative of
+# the rows; it matters where the path curves within a hundred steps, as near a fold.
 DIFFERENCES = tuple(1e-3 * 0.5**k for k in range(8))
 # If the estimates of fourth and sixth order agree to this fraction, the truncation of the latter is
 # below round-off: the ratio of the two truncations is about the square of the step times the
 # curvature, 1e-4 here.
 AGREE = 1e-9
-# Central differences: h f' = sum of weight * f(k h), of sixth order and of fourth.
-WEIGHTS = ((-3, -1 / 60, 0.0), (-2, 3 / 20, 1 / 12), (-1, -3 / 4, -2 / 3))
+# Central differences at k: h f' = sum of weight * f(k h), of sixth order and of fourth.
+STEPS = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])
+WEIGHTS = np.array(
+    [
+        [-1 / 60, 3 / 20, -3 / 4, 3 / 4, -3 / 20, 1 / 60],
+        [0.0, 1 / 12, -2 / 3, 2 / 3, -1 / 12, 0.0],
+    ]
+)
 
 
 class Exudyn(ProjectionEngine):
@@ -52,8 +272,8 @@ class Exudyn(ProjectionEngine):
             "residual": "ComputeAlgebraicEquations",
             "jacobian": "ComputeNewtonJacobian, constraint rows",
             "acceleration": (
-                "Jacobian differentiated along the velocity, sixth order, coordinates changed by"
-                f" {DIFFERENCES[0]:g} or less"
+                "ComputeAlgebraicEquations of rates, differentiated along the motion, sixth order,"
+                f" coordinates changed by {DIFFERENCES[0]:g} or less"
             ),
         }
 
@@ -68,7 +288,7 @@ class Exudyn(ProjectionEngine):
     def floor(self, case: Case) -> Floor:
         """Return the floor from the static solver's residual and Jacobian.
 
-        Rates need two more Jacobians for a difference.
+        Accelerations need two rates of the rows for a difference.
         """
         model = self.build(case)
         solved = self.solve(model, case, 1e-12)
@@ -83,13 +303,11 @@ class Exudyn(ProjectionEngine):
             for s, m, t in ((model.solver, model.mbs, model.settings), (solver, mbs, settings))
         )
         pose = {"ComputeAlgebraicEquations": residual, "ComputeNewtonJacobian": (own, empty, 1)}
-        return floor_of(
-            self.name,
-            solved,
-            model.unknowns,
-            pose,
-            {"ComputeNewtonJacobian (rates)": (own, empty, 2)},
-        )
+        once = {
+            "ComputeNewtonJacobian (rates)": (own, empty, 1),
+            "ComputeAlgebraicEquations (rates)": (*residual[:2], 2),
+        }
+        return floor_of(self.name, solved, model.unknowns, pose, once)
 
 
 def _least() -> tuple[Any, Any, Any, Any]:
@@ -107,11 +325,28 @@ def _least() -> tuple[Any, Any, Any, Any]:
     return container, mbs, settings, solver
 
 
+def _way(q: Array, v: Array, lengths: Array) -> tuple[Array, Array]:
+    """Return coordinates and rates of all nodes at n lengths of a motion at constant rates, shape
+    (n, coordinates) each.
+
+    The motion is along lines and along great circles of the Euler parameters, since Exudyn's rates
+    are those of the rows only on the unit sphere.
+    """
+    q, v, s = q.reshape(-1, 7), v.reshape(-1, 7), lengths[:, None, None]
+    turn = np.sqrt((v[:, 3:] ** 2).sum(axis=1, keepdims=True))
+    p, d = q[:, 3:] + NO_ROTATION, v[:, 3:] / np.where(turn, turn, 1.0)
+    cosine, sine = np.cos(s * turn), np.sin(s * turn)
+    coordinates, rates = q + s * v, np.empty((len(s), *v.shape))
+    coordinates[..., 3:] = cosine * p + sine * d - NO_ROTATION
+    rates[..., :3], rates[..., 3:] = v[:, :3], turn * (cosine * d - sine * p)
+    return coordinates.reshape(len(s), -1), rates.reshape(len(s), -1)
+
+
 class ExudynModel:
     """A `ProjectionModel` of Exudyn's equations.
 
     Unknowns: displacements of the node coordinates (position, Euler parameters), then the further
-    unknowns of the rows (see `equations`).
+    unknowns of the rows (see `rows`).
     """
 
     def __init__(self, case: Case) -> None:
@@ -188,8 +423,8 @@ class ExudynModel:
         # sphere, Newton's convergence is not quadratic.
         x = self.x + dx
         q = x[: self.coordinates].reshape(-1, 7)
-        parameters = q[:, 3:] + NO_ROTATION
-        q[:, 3:] = parameters / np.linalg.norm(parameters, axis=1, keepdims=True) - NO_ROTATION
+        p = q[:, 3:] + NO_ROTATION
+        q[:, 3:] = p / np.sqrt((p * p).sum(axis=1, keepdims=True)) - NO_ROTATION
         self.restore(x)
 
     def residual(self, c: Array) -> Array:
@@ -217,15 +452,14 @@ class ExudynModel:
         return self.mbs.GetMarkerOutput(marker, self.rotation)[::3]
 
     def jacobian(self) -> Array:
-        for row, place, curve in self.bent:
-            self.shared[row, place] = curve.deriv()(self.x[self.coordinates + place])
-        return np.hstack([self._jacobian(), -self.shared])
-
-    def _jacobian(self) -> Array:
-        """Return the derivative of the rows by Exudyn's coordinates, shape (rows, coordinates)."""
         # ComputeJacobianAE adds to the matrix; this call clears it first
         self.solver.ComputeNewtonJacobian(self.mbs, self.settings)
-        return self.solver.GetSystemJacobian()[self.kept, : self.coordinates]
+        found = self.solver.GetSystemJacobian()[self.kept, : self.coordinates]
+        if not self.shared.size:
+            return found
+        for row, place, curve in self.bent:
+            self.shared[row, place] = curve.deriv()(self.x[self.coordinates + place])
+        return np.hstack([found, -self.shared])
 
     def driver_columns(self) -> Array:
         return self.driven
@@ -236,29 +470,27 @@ class ExudynModel:
         # the rate of the sweep.
         v, rates = v[: self.coordinates], v[self.coordinates :]
         speed = np.abs(v).max() or 1.0
-        bias = np.zeros(len(self.kept))
+        unit_rates, bias = v / speed, np.zeros(len(self.kept))
         for h in DIFFERENCES:
-            bias, low = self._difference(v / speed, h)
+            way = zip(*_way(self.q, unit_rates, h * STEPS), strict=True)
+            bias, low = WEIGHTS @ [self._rates(*each) for each in way] / h
             if np.abs(bias - low).max() <= AGREE * max(np.abs(bias).max(), 1.0):
                 break
+        # the rows of the normalisation, |p|^2 = 1, stay satisfied on the way by its curvature alone
+        turns = unit_rates.reshape(-1, 7)[:, 3:]
+        bias[len(bias) - len(turns) :] = 2.0 * (turns**2).sum(axis=1)
         self.state.SetODE2Coordinates(self.q)
         bias *= speed**2
         for row, place, curve in self.bent:
             bias[row] -= curve.deriv(2)(self.x[self.coordinates + place]) * rates[place] ** 2
         return bias
 
-    def _difference(self, u: Array, h: float) -> tuple[Array, Array]:
-        """Return the derivative of J u along u by sixth and by fourth order, shape (rows,) each."""
-        high, low = np.zeros((2, len(self.kept)))
-        for k, sixth, fourth in WEIGHTS:
-            change = self._rates(u, k * h) - self._rates(u, -k * h)
-            high += sixth * change
-            low += fourth * change
-        return high / h, low / h
-
-    def _rates(self, u: Array, h: float) -> Array:
-        self.state.SetODE2Coordinates(self.q + h * u)
-        return self._jacobian() @ u
+    def _rates(self, q: Array, q_t: Array) -> Array:
+        """Return the rates of the rows."""
+        self.state.SetODE2Coordinates(q)
+        self.state.SetODE2Coordinates_t(q_t)
+        self.solver.ComputeAlgebraicEquations(self.mbs, True)
+        return self.solver.GetSystemResidual()[self.kept]
 
     def points(self, v: Array, a: Array) -> list[tuple[Array, Array, Array]]:
         self.state.SetODE2Coordinates_t(v[: self.coordinates])

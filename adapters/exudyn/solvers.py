@@ -1,30 +1,169 @@
 """Exudyn in simulate mode: its own static and dynamic solvers over a whole leg of the sweep.
 
-Joints are as in projection; `coordinates` has drivers and relations.
+Joints are as in projection. A generic joint with a moving offset has no rate, so driven coordinates
+are constraints on Exudyn's relative coordinates of two bodies, and so are the relations of screws,
+gears, racks and pinions. The drivers' values come from Python, from a table prepared beforehand.
 """
 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from ...core import joints
 from ...core.case.case import Case
-from ...core.trajectory import Array, Trajectory
-from ..shared.simulation import Leg, SimulatedPose, SimulationEndedError, simulated, start_of
-from .coordinates import Coordinates, DriverTable
+from ...core.joints.base import unit
+from ...core.kinematics import start_of as where_from
+from ...core.mechanism.mechanism import GROUND
+from ...core.mechanism.motions import Driver, JointDriver, PointCoordinate
+from ...core.trajectory import Array
+from ..shared.simulation import (
+    Leg,
+    SimulatedPose,
+    Simulation,
+    SimulationEndedError,
+    start_of,
+    uneven,
+)
 from .exudyn import Exudyn, ExudynModel
-from .limitations import limitation_of
+from .rows import Rows
+
+
+class DriverTable:
+    """Values and rates of the drivers at every step of a leg, which Exudyn reads at its time."""
+
+    def __init__(self) -> None:
+        self.per_second, self.rows = 1.0, list[list[list[float]]]()
+
+    def reader(self, order: int, value: int) -> Any:
+        """Return a user function of Exudyn for one driver and order of derivative."""
+
+        def at(mbs: Any, t: float, number: int, offset: float) -> float:
+            return self.rows[order][value][round(t * self.per_second)]
+
+        return at
+
+
+class Coordinates(Rows):
+    """The rows, with drivers and relations for Exudyn's own solvers.
+
+    Attributes:
+        angles: driver number of each relative angle, or None; the turns of these angles are
+            counted.
+    """
+
+    def __init__(self, mbs: Any, items: Any, case: Case, table: DriverTable) -> None:
+        self.table = table
+        self.angles: list[int | None] = []
+        super().__init__(mbs, items, case.mechanism)
+
+    def relative(self, name: str, freedom: str, value: int | None = None) -> int:
+        """Return a new marker for the coordinate of a joint."""
+        joint: Any = self.mechanism.joint(name)
+        if freedom == "translation":
+            return self.shift(joint.i, joint.j, joint.point, joint.axis)
+        (i, _), (j, _) = (self.bodies[body] for body in joint.bodies)
+        node = self.mbs.AddNode(
+            self.items.NodeGenericData(initialCoordinates=[0.0], numberOfDataCoordinates=1)
+        )
+        self.angles.append(value)
+        axis = [*unit(joint.axis)]
+        marker = self.items.MarkerBodiesRelativeRotationCoordinate(
+            bodyNumbers=[i, j], nodeNumber=node, axis0=axis
+        )
+        return self.mbs.AddMarker(marker)
+
+    def shift(self, i: str, j: str, point: Sequence[float], axis: Sequence[float]) -> int:
+        """Return a new marker for the displacement of a point of body j along an axis of body i."""
+        numbers, origins = zip(*(self.bodies[body] for body in (i, j)), strict=True)
+        arms = [np.subtract(point, origin) for origin in origins]
+        marker = self.items.MarkerBodiesRelativeTranslationCoordinate(
+            bodyNumbers=[*numbers],
+            localPosition0=arms[0],
+            localPosition1=arms[1],
+            axis0=[*unit(axis)],
+        )
+        return self.mbs.AddMarker(marker)
+
+    def drive(self, driver: Driver, value: int) -> None:
+        if isinstance(driver, PointCoordinate):
+            point = self.mechanism.point(driver.point)
+            marker = self.shift(GROUND, point.body, point.position, driver.direction)
+        else:
+            assert isinstance(driver, JointDriver)
+            marker = self.relative(driver.joint, driver.freedom, value)
+        still = self.mbs.AddNode(self.items.NodePointGround())
+        rest = self.mbs.AddMarker(self.items.MarkerNodeCoordinate(nodeNumber=still, coordinate=0))
+        self.connect(
+            self.items.ObjectConnectorCoordinate(
+                markerNumbers=[rest, marker],
+                offset=1.0,
+                offsetUserFunction=self.table.reader(0, value),
+                offsetUserFunction_t=self.table.reader(1, value),
+            ),
+            range(1),
+        )
+
+    def relate(self, terms: Sequence[tuple[str, str, float]]) -> None:
+        (one, large), (other, small) = sorted(
+            ((self.relative(joint, freedom), weight) for joint, freedom, weight in terms),
+            key=lambda term: -abs(term[1]),
+        )
+        self.connect(
+            self.items.ObjectConnectorCoordinate(
+                markerNumbers=[other, one], factor1=-large / small
+            ),
+            range(1),
+        )
+
+
+# Exudyn's objects keep products only at zero; a smaller value is round-off, below any residual.
+NOTHING = 1e-12
+
+
+def limitation_of(case: Case) -> str | None:
+    """Return the reason why Exudyn's own solvers cannot simulate the case; None without one."""
+    for joint in case.mechanism.joints:
+        if isinstance(joint, joints.ConstantVelocity):
+            return (
+                f"{joint}: Exudyn's own solvers have no object that ties two products, which"
+                " the joint needs"
+            )
+        kept = _kept(joint)
+        if abs(kept) > NOTHING:
+            return (
+                f"{joint} keeps a product at {kept:.3g}, and Exudyn's own objects keep products at"
+                " only zero; make its axes exact"
+            )
+    for coupler in case.mechanism.couplers:
+        if coupler.curve:
+            return f"{coupler}: Exudyn's own solvers have no object that keeps a polynomial"
+    if (reason := uneven(case, "Exudyn")) is not None:
+        return reason
+    if case.mechanism.couplers and not where_from(case.mechanism, case.sweep.path).stands:
+        return "turns of coupled joints count from the design, where this motion does not begin"
+    return None
+
+
+def _kept(joint: joints.Joint) -> float:
+    """Return the constant value of the last row of a joint [m or -]."""
+    if isinstance(joint, joints.Universal | joints.PerpendicularAxes):
+        return unit(joint.axes[0]) @ unit(joint.axes[1])
+    if isinstance(joint, joints.RevoluteSpherical):
+        return float(np.array([*unit(joint.axis)]) @ np.subtract(joint.points[1], joint.points[0]))
+    return 0.0
+
 
 # Relative and absolute tolerance of Newton; it leaves the constraints at round-off.
 TIGHT = 1e-12
 
 
 @dataclass(frozen=True)
-class Solver:
+class Solver(Simulation):
     """Exudyn's solver.
 
     Attributes:
@@ -42,7 +181,7 @@ class Solver:
     modified: bool = True
     tolerance: float = TIGHT
     steps: int = 1
-    mode = "simulate"
+    projection = Exudyn
     loop = "simulator"
 
     @property
@@ -66,10 +205,6 @@ class Solver:
             "linear solver": "EXUdense; where rows are redundant, EigenDense that ignores it",
         }
 
-    def version(self) -> str | None:
-        """Version of Exudyn, or None if it cannot be imported."""
-        return Exudyn().version()
-
     def unsupported(self, case: Case) -> str | None:
         """Return a message on an unsupported joint, driver or sample grid, or None."""
         return Exudyn().unsupported(case) or limitation_of(Exudyn().known(case))
@@ -83,16 +218,9 @@ class Solver:
             }
         return {f"{n} steps a sample": replace(self, steps=n) for n in (1, 2, 4, 8, 16)}
 
-    def floor(self, case: Case) -> None:
-        """Return None: the simulator runs its own loop."""
-
     def build(self, case: Case) -> _Solved:
         """Return Exudyn's system and its start."""
         return _Solved(Exudyn().known(case), self)
-
-    def solve(self, model: _Solved, case: Case, tol: float) -> Trajectory:
-        """Simulate all samples; Exudyn uses its own tolerance (see `settings`), not tol."""
-        return simulated(case, model.start, model.run, model.details)
 
 
 def trapezoidal() -> Solver:

@@ -21,7 +21,7 @@ from ...core.errors import CaseError, KincheckError
 from ...core.kinematics import start_of
 from ...core.mechanism.motions import outwards
 from ...core.trajectory import Array
-from ..shared.length_scaling import own_frame
+from ..shared.equivalents import own_frame
 from ..shared.pose_solver import Sample
 from ..shared.projection import Walk
 from .mujoco import MuJoCo, MuJoCoModel
@@ -64,19 +64,20 @@ def rod_forces(case: Case, rod: str) -> RodForces:
         raise CaseError(f"case {case.name!r}: no output reads a force; add one, as joint_force")
     if (reason := MuJoCo().unsupported(case)) is not None:
         raise CaseError(f"case {case.name!r}: {reason}")
-    model, unit = MuJoCo().build(case), own_frame(case).unit
-    loaded, m, d, mj = model.loaded, model.m, model.d, model.mj
-    assert loaded is not None
-    tendons = [
-        rows.start for each, rows in loaded.rows if (each.joint, each.kind) == (rod, "tendon")
-    ]
-    if not tendons:
-        known = [each.joint for each, _ in loaded.rows if each.kind == "tendon"]
+    engine = MuJoCo()
+    model, unit = engine.model_of(engine.own(case)), own_frame(case).unit
+    m, d, mj = model.m, model.d, model.mj
+    tendons = {
+        str(each.keeps): rows.start
+        for each, (rows, _) in zip(model.equalities, model.own_rows, strict=True)
+        if each.kind == "tendon"
+    }
+    if rod not in tendons:
         raise CaseError(
             f"case {case.name!r}: joint {rod!r} is no rod that MuJoCo has as a tendon, expected one"
-            f" of: {', '.join(known) or 'none'}"
+            f" of: {', '.join(tendons) or 'none'}"
         )
-    row, equalities = tendons[0], model.n
+    row, equalities = tendons[rod], model.own_count
     m.dof_armature[:] = 0.0
     rigid, without_bias = list[float](), list[float]()
     own = {(way, name): list[float]() for way in ("forward", "inverse") for name in SOFTNESS}
@@ -90,7 +91,7 @@ def rod_forces(case: Case, rod: str) -> RodForces:
         J = np.array(model.jacobian())
         given = model.dynamics(at.v, at.a)
         multipliers = np.linalg.lstsq(J.T, given.demand)[0]
-        applied = loaded.inverse_dynamics(at.v, at.a) - given.demand
+        applied = model.inverse_dynamics(at.v, at.a) - given.demand
         applied += J[equalities:].T @ multipliers[equalities:]
         bias = model.bias(at.v)[:equalities]
         bias[row] = 0.0
@@ -120,10 +121,8 @@ def _rigid(
 ) -> Array:
     """Return the multipliers of rigid rows E qacc = -bias under these applied forces."""
     n, (rows, _) = len(v), E.shape
-    loaded = model.loaded
-    assert loaded is not None
-    drift = loaded.inverse_dynamics(v, np.zeros(n))
-    columns = [loaded.inverse_dynamics(v, unit) - drift for unit in np.eye(n)]
+    drift = model.inverse_dynamics(v, np.zeros(n))
+    columns = [model.inverse_dynamics(v, unit) - drift for unit in np.eye(n)]
     mass = np.array(columns).T
     if np.linalg.eigvalsh(0.5 * (mass + mass.T))[0] <= 0.0:
         raise CaseError(

@@ -19,8 +19,8 @@ import numpy as np
 from ...core.case.case import Case
 from ...core.mechanism.motions import Ramp
 from ...core.trajectory import Array, Trajectory
-from ..shared.joint_equivalents import jointed
-from ..shared.simulation import Leg, SimulatedPose, SimulationEndedError, simulated, start_of
+from ..shared.equivalents import jointed
+from ..shared.simulation import Leg, SimulatedPose, Simulation, SimulationEndedError, start_of
 from .mujoco import MuJoCo, MuJoCoModel, mujoco
 
 # Inertia of driven coordinates [kg or kg m2] next to bodies with unit inertia: reactions change
@@ -39,7 +39,7 @@ TOLERANCE = 1e-15
 
 
 @dataclass(frozen=True)
-class Stepping:
+class Stepping(Simulation):
     """MuJoCo's time stepping: equal steps between the samples.
 
     Attributes:
@@ -54,7 +54,7 @@ class Stepping:
     name: str
     kind: str
     effort: int
-    mode = "simulate"
+    projection = MuJoCo
 
     @property
     def loop(self) -> str:
@@ -88,10 +88,6 @@ class Stepping:
         }
         return {**own[self.kind], **shared, "options": "no gravity, no contact, no autoreset"}
 
-    def version(self) -> str | None:
-        """Return MuJoCo's version, or None if the import fails."""
-        return MuJoCo().version()
-
     def unsupported(self, case: Case) -> str | None:
         """Return a message on the joint or driver that is not supported here, or None."""
         return MuJoCo().unsupported(case)
@@ -102,17 +98,13 @@ class Stepping:
         what = "times the default number of steps" if self.kind == "default" else "steps a sample"
         return {f"{n} {what}": replace(self, effort=n) for n in counts}
 
-    def floor(self, case: Case) -> None:
-        """Return None: the simulator runs its own loop."""
-
     def build(self, case: Case) -> _Steps:
         """Return the compiled model with its settings and start."""
         return _Steps(mujoco(), MuJoCo().known(case), self)
 
     def solve(self, model: _Steps, case: Case, tol: float) -> Trajectory:
-        """Solve all reachable samples, however far the constraints drift; see `Engine.solve`."""
         with model.warnings():
-            return simulated(case, model.start, model.run, model.of.details)
+            return super().solve(model, case, tol)
 
 
 def stiff() -> Stepping:
@@ -139,10 +131,11 @@ class _Steps:
     def __init__(self, mj: Any, case: Case, how: Stepping) -> None:
         case = replace(case, mechanism=jointed(case.mechanism))
         self.mj, self.how, self.of = mj, how, _Massless(mj, case)
-        self.start = start_of(self.of, case)
+        self.start, self.details = start_of(self.of, case), self.of.details
         m = self.m = self.of.m
         self.longest = float(m.opt.timestep)
-        self.q, self.v, self.sign = (np.array(each) for each in zip(*self.of.driven, strict=True))
+        places = [(*self.of.coordinate(name), sign) for name, sign in self.of.driven]
+        self.q, self.v, self.sign = (np.array(each) for each in zip(*places, strict=True))
         m.dof_armature[self.v] = ARMATURE
         mj.mj_setConst(m, self.of.d)  # MuJoCo scales the softness by this
         if how.kind == "stiff":
@@ -226,15 +219,19 @@ class _Steps:
         """Return the pose at the current state, with the steps since the previous sample."""
         mj, m, d = self.mj, self.m, self.of.d
         self.set(*driven)
-        points = np.full((3, len(self.of.watched), 3), np.nan)
-        if self.how.kind == "projecting":
-            mj.mj_fwdPosition(m, d)
-        else:
+        points, moves = np.full((3, len(self.of.wanted), 3), np.nan), self.how.kind != "projecting"
+        if moves:
             mj.mj_forward(m, d)
             mj.mj_rnePostConstraint(m, d)
-            for k, site in enumerate(self.of.watched):
-                for order, rate in ((1, mj.mj_objectVelocity), (2, mj.mj_objectAcceleration)):
-                    rate(m, d, mj.mjtObj.mjOBJ_SITE, site, self.twist, 0)
+        else:
+            mj.mj_fwdPosition(m, d)
+        for k, frame in enumerate(self.of.wanted):
+            if frame.handle is None:  # of the ground
+                points[:, k] = frame.position, np.zeros(3), np.zeros(3)
+                continue
+            points[0, k] = d.site_xpos[frame.handle]
+            for order, rate in ((1, mj.mj_objectVelocity), (2, mj.mj_objectAcceleration)):
+                if moves:
+                    rate(m, d, mj.mjtObj.mjOBJ_SITE, frame.handle, self.twist, 0)
                     points[order, k] = self.twist[3:]
-        points[0] = d.site_xpos[self.of.watched]
         return SimulatedPose(points, float(np.abs(d.efc_pos[: d.ne]).max(initial=0.0)), steps)

@@ -1,24 +1,30 @@
-"""Poses of bodies as displacements from design, and the coordinates of chains of links.
+"""Poses of bodies as displacements from design, the coordinates of chains of links, and a mechanism
+with another pose as its design position, for formats without a state.
 
 A displacement maps every point of a body from its design position to its current position, x -> q x
-+ s, in global axes. So a chain of links (see `joint_chains`) displaces its second body relative to
++ s, in global axes. So a chain of links (see `tree_plan`) displaces its second body relative to
 its first by the product of its links' displacements; the reversed chain has the same coordinates
-with other signs.
+with other signs. OpenSim has angles of successive rotations about a body's x, y and z axes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import atan2, hypot
+from typing import Any
 
 import numpy as np
+from numpy.polynomial import Polynomial as Powers
 
 from ...core.algebra import IDENTITY, ZERO, Quat, Scalar, Vec3, angle_about, cross, quat, vec
-from ...core.joints import Joint
-from ...core.joints.base import triad
-from ...core.mechanism.mechanism import GROUND, Body, Mechanism, Vector
+from ...core.joints import Coupler, Distance, Joint, Polynomial
+from ...core.joints.base import Kind, triad
+from ...core.mechanism.body import Body, inertia_matrix
+from ...core.mechanism.loads import ForceElement, SpringDamper, TorsionSpringDamper
+from ...core.mechanism.mechanism import GROUND, Mechanism, Vector
 from ...core.trajectory import Array, BodyMotion
-from .joint_chains import Link
+from .tree_plan import CHAINS, Link, ends_of
 
 
 def rotated(q: Quat, a: Vec3) -> Vec3:
@@ -59,19 +65,6 @@ class Displacement:
 def frame_along(axis: Sequence[float], column: int) -> Array:
     """Return a right-handed frame with the unit vector of the axis in a column, shape (3, 3)."""
     return np.roll(np.column_stack([tuple(e) for e in triad(axis)]), column - 2, axis=1)
-
-
-def middle(mechanism: Mechanism, body: Body) -> Array:
-    """Return the mean of a body's joint points, or its origin without any; global at design [m],
-    shape (3,).
-    """
-    points = [
-        at
-        for joint in mechanism.joints
-        if body.name in joint.bodies
-        for at in joint.points_on(body.name)
-    ]
-    return np.mean(points, axis=0) if points else np.array(body.origin)
 
 
 def attitude(body: Body) -> Quat:
@@ -190,3 +183,124 @@ def direction(body: Body, a: Sequence[float]) -> Vector:
     """Return a vector, global at design, in the axes of a body."""
     x, y, z = rotated(attitude(body).conjugate(), vec(a))
     return x, y, z
+
+
+def at_start(mechanism: Mechanism, way: Mapping[str, BodyMotion]) -> Mechanism:
+    """Return the mechanism with the end of the way as its design position.
+
+    A joint's point moves with its second body and its axis with its first, so that a point stays on
+    its line or plane; of a pair, each element moves with its body. Distances keep their lengths.
+    Coordinates of polynomials and of torsional springs count from the start. Drivers, forces and
+    torques are left out.
+    """
+    placed = displacements(mechanism, way)
+
+    def coordinate(joint: Joint, freedom: str) -> float:
+        links = CHAINS[type(joint)](joint, ends_of(mechanism, joint)[0])
+        values = link_coordinates(joint, links, placed)
+        found = {link.name: value[0] for link, value in zip(links, values, strict=True)}
+        return found[freedom]
+
+    def coupler(each: Coupler) -> Coupler:
+        if not isinstance(each, Polynomial):
+            return each
+        named = zip(each.joints, each.freedoms, strict=True)
+        y, x = (coordinate(mechanism.joint(name), freedom) for name, freedom in named)
+        moved = Powers(each.coefficients)(Powers((x, 1.0))) - y
+        return replace(each, coefficients=(*moved.coef.tolist(),))
+
+    def springs() -> Iterator[ForceElement]:
+        for each in mechanism.forces:
+            if isinstance(each, SpringDamper):
+                ends = zip(each.bodies, each.points, strict=True)
+                P, Q = (_last(placed[body].of(vec(point))) for body, point in ends)
+                yield replace(each, points=(P, Q))
+            elif isinstance(each, TorsionSpringDamper):
+                angle = coordinate(mechanism.joint(each.joint), "rotation")
+                yield replace(each, free_angle=each.free_angle - angle)
+
+    return mechanism.with_joints(
+        lambda joint: _joint(joint, placed),
+        bodies=[_body(body, placed[body.name], way) for body in mechanism.bodies],
+        points=[
+            replace(point, position=_last(placed[point.body].of(vec(point.position))))
+            for point in mechanism.points
+        ],
+        drivers=[],
+        couplers=[coupler(each) for each in mechanism.couplers],
+        forces=[*springs()],
+    )
+
+
+def _last(a: Vec3) -> Vector:
+    x, y, z = (float(np.ravel(each)[-1]) for each in a)
+    return x, y, z
+
+
+def _body(body: Body, placed: Displacement, way: Mapping[str, BodyMotion]) -> Body:
+    if body.name not in way:
+        return body
+    x, y, z = way[body.name].r[-1].tolist()
+    changes: dict[str, Any] = {"euler_parameters": (*way[body.name].p[-1].tolist(),)}
+    if body.center_of_mass is not None:
+        changes["center_of_mass"] = _last(placed.of(vec(body.center_of_mass)))
+    if body.inertia is not None:
+        turn = np.column_stack([_last(rotated(placed.turn, vec(e))) for e in np.eye(3).tolist()])
+        moved = turn @ inertia_matrix(body.inertia) @ turn.T
+        xx, yy, zz = np.diag(moved).tolist()
+        changes["inertia"] = (xx, yy, zz, *(float(moved[at]) for at in ((0, 1), (1, 2), (0, 2))))
+    return replace(body, origin=(x, y, z), **changes)
+
+
+def _joint(joint: Joint, placed: Mapping[str, Displacement]) -> Joint:
+    def moved(kind: Kind, value: Any, body: str) -> Vector:
+        if kind is Kind.POSITION:
+            return _last(placed[body].of(vec(value)))
+        return _last(rotated(placed[body].turn, vec(value)))
+
+    changes: dict[str, Any] = {}
+    for name, kind, value in joint.geometry():
+        if kind.single is Kind.LENGTH:
+            continue
+        if kind.pair:
+            changes[name] = tuple(
+                moved(kind.single, one, body) for one, body in zip(value, joint.bodies, strict=True)
+            )
+        else:
+            changes[name] = moved(kind, value, joint.j if kind is Kind.POSITION else joint.i)
+    if isinstance(joint, Distance):
+        changes["length"] = joint.rod_length
+    # without checks: axes rounded by a table stay rounded after the motion
+    return joint.changed(**changes)
+
+
+Parameters = tuple[float, float, float, float]
+
+
+def orientation(move: str, axis: Vector) -> Vector:
+    """Return the angles about x, y and z, one after the other, of frames along an axis [rad].
+
+    A slider moves along x of its frames, a pin turns about z.
+    """
+    x, y, z = axis
+    match move:
+        case "slide":
+            return 0.0, atan2(-z, x), atan2(y, hypot(x, z))
+        case "hinge":
+            return atan2(-y, z), atan2(x, hypot(y, z)), 0.0
+        case _:
+            return 0.0, 0.0, 0.0
+
+
+def euler_angles(p: Sequence[float]) -> tuple[float, float, float]:
+    """Return the angles [rad] of successive rotations about the body's x, y and z axes, exact to
+    round-off at any rotation.
+
+    With half angles a, b, c the parameters of such turns give (e1 ± e3, e0 ± e2) =
+    (cos b ± sin b) (sin(a ± c), cos(a ± c)).
+    """
+    e0, e1, e2, e3 = p
+    plus, minus = (e1 + e3, e0 + e2), (e1 - e3, e0 - e2)
+    total, difference = atan2(*plus), atan2(*minus)
+    large, small = hypot(*plus), hypot(*minus)
+    return total + difference, 2.0 * atan2(large - small, large + small), total - difference

@@ -1,9 +1,9 @@
 """Projection mode, shared by the simulators: one Newton loop over the samples with their residuals
 and Jacobians.
 
-The loop walks from the design position in both directions, with a tangent predictor. Residual and
-finiteness decide on convergence, never a simulator's status; a step without convergence, or to
-another assembly, is halved.
+The loop walks from the design position in both directions, with a predictor of second order.
+Residual and finiteness decide on convergence, never a simulator's status; a step without
+convergence, or to another assembly, is halved.
 """
 
 from __future__ import annotations
@@ -26,16 +26,13 @@ from ...core.kinematics import (
     solve_from_start,
     start_of,
 )
-from ...core.mechanism.drivers import Driver
-from ...core.mechanism.motions import Path, outwards
-from ...core.trajectory import PointMotion, Trajectory, largest_found
+from ...core.mechanism.motions import Driver, Path, outwards
+from ...core.trajectory import Array, PointMotion, Trajectory, largest_found
+from .equivalents import GLOBAL, OwnFrame
 from .force_solution import ForceModel, solved_forces
-from .length_scaling import GLOBAL, OwnFrame
-from .pose_solver import PoseSolver, Sample
-from .projection_model import ProjectionModel
+from .pose_solver import PoseSolver, ProjectionModel, Sample
 
-# Newton steps after one tangent predictor, by effort; 0 is Euler's method, None iterates to
-# convergence.
+# Newton steps after one predictor of second order, by effort; None iterates to convergence.
 EFFORTS: Mapping[str, int | None] = {
     "predictor only": 0,
     "1 Newton step": 1,
@@ -90,14 +87,12 @@ def solve_by_projection(
             iterates until the residual meets tol.
         frame: the frame of the mechanism in the model.
     """
-    walk, mechanism, path = (
-        Walk(model, case, tol, corrections, frame),
-        case.mechanism,
-        case.sweep.path,
-    )
-    start, exact = start_of(mechanism, path), corrections is None
+    walk, mechanism = Walk(model, case, tol, corrections, frame), case.mechanism
+    start, exact = start_of(mechanism, walk.path), corrections is None
     return solve_from_start(
-        start, mechanism, path, lambda each: walk.trajectory(details or {}, each), compare=exact
+        *(start, mechanism, walk.path),
+        lambda each: walk.trajectory(details or {}, each),
+        compare=exact,
     )
 
 
@@ -116,7 +111,7 @@ class Walk(PoseSolver):
             to = t if abs(t - at.t) <= abs(h) else at.t + h
             dt = to - at.t
             self.model.restore(at.saved)
-            self.model.move(dt * at.v)
+            self.model.move(self.predicted(at, dt))
             new, whole = self.solve(path, to), step or abs(t - start.t)
             short = abs(dt) <= FOLD * whole
             if new is not None and self.connected(at, new) and (short or self.regular(at, new)):
@@ -127,6 +122,11 @@ class Walk(PoseSolver):
                     return at, False
         return at, True
 
+    @staticmethod
+    def predicted(at: Sample, dt: float) -> Array:
+        """Return the change of the unknowns over a time, to second order."""
+        return dt * (at.v + (0.5 * dt) * at.a)
+
     def connected(self, at: Sample, new: Sample) -> bool:
         """Return whether output points and coordinates moved between two poses by their rates.
 
@@ -136,16 +136,13 @@ class Walk(PoseSolver):
             return False
         dt = np.float64(new.t - at.t)
         watched = continuous(new.x - at.x, new.rows[1].ravel(), at.rows[1].ravel(), dt, self.size)
-        change = dt * at.v + new.corrected
+        change = self.predicted(at, float(dt)) + new.corrected
         everything = continuous(change, new.v, at.v, dt, self.size)
         return bool(watched & everything) and continued(change, new.v, at.v, dt)
 
     def regular(self, at: Sample, new: Sample) -> bool:
         """Return whether no singular value of the Jacobian can have been zero between two poses."""
-        try:
-            return regular_between(self.linear(at.jacobian, new.jacobian))
-        except np.linalg.LinAlgError:
-            return False
+        return regular_between(at.inverse @ new.jacobian)
 
     def start(self, path: Path, begin: Start) -> tuple[Sample | None, str]:
         """Return the first pose of the walk, or None with the reason."""
@@ -191,7 +188,7 @@ class Walk(PoseSolver):
         return FailureKind.NOT_CLOSED if self.lost.kind is FailureKind.NOT_FOUND else self.lost.kind
 
     def trajectory(self, details: Mapping[str, Any], begin: Start) -> Trajectory:
-        path, points = self.case.sweep.path, self.case.points
+        path, points = self.path, self.case.points
         times, n = path.times, len(path.times)
         motion = np.full((3, n, len(points), 3), np.nan)
         iterations, residual = np.zeros(n, dtype=np.int64), np.zeros(n)

@@ -1,9 +1,9 @@
 """A mechanism as one tree of slides, hinges and balls, for simulators with generalized coordinates.
 
-The base owns the spanning tree, the joints as chains of links (`joint_chains`), the conditions of
-loops (`loop_closures`), relations, couplers and drivers. A simulator adds links and frames and
-reports their motion. It knows a body by the number of its link; the ground is body 0. The axes of
-every body are global at design, and its origin is the point of its link there.
+The base adds the parts of the plan (`tree_plan`), the conditions of loops (`constraints`) and the
+drivers. A simulator adds links and frames and reports their motion. It knows a body by the number
+of its link; the ground is body 0. The axes of every body are global at design, and its origin is
+the point of its link there.
 
 A constructor prepares the simulator's empty model and then calls the base constructor, which calls
 `add_link` for every link, parents first, `make_frame` for every frame, and finally `finish`. Then
@@ -13,29 +13,130 @@ simulator's data, which `placement`, `slope` and `motion` read frame by frame.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from itertools import accumulate, pairwise
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
 from ...core.case.case import Case
-from ...core.joints import Fixed, Joint
+from ...core.harness.engine import Floor
+from ...core.joints import Fixed, Joint, Translational
 from ...core.joints.base import unit
-from ...core.mechanism.drivers import JointDriver, PointCoordinate
 from ...core.mechanism.loads import TorsionSpringDamper
-from ...core.mechanism.mechanism import GROUND, Mechanism, Vector
-from ...core.mechanism.topology import Branch, SpanningTree, spanning_tree
+from ...core.mechanism.mechanism import GROUND, Body, Mechanism, Point, Vector
+from ...core.mechanism.motions import JointDriver, PointCoordinate
 from ...core.trajectory import Array
-from .force_solution import Dynamics
-from .frame_constraints import Condition
-from .joint_chains import CHAINS, Link, free, relations
-from .loop_closures import CLOSURES, ends_of
-from .poses import middle
-from .tree_forces import TreeForces
-from .tree_reactions import RowWrench
-from .tree_rows import BodyFrame, Curved, DrivenPoint, Linear, Terms, by_frame
-from .tree_simulator import TreeSimulator
+from .constraints import CLOSURES, BodyFrame, Condition, Curved, DrivenPoint, Linear, by_frame
+from .force_solution import Dynamics, RowWrench
+from .projection_engine import Call, ProjectionEngine, floor_of
+from .tree_forces import Mass, TreeForces
+from .tree_plan import Chain, Closure, Link, Relation, plan_tree
+
+
+class TreeSimulator(ABC):
+    """A simulator of trees of links.
+
+    Attributes:
+        q: the configuration, never changed in place.
+        recursion: whether the simulator gives the wrenches of its joints.
+        computed_by: the forces that the simulator computes, with its calls.
+    """
+
+    q: Array
+    recursion: ClassVar[bool] = True
+    computed_by: ClassVar[Mapping[str, str]]
+
+    @abstractmethod
+    def add_link(self, parent: int, link: Link, offset: Array) -> None:
+        """Add a body that moves by a link relative to its parent, at an offset from the parent's
+        origin [m].
+        """
+
+    @abstractmethod
+    def make_frame(self, body: int, offset: Array) -> Any:
+        """Return a handle of a frame of a body other than the ground, at an offset from its origin
+        [m].
+        """
+
+    @abstractmethod
+    def finish(self) -> None:
+        """Finish the model for solving; no link and no frame follows."""
+
+    @property
+    @abstractmethod
+    def unknowns(self) -> int:
+        """The number of velocities."""
+
+    @abstractmethod
+    def coordinate(self, body: Any) -> tuple[int, int]:
+        """Return the indices of a slide's or hinge's coordinate in q and in v."""
+
+    @abstractmethod
+    def design(self) -> Array:
+        """Return the configuration at design, zero for slides and hinges."""
+
+    @abstractmethod
+    def moved(self, dx: Array) -> Array:
+        """Return the configuration q advanced by dx, shape (unknowns,)."""
+
+    @abstractmethod
+    def place(self) -> None:
+        """Update the simulator's poses and Jacobians to q."""
+
+    @abstractmethod
+    def rate(self, v: Array, a: Array) -> None:
+        """Update the simulator's velocities and accelerations to v and a, at the q last placed."""
+
+    @abstractmethod
+    def placement(self, handle: Any) -> tuple[Array, Array]:
+        """Return the position of a frame [m], shape (3,), and the rotation since design, shape
+        (3, 3).
+        """
+
+    @abstractmethod
+    def slope(self, handle: Any) -> Array:
+        """Return the Jacobian of a frame's point over that of its rotation, global axes, shape
+        (6, unknowns).
+        """
+
+    @abstractmethod
+    def motion(self, handle: Any) -> tuple[Array, Array]:
+        """Return velocity and acceleration of a frame's point, over the angular velocity and
+        acceleration, global axes, each of shape (6,).
+
+        Without accelerations of the coordinates, the acceleration is Jdot v.
+        """
+
+    @abstractmethod
+    def set_loads(self, gravity: Vector, masses: Sequence[Mass]) -> None:
+        """Set the masses of these bodies, zero mass for others, and the gravity of the model."""
+
+    @abstractmethod
+    def inverse_dynamics(self, v: Array, a: Array) -> Array:
+        """Return M a + h at v and a, at the q last placed, shape (unknowns,).
+
+        It also updates velocities and accelerations, as `rate` does.
+        """
+
+    def passed_on(self, body: int, point: Array) -> Array:
+        """Return the wrench that a body's joint transmits to it and all carried bodies, after
+        `inverse_dynamics`: force over moment about a global point, shape (6,).
+
+        Only simulators with a recursion implement it.
+        """
+        raise NotImplementedError
+
+    def look(self, frame: BodyFrame) -> None:
+        """Read pose, Jacobian and motion of a frame."""
+        if frame.handle is not None:
+            frame.position, frame.rotation = self.placement(frame.handle)
+            frame.jacobian = self.slope(frame.handle)
+            frame.velocity, frame.acceleration = self.motion(frame.handle)
 
 
 class TreeModel(TreeSimulator):
@@ -44,49 +145,54 @@ class TreeModel(TreeSimulator):
     Attributes:
         origin: origin of each body, global at design [m].
         carrier: name of a body of the mechanism -> number of its body here.
-        coordinates: joint and freedom -> body moved by this coordinate, and its sign.
+        coordinates: joint and freedom -> the simulator's coordinate, by default the number of the
+            body that it moves, and its sign.
         conditions: all rows, the rows of drivers last.
         closures: name of a cut joint -> description of its rows.
+        whole: types of joints that close a loop by all their conditions; see `plan_tree`.
         parents: number of the carrier of each body; the ground carries itself.
         branch_of: joint of the tree -> carried body, and its sign: -1 if it is the joint's first.
         tied: conditions between frames, with their joint and frames.
-        related: rows of coordinates, with joint, freedom and weight of the terms.
+        related: rows of coordinates, with their relation.
+        own: the simulator's own constraints, whose rows come first: their number, and what they
+            keep, the name of a cut joint or a relation.
+        merges: whether bodies that a fixed joint connects are one body of the simulator.
         forces: None unless outputs of the case use forces.
     """
 
     gives_forces: ClassVar[bool] = True
+    whole: ClassVar[Collection[type[Joint]]] = CLOSURES
+    merges: ClassVar[bool] = True
 
     def __init__(self, case: Case) -> None:
-        self.case = case
-        mechanism, tree = case.mechanism, spanning_tree(case.mechanism)
+        self.case, mechanism = case, case.mechanism
         self.carrier = {GROUND: 0} | {body.name: 0 for body in mechanism.bodies if body.fixed}
         self.origin = [np.zeros(3)]
-        self.coordinates: dict[tuple[str, str], tuple[int, int]] = {}
+        self.coordinates: dict[tuple[str, str], tuple[Any, int]] = {}
         self.conditions: list[Condition] = []
         self.closures: dict[str, str] = {}
         self.frames: list[BodyFrame] = []
         self.parents = [0]
         self.branch_of: dict[str, tuple[int, int]] = {}
         self.tied: list[tuple[str, Condition, tuple[BodyFrame, BodyFrame]]] = []
-        self.related: list[tuple[Condition, Terms]] = []
+        self.related: list[tuple[Condition, Relation]] = []
+        self.own: list[tuple[int, str | Relation]] = []
         self.loaded = self.gives_forces and bool(case.forces)
-        cut = tree.cut
-        for branch in self.branches(mechanism, tree):
-            if self.loaded and isinstance(branch.joint, Fixed):  # see `tree_forces`
-                cut = (*cut, branch.joint)
-                branch = Branch(GROUND, branch.child, None)
-            self.carry(mechanism, branch)
-        for joint in cut:
-            self.close(joint, ends_of(mechanism, joint), joint.name in self._named(mechanism))
-        for coupler in mechanism.couplers:
-            self.relate(coupler.terms, coupler.curve)
+        for part in self.plan():
+            match part:
+                case Chain():
+                    self.carry(part)
+                case Closure():
+                    self.close(part)
+                case Relation():
+                    self.relate(part)
         for driver in mechanism.drivers:
             if isinstance(driver, PointCoordinate):
                 point, k = mechanism.point(driver.point), np.array([*unit(driver.direction)])
                 frame = self.add_frame(self.carrier[point.body], point.position)
                 self.conditions.append(DrivenPoint(frame, k, np.array(point.position)))
             elif isinstance(driver, JointDriver):
-                self.relate([(driver.joint, driver.freedom, 1.0)])
+                self.add_row(Relation(driver.name, [(driver.joint, driver.freedom, 1.0)], ()))
         conditioned = len(self.frames)
         self.forces = TreeForces(self) if self.loaded else None
         if self.forces:
@@ -109,73 +215,64 @@ class TreeModel(TreeSimulator):
 
     # methods that a simulator may override
 
-    def branches(self, mechanism: Mechanism, tree: SpanningTree) -> Iterable[Branch]:
-        """Return the branches in an order with parents before children."""
-        return tree.branches
-
-    def close(self, joint: Joint, ends: tuple[Vector, Vector], named: bool) -> None:
-        """Add the conditions of a cut joint, by its points on both bodies.
-
-        Args:
-            named: whether a driver or coupler names the joint. Its coordinates, which count the
-                turns, then move a copy of the second body.
+    def plan(self) -> Iterable[Chain | Relation | Closure]:
+        """Return the parts of the tree. Joints whose coordinates are used count turns: driven and
+        coupled ones, and those with torsional springs.
         """
-        (i, j), closure, copied = self.bodies_of(joint), CLOSURES[type(joint)], ""
-        if named:
-            i, closure = self.add_joint(i, joint, ends[0], 1), CLOSURES[Fixed]
-            copied = f"on a copy of {joint.j!r}: "
-        self.closures[joint.name] = copied + closure.text
-        i_frame, j_frame = map(self.add_frame, (i, j), ends)
-        conditions = closure.conditions(joint, i_frame, j_frame)
+        mechanism = self.case.mechanism
+        counted = {name for coupler in mechanism.couplers for name in coupler.joints}
+        counted |= {each.joint for each in mechanism.drivers if isinstance(each, JointDriver)}
+        if self.loaded:
+            springs = (f for f in mechanism.forces if isinstance(f, TorsionSpringDamper))
+            counted |= {spring.joint for spring in springs}
+        return plan_tree(
+            mechanism,
+            whole=self.whole,
+            counted=counted,
+            # see `tree_forces`
+            loose=lambda joint: self.loaded and self.merges and isinstance(joint, Fixed),
+        )
+
+    def close(self, closure: Closure) -> None:
+        """Add the conditions of a cut joint."""
+        joint, by = closure.joint, CLOSURES[closure.by]
+        copied = f"on a copy of {joint.j!r}: " if closure.links else ""
+        self.closures[joint.name] = copied + by.text
+        i, j = map(self.add_frame, self.bodies_of(closure), closure.points)
+        conditions = by.conditions(joint, i, j)
         self.conditions += conditions
-        self.tied += [(joint.name, each, (i_frame, j_frame)) for each in conditions]
+        self.tied += [(joint.name, each, (i, j)) for each in conditions]
+
+    def relate(self, relation: Relation) -> None:
+        """Add the row of a relation of coordinates."""
+        self.add_row(relation)
 
     # methods of the base
 
-    def _named(self, mechanism: Mechanism) -> set[str]:
-        """Return the joints whose coordinates are used: driven, coupled, with torsional springs."""
-        found = {name for coupler in mechanism.couplers for name in coupler.joints}
-        found |= {each.joint for each in mechanism.drivers if isinstance(each, JointDriver)}
-        springs = mechanism.forces if self.loaded else ()
-        return found | {f.joint for f in springs if isinstance(f, TorsionSpringDamper)}
+    @property
+    def driven(self) -> list[tuple[Any, int]]:
+        """The driven coordinates, and their signs."""
+        drivers = [each for each in self.case.mechanism.drivers if isinstance(each, JointDriver)]
+        return [self.coordinates[each.joint, each.freedom] for each in drivers]
 
-    def bodies_of(self, joint: Joint) -> tuple[int, int]:
-        """Return the numbers of a joint's first and second body."""
-        return self.carrier[joint.i], self.carrier[joint.j]
+    def bodies_of(self, closure: Closure) -> tuple[int, int]:
+        """Return the numbers of the bodies to be tied."""
+        i, j = closure.ends
+        return self.carrier[i], self.carrier[j]
 
-    def carry(self, mechanism: Mechanism, branch: Branch) -> None:
-        """Add the links of a branch."""
-        at, joint = self.carrier[branch.parent], branch.joint
-        if joint is None:
-            # a tangent predicts a body best that turns about its middle
-            x, y, z = middle(mechanism, mechanism.body(branch.child)).tolist()
-            self.carrier[branch.child] = self.add_links(at, free((x, y, z)))
-        else:
-            sign = 1 if joint.j == branch.child else -1
-            P = ends_of(mechanism, joint)[0]
-            self.carrier[branch.child] = self.add_joint(at, joint, P, sign)
-            self.branch_of[joint.name] = self.carrier[branch.child], sign
-
-    def add_joint(self, at: int, joint: Joint, P: Vector, sign: int) -> int:
-        """Add the links and the relations of a joint on a body; return the number of the last body.
-
-        The chain begins at the joint's first body, or for sign -1 at its second.
-        """
-        at = self.add_links(at, CHAINS[type(joint)](joint, P), joint.name, sign)
-        for relation in relations(joint):
-            self.relate(relation)
-        return at
-
-    def add_links(self, at: int, links: Sequence[Link], joint: str = "", sign: int = 1) -> int:
-        """Add links in the order of the sign; return the number of the last body."""
-        for link in links[::sign]:
+    def carry(self, chain: Chain) -> None:
+        """Add the links of a chain."""
+        at = self.carrier[chain.parent]
+        for link in chain.links:
             self.add_link(at, link, np.array(link.point) - self.origin[at])
             self.parents.append(at)
             at = len(self.origin)
             self.origin.append(np.array(link.point))
-            if link.name:
-                self.coordinates[joint, link.name] = at, sign
-        return at
+            if chain.joint and link.name:
+                self.coordinates[chain.joint.name, link.name] = at, chain.sign
+        self.carrier[chain.child] = at
+        if chain.joint and not chain.cut:
+            self.branch_of[chain.joint.name] = at, chain.sign
 
     def add_frame(self, body: int, at: Vector) -> BodyFrame:
         """Add a frame to a body, at a point, global at design [m]."""
@@ -183,17 +280,14 @@ class TreeModel(TreeSimulator):
         self.frames.append(BodyFrame(body, handle, np.array(at)))
         return self.frames[-1]
 
-    def relate(self, terms: Terms, curve: Sequence[float] = ()) -> None:
-        """Add the row of a weighted sum of coordinates: joint, freedom and weight of its terms.
-
-        Args:
-            curve: coefficients of a polynomial in the last coordinate, which is added.
-        """
-        moved = [(*self.coordinates[joint, freedom], weight) for joint, freedom, weight in terms]
+    def add_row(self, relation: Relation) -> None:
+        """Add the row of a relation or of a driver's coordinate."""
+        moved = [(*self.coordinates[joint, freedom], w) for joint, freedom, w in relation.terms]
         weights = np.array([sign * weight for _, sign, weight in moved])
         row = Linear(self, [body for body, _, _ in moved], weights)
-        self.conditions.append(Curved(row, Polynomial(curve), moved[-1][1]) if curve else row)
-        self.related.append((self.conditions[-1], terms))
+        curve = Polynomial(relation.curve) if relation.curve else None
+        self.conditions.append(Curved(row, curve, moved[-1][1]) if curve else row)
+        self.related.append((self.conditions[-1], relation))
 
     @property
     def details(self) -> Mapping[str, Any]:
@@ -265,9 +359,22 @@ class TreeModel(TreeSimulator):
         body, sign = self.coordinates[joint, "rotation"]
         return sign * float(self.q[self.coordinate(body)[0]])
 
+    @property
+    def own_count(self) -> int:
+        """Return the number of rows of the simulator's own constraints."""
+        return sum(n for n, _ in self.own)
+
+    @property
+    def own_rows(self) -> list[tuple[slice, str | Relation]]:
+        """Return the rows of the simulator's own constraints, and what they keep."""
+        ends = accumulate((n for n, _ in self.own), initial=0)
+        kept = (what for _, what in self.own)
+        return [(slice(*pair), what) for pair, what in zip(pairwise(ends), kept, strict=True)]
+
     def rows_of(self, joint: str) -> list[slice]:
         """Return the rows of a cut joint."""
-        return [self._rows(each) for name, each, _ in self.tied if name == joint]
+        tied = [self._rows(each) for name, each, _ in self.tied if name == joint]
+        return [rows for rows, what in self.own_rows if what == joint] + tied
 
     def _rows(self, condition: Condition) -> slice:
         return self.slices[self.conditions.index(condition)]
@@ -287,11 +394,72 @@ class TreeModel(TreeSimulator):
 
     def coordinate_rows(self) -> dict[int, list[tuple[str, str]]]:
         """Return the rows of coordinates, and joint and freedom of each."""
+        rows = [(self._rows(row), relation) for row, relation in self.related]
+        rows += [(at, what) for at, what in self.own_rows if isinstance(what, Relation)]
         return {
-            self._rows(row).start: [(joint, freedom) for joint, freedom, _ in terms]
-            for row, terms in self.related
+            at.start: [(joint, freedom) for joint, freedom, _ in relation.terms]
+            for at, relation in rows
         }
 
     def coordinate_weight(self, row: int, joint: str, freedom: str) -> float:
         body, sign = self.coordinates[joint, freedom]
         return sign * float(self.J[row, self.coordinate(body)[1]])
+
+
+# The smallest model: one slide with a driven point, so one frame in a condition.
+LEAST = Mechanism(
+    "slide",
+    [Body("slide")],
+    [Translational("rail", GROUND, "slide", point=(0.0, 0.0, 0.0), axis=(1.0, 0.0, 0.0))],
+    [Point("slide", "slide", (1.0, 0.0, 0.0))],
+    [PointCoordinate("stroke", "slide", (1.0, 0.0, 0.0))],
+)
+
+
+class TreeEngine(ProjectionEngine):
+    """An engine whose model is a `TreeModel`."""
+
+    joints = CLOSURES
+
+    @property
+    def described(self) -> Mapping[str, Any]:
+        """Return the coordinates of the tree and the equations of its loops."""
+        return {
+            "coordinates": f"spanning tree in {self.title}; a joint is a chain of slides, hinges"
+            " and balls",
+            "closures": "conditions on placements, Jacobians and accelerations of frames",
+        }
+
+    @abstractmethod
+    def model_of(self, case: Case) -> TreeModel:
+        """Return the simulator's model of the unscaled case, at the design position."""
+
+    def build(self, case: Case) -> TreeModel:
+        """Return the simulator's model of the case in the scaled frame, at the design position."""
+        return self.model_of(self.own(case))
+
+    def floor(self, case: Case) -> Floor:
+        """Return the floor from all simulator calls for a pose and its rates."""
+        model, least = self.build(case), self.model_of(replace(case, mechanism=LEAST, outputs=()))
+        solved = self.solve(model, case, 1e-12)
+        n, wanted = len(model.moving), len(model.wanted)
+        # the same Python on the smallest model
+        least.moving, least.wanted = least.moving * n, least.moving * wanted
+        zeros = np.zeros(model.unknowns), np.zeros(least.unknowns)
+        pose: dict[str, tuple[Call, Call, int]] = {
+            f"placements and Jacobians of {n} frames": (model.observe, least.observe, 1),
+        }
+        own, empty = zeros
+        rates: dict[str, tuple[Call, Call, int]] = {
+            f"accelerations of {n} frames": (
+                partial(model.observe_rates, own),
+                partial(least.observe_rates, empty),
+                1,
+            ),
+            f"motions of {wanted} points": (
+                partial(model.points, own, own),
+                partial(least.points, empty, empty),
+                1,
+            ),
+        }
+        return floor_of(self.name, solved, model.unknowns, pose, rates)

@@ -15,10 +15,9 @@ import numpy as np
 
 from ...core.case.case import Case
 from ...core.errors import SolveError
-from ...core.mechanism.drivers import JointDriver
-from ...core.trajectory import Array, Trajectory
-from ..shared.joint_equivalents import jointed
-from ..shared.simulation import Leg, SimulatedPose, SimulationEndedError, simulated, start_of
+from ...core.trajectory import Array
+from ..shared.equivalents import jointed
+from ..shared.simulation import Leg, SimulatedPose, Simulation, SimulationEndedError, start_of
 from .simbody import Simbody, SimbodyModel, opensim
 
 # Weight of constraints; a driven coordinate has weight 1. With OpenSim's default, an infinite
@@ -27,7 +26,7 @@ WEIGHT = 1e3
 
 
 @dataclass(frozen=True)
-class Assembly:
+class Assembly(Simulation):
     """Simbody's assembler, pose after pose.
 
     Attributes:
@@ -36,7 +35,7 @@ class Assembly:
 
     accuracy: float = 1e-12
     name = "simbody"
-    mode = "simulate"
+    projection = Simbody
     loop = "python"
 
     @property
@@ -49,10 +48,6 @@ class Assembly:
             "rods": "bodies between a cross and a ball",
         }
 
-    def version(self) -> str | None:
-        """Return the version of OpenSim's package, or None if the import fails."""
-        return Simbody().version()
-
     def unsupported(self, case: Case) -> str | None:
         """Return a message on the joint or driver that is not supported here, or None."""
         for coupler in case.mechanism.couplers:
@@ -64,17 +59,10 @@ class Assembly:
         """Return the efforts by the accuracy."""
         return {f"accuracy {x:g}": replace(self, accuracy=x) for x in (1e-3, 1e-6, 1e-9, 1e-12)}
 
-    def floor(self, case: Case) -> None:
-        """Return None: the simulator runs its own iterations."""
-
     def build(self, case: Case) -> _Assembled:
         """Return OpenSim's model and its start."""
         case = replace(case, mechanism=jointed(case.mechanism))
         return _Assembled(opensim(), case, self.accuracy)
-
-    def solve(self, model: _Assembled, case: Case, tol: float) -> Trajectory:
-        """Solve all samples that can be assembled; see `Engine.solve`."""
-        return simulated(case, model.start, model.run, model.details)
 
 
 class _Assembled(SimbodyModel):
@@ -83,14 +71,12 @@ class _Assembled(SimbodyModel):
     def __init__(self, o: Any, case: Case, accuracy: float) -> None:
         super().__init__(o, case)
         self.accuracy, self.start = accuracy, start_of(self, case)
-        joints = [each for each in case.mechanism.drivers if isinstance(each, JointDriver)]
-        if len(self.conditions) > len(joints) + (self.state.getNQErr() > 0):
+        if len(self.conditions) > len(self.driven) + (self.state.getNQErr() > 0):
             raise SolveError(
                 f"case {case.name!r}: a joint closes a loop of one body with itself, which"
                 " Simbody's assembler does not support; use the projection mode"
             )
-        driven = [self.coordinates[each.joint, each.freedom] for each in joints]
-        self.driven = [(self.moves[body - 1].get_coordinates(0), sign) for body, sign in driven]
+        self.held = [(self.moves[at - 1].get_coordinates(0), sign) for at, sign in self.driven]
 
     def run(self, leg: Leg) -> Iterator[SimulatedPose]:
         """Yield the poses of a leg."""
@@ -103,7 +89,7 @@ class _Assembled(SimbodyModel):
         """Return the pose at values of the drivers."""
         o, state = self.o, self.state
         references = o.SimTKArrayCoordinateReference()
-        for (coordinate, sign), value in zip(self.driven, values.tolist(), strict=True):
+        for (coordinate, sign), value in zip(self.held, values.tolist(), strict=True):
             reference = o.CoordinateReference(coordinate.getName(), o.Constant(sign * value))
             reference.setWeight(1.0)
             references.push_back(reference)
@@ -119,7 +105,7 @@ class _Assembled(SimbodyModel):
         self.model.realizePosition(state)
         gaps = [
             coordinate.getValue(state) - sign * value
-            for (coordinate, sign), value in zip(self.driven, values.tolist(), strict=True)
+            for (coordinate, sign), value in zip(self.held, values.tolist(), strict=True)
         ]
         stations: list[Any] = self.wanted
         points = np.full((3, len(stations), 3), np.nan)

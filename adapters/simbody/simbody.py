@@ -1,32 +1,312 @@
 """Simbody in projection mode: its joints as a spanning tree, its own constraints to close loops.
 
 The simulator comes with OpenSim's Python package. A cut joint has its slides and hinges on its
-first body (see `joint_chains`); one constraint of Simbody, of a point or of a whole frame, ties
+first body (see `tree_plan`); one constraint of Simbody, of a point or of a whole frame, ties
 their end to the second body. A rod is a constant distance, and a coordinate coupler relates two
 coordinates. Simbody gives residual, Jacobian and bias of these rows; the base adds the drivers.
+
+The axes of every body are global at design. Names are numbers, because OpenSim aborts the process
+at a name with a space. Limits of coordinates have no effect: they act on forces and on `setValue`,
+and neither is used.
+
+OpenSim disables Simbody's quaternions, and its package cannot enable them. At a second angle of 90
+degrees the rates of the other two are infinite (gimbal lock), but the velocities of a ball joint in
+Simbody are its angular velocity, which has no lock. So a step rotates Euler parameters by this
+velocity, and Simbody gets the angles of the result: no rate of an angle is used.
 """
 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import Any
+from functools import cached_property, partial
+from math import cos, hypot, sin
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
 from ...core.case.case import Case
 from ...core.harness.engine import Floor
-from ...core.mechanism.drivers import PointCoordinate
+from ...core.joints import Distance, Inline, Spherical
+from ...core.joints.base import unit
 from ...core.mechanism.mechanism import Vector
+from ...core.mechanism.motions import PointCoordinate
 from ...core.trajectory import Array
-from ..shared.compiled_floor import Call, floor_of
-from ..shared.opensim_frames import euler_angles
-from ..shared.tree_engine import LEAST, TreeEngine
-from .forces import LoadedSimbody
-from .rotations import UNTURNED, turned
-from .stations import Station
+from ..shared.force_solution import RowWrench
+from ..shared.poses import Parameters, euler_angles, orientation
+from ..shared.projection_engine import Call, floor_of
+from ..shared.tree_forces import NO_MASS, Mass, mass_properties
+from ..shared.tree_model import LEAST, TreeEngine, TreeModel
+from ..shared.tree_plan import Closure, Link, Relation
+
+UNTURNED: Parameters = (1.0, 0.0, 0.0, 0.0)
+
+
+def turned(p: Sequence[float], turn: Sequence[float]) -> Parameters:
+    """Return Euler parameters p after a further rotation by a rotation vector in the axes of the
+    parent [rad].
+    """
+    e0, e1, e2, e3 = p
+    x, y, z = turn
+    angle = hypot(x, y, z)
+    # sin(angle / 2) / angle; at an angle of 1e-8 its next term is below round-off
+    scale = sin(0.5 * angle) / angle if angle > 1e-8 else 0.5
+    w, x, y, z = cos(0.5 * angle), scale * x, scale * y, scale * z
+    parameters = (
+        w * e0 - x * e1 - y * e2 - z * e3,
+        w * e1 + x * e0 + y * e3 - z * e2,
+        w * e2 - x * e3 + y * e0 + z * e1,
+        w * e3 + x * e2 - y * e1 + z * e0,
+    )
+    size = hypot(*parameters)
+    e0, e1, e2, e3 = parameters
+    return e0 / size, e1 / size, e2 / size, e3 / size
+
+
+class Solved(Protocol):
+    """A model in Simbody's state; u, a: velocities and accelerations of the coordinates; matrix:
+    for results.
+    """
+
+    state: Any
+    matter: Any
+    matrix: Any
+    u: Array
+    a: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Station:
+    """A point of a body and the body's axes; see `constraints.Frame`.
+
+    Attributes:
+        body: number of the body.
+        carrier: OpenSim's body.
+        point: position of the point in the axes of the body [m].
+    """
+
+    of: Solved
+    body: int
+    carrier: Any
+    point: Any
+
+    @cached_property
+    def _place(self) -> tuple[Any, Any, Any]:
+        return self.of.state, self.carrier.getMobilizedBodyIndex(), self.point
+
+    @property
+    def position(self) -> Array:
+        return self.carrier.findStationLocationInGround(self.of.state, self.point).to_numpy()
+
+    @property
+    def rotation(self) -> Array:
+        R = self.carrier.getTransformInGround(self.of.state).R()
+        return np.array([[R.get(i, j) for j in range(3)] for i in range(3)])
+
+    @property
+    def jacobian(self) -> Array:
+        self.of.matter.calcFrameJacobian(*self._place, self.of.matrix)
+        J = self.of.matrix.to_numpy()
+        return np.concatenate((J[3:], J[:3]))  # Simbody has the rotation first
+
+    @property
+    def velocity(self) -> Array:
+        turn = self.carrier.getAngularVelocityInGround(self.of.state)
+        return np.concatenate((self._speed(), turn.to_numpy()))
+
+    @property
+    def acceleration(self) -> Array:
+        bias = self.of.matter.calcBiasForFrameJacobian(*self._place)
+        bias = np.concatenate((bias.get(1).to_numpy(), bias.get(0).to_numpy()))
+        return bias + self.jacobian @ self.of.a if self.of.a.any() else bias
+
+    def motion(self) -> tuple[Array, Array, Array]:
+        """Return position, velocity and acceleration of the point."""
+        matter, matrix = self.of.matter, self.of.matrix
+        matter.calcStationJacobian(*self._place, matrix)
+        J, bias = matrix.to_numpy(), matter.calcBiasForStationJacobian(*self._place)
+        return self.position, J @ self.of.u, bias.to_numpy() + J @ self.of.a
+
+    def _speed(self) -> Array:
+        return self.carrier.findStationVelocityInGround(self.of.state, self.point).to_numpy()
+
+
+NO_TURN = (0.0, 0.0, 0.0)
+
+
+class ConstrainedTree(TreeModel):
+    """The OpenSim model of a case: a body with its joint for each link, a constraint for each cut
+    joint and each relation.
+
+    Attributes:
+        o: OpenSim's package.
+        model: OpenSim's model, which owns all other objects.
+        bodies: OpenSim's bodies by their numbers; the first is the ground.
+        moves: OpenSim's joint of each body after the ground.
+    """
+
+    whole = (Distance, Inline)
+
+    def __init__(self, o: Any, case: Case) -> None:
+        self.o, self.model = o, o.Model()
+        self.bodies = [self.model.getGround()]
+        self.moves: list[Any] = []
+        super().__init__(case)
+
+    def add_link(self, parent: int, link: Link, offset: Array) -> None:
+        o, number = self.o, len(self.bodies)
+        joint = {"slide": o.SliderJoint, "hinge": o.PinJoint, "ball": o.BallJoint}[link.move]
+        axes = self.vector(orientation(link.move, link.axis))
+        # kinematics does not depend on masses, but OpenSim requires them
+        mass = NO_MASS if self.loaded else 1.0
+        body = o.Body(f"body_{number}", mass, o.Vec3(0.0), o.Inertia(mass, mass, mass))
+        move = joint(
+            f"joint_{number}",
+            self.bodies[parent],
+            self.vector(offset),
+            axes,
+            body,
+            o.Vec3(0.0),
+            axes,
+        )
+        if link.move != "ball":
+            move.upd_coordinates(0).setName(coordinate_name(number))
+        self.model.addBody(body)
+        self.model.addJoint(move)
+        self.bodies.append(body)
+        self.moves.append(move)
+
+    def close(self, closure: Closure) -> None:
+        i, j = self.bodies_of(closure)
+        if i == j:
+            # OpenSim aborts the process at a constraint of a body with itself
+            super().close(closure)
+            return
+        o, joint = self.o, closure.joint
+        at_i, at_j = (
+            (self.bodies[body], self.vector(np.array(P) - self.origin[body]))
+            for body, P in zip((i, j), closure.points, strict=True)
+        )
+        none = self.vector(NO_TURN)
+        if isinstance(joint, Distance):
+            rows, constraint = 1, o.ConstantDistanceConstraint(*at_i, *at_j, joint.rod_length)
+        elif isinstance(joint, Inline):
+            body, P = at_i
+            along = self.vector(unit(joint.axis))
+            rows, constraint = 2, o.PointOnLineConstraint(body, along, P, *at_j)
+        elif closure.by is Spherical:
+            rows, constraint = 3, o.PointConstraint(*at_i, *at_j)
+        else:
+            rows, constraint = 6, o.WeldConstraint("weld", *at_i, none, *at_j, none)
+        self.constrain(constraint, rows, joint.name)
+        moved = f", on a body that {' and '.join(closure.links)} move on {joint.i!r}"
+        name = constraint.getConcreteClassName()
+        self.closures[joint.name] = name + (moved if closure.links else "")
+
+    def relate(self, relation: Relation) -> None:
+        if relation.curve:
+            super().relate(relation)
+            return
+        o, coupler = self.o, self.o.CoordinateCouplerConstraint()
+        one, other, (_, factor) = relation.follower(signed=True)
+        names = o.ArrayStr()
+        names.append(coordinate_name(self.coordinates[other][0]))
+        coupler.setIndependentCoordinateNames(names)
+        coupler.setDependentCoordinateName(coordinate_name(self.coordinates[one][0]))
+        coupler.setFunction(o.LinearFunction(factor, 0.0))
+        self.constrain(coupler, 1, relation)
+
+    def constrain(self, constraint: Any, rows: int, keeps: str | Relation) -> None:
+        """Add a constraint with a number of rows under a unique name."""
+        self.own.append((rows, keeps))
+        constraint.setName(f"constraint_{self.model.getNumConstraints()}")
+        self.model.addConstraint(constraint)
+
+    def vector(self, a: Iterable[float]) -> Any:
+        """Return a vector as OpenSim's type."""
+        return self.o.Vec3(*map(float, a))
+
+
+def coordinate_name(body: int) -> str:
+    """Return the name in OpenSim of the coordinate of a body's slide or hinge."""
+    return f"coordinate_{body}"
+
+
+COMPUTED_BY: Mapping[str, str] = {
+    "inverse dynamics": "calcResidualForceIgnoringConstraints, getGravityBodyForces",
+    "reactions of tree joints": (
+        "Newton and Euler, of the adapter, by velocities and accelerations of Simbody's bodies"
+    ),
+    "reactions of cut joints": "calcConstraintForcesFromMultipliers",
+    "force elements": "of the adapter, by stations of Simbody",
+}
+
+
+class LoadedSimbody(ConstrainedTree):
+    """The tree with masses; see `tree_forces.LoadedTree`."""
+
+    recursion: ClassVar[bool] = False
+    computed_by: ClassVar[Mapping[str, str]] = COMPUTED_BY
+    state: Any
+    matter: Any
+
+    def set_loads(self, gravity: Vector, masses: Sequence[Mass]) -> None:
+        self.model.setGravity(self.vector(gravity))
+        for each in masses:
+            link: int = each.frame.body
+            mass, center, I = mass_properties(each.body, self.origin[link])  # noqa: E741
+            entries = I[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]].tolist()
+            body = self.bodies[link]
+            body.setMass(mass)
+            body.setMassCenter(self.vector(center))
+            body.setInertia(self.o.Inertia(*entries))
+
+    def inverse_dynamics(self, v: Array, a: Array) -> Array:
+        o, state, n = self.o, self.state, self.unknowns
+        self.rate(v, a)
+        self.model.realizeDynamics(state)
+        none, found = o.Vector(n, 0.0), o.Vector(n, 0.0)
+        gravity = self.model.getGravityBodyForces(state)
+        self.matter.calcResidualForceIgnoringConstraints(
+            state, none, gravity, o.Vector.createFromMat(np.ascontiguousarray(a)), found
+        )
+        return np.array(found.to_numpy())
+
+    def look(self, frame: Any) -> None:
+        pass  # stations are read on demand
+
+    def exerted(self) -> list[RowWrench]:
+        found = super().exerted()
+        origins = [self.position_of(number) for number in range(len(self.bodies))]
+        for rows, keeps in self.own_rows:
+            if not isinstance(keeps, str):
+                continue
+            wrenches = np.array([self._on_bodies(row) for row in range(rows.start, rows.stop)])
+            found += [
+                RowWrench(rows, number, origins[number], wrenches[:, number])
+                for number in range(len(self.bodies))
+                if wrenches[:, number].any()
+            ]
+        return found
+
+    def position_of(self, number: int) -> Array:
+        """Return the position of a body's origin."""
+        body = self.bodies[number]
+        return body.findStationLocationInGround(self.state, self.o.Vec3(0.0)).to_numpy()
+
+    def _on_bodies(self, row: int) -> Array:
+        """Return the wrench of a unit multiplier on each body, shape (bodies, 6): force over moment
+        about its origin.
+        """
+        o, unit = self.o, np.zeros(self.own_count)
+        unit[row] = 1.0
+        on_bodies, on_coordinates = o.VectorOfSpatialVec(), o.Vector()
+        self.matter.calcConstraintForcesFromMultipliers(
+            self.state, o.Vector.createFromMat(unit), on_bodies, on_coordinates
+        )
+        each = [on_bodies.get(int(body.getMobilizedBodyIndex())) for body in self.bodies]
+        return np.array([[*w.get(1).to_numpy(), *w.get(0).to_numpy()] for w in each])
 
 
 class Simbody(TreeEngine):
@@ -112,7 +392,7 @@ def opensim() -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Constraints:
-    """All rows of Simbody's constraints; see `frame_constraints.Condition`."""
+    """All rows of Simbody's constraints; see `constraints.Condition`."""
 
     of: SimbodyModel
     n: int
@@ -165,8 +445,8 @@ class SimbodyModel(LoadedSimbody):
     def unknowns(self) -> int:
         return self.state.getNU()
 
-    def coordinate(self, body: int) -> tuple[int, int]:
-        return self.places[body - 1]
+    def coordinate(self, body: Any) -> tuple[int, int]:
+        return self.places[int(body) - 1]
 
     def design(self) -> Array:
         q = np.zeros(self.slots)
@@ -189,7 +469,7 @@ class SimbodyModel(LoadedSimbody):
         self.model.realizePosition(self.state)
 
     def rate(self, v: Array, a: Array) -> None:
-        self.a = a
+        self.u, self.a = v, a
         self.state.setU(self.o.Vector.createFromMat(v))
         self.model.realizeVelocity(self.state)
 

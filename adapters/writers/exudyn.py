@@ -22,29 +22,181 @@ from ...core import joints as j
 from ...core.algebra import vec
 from ...core.errors import KincheckError
 from ...core.joints.base import unit
-from ...core.mechanism.loads import Force, ForceElement, SpringDamper, Torque, TorsionSpringDamper
-from ...core.mechanism.mechanism import GROUND, Body, Mechanism
+from ...core.mechanism.body import Body
+from ...core.mechanism.loads import (
+    Axes,
+    Bushing,
+    Force,
+    ForceElement,
+    SpringDamper,
+    Torque,
+    TorsionSpringDamper,
+)
+from ...core.mechanism.mechanism import GROUND, Mechanism
 from ...core.trajectory import Array, BodyMotion
-from ..shared.joint_chains import CHAINS, dependence, relations
-from ..shared.loop_closures import ends_of
+from ..shared.exudyn_joints import objects_of
 from ..shared.poses import Displacement, displacements, frame_along, link_coordinates, link_motions
-from . import exudyn_loads
-from .exudyn_preamble import END, beginning
+from ..shared.tree_plan import CHAINS, Relation, Terms, ends_of, relations
+from . import text
+from .text import require_known
+
+
+def inertial(body: Body) -> tuple[float, list[float], list[float]]:
+    """Return mass, centre of mass and inertia of a body, relative to its origin and parallel to the
+    global axes at design; Exudyn puts the product yz first.
+    """
+    xx, yy, zz, xy, xz, yz = text.six(text.inertia_at_origin(body))
+    center = np.subtract(text.center_of(body), body.origin)
+    return text.mass_of(body), center.tolist(), [xx, yy, zz, yz, xz, xy]
+
+
+def known(element: ForceElement) -> bool:
+    """Return whether a script has the element: Exudyn's own bushing has a law of other angles, and
+    its springs have no curve.
+    """
+    return not isinstance(element, Bushing) and not getattr(element, "curve", None)
+
+
+def load_options(element: ForceElement) -> dict[str, Any]:
+    """Return the options of the object or load."""
+    match element:
+        case Force() | Torque():
+            turns = element.frame is Axes.BODY
+            return {"loadVector": element.vector, "bodyFixed": turns}
+        case SpringDamper():
+            own = {"referenceLength": element.free_length}
+        case TorsionSpringDamper():
+            own = {"offset": element.free_angle}
+        case _:
+            raise NotImplementedError(f"{element}: give its options in Exudyn here")
+    return {"stiffness": element.stiffness, "damping": element.damping, **own}
+
+
+def beginning(loaded: bool) -> str:
+    """Return the functions that the lines call; with masses and force elements if loaded."""
+    masses, body = (text.LOADED, LOADED_BODY) if loaded else (text.PLAIN, PLAIN_BODY)
+    return BEGINNING.replace("MASSES", masses).replace("BODY", body)
+
+
+PLAIN_BODY = """
+def body(name, position, initial, frame):
+    frames[name], reference = frame, [*position, 1, 0, 0, 0]
+    node = NodeRigidBodyEP(
+        name=name, referenceCoordinates=reference, initialCoordinates=initial
+    )
+    nodes[name] = mbs.AddNode(node)
+    rigid = ObjectRigidBody(name=name, mass=1, inertia=[1, 1, 1, 0, 0, 0], nodeNumber=nodes[name])
+    bodies[name] = mbs.AddObject(rigid)
+"""
+LOADED_BODY = '''
+forces = {}
+
+
+def body(name, position, initial, frame, mass, center, inertia):
+    """The centre of mass is from the origin; the inertia is about the origin."""
+    frames[name], reference = frame, [*position, 1, 0, 0, 0]
+    node = NodeRigidBodyEP(
+        name=name, referenceCoordinates=reference, initialCoordinates=initial
+    )
+    nodes[name] = mbs.AddNode(node)
+    rigid = ObjectRigidBody(
+        name=name, mass=mass, inertia=inertia, centerOfMass=center, nodeNumber=nodes[name]
+    )
+    bodies[name] = mbs.AddObject(rigid)
+    falling = mbs.AddMarker(MarkerBodyMass(bodyNumber=bodies[name]))
+    mbs.AddLoad(LoadMassProportional(markerNumber=falling, loadVector=gravity))
+
+
+def spring(name, first, second, **options):
+    item = ObjectConnectorSpringDamper(
+        name=name, markerNumbers=[marker(*first), marker(*second)], **options
+    )
+    forces[name] = mbs.AddObject(item)
+
+
+def torsion(name, first, second, turn, **options):
+    """A torsional spring-damper about the z axis of its markers, whose turn a node counts."""
+    turns = mbs.AddNode(NodeGenericData(numberOfDataCoordinates=1, initialCoordinates=[turn]))
+    item = ObjectConnectorTorsionalSpringDamper(
+        name=name, markerNumbers=[marker(*first), marker(*second)], nodeNumber=turns, **options
+    )
+    forces[name] = mbs.AddObject(item)
+
+
+def force(name, at, **options):
+    item = LoadForceVector(markerNumber=marker(*at), **options)
+    forces[name] = mbs.AddLoad(item)
+
+
+def torque(name, at, **options):
+    item = LoadTorqueVector(markerNumber=marker(*at), **options)
+    forces[name] = mbs.AddLoad(item)
+'''
+BEGINNING = '''\
+"""A mechanism in Exudyn, written by kincheck. Lengths are in m, angles in rad.
+
+MASSES Drivers are not part of the model: the initial
+coordinates are consistent with the driver values below. All bodies are parallel to the global axes
+at design, in their reference coordinates, from which the state of Exudyn is measured; `frames` has
+the Euler parameters of the bodies' own axes in these.
+"""
+
+import exudyn as exu
+import numpy as np
+from exudyn.itemInterface import *
+
+SC = exu.SystemContainer()
+mbs = SC.AddSystem()
+ground = mbs.AddObject(ObjectGround())
+nodes, bodies, frames, joints, coordinates, points = {}, {}, {}, {}, {}, {}
+
+BODY
+
+def marker(name, position, rotation=np.eye(3)):
+    frame = np.eye(4)
+    frame[:3, :3], frame[:3, 3] = rotation, position
+    return mbs.AddMarker(MarkerBodyRigid(bodyNumber=bodies[name], localHT=frame))
+
+
+def joint(name, kind, first, second, **options):
+    item = kind(markerNumbers=[marker(*first), marker(*second)], **options)
+    joints.setdefault(name, []).append(mbs.AddObject(item))
+
+
+def translation(name, first, second, axis):
+    """The displacement of the second point against the first along an axis of the first body."""
+    (one, at), (two, there) = first, second
+    points = dict(localPosition0=at, localPosition1=there)
+    item = MarkerBodiesRelativeTranslationCoordinate(
+        bodyNumbers=[bodies[one], bodies[two]], axis0=axis, **points
+    )
+    coordinates[name] = mbs.AddMarker(item)
+
+
+def rotation(name, first, second, axis, initial):
+    """The turn of the second body against the first; a node keeps it, and so counts the turns."""
+    (one, at), (two, there) = first, second
+    turns = mbs.AddNode(NodeGenericData(numberOfDataCoordinates=1, initialCoordinates=[initial]))
+    points = dict(localPosition0=at, localPosition1=there)
+    item = MarkerBodiesRelativeRotationCoordinate(
+        nodeNumber=turns, bodyNumbers=[bodies[one], bodies[two]], axis0=axis, **points
+    )
+    coordinates[name] = mbs.AddMarker(item)
+
+
+def relation(name, one, other, factor):
+    """One coordinate is the factor times the other."""
+    markers = [coordinates[one], coordinates[other]]
+    item = ObjectConnectorCoordinate(markerNumbers=markers, factor1=factor)
+    joints.setdefault(name, []).append(mbs.AddObject(item))
+
+
+'''
+END = "\nmbs.Assemble()\n"
+
 
 # Round-off of a right angle between unit vectors, which a generic joint leaves as a residual.
 RIGHT_ANGLE = 1e-15
-
-GENERIC: Mapping[type[j.Joint], tuple[int, Sequence[int]]] = {
-    j.Cylindrical: (2, (1, 1, 0, 1, 1, 0)),
-    j.Screw: (2, (1, 1, 0, 1, 1, 0)),  # and its relation
-    j.InPlane: (0, (1, 0, 0, 0, 0, 0)),
-    j.Inline: (2, (1, 1, 0, 0, 0, 0)),
-    j.ParallelAxes: (2, (0, 0, 0, 1, 1, 0)),
-    j.Planar: (2, (0, 0, 1, 1, 1, 0)),
-}
-"""Joints about one axis as generic joints: the axis of the frame that is the joint's axis, and the
-constrained directions: x, y, z, then rotations about them.
-"""
 
 
 def write(
@@ -55,12 +207,7 @@ def write(
     Raises:
         KincheckError: a joint or coupler has no counterpart in Exudyn.
     """
-    for joint in mechanism.joints:
-        if type(joint) not in CHAINS and type(joint) is not j.Distance:
-            raise KincheckError(
-                f"{joint} has no counterpart in Exudyn here; write an equivalent of known joints"
-                " instead"
-            )
+    require_known(mechanism, "Exudyn")
     if curved := next((each for each in mechanism.couplers if each.curve), None):
         raise KincheckError(f"{curved} has no counterpart in Exudyn; export MJCF or URDF instead")
     return {".py": _Script(*_spelled_out(mechanism, way)).text(start)}
@@ -87,7 +234,7 @@ class _Script:
             moved = [*(self.way[body.name].r[-1] - body.origin), *(turn - (1.0, 0.0, 0.0, 0.0))]
             self.call(
                 *("body", body.name, body.origin, moved, body.euler_parameters),
-                *(exudyn_loads.inertial(body) if self.loaded else ()),
+                *(inertial(body) if self.loaded else ()),
             )
         for joint in self.mechanism.joints:
             self.joint(joint)
@@ -95,9 +242,9 @@ class _Script:
                 self.relate(joint.name, relation)
         for coupler in self.mechanism.couplers:
             self.relate(coupler.name, coupler.terms)
-        if strange := [str(f) for f in self.mechanism.forces if not exudyn_loads.known(f)]:
+        if strange := [str(f) for f in self.mechanism.forces if not known(f)]:
             self.lines.append(f"# Left out: {', '.join(strange)}")
-        for force in filter(exudyn_loads.known, self.mechanism.forces):
+        for force in filter(known, self.mechanism.forces):
             self.load(force)
         for point in self.mechanism.points:
             self.lines.append(
@@ -130,66 +277,21 @@ class _Script:
         frame = [] if axes is None else [_text(axes)]
         return _Code(f"({', '.join([repr(body), self.arm(body, P), *frame])})")
 
-    def add(
-        self,
-        joint: j.Joint,
-        kind: str,
-        axes: Array | None = None,
-        *,
-        ends: Any = None,
-        second: Array | None = None,
-        **options: Any,
-    ) -> None:
-        """Add an object of Exudyn between the two bodies of a joint, with equal frames unless the
-        second has another.
-        """
-        P_i, P_j = ends or ends_of(self.mechanism, joint)
-        markers = (
-            self.marker(joint.i, P_i, axes),
-            self.marker(joint.j, P_j, axes if second is None else second),
-        )
-        self.call("joint", joint.name, _Code(kind), *markers, **options)
-
-    def generic(
-        self, joint: j.Joint, constrained: Sequence[int], axes: Array | None = None, **options: Any
-    ) -> None:
-        """Add a generic joint with constrained directions: x, y, z, then rotations about them."""
-        self.add(joint, "ObjectJointGeneric", axes, constrainedAxes=[*constrained], **options)
-
     def joint(self, joint: j.Joint) -> None:
         """Add a joint as objects of Exudyn."""
-        match joint:
-            case j.Spherical():
-                self.add(joint, "ObjectJointSpherical")
-            case j.Revolute():
-                self.add(joint, "ObjectJointRevoluteZ", frame_along(joint.axis, 2))
-            case j.Translational():
-                self.add(joint, "ObjectJointPrismaticX", frame_along(joint.axis, 0))
-            case j.Universal() | j.PerpendicularAxes():
-                point = int(isinstance(joint, j.Universal))
-                first, second = frame_along(joint.axes[0], 0), frame_along(joint.axes[1], 1)
-                self.generic(joint, (point, point, point, 0, 0, 1), first, second=second)
-            case j.Fixed():
-                self.generic(joint, (1, 1, 1, 1, 1, 1))
-            case j.OrientationLock():
-                self.generic(joint, (0, 0, 0, 1, 1, 1))
-            case j.Distance():
-                self.add(joint, "ObjectConnectorDistance", distance=joint.rod_length)
-            case j.RevoluteSpherical(points=(hinge, ball), axis=axis):
+        for each in objects_of(joint, ends_of(self.mechanism, joint)):
+            points = each.points
+            if isinstance(joint, j.RevoluteSpherical) and each.axes:
                 # the link keeps its position along the hinge; if its foot is on the hinge, the
                 # generic joint needs no offset
-                link = vec(ball) - vec(hinge)
-                self.add(joint, "ObjectConnectorDistance", distance=float(np.hypot.reduce([*link])))
-                foot = [*(vec(hinge) + (unit(axis) @ link) * unit(axis))]
-                self.generic(joint, (1, 0, 0, 0, 0, 0), frame_along(axis, 0), ends=(foot, ball))
-            case _:
-                axis: Sequence[float] = vars(joint)["axis"]
-                column, constrained = GENERIC[type(joint)]
-                self.generic(joint, constrained, frame_along(axis, column))
+                link, axis = vec(points[1]) - vec(points[0]), unit(joint.axis)
+                points = [*(vec(points[0]) + (axis @ link) * axis)], points[1]
+            markers = map(self.marker, joint.bodies, points, each.frames)
+            self.call("joint", joint.name, _Code(each.kind), *markers, **each.options)
 
     def load(self, force: ForceElement) -> None:
         """Add a force element as an object or load of Exudyn."""
-        options = exudyn_loads.options(force)
+        options = load_options(force)
         if isinstance(force, SpringDamper):
             ends = map(self.marker, force.bodies, force.points)
             self.call("spring", force.name, *ends, **options)
@@ -202,11 +304,9 @@ class _Script:
             at = force.point if isinstance(force, Force) else (0.0, 0.0, 0.0)
             self.call(force.type, force.name, self.marker(force.body, at), **options)
 
-    def relate(self, name: str, terms: Sequence[tuple[str, str, float]]) -> None:
+    def relate(self, name: str, terms: Terms) -> None:
         """Keep the weighted sum of two coordinates (joint, freedom, weight) at zero."""
-        one, other, factor = dependence(
-            ((joint, freedom), weight) for joint, freedom, weight in terms
-        )
+        one, other, (_, factor) = Relation(name, terms, ()).follower(signed=False)
         self.call("relation", name, self.coordinate(*one), self.coordinate(*other), factor)
 
     def values(self, joint: Any) -> Mapping[str, tuple[float, ...]]:

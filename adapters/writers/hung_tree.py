@@ -1,26 +1,19 @@
 """A mechanism for formats with single links: a tree of links, ties that close its loops, and
-relations of coordinates.
+relations of coordinates; see `tree_plan`.
 
-Every joint is a chain of slides, hinges and balls (see `joint_chains`), with auxiliary links
-between several. A joint that closes a loop has its chain on its first body, and a tie of one point
-or of a whole frame connects the end to its second body. Coordinates have the sense of the joint's
-coordinates: a chain from the second body to the first has reversed axes.
+Coordinates have the sense of the joint's coordinates: a chain from the second body to the first has
+reversed axes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, TypeAlias
 
-from ...core.errors import KincheckError
-from ...core.joints import Distance, Joint
+from ...core.joints import Distance, Fixed
 from ...core.mechanism.body import Body
 from ...core.mechanism.mechanism import GROUND, Mechanism, Vector
-from ...core.mechanism.topology import spanning_tree
-from ..shared.joint_chains import CHAINS, Link, end_of_loop, polynomial_in_tree, relations
-from ..shared.loop_closures import ends_of
-from .xml_text import link_names
+from ..shared.tree_plan import Chain, Closure, Relation, plan_tree
 
 
 @dataclass(frozen=True)
@@ -56,6 +49,9 @@ class Tie:
     length: float | None = None
 
 
+Following: TypeAlias = tuple[str, str, str, list[float]]
+
+
 @dataclass(frozen=True)
 class Tree:
     """The parts of a mechanism for a format, except masses and points.
@@ -63,36 +59,17 @@ class Tree:
     Attributes:
         frames: frames of all links at design, parents before children; an auxiliary frame is
             parallel to the global axes.
-        relations: name, and weights by coordinate: the weighted sum stays zero.
-        curves: name, driven and driving coordinate, and the polynomial's coefficients, the constant
-            first.
+        relations, curves: name, coordinate that follows another, the other, and coefficients of
+            the line or polynomial that it follows, the constant first.
         coordinates: names by joint and freedom.
     """
 
     frames: dict[str, Body] = field(default_factory=dict[str, Body])
     joints: list[Hung] = field(default_factory=list[Hung])
     ties: list[Tie] = field(default_factory=list[Tie])
-    relations: list[tuple[str, dict[str, float]]] = field(
-        default_factory=list[tuple[str, dict[str, float]]]
-    )
-    curves: list[tuple[str, str, str, list[float]]] = field(
-        default_factory=list[tuple[str, str, str, list[float]]]
-    )
+    relations: list[Following] = field(default_factory=list[Following])
+    curves: list[Following] = field(default_factory=list[Following])
     coordinates: dict[tuple[str, str], str] = field(default_factory=dict[tuple[str, str], str])
-
-
-def require_known(mechanism: Mechanism, title: str) -> None:
-    """Refuse joints without a counterpart.
-
-    Raises:
-        KincheckError: a joint is neither a chain nor a distance.
-    """
-    for joint in mechanism.joints:
-        if type(joint) not in CHAINS and type(joint) is not Distance:
-            raise KincheckError(
-                f"{joint} has no counterpart in {title} here; write an equivalent of known joints"
-                " instead"
-            )
 
 
 def hung(mechanism: Mechanism) -> Tree:
@@ -102,68 +79,34 @@ def hung(mechanism: Mechanism) -> Tree:
         if body.fixed:
             tree.frames[body.name] = body
             tree.joints.append(Hung(f"{body.name}.fixed", "fixed", GROUND, body.name, body.origin))
-    spanning = spanning_tree(mechanism)
-    for branch in spanning.branches:
-        body, joint = mechanism.body(branch.child), branch.joint
-        if joint is None:
-            tree.frames[body.name] = body
-            tree.joints.append(Hung(f"{body.name}.free", "free", GROUND, body.name, body.origin))
-            continue
-        P = ends_of(mechanism, joint)[0]
-        links, forward = CHAINS[type(joint)](joint, P), joint.j == body.name
-        parent = joint.bodies[not forward]
-        _hang(tree, joint, links, parent, body, P, forward=forward)
-    for joint in spanning.cut:
-        _close(tree, mechanism, joint)
-    for coupler in mechanism.couplers:
-        terms = [(tree.coordinates[each, freedom], w) for each, freedom, w in coupler.terms]
-        if coupler.curve:
-            (driven, _), (driving, weight) = terms
-            follows = polynomial_in_tree(weight, coupler.curve, 1.0, 1.0)
-            tree.curves.append((coupler.name, driven, driving, follows))
-        else:
-            tree.relations.append((coupler.name, dict(terms)))
+    for part in plan_tree(mechanism, whole=[Distance], auxiliary="{last}.link"):
+        match part:
+            case Chain():
+                _hang(tree, part, None if part.cut else mechanism.body(part.child))
+            case Closure(joint=joint):
+                length = joint.rod_length if isinstance(joint, Distance) else None
+                whole = part.by is Fixed
+                tree.ties.append(Tie(joint.name, part.ends, part.points, whole, length))
+            case Relation():
+                one, other, curve = part.follower(signed=False)
+                names = tree.coordinates[one], tree.coordinates[other]
+                found = tree.curves if part.curve else tree.relations
+                found.append((part.name, *names, curve))
     return tree
 
 
-def _hang(
-    tree: Tree,
-    joint: Joint,
-    links: Sequence[Link],
-    parent: str,
-    end: Body | None,
-    P: Vector,
-    *,
-    forward: bool = True,
-) -> str:
-    """Add a chain to a parent, with a body at its end or only auxiliary links; return the name of
-    the last link.
-    """
-    chain = [*zip(link_names(joint.name, links), links, strict=True)]
-    for k, (name, link) in enumerate(chain if forward else chain[::-1], 1):
-        last = end is not None and k == len(chain)
-        child = end if last and end is not None else Body(f"{name}.link", link.point)
+def _hang(tree: Tree, chain: Chain, end: Body | None) -> None:
+    joint = chain.joint
+    if end is not None and (joint is None or not chain.links):
+        tree.frames[end.name] = end
+        name, move = (joint.name, "fixed") if joint else (f"{end.name}.free", "free")
+        tree.joints.append(Hung(name, move, chain.parent, end.name, chain.point))
+        return
+    assert joint is not None
+    for name, link, parent, child in chain.each():
+        tree.frames[child] = end if end and child == end.name else Body(child, link.point)
         x, y, z = link.axis
-        axis = link.axis if forward else (-x, -y, -z)
-        tree.frames[child.name] = child
-        tree.joints.append(Hung(name, link.move, parent, child.name, link.point, axis))
+        axis = link.axis if chain.sign > 0 else (-x, -y, -z)
+        tree.joints.append(Hung(name, link.move, parent, child, link.point, axis))
         if link.name:
             tree.coordinates[joint.name, link.name] = name
-        parent = child.name
-    if end is not None and not chain:
-        tree.frames[end.name] = end
-        tree.joints.append(Hung(joint.name, "fixed", parent, end.name, P))
-    for relation in relations(joint):
-        weights = {tree.coordinates[name, freedom]: weight for name, freedom, weight in relation}
-        tree.relations.append((joint.name, weights))
-    return parent
-
-
-def _close(tree: Tree, mechanism: Mechanism, joint: Joint) -> None:
-    ends = ends_of(mechanism, joint)
-    if isinstance(joint, Distance):
-        tree.ties.append(Tie(joint.name, joint.bodies, ends, length=joint.rod_length))
-        return
-    links, point, turns = end_of_loop(CHAINS[type(joint)](joint, ends[0]), ends[0])
-    last = _hang(tree, joint, links, joint.i, None, point)
-    tree.ties.append(Tie(joint.name, (last, joint.j), (point, point), whole=not turns))

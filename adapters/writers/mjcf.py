@@ -2,7 +2,7 @@
 digits.
 
 A body is a <body> with its frame in the case. A joint is a chain of MuJoCo joints (see
-`joint_chains`), in the tree or, if it closes a loop, on an auxiliary body tied to the second
+`tree_plan`), in the tree or, if it closes a loop, on an auxiliary body tied to the second
 body by an equality; a distance is a tendon of constant length. Joint equalities tie
 coordinates to one another. Spring-dampers are tendons and attributes of joints; MJCF has
 no constant forces. Without masses in the mechanism, bodies have a unit mass and inertia.
@@ -11,25 +11,14 @@ no constant forces. Without masses in the mechanism, bodies have a unit mass and
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from ...core.algebra import vec
-from ...core.case.models.mjcf.masses import STAND_INS
-from ...core.errors import KincheckError
-from ...core.joints import Coupler, Distance, Joint
+from ...core.case.models.trees.mjcf import STAND_INS
+from ...core.joints import Distance, Spherical
 from ...core.mechanism.loads import ForceElement, SpringDamper, TorsionSpringDamper
 from ...core.mechanism.mechanism import GROUND, Body, Mechanism
-from ...core.mechanism.topology import spanning_tree
 from ...core.trajectory import BodyMotion
-from ..shared.joint_chains import (
-    CHAINS,
-    Link,
-    dependence,
-    end_of_loop,
-    polynomial_in_tree,
-    relations,
-)
-from ..shared.loop_closures import ends_of
 from ..shared.poses import (
     attitude,
     backwards,
@@ -39,15 +28,16 @@ from ..shared.poses import (
     local,
     rotated,
 )
-from . import loads
-from .xml_text import document, link_names, numbers
+from ..shared.tree_plan import CHAINS, Chain, Closure, Relation, ends_of, plan_tree
+from . import text
+from .text import document, numbers, require_known
 
 NOTE = (
     " Written by kincheck. Lengths are in m, angles in rad. {} Drivers are not part of the model:"
     " the keyframe is consistent with the driver values under custom.{} "
 )
 PLAIN = "Masses, inertias and armatures are placeholders."
-LOADED = f"{loads.LOADED} Coordinates have an armature of {loads.STAND_IN:g}."
+LOADED = f"{text.LOADED} Coordinates have an armature of {text.STAND_IN:g}."
 
 
 def write(
@@ -58,12 +48,7 @@ def write(
     Raises:
         KincheckError: a joint has no counterpart in MJCF, or a name cannot be used there.
     """
-    for joint in mechanism.joints:
-        if type(joint) not in CHAINS and type(joint) is not Distance:
-            raise KincheckError(
-                f"{joint} has no counterpart in MJCF here; write an equivalent of known joints"
-                " instead"
-            )
+    require_known(mechanism, "MJCF")
     return {".xml": _Model(mechanism, way).text(start)}
 
 
@@ -81,7 +66,7 @@ class _Model:
         ET.SubElement(self.root, "option", gravity=gravity)
         # an inertia of each coordinate alone: otherwise hinges in line make the mass matrix nearly
         # singular
-        armature = numbers([loads.STAND_IN]) if self.loaded else "1"
+        armature = numbers([text.STAND_IN]) if self.loaded else "1"
         ET.SubElement(ET.SubElement(self.root, "default"), "joint", armature=armature)
         self.custom = ET.SubElement(self.root, "custom")
         if not self.loaded:  # for the reader: the masses below are placeholders
@@ -93,38 +78,24 @@ class _Model:
         )
         self.frames = {GROUND: Body(GROUND)}  # design frames of everything with an element
         self.qpos: dict[str, Sequence[float]] = {}
-        self.coordinates: dict[
-            tuple[str, str], str
-        ] = {}  # names of coordinates, by joint and freedom
-        # sign of a joint's coordinates: minus if they move the joint's first body
-        self.signs: dict[str, float] = {}
+        # name and sign of coordinates, by joint and freedom
+        self.coordinates: dict[tuple[str, str], tuple[str, int]] = {}
         for body in mechanism.bodies:
             if body.fixed:
                 self.add_body(body, GROUND)
-        tree = spanning_tree(mechanism)
-        for branch in tree.branches:
-            body, joint = mechanism.body(branch.child), branch.joint
-            if joint is None:
-                self.add_free(body)
-            else:
-                forward = joint.j == body.name
-                self.add_body(body, joint.i if forward else joint.j)
-                self.carry(body.name, joint, self.links(joint), 1 if forward else -1)
-        for joint in tree.cut:
-            self.close(joint)
-        for coupler in mechanism.couplers:
-            if coupler.curve:
-                self.bend(coupler)
-            else:
-                self.relate(
-                    (joint, freedom, self.signs[joint] * weight)
-                    for joint, freedom, weight in coupler.terms
-                )
+        for part in plan_tree(mechanism, whole=[Distance]):
+            match part:
+                case Chain():
+                    self.carry(part)
+                case Closure():
+                    self.close(part)
+                case Relation():
+                    self.relate(part)
         for point in mechanism.points:
             self.add_site(point.name, point.body, point.position)
         sprung = {force.name for force in mechanism.forces if self.add_spring(force)}
         self.note.text = NOTE.format(
-            LOADED if self.loaded else PLAIN, loads.left_out(mechanism, sprung, True)
+            LOADED if self.loaded else PLAIN, text.left_out(mechanism, sprung, True)
         )
 
     def text(self, start: Mapping[str, float]) -> str:
@@ -155,9 +126,9 @@ class _Model:
         at = {"pos": "0 0 0", "mass": "1", "diaginertia": "1 1 1"}
         if self.loaded:
             at = {
-                "pos": numbers(local(frame, loads.center_of(frame))),
-                "mass": numbers([loads.mass_of(frame)]),
-                "fullinertia": numbers(loads.six(loads.own_inertia(frame))),
+                "pos": numbers(local(frame, text.center_of(frame))),
+                "mass": numbers([text.mass_of(frame)]),
+                "fullinertia": numbers(text.six(text.own_inertia(frame))),
             }
         ET.SubElement(self.elements[frame.name], "inertial", at)
 
@@ -174,57 +145,45 @@ class _Model:
         )
         return name
 
-    def add_free(self, body: Body) -> None:
-        """Add a body without a joint: its coordinates are its pose."""
-        name, motion = f"{body.name}.free", self.way[body.name]
-        self.add_body(body, GROUND)
-        ET.SubElement(self.elements[body.name], "freejoint", name=name)
-        self.qpos[name] = [*motion.r[-1], *motion.p[-1]]
-
-    def links(self, joint: Joint) -> list[Link]:
-        """Return a joint's chain, from its first body to its second."""
-        return CHAINS[type(joint)](joint, ends_of(self.mechanism, joint)[0])
-
-    def carry(self, body: str, joint: Joint, links: Sequence[Link], sign: int = 1) -> None:
-        """Let a body move by a joint's links, from the joint's first body on or (sign -1) from its
-        second.
-        """
-        frame, element = self.frames[body], self.elements[body]
-        values = link_coordinates(joint, self.links(joint), self.placed)
-        for name, link, value in [*zip(link_names(joint.name, links), links, values, strict=False)][
-            ::sign
-        ]:
+    def carry(self, chain: Chain) -> None:
+        """Add a body on its carrier; a free one has its pose as coordinates."""
+        joint, links = chain.joint, chain.links[:: chain.sign]
+        if chain.cut:
+            carrier = self.frames[chain.parent]
+            frame = Body(chain.child, carrier.origin, carrier.euler_parameters)
+        else:
+            frame = self.mechanism.body(chain.child)
+        self.add_body(frame, chain.parent)
+        element = self.elements[frame.name]
+        if joint is None:
+            name, motion = f"{frame.name}.free", self.way[frame.name]
+            ET.SubElement(element, "freejoint", name=name)
+            self.qpos[name] = [*motion.r[-1], *motion.p[-1]]
+            return
+        # the last link of a joint may be a ball that is left out here
+        every = CHAINS[type(joint)](joint, ends_of(self.mechanism, joint)[0])
+        values = link_coordinates(joint, every, self.placed)[: len(links)][:: chain.sign]
+        for (name, link, _, _), value in zip(chain.each(), values, strict=True):
             along = {} if link.move == "ball" else {"axis": numbers(direction(frame, link.axis))}
             at = {"pos": numbers(local(frame, link.point)), **along}
             ET.SubElement(element, "joint", {"name": name, "type": link.move, **at})
-            self.qpos[name] = value = value if sign > 0 else backwards(link, value)
+            self.qpos[name] = value = value if chain.sign > 0 else backwards(link, value)
             if link.move == "ball":  # in the axes of the body that it carries
                 self.qpos[name] = value[0], *rotated(attitude(frame).conjugate(), vec(value[1:]))
-            self.coordinates[joint.name, link.name] = name
-        # all coordinates of the joint have the same sign, so their relations need none
-        self.signs[joint.name] = sign
-        for relation in relations(joint):
-            self.relate(relation)
+            self.coordinates[joint.name, link.name] = name, chain.sign
 
-    def close(self, joint: Joint) -> None:
+    def close(self, closure: Closure) -> None:
         """Express a joint of a closed loop by an equality."""
+        joint = closure.joint
         if isinstance(joint, Distance):
             self.add_tendon(joint.name, joint.bodies, joint.points)
             # the constant of the polynomial is the change of length since design
             change = numbers([joint.rod_length - joint.design_distance, 0, 0, 0, 0])
             ET.SubElement(self.equalities, "tendon", tendon1=joint.name, polycoef=change)
             return
-        links, point, turns = end_of_loop(self.links(joint), ends_of(self.mechanism, joint)[0])
-        carrier = joint.i
-        if links:
-            carrier = f"{joint.name}.auxiliary"
-            frame = self.frames[joint.i]
-            self.add_body(Body(carrier, frame.origin, frame.euler_parameters), joint.i)
-            self.carry(carrier, joint, links)
-        one, two = self.add_ends(joint.name, (carrier, joint.j), (point, point))
-        ET.SubElement(
-            self.equalities, "connect" if turns else "weld", name=joint.name, site1=one, site2=two
-        )
+        one, two = self.add_ends(joint.name, closure.ends, closure.points)
+        kind = "connect" if closure.by is Spherical else "weld"
+        ET.SubElement(self.equalities, kind, name=joint.name, site1=one, site2=two)
 
     def add_spring(self, force: ForceElement) -> bool:
         """Add a spring-damper; return whether MJCF has the force element."""
@@ -234,14 +193,14 @@ class _Model:
             tendon = self.add_tendon(force.name, force.bodies, force.points)
             tendon.set("springlength", numbers([force.free_length]))
         elif isinstance(force, TorsionSpringDamper):
-            name = self.coordinates.get((force.joint, "rotation"))
+            name, sign = self.coordinates.get((force.joint, "rotation"), ("", 1))
             tendon = next(
                 (each for each in self.root.iter("joint") if name and each.get("name") == name),
                 None,
             )
             if tendon is None or "stiffness" in tendon.attrib:  # between fixed bodies, or a second
                 return False
-            tendon.set("springref", numbers([self.signs[force.joint] * force.free_angle]))
+            tendon.set("springref", numbers([sign * force.free_angle]))
         else:
             return False
         tendon.set("stiffness", numbers([force.stiffness]))
@@ -267,21 +226,9 @@ class _Model:
             for which, body, point in ends
         ]
 
-    def relate(self, terms: Iterable[tuple[str, str, float]]) -> None:
-        """Keep the weighted sum of two coordinates (joint, freedom, weight) at zero."""
-        one, other, factor = dependence(
-            (self.coordinates[joint, freedom], weight) for joint, freedom, weight in terms
-        )
-        self.follow(one, other, [0, factor])
-
-    def bend(self, coupler: Coupler) -> None:
-        """Let the first coordinate, of weight one, follow the polynomial of the second."""
-        *_, (_, _, weight) = coupler.terms
-        one, other = (self.coordinates[joint, freedom] for joint, freedom, _ in coupler.terms)
-        signs = (self.signs[joint] for joint in coupler.joints)
-        self.follow(one, other, polynomial_in_tree(weight, coupler.curve, *signs))
-
-    def follow(self, one: str, other: str, coefficients: Sequence[float]) -> None:
-        """Keep a coordinate at a polynomial of another; the constant is the first coefficient."""
-        polynomial = numbers([*coefficients, 0, 0, 0, 0][:5])
-        ET.SubElement(self.equalities, "joint", joint1=one, joint2=other, polycoef=polynomial)
+    def relate(self, relation: Relation) -> None:
+        """Keep a coordinate at a polynomial of another."""
+        one, other, curve = relation.follower(signed=True)
+        (name, _), (other_name, _) = self.coordinates[one], self.coordinates[other]
+        polynomial = numbers([*curve, 0, 0, 0, 0][:5])
+        ET.SubElement(self.equalities, "joint", joint1=name, joint2=other_name, polycoef=polynomial)

@@ -20,13 +20,10 @@ from ...core.mechanism.body import Body
 from ...core.mechanism.loads import ForceElement, SpringDamper, TorsionSpringDamper
 from ...core.mechanism.mechanism import GROUND, Mechanism, Vector
 from ...core.trajectory import BodyMotion
-from ..shared.joint_chains import dependence
-from ..shared.opensim_frames import euler_angles, orientation
-from ..shared.poses import about, attitude, local
-from ..shared.start_pose import at_start
-from . import loads
-from .hung_tree import Hung, Tie, hung, require_known
-from .xml_text import document, numbers
+from ..shared.poses import about, at_start, attitude, euler_angles, local, orientation
+from . import text
+from .hung_tree import Hung, Tie, hung
+from .text import add_text, document, numbers, require_known
 
 NOTE = (
     " Written by kincheck. Lengths are in m, angles in rad. {} Coordinates are zero at the start,"
@@ -61,10 +58,8 @@ def write(
     require_known(mechanism, "OpenSim")
     model = _Model(at_start(mechanism, way), mechanism.gravity if mechanism.has_loads else NONE)
     at = ", ".join(f"{name} = {value!r}" for name, value in start.items())
-    facts = (loads.PLAIN, "")
-    if mechanism.has_loads:
-        facts = (loads.LOADED, loads.left_out(mechanism, model.sprung, True))
-    model.root.insert(0, ET.Comment(NOTE.format(facts[0], at and f" ({at})", facts[1])))
+    masses, left_out = text.facts(mechanism, model.sprung, True)
+    model.root.insert(0, ET.Comment(NOTE.format(masses, at and f" ({at})", left_out)))
     sets = [["Body"], [*KINDS.values()], ["Coordinate"], ["Marker"], [*TIES], [*SPRINGS]]
     return {".osim": document(model.root, sets, reserved=[GROUND])}
 
@@ -88,7 +83,7 @@ class _Model:
         self.root = ET.Element("OpenSimDocument", Version="40000")
         model = ET.SubElement(self.root, "Model", name=_name(mechanism.name))
         ET.SubElement(model, "Ground", name=GROUND)
-        _text(model, "gravity", numbers(gravity))
+        add_text(model, "gravity", numbers(gravity))
         bodies, joints, constraints, markers = (
             ET.SubElement(ET.SubElement(model, kind, name=kind.lower()), "objects")
             for kind in ("BodySet", "JointSet", "ConstraintSet", "MarkerSet")
@@ -99,15 +94,14 @@ class _Model:
             self.add_joint(joints, joint)
         for tie in self.tree.ties:
             self.add_tie(constraints, tie)
-        for k, (name, weights) in enumerate(self.tree.relations):
-            one, other, factor = dependence(weights.items())
-            self.couple(constraints, f"{name}.{k}", one, other, [0.0, factor])
-        for name, driven, driving, follows in self.tree.curves:
-            self.couple(constraints, name, driven, driving, follows)
+        for k, (name, one, other, line) in enumerate(self.tree.relations):
+            self.couple(constraints, f"{name}.{k}", one, other, line)
+        for curve in self.tree.curves:
+            self.couple(constraints, *curve)
         for point in mechanism.points:
             marker = ET.SubElement(markers, "Marker", name=_name(point.name))
-            _text(marker, "socket_parent_frame", _path(point.body))
-            _text(marker, "location", numbers(self.local(point.body, point.position)))
+            add_text(marker, "socket_parent_frame", _path(point.body))
+            add_text(marker, "location", numbers(self.local(point.body, point.position)))
 
         self.sprung = set[str]()
         if mechanism.forces:
@@ -126,35 +120,35 @@ class _Model:
     def add_body(self, bodies: ET.Element, body: Body) -> None:
         """Add a body with its mass."""
         element = ET.SubElement(bodies, "Body", name=_name(body.name))
-        _text(element, "mass", numbers([loads.mass_of(body)]))
-        _text(element, "mass_center", numbers(local(body, loads.center_of(body))))
+        add_text(element, "mass", numbers([text.mass_of(body)]))
+        add_text(element, "mass_center", numbers(local(body, text.center_of(body))))
         # a placeholder is the same in all axes, so the frame does not matter
-        matrix = loads.inertia_of(body) if body.inertia is None else loads.own_inertia(body)
-        xx, yy, zz, xy, yz, xz = loads.six(matrix)
-        _text(element, "inertia", numbers([xx, yy, zz, xy, xz, yz]))
+        matrix = text.inertia_of(body) if body.inertia is None else text.own_inertia(body)
+        xx, yy, zz, xy, yz, xz = text.six(matrix)
+        add_text(element, "inertia", numbers([xx, yy, zz, xy, xz, yz]))
 
     def add_joint(self, joints: ET.Element, joint: Hung) -> None:
         """Add a joint between a frame of the parent and a frame of the child, which coincide at
         zero.
         """
         element = ET.SubElement(joints, KINDS[joint.move], name=_name(joint.name))
-        _text(element, "socket_parent_frame", "parent")
-        _text(element, "socket_child_frame", "child")
+        add_text(element, "socket_parent_frame", "parent")
+        add_text(element, "socket_child_frame", "child")
         suffixes = COORDINATES[joint.move]
         coordinates = ET.SubElement(element, "coordinates") if suffixes else element
         for suffix in suffixes:
             coordinate = ET.SubElement(coordinates, "Coordinate", name=_name(joint.name + suffix))
-            _text(coordinate, "default_value", "0")
-            _text(coordinate, "range", "-1e9 1e9")
+            add_text(coordinate, "default_value", "0")
+            add_text(coordinate, "range", "-1e9 1e9")
         frames = ET.SubElement(element, "frames")
         turn = _turns(orientation(joint.move, joint.axis))
         if joint.move in ("fixed", "free"):
             turn = attitude(self.frame(joint.child))
         for end, body in (("parent", joint.parent), ("child", joint.child)):
             frame = ET.SubElement(frames, "PhysicalOffsetFrame", name=end)
-            _text(frame, "socket_parent", _path(body))
-            _text(frame, "translation", numbers(self.local(body, joint.point)))
-            _text(frame, "orientation", numbers(self.angles(body, turn)))
+            add_text(frame, "socket_parent", _path(body))
+            add_text(frame, "translation", numbers(self.local(body, joint.point)))
+            add_text(frame, "orientation", numbers(self.angles(body, turn)))
 
     def angles(self, body: str, turn: Quat) -> tuple[float, float, float]:
         """Return the angles of a rotation, global at design, in the axes of a link [rad]."""
@@ -167,19 +161,19 @@ class _Model:
             element = ET.SubElement(constraints, "WeldConstraint", name=_name(tie.name))
             frames = ET.SubElement(element, "frames")
             for k, (link, at) in enumerate(zip(tie.links, tie.points, strict=True), 1):
-                _text(element, f"socket_frame{k}", f"end{k}")
+                add_text(element, f"socket_frame{k}", f"end{k}")
                 frame = ET.SubElement(frames, "PhysicalOffsetFrame", name=f"end{k}")
-                _text(frame, "socket_parent", _path(link))
-                _text(frame, "translation", numbers(self.local(link, at)))
-                _text(frame, "orientation", numbers(self.angles(link, IDENTITY)))
+                add_text(frame, "socket_parent", _path(link))
+                add_text(frame, "translation", numbers(self.local(link, at)))
+                add_text(frame, "orientation", numbers(self.angles(link, IDENTITY)))
             return
         kind = "PointConstraint" if tie.length is None else "ConstantDistanceConstraint"
         element = ET.SubElement(constraints, kind, name=_name(tie.name))
         for k, (link, at) in enumerate(zip(tie.links, tie.points, strict=True), 1):
-            _text(element, f"socket_body_{k}", _path(link))
-            _text(element, f"location_body_{k}", numbers(self.local(link, at)))
+            add_text(element, f"socket_body_{k}", _path(link))
+            add_text(element, f"location_body_{k}", numbers(self.local(link, at)))
         if tie.length is not None:
-            _text(element, "constant_distance", numbers([tie.length]))
+            add_text(element, "constant_distance", numbers([tie.length]))
 
     def add_spring(self, forces: ET.Element, force: ForceElement) -> bool:
         """Add a spring-damper; return whether OpenSim has it."""
@@ -188,23 +182,23 @@ class _Model:
         if isinstance(force, SpringDamper):
             element = ET.SubElement(forces, SPRINGS[0], name=_name(force.name))
             for k, (link, at) in enumerate(zip(force.bodies, force.points, strict=True), 1):
-                _text(element, f"body{k}", _path(link))
-                _text(element, f"point{k}", numbers(self.local(link, at)))
+                add_text(element, f"body{k}", _path(link))
+                add_text(element, f"point{k}", numbers(self.local(link, at)))
             stiffness, length, damping = (
                 numbers([each]) for each in (force.stiffness, force.free_length, force.damping)
             )
             # a force that pulls the points together is positive
-            _text(element, "expression", f"{stiffness}*(d-{length})+{damping}*ddot")
+            add_text(element, "expression", f"{stiffness}*(d-{length})+{damping}*ddot")
             return True
         if isinstance(force, TorsionSpringDamper):
             coordinate = self.tree.coordinates.get((force.joint, "rotation"))
             if coordinate is None:  # between fixed bodies
                 return False
             element = ET.SubElement(forces, SPRINGS[1], name=_name(force.name))
-            _text(element, "coordinate", _name(coordinate))
-            _text(element, "stiffness", numbers([force.stiffness]))
-            _text(element, "rest_length", numbers([force.free_angle]))
-            _text(element, "viscosity", numbers([force.damping]))
+            add_text(element, "coordinate", _name(coordinate))
+            add_text(element, "stiffness", numbers([force.stiffness]))
+            add_text(element, "rest_length", numbers([force.free_angle]))
+            add_text(element, "viscosity", numbers([force.damping]))
             return True
         return False
 
@@ -217,9 +211,9 @@ class _Model:
             ET.SubElement(element, "coupled_coordinates_function"),
             "LinearFunction" if len(follows) == 2 else "PolynomialFunction",
         )
-        _text(function, "coefficients", numbers(follows[::-1]))
-        _text(element, "independent_coordinate_names", _name(other))
-        _text(element, "dependent_coordinate_name", _name(one))
+        add_text(function, "coefficients", numbers(follows[::-1]))
+        add_text(element, "independent_coordinate_names", _name(other))
+        add_text(element, "dependent_coordinate_name", _name(one))
 
 
 def _turns(angles: Vector) -> Quat:
@@ -228,10 +222,6 @@ def _turns(angles: Vector) -> Quat:
         about(vec(axis), angle) for axis, angle in zip(np.eye(3).tolist(), angles, strict=True)
     )
     return x * y * z
-
-
-def _text(parent: ET.Element, tag: str, text: str) -> None:
-    ET.SubElement(parent, tag).text = text
 
 
 def _name(name: str) -> str:

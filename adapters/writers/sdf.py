@@ -21,13 +21,11 @@ from ...core.mechanism.body import Body
 from ...core.mechanism.loads import ForceElement, SpringDamper, TorsionSpringDamper
 from ...core.mechanism.mechanism import GROUND, Mechanism, Vector
 from ...core.trajectory import BodyMotion
-from ..shared.joint_chains import dependence
-from ..shared.joint_equivalents import cross_of
-from ..shared.poses import attitude, local
-from ..shared.start_pose import at_start
-from . import loads
-from .hung_tree import Hung, Tie, hung, require_known
-from .xml_text import document, numbers
+from ..shared.equivalents import cross_of
+from ..shared.poses import at_start, attitude, local
+from . import text
+from .hung_tree import Hung, Tie, hung
+from .text import add_text, document, numbers, require_known
 
 NOTE = (
     " Written by kincheck. Lengths are in m, angles in rad. {} Joints are at zero at the start,"
@@ -58,10 +56,8 @@ def write(
             )
     model = _Model(at_start(mechanism, way))
     at = ", ".join(f"{name} = {value!r}" for name, value in start.items())
-    facts = (loads.PLAIN, "")
-    if mechanism.has_loads:
-        facts = (loads.LOADED, loads.left_out(mechanism, model.sprung, False))
-    model.root.insert(0, ET.Comment(NOTE.format(facts[0], at and f" ({at})", facts[1])))
+    masses, left_out = text.facts(mechanism, model.sprung, False)
+    model.root.insert(0, ET.Comment(NOTE.format(masses, at and f" ({at})", left_out)))
     kinds = (["link", "frame", "joint", "drake:ball_constraint"], [SPRING])
     return {".sdf": document(model.root, kinds, reserved=[WORLD])}
 
@@ -85,8 +81,8 @@ class _Model:
         for joint in self.tree.joints:
             if joint.move != "free":  # a link without a joint is free
                 self.add_joint(joint)
-        for name, weights in self.tree.relations:
-            self.relate(name, weights)
+        for name, one, other, (_, factor) in self.tree.relations:
+            self.relate(name, one, other, factor)
         for point in mechanism.points:
             frame = {"name": f"point.{point.name}", "attached_to": point.body}
             self.add_pose(ET.SubElement(self.model, "frame", frame), point.position)
@@ -121,20 +117,20 @@ class _Model:
         link = ET.SubElement(self.model, "link", name=body.name)
         self.add_pose(link, body.origin, body)
         inertial = ET.SubElement(link, "inertial")
-        _text(inertial, "pose", f"{numbers(local(body, loads.center_of(body)))} 0 0 0")
-        _text(inertial, "mass", numbers([loads.mass_of(body)]))
+        add_text(inertial, "pose", f"{numbers(local(body, text.center_of(body)))} 0 0 0")
+        add_text(inertial, "mass", numbers([text.mass_of(body)]))
         inertia = ET.SubElement(inertial, "inertia")
         entries = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
         # a placeholder is the same in all axes, so the frame does not matter
-        matrix = loads.inertia_of(body) if body.inertia is None else loads.own_inertia(body)
-        for entry, value in zip(entries, loads.six(matrix), strict=True):
-            _text(inertia, entry, numbers([value]))
+        matrix = text.inertia_of(body) if body.inertia is None else text.own_inertia(body)
+        for entry, value in zip(entries, text.six(matrix), strict=True):
+            add_text(inertia, entry, numbers([value]))
 
     def add_pose(self, element: ET.Element, at: Vector, frame: Body | None = None) -> None:
         """Add the pose of an element at a point, in global axes or those of a body."""
         e0, e1, e2, e3 = attitude(frame or Body(GROUND))
         options = {"relative_to": "__model__", "rotation_format": "quat_xyzw"}
-        _text(element, "pose", f"{numbers(at)} {numbers((e1, e2, e3, e0))}", options)
+        add_text(element, "pose", f"{numbers(at)} {numbers((e1, e2, e3, e0))}", options)
 
     def add_joint(self, joint: Hung) -> None:
         """Add a joint at its point, in global axes."""
@@ -142,15 +138,15 @@ class _Model:
             self.model, "joint", name=self.joint_name(joint.name), type=KINDS[joint.move]
         )
         self.joints[joint.name] = element
-        _text(element, "parent", joint.parent)
-        _text(element, "child", joint.child)
+        add_text(element, "parent", joint.parent)
+        add_text(element, "child", joint.child)
         self.add_pose(element, joint.point)
         if joint.move in ("slide", "hinge"):
             axis = ET.SubElement(element, "axis")
-            _text(axis, "xyz", numbers(joint.axis))
+            add_text(axis, "xyz", numbers(joint.axis))
             limit = ET.SubElement(axis, "limit")
-            _text(limit, "lower", "-inf")
-            _text(limit, "upper", "inf")
+            add_text(limit, "lower", "-inf")
+            add_text(limit, "upper", "inf")
 
     def joint_name(self, name: str) -> str:
         """Return the name of a joint, which in SDF must differ from the names of links."""
@@ -166,9 +162,9 @@ class _Model:
             for side, link, P in zip("AB", tie.links, tie.points, strict=True):
                 point = triple(np.array(P) + offset)
                 end = "P" if side == "A" else "Q"
-                _text(element, f"drake:ball_constraint_body_{side}", link)
+                add_text(element, f"drake:ball_constraint_body_{side}", link)
                 name = f"drake:ball_constraint_p_{side}{end}"
-                _text(element, name, numbers(self.local(link, point)))
+                add_text(element, name, numbers(self.local(link, point)))
 
     def add_spring(self, force: ForceElement) -> bool:
         """Add a spring-damper; return whether Drake has it. Its bushing has another law: forces
@@ -184,11 +180,11 @@ class _Model:
                 return False
             element = ET.SubElement(self.model, SPRING, name=force.name)
             for side, end, link, P in zip("AB", "PQ", force.bodies, force.points, strict=True):
-                _text(element, f"{SPRING}_body_{side}", link)
-                _text(element, f"{SPRING}_p_{side}{end}", numbers(self.local(link, P)))
-            _text(element, f"{SPRING}_free_length", numbers([force.free_length]))
-            _text(element, f"{SPRING}_stiffness", numbers([force.stiffness]))
-            _text(element, f"{SPRING}_damping", numbers([force.damping]))
+                add_text(element, f"{SPRING}_body_{side}", link)
+                add_text(element, f"{SPRING}_p_{side}{end}", numbers(self.local(link, P)))
+            add_text(element, f"{SPRING}_free_length", numbers([force.free_length]))
+            add_text(element, f"{SPRING}_stiffness", numbers([force.stiffness]))
+            add_text(element, f"{SPRING}_damping", numbers([force.damping]))
             return True
         if isinstance(force, TorsionSpringDamper):
             name = self.tree.coordinates.get((force.joint, "rotation"))
@@ -197,9 +193,9 @@ class _Model:
             if axis is None or axis.find("dynamics") is not None:
                 return False
             dynamics = ET.SubElement(axis, "dynamics")
-            _text(dynamics, "damping", numbers([force.damping]))
-            _text(dynamics, "spring_reference", numbers([force.free_angle]))
-            _text(dynamics, "spring_stiffness", numbers([force.stiffness]))
+            add_text(dynamics, "damping", numbers([force.damping]))
+            add_text(dynamics, "spring_reference", numbers([force.free_angle]))
+            add_text(dynamics, "spring_stiffness", numbers([force.stiffness]))
             return True
         return False
 
@@ -207,13 +203,12 @@ class _Model:
         """Return a point, global at the start, in the axes of a link [m]."""
         return local(self.tree.frames[link], P)
 
-    def relate(self, name: str, weights: Mapping[str, float]) -> None:
-        """Let one coordinate of a relation mimic the other.
+    def relate(self, name: str, one: str, other: str, factor: float) -> None:
+        """Let one coordinate mimic another, by a factor, or the other by its inverse.
 
         Raises:
             KincheckError: both mimic others already.
         """
-        one, other, factor = dependence(weights.items())
         taken = [self.joints[each].find(MIMIC) is not None for each in (one, other)]
         if all(taken):
             raise KincheckError(
@@ -224,9 +219,3 @@ class _Model:
             one, other, factor = other, one, 1.0 / factor
         options = {"joint": self.joint_name(other), "multiplier": numbers([factor]), "offset": "0"}
         ET.SubElement(self.joints[one], MIMIC, options)
-
-
-def _text(
-    parent: ET.Element, tag: str, text: str, options: Mapping[str, str] | None = None
-) -> None:
-    ET.SubElement(parent, tag, dict(options or {})).text = text

@@ -2,9 +2,9 @@
 
 Every link is parallel to the global axes at design, so axes and arms are the numbers of the case;
 its origin is the point of its joint. A joint is a chain of URDF's revolute and prismatic joints
-(see `joint_chains`). URDF has no ball joint, and three hinges would lock at a quarter turn, so a
+(see `tree_plan`). URDF has no ball joint, and three hinges would lock at a quarter turn, so a
 body that every chain connects by a ball floats, and its joints are conditions (see
-`loop_closures`). Hinges are "revolute" with very large limits, not "continuous": their coordinate
+`constraints`). Hinges are "revolute" with very large limits, not "continuous": their coordinate
 is then the angle including full turns.
 """
 
@@ -12,23 +12,28 @@ from __future__ import annotations
 
 import json
 import xml.etree.ElementTree as ET
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
 from ...core.algebra import vec
-from ...core.errors import KincheckError
-from ...core.joints import Fixed, Joint
+from ...core.joints import Joint
 from ...core.mechanism.mechanism import GROUND, Body, Mechanism, Vector
-from ...core.mechanism.topology import spanning_tree
 from ...core.trajectory import BodyMotion
-from ..shared.frame_constraints import Frame
-from ..shared.joint_chains import CHAINS, Link, polynomial_in_tree, relations
-from ..shared.loop_closures import CLOSURES, ends_of
+from ..shared.constraints import (
+    CLOSURES,
+    Coincident,
+    Condition,
+    Difference,
+    Direction,
+    Dot,
+    Frame,
+    Length,
+)
 from ..shared.poses import backwards, displacements, link_coordinates
-from . import loads
-from .conditions import as_data
-from .xml_text import document, link_names, numbers
+from ..shared.tree_plan import CHAINS, Chain, Closure, Relation, plan_tree, relations
+from . import text
+from .text import document, numbers, require_known
 
 SCHEMA = "kincheck-constraints/1"
 NOTE = (
@@ -67,12 +72,7 @@ def write(
     Raises:
         KincheckError: a joint has no counterpart here, or a name cannot be used.
     """
-    for joint in mechanism.joints:
-        if type(joint) not in CLOSURES:
-            raise KincheckError(
-                f"{joint} has no counterpart in URDF here; write an equivalent of known joints"
-                " instead"
-            )
+    require_known(mechanism, "URDF")
     model = _Model(mechanism, way)
     beside = {
         "schema": SCHEMA,
@@ -83,8 +83,8 @@ def write(
         "bodies": {body.name: model.pose(body) for body in mechanism.bodies},
         "start": {"drivers": dict(start), "coordinates": model.q},
     }
-    text = document(model.root, (["link"], ["joint"]))
-    return {".urdf": text, ".constraints.json": _json(beside)}
+    found = document(model.root, (["link"], ["joint"]))
+    return {".urdf": found, ".constraints.json": _json(beside)}
 
 
 def _json(table: Mapping[str, Any]) -> str:
@@ -122,6 +122,28 @@ class _End:
     point: list[float]
 
 
+def _as_data(condition: Condition) -> Iterator[dict[str, Any]]:
+    """Yield a condition as data, by the links of its frames and points in their axes."""
+
+    def end(frame: Any) -> dict[str, Any]:
+        return {"link": frame.link, "point": frame.point}
+
+    def along(direction: Direction) -> dict[str, Any]:
+        return {"link": cast(Any, direction.frame).link, "direction": direction.a0.tolist()}
+
+    match condition:
+        case Coincident(Difference(i, j)):
+            yield {"kind": "coincident", "i": end(i), "j": end(j)}
+        case Length(Difference(i, j), length):
+            yield {"kind": "distance", "i": end(i), "j": end(j), "value": length}
+        case Dot(Direction() as x, Direction() as y, value):
+            yield {"kind": "directions", "x": along(x), "y": along(y), "value": value}
+        case Dot(Direction() as x, Difference(i, j), value):
+            yield {"kind": "offset", "x": along(x), "i": end(i), "j": end(j), "value": value}
+        case _:
+            raise NotImplementedError(f"{type(condition).__name__}: give its kind here")
+
+
 class _Model:
     """The document and the constraints file during their construction."""
 
@@ -130,7 +152,7 @@ class _Model:
         self.root = ET.Element("robot", name=mechanism.name)
         note = ("nothing has a mass", "")
         if mechanism.has_loads:
-            note = ("masses are in kg", loads.left_out(mechanism, (), False))
+            note = ("masses are in kg", text.left_out(mechanism, (), False))
         self.root.append(ET.Comment(NOTE.format(*note)))
         self.origin: dict[str, Vector] = {}  # origins of links, global at design
         self.q: dict[str, list[float]] = {}
@@ -141,20 +163,18 @@ class _Model:
         for body in mechanism.bodies:
             if body.fixed:
                 self.attach(body.name, GROUND, body.origin, f"{body.name}.fixed")
-        tree = spanning_tree(mechanism)
-        cut = set(tree.cut)
-        for branch in tree.branches:
-            joint, body = branch.joint, mechanism.body(branch.child)
-            if joint is not None and (links := self.links(joint)) is not None:
-                self.carry(body.name, joint, links, 1 if joint.j == body.name else -1)
-                continue
-            self.add_free(body)
-            cut |= {joint} - {None}
-        coupled = {name for coupler in mechanism.couplers for name in coupler.joints}
-        for joint in (each for each in mechanism.joints if each in cut):
-            self.close(joint, on_copy=joint.name in coupled or bool(relations(joint)))
-        for coupler in mechanism.couplers:
-            self.relate(coupler.name, coupler.terms, coupler.curve)
+        counted = {name for coupler in mechanism.couplers for name in coupler.joints}
+        counted |= {joint.name for joint in mechanism.joints if relations(joint)}
+        for part in plan_tree(
+            mechanism, whole=CLOSURES, counted=counted, loose=_turns, auxiliary="{joint}.copy"
+        ):
+            match part:
+                case Chain():
+                    self.carry(part)
+                case Closure():
+                    self.close(part)
+                case Relation():
+                    self.relate(part)
         for point in mechanism.points:
             self.attach(
                 f"point.{point.name}", point.body, point.position, f"point.{point.name}.fixed"
@@ -162,14 +182,6 @@ class _Model:
         for body in mechanism.bodies:
             if body.mass:
                 self.weigh(body)
-
-    def links(self, joint: Joint) -> list[Link] | None:
-        """Return a joint's chain, from its first body to its second; None if there is none or it
-        has a ball.
-        """
-        chain = CHAINS.get(type(joint))
-        links = chain and chain(joint, ends_of(self.mechanism, joint)[0])
-        return None if links is None or any(link.move == "ball" for link in links) else links
 
     def add_link(self, name: str, origin: Vector) -> ET.Element:
         """Add a link with its origin at a position, global at design."""
@@ -192,86 +204,63 @@ class _Model:
         link = next(each for each in self.root.iter("link") if each.get("name") == body.name)
         inertial = ET.Element("inertial")
         link.insert(0, inertial)
-        center = numbers(self.arm(body.name, loads.center_of(body)))
+        center = numbers(self.arm(body.name, text.center_of(body)))
         ET.SubElement(inertial, "origin", xyz=center, rpy="0 0 0")
         ET.SubElement(inertial, "mass", value=numbers([body.mass]))
-        values = [numbers([x]) for x in loads.six(loads.inertia_of(body, 0.0))]
+        values = [numbers([x]) for x in text.six(text.inertia_of(body, 0.0))]
         ET.SubElement(inertial, "inertia", dict(zip(ENTRIES, values, strict=True)))
 
     def arm(self, link: str, P: Sequence[float]) -> list[float]:
         """Return a point of a link from its design position."""
         return [*(vec(P) - vec(self.origin[link]))]
 
-    def add_free(self, body: Body) -> None:
-        """Add a body without a chain."""
-        name = f"{body.name}.free"
-        self.attach(body.name, GROUND, body.origin, name, "floating")
-        e0, *e = (float(each[-1]) for each in self.placed[body.name].turn)
-        self.q[name] = [*(self.way[body.name].r[-1] - body.origin).tolist(), *e, e0]
-
-    def carry(self, end: str, joint: Joint, links: Sequence[Link], sign: int = 1) -> None:
-        """Add a chain to a new link, from the joint's first body or (sign -1) from its second."""
-        at = joint.bodies[sign < 0]
-        values = link_coordinates(joint, links, self.placed)
-        chain = [*zip(link_names(joint.name, links), links, values, strict=True)][::sign]
-        for k, (name, link, value) in enumerate(chain, 1):
-            following = end if k == len(chain) else f"{name}.link"
-            element = self.attach(following, at, link.point, name, KINDS[link.move])
+    def carry(self, chain: Chain) -> None:
+        """Add a chain to a new link; a free body has a floating joint."""
+        joint, child = chain.joint, chain.child
+        if joint is None:
+            name = f"{child}.free"
+            self.attach(child, GROUND, chain.point, name, "floating")
+            e0, *e = (float(each[-1]) for each in self.placed[child].turn)
+            self.q[name] = [*(self.way[child].r[-1] - chain.point).tolist(), *e, e0]
+            return
+        if not chain.links:
+            self.attach(child, chain.parent, chain.point, joint.name)
+        values = link_coordinates(joint, chain.links[:: chain.sign], self.placed)[:: chain.sign]
+        for (name, link, parent, following), value in zip(chain.each(), values, strict=True):
+            element = self.attach(following, parent, link.point, name, KINDS[link.move])
             ET.SubElement(element, "axis", xyz=numbers(link.axis))
             ET.SubElement(element, "limit", FAR)
-            self.q[name] = [*(value if sign > 0 else backwards(link, value))]
-            self.coordinates[joint.name, link.name] = name, float(sign)
-            at = following
-        if not chain:
-            self.attach(end, at, ends_of(self.mechanism, joint)[0], joint.name)
-        for relation in relations(joint):
-            self.relate(joint.name, relation)
+            self.q[name] = [*(value if chain.sign > 0 else backwards(link, value))]
+            self.coordinates[joint.name, link.name] = name, float(chain.sign)
 
-    def close(self, joint: Joint, on_copy: bool) -> None:
-        """Add the conditions of a joint outside the tree; if its coordinates must count turns, they
-        move a copy of the body.
-        """
-        (i, j), ends, closing = joint.bodies, ends_of(self.mechanism, joint), CLOSURES[type(joint)]
-        if on_copy:
-            links = self.links(joint)
-            assert links is not None  # joints with relations or couplers have no ball
-            i, closing = f"{joint.name}.copy", CLOSURES[Fixed]
-            self.carry(i, joint, links)
+    def close(self, closure: Closure) -> None:
+        """Add the conditions of a cut joint."""
+        joint = closure.joint
         frames = [
-            cast(Frame, _End(link, self.arm(link, P))) for link, P in zip((i, j), ends, strict=True)
+            cast(Frame, _End(link, self.arm(link, P)))
+            for link, P in zip(closure.ends, closure.points, strict=True)
         ]
-        for condition in closing.conditions(joint, *frames):
-            self.constraints += ({"joint": joint.name, **written} for written in as_data(condition))
-
-    def relate(
-        self, name: str, terms: Sequence[tuple[str, str, float]], curve: Sequence[float] = ()
-    ) -> None:
-        """Keep the weighted sum of coordinates (joint, freedom, weight) at zero.
-
-        Args:
-            curve: coefficients of a polynomial in the last coordinate that is added.
-        """
-        found = [(*self.coordinates[joint, freedom], weight) for joint, freedom, weight in terms]
-        if curve:
-            (driven, first, _), (driving, second, weight) = found
-            coefficients = polynomial_in_tree(weight, curve, first, second)
-            self.constraints.append(
-                {
-                    "joint": name,
-                    "kind": "polynomial",
-                    "driven": driven,
-                    "driving": driving,
-                    "coefficients": coefficients,
-                }
+        for condition in CLOSURES[closure.by].conditions(joint, *frames):
+            self.constraints += (
+                {"joint": joint.name, **written} for written in _as_data(condition)
             )
-            return
-        self.constraints.append(
-            {
-                "joint": name,
-                "kind": "linear",
-                "weights": {one: sign * weight for one, sign, weight in found},
+
+    def relate(self, relation: Relation) -> None:
+        """Keep the weighted sum of coordinates at zero, or a coordinate at a polynomial of
+        another.
+        """
+        if relation.curve:
+            one, other, coefficients = relation.follower(signed=True)
+            table = {
+                "kind": "polynomial",
+                "driven": self.coordinates[one][0],
+                "driving": self.coordinates[other][0],
+                "coefficients": coefficients,
             }
-        )
+        else:
+            found = [(*self.coordinates[name, one], weight) for name, one, weight in relation.terms]
+            table = {"kind": "linear", "weights": {one: sign * w for one, sign, w in found}}
+        self.constraints.append({"joint": relation.name, **table})
 
     def pose(self, body: Body) -> dict[str, Any]:
         """Return a body's frame in its link."""
@@ -280,3 +269,9 @@ class _Model:
             "origin": self.arm(body.name, body.origin),
             "euler_parameters": [*body.euler_parameters],
         }
+
+
+def _turns(joint: Joint) -> bool:
+    """Return whether a joint has a ball, which URDF has not."""
+    point = (0.0, 0.0, 0.0)
+    return any(link.move == "ball" for link in CHAINS[type(joint)](joint, point))

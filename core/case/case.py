@@ -16,11 +16,27 @@ from ..mechanism.mechanism import Mechanism
 from ..mechanism.motions import Absolute, Motion, Path, Ramp, Slowed
 from ..trajectory import Array
 from .compliance import Rig
-from .hardpoint import Hardpoint
 from .quantity import MARKER as MARKER
 from .quantity import ORDERS as ORDERS
 from .quantity import Output as Output
 from .quantity import Quantity
+
+
+@dataclass(frozen=True, eq=False)
+class Hardpoint:
+    """A row of a table of hardpoints. Joints, axes and points follow it, on both sides of an axle.
+
+    Attributes:
+        name: as in the table.
+        roles: names in the template of the suspension.
+        moves: derivatives of the numbers of each following place, see `kinematics.places`, by x, y
+            and z of the table [m/m], shape (numbers, 3). They are constant.
+    """
+
+    name: str
+    roles: tuple[str, ...]
+    moves: Mapping[str, Array]
+
 
 SLOW = 2.0**60
 """Seconds of a path at rest for each second of its motions."""

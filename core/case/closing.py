@@ -1,13 +1,19 @@
-"""A case within the digits of its file: without rows redundant but for these digits."""
+"""Cases made of a case: without rows redundant but for the digits of its file, and on a path for
+derivatives by the travel of wheels.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
-from ..errors import MechanismError
+import numpy as np
+
+from ..errors import MOST_NAMED, CaseError, MechanismError, shortened
 from ..kinematics import NativeSolver, degrees_of_freedom, largest_residual, reduce_rows
-from .case import Case, Closure
+from ..mechanism.motions import Motion, Waypoints
+from ..trajectory import Array
+from .case import HELD_BUT, TIME, Case, Closure, Sweep, size
 
 # Largest accepted residual of the rows that are solved, relative to the mechanism's size.
 _TOL = 1e-12
@@ -73,3 +79,40 @@ def _residual_left(case: Case) -> float:
         for name, each in motion.bodies.items()
     }
     return largest_residual(case.mechanism, joints, solved)
+
+
+# Displacement of a driver at that rate in the time between two samples, over the mechanism's
+# size: small, so that the path between samples goes hardly beyond them.
+STEP = 1e-3
+
+
+def held_case(case: Case, drivers: Sequence[str]) -> Case:
+    """Return the case on a path through the same poses, on which these drivers alone move at each
+    sample.
+    """
+    # only ratios of rates count, and those of a path at rest are the same
+    sweep = replace(case.sweep, rate=1.0) if case.sweep.static else case.sweep
+    path = sweep.path
+    times: Array = np.unique([0.0, *path.times]) if path.covers(0.0) else np.unique(path.times)
+    shortest = float(np.diff(times).min(initial=1.0))
+    rate = STEP * size(case) / shortest
+    motions: dict[str, Motion] = {}
+    for name in dict.fromkeys((*path.motions, *drivers)):
+        values = path.motions[name].at(times)[0] if name in path.motions else np.zeros_like(times)
+        motions[name] = Waypoints(
+            tuple(times.tolist()), tuple(values.tolist()), rate if name in drivers else 0.0
+        )
+    return replace(case, sweep=Sweep(TIME, path.times, motions=motions))
+
+
+def require_no_held(case: Case) -> None:
+    """Refuse outputs that are such derivatives.
+
+    Raises:
+        CaseError: there is one.
+    """
+    if held := [output.name for output in case.outputs if HELD_BUT in output.facts]:
+        raise CaseError(
+            f"case {case.name!r}: {shortened(held, MOST_NAMED)}: found derivatives with other"
+            " drivers held, expected outputs of poses; choose others by --output"
+        )

@@ -9,8 +9,8 @@ coupler moves the second.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import MISSING, fields, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import MISSING, Field, fields, replace
 from itertools import combinations
 from typing import Any, TypeVar
 
@@ -18,8 +18,8 @@ import numpy as np
 
 from ..errors import MechanismError
 from ..joints import AxialJoint, Coupler, Distance, Joint, Kind, Revolute, Translational
-from ..mechanism.drivers import JointAngle
 from ..mechanism.mechanism import GROUND, Body, Mechanism, Point, Vector
+from ..mechanism.motions import JointAngle
 from .case import Case, Output, Sweep, Truth
 
 # Design position: skew axes and uneven numbers, so no row vanishes by symmetry. Global, in metres.
@@ -29,6 +29,8 @@ LINK: Vector = (0.33, -0.18, 0.34)
 AXIS: Vector = (2.0, -1.0, 2.0)
 LENGTH = 0.05
 NUMBER = 1.5
+
+AXES: Mapping[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 # A perpendicular pair, and one 40 degrees apart for joints whose shafts must point in one
 # direction.
@@ -111,19 +113,43 @@ def specimen(of: type[_Tested]) -> _Tested:
     between: dict[str, Any] = (
         {"i": "a", "j": "b"} if issubclass(of, Joint) else {"joints": ("first", "second")}
     )
+    try:
+        return fitting(of, {"name": "tested", **between}, map(_made_of_pair, PAIRS))
+    except MechanismError as refused:
+        raise MechanismError(
+            f"{of.__name__}: no specimen can be made, it refuses axes at right angles and at 40"
+            f" degrees; the last refusal: {refused}"
+        ) from refused
+
+
+def fitting(
+    of: type[_Tested], given: Mapping[str, Any], makers: Iterable[Callable[[Field[Any]], Any]]
+) -> _Tested:
+    """Return an instance with the given fields, and the other required ones by the first maker
+    whose values it accepts.
+
+    Raises:
+        MechanismError: the last refusal, if it accepts none.
+    """
     refused: MechanismError | None = None
-    for pair in PAIRS:
+    for make in makers:
+        values = {each.name: make(each) for each in required(of) if each.name not in given}
         try:
-            return of(name="tested", **between, **dict(_geometry(of, pair)))
+            return of(**given, **values)
         except MechanismError as error:
             refused = error
-    raise MechanismError(
-        f"{of.__name__}: no specimen can be made, it refuses axes at right angles and at 40"
-        f" degrees; the last refusal: {refused}"
-    )
+    assert refused is not None
+    raise refused
 
 
-def _geometry(of: type[Joint] | type[Coupler], pair: Any) -> Iterator[tuple[str, Any]]:
+def required(of: type[Joint] | type[Coupler]) -> list[Field[Any]]:
+    """Return the fields without a default."""
+    return [
+        each for each in fields(of) if each.default is MISSING and each.default_factory is MISSING
+    ]
+
+
+def _made_of_pair(pair: Any) -> Callable[[Field[Any]], Any]:
     values = {
         Kind.POSITION: POINT,
         Kind.POSITIONS: (POINT, LINK),
@@ -132,11 +158,7 @@ def _geometry(of: type[Joint] | type[Coupler], pair: Any) -> Iterator[tuple[str,
         Kind.LENGTH: LENGTH,
         None: NUMBER,
     }
-    for each in fields(of):
-        required = each.default is MISSING and each.default_factory is MISSING
-        if required and each.name not in ("name", "i", "j", "joints"):
-            one = values[each.metadata.get("kind")]
-            yield each.name, CURVE if each.type in LISTS else one
+    return lambda each: CURVE if each.type in LISTS else values[each.metadata.get("kind")]
 
 
 def _of_joint(joint: Joint) -> Iterator[Case]:
@@ -174,23 +196,19 @@ def _case(
         drivers=[JointAngle("turn", "hinge")],
         couplers=couplers,
     )
-    outputs = tuple(
-        Output(
-            f"{point.name}_{axis}",
-            point.name,
-            direction,
-            relative=False,
-            atol=ATOL,
-            rtol=0.0,
-            why=WHY,
-        )
-        for point in mechanism.points
-        for axis, direction in zip(
-            "xyz", ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), strict=True
-        )
-    )
     source = (
         f"probe of the {type_.replace('_', ' ')} joint: its geometry, a driven hinge, and rods at"
         " fixed positions"
     )
-    return Case(type_, source, Truth.CONSENSUS_ONLY, mechanism, Sweep("turn", TURN), outputs)
+    return Case(
+        type_, source, Truth.CONSENSUS_ONLY, mechanism, Sweep("turn", TURN), coordinates(mechanism)
+    )
+
+
+def coordinates(mechanism: Mechanism) -> tuple[Output, ...]:
+    """Return the coordinates of all points as outputs."""
+    return tuple(
+        Output(f"{point.name}_{axis}", point.name, direction, False, ATOL, 0.0, WHY)
+        for point in mechanism.points
+        for axis, direction in AXES.items()
+    )

@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 
 from ..algebra import Vec3, cross, quat
 from ..jet import Jet, arctan2, doubles, sqrt
-from ..kinematics import DOUBTFUL, agreement
-from ..mechanism.motions import Path
 from ..trajectory import Array
 
 # Below this square of |e| = sin(angle / 2) a series is exact in double precision, and a quotient by
@@ -85,83 +83,6 @@ def rotation_vector(e: Sequence[Jet]) -> list[Jet]:
         coefficient *= (2 * k + 1) ** 2 / ((2 * k + 2) * (2 * k + 3))
     factor = _select(small.astype(int), [quotient, series])
     return [factor * each for each in along]
-
-
-def turns(x: Array, v: Array, period: float, path: Path) -> Array:
-    """Return the whole number of periods to add to values known but for a multiple of the period.
-
-    From sample to sample in time the change is the one nearest to that by the velocities; without
-    velocities, the smallest. Time zero is the design and has the value zero, unless the path starts
-    elsewhere: then the sample nearest to it has the smallest value.
-
-    Args:
-        x, v: values and velocities, samples along the first axis; NaN if unknown.
-    """
-    order = np.argsort(path.times, kind="stable")
-    t, x, v = path.times[order], x[order], v[order]
-    t = t.reshape(-1, *(1,) * (x.ndim - 1))
-    before = _known_before(np.isfinite(x))
-    change = x - np.take_along_axis(x, before, 0)
-    speed = 0.5 * (v + np.take_along_axis(v, before, 0))
-    gone = speed * (t - np.take_along_axis(np.broadcast_to(t, x.shape), before, 0))
-    count = np.cumsum(_whole((np.nan_to_num(gone) - change) / period), axis=0)
-    nearest = np.argsort(np.abs(t).ravel(), kind="stable")
-    first = nearest[np.argmax(np.isfinite(x)[nearest], axis=0)][None]
-    x0, v0, n0 = (np.take_along_axis(each, first, 0) for each in (x, v, count))
-    expected = np.nan_to_num(v0 * t.ravel()[first]) * float(_through_design(path))
-    count = count - n0 + _whole((expected - x0) / period)
-    found = np.empty_like(x)
-    found[order] = count
-    return found
-
-
-def signs(e: Array, rate: Array, path: Path) -> tuple[Array, bool]:
-    """Return the signs of Euler parameters of the same rotations, shape (n, ...), and whether the
-    angular velocities leave one in doubt.
-
-    They are chosen like `turns`: from sample to sample in time the rotation is the one nearest to
-    that by the angular velocities; without these, the smallest.
-
-    Args:
-        e: Euler parameters, either sign, shape (4, n, ...); NaN if unknown.
-        rate: angular velocity [rad/s], shape (3, n, ...); NaN if unknown.
-    """
-    order = np.argsort(path.times, kind="stable")
-    t, e, rate = path.times[order], e[:, order], rate[:, order]
-    t = np.broadcast_to(t.reshape(-1, *(1,) * (e.ndim - 2)), e.shape[1:])
-    known = np.isfinite(e.sum(axis=0))
-    before = _known_before(known)
-    last, rate_there = (np.take_along_axis(each, before[None], 1) for each in (e, rate))
-    change = quat(e) * quat(last).conjugate()
-    mean = 0.5 * (rate + rate_there)
-    agrees = agreement(change, mean, t - np.take_along_axis(t, before, 0))
-    # nothing contradicts what is unknown
-    doubt = bool((np.isfinite(mean.sum(axis=0)) & (np.abs(agrees) < DOUBTFUL)).any())
-    sign = np.cumprod(np.where(agrees < 0.0, -1.0, 1.0), axis=0)
-    nearest = np.argsort(np.abs(path.times[order]), kind="stable")
-    first = nearest[np.argmax(known[nearest], axis=0)][None]
-    e0, rate0 = (np.take_along_axis(each, first[None], 1) for each in (e, rate))
-    since = np.take_along_axis(t, first, 0) * float(_through_design(path))
-    own = np.where(agreement(quat(e0), rate0, since) < 0.0, -1.0, 1.0)
-    found = np.empty(sign.shape)
-    found[order] = sign * np.take_along_axis(sign, first, 0) * own
-    return found, doubt
-
-
-def _through_design(path: Path) -> bool:
-    """Return whether all drivers have their design values at time zero."""
-    return path.covers(0.0) and bool(np.allclose(path.values(np.zeros(1)), 0.0, atol=1e-9))
-
-
-def _whole(x: Array) -> Array:
-    return np.nan_to_num(np.rint(x))
-
-
-def _known_before(known: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Return the index of the last known sample before each sample, along the first axis."""
-    indices = np.arange(len(known)).reshape(-1, *(1,) * (known.ndim - 1))
-    last = np.maximum.accumulate(np.where(known, indices, 0), axis=0)
-    return np.concatenate([last[:1], last[:-1]])
 
 
 def _select(which: NDArray[Any], jets: Sequence[Jet]) -> Jet:

@@ -4,8 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import Field, dataclass
 from fractions import Fraction
+from typing import Any, TypeAlias, cast
+
+from ..joints import Kind
+from ..mechanism.body import Dimension, dimension_of
+from ..mechanism.curves import dimensions_of, scaled
+from ..mechanism.motions import Measure
+
+Convert: TypeAlias = Callable[[float], float]
+"""Conversion from the unit of a file to SI."""
 
 # A double holds any decimal of 15 digits. Numbers with more digits are computed ones: 10 are shown.
 DIGITS, ROUNDED = 15, 10
@@ -22,7 +31,7 @@ class Unit:
 
     name: str
     size: float
-    convert: Callable[[float], float]
+    convert: Convert
 
     def __call__(self, number: float) -> float:
         return self.convert(number)
@@ -65,6 +74,66 @@ LENGTHS: Mapping[str, Unit] = {
     "foot": Unit("foot", 0.3048, lambda x: x * 0.3048),
 }
 ANGLES: Mapping[str, Unit] = {"rad": RADIAN, "deg": Unit("deg", math.pi / 180.0, math.radians)}
+
+
+@dataclass(frozen=True)
+class FileUnits:
+    """Units of length and angle of a file. Mass is in kg, time in s and force in N everywhere."""
+
+    length: Unit = METRE
+    angle: Unit = RADIAN
+
+    def of(self, unit: str) -> tuple[str, Convert]:
+        """Return the unit of the file for an SI unit (m, rad, 1, N, N m, or one of these per m or
+        rad), and the conversion of its numbers to SI.
+        """
+        above, _, below = unit.partition("/")
+        known = {"m": self.length, "rad": self.angle}
+        convert = self.length if above == "N m" else known.get(above, float)
+        name = convert.name if isinstance(convert, Unit) else above
+        if not below:
+            return name, convert
+        scale = known[below](1.0)
+        return f"{name}/{known[below].name}", lambda number: convert(number) / scale
+
+    def power(self, dimension: Dimension, value: Any) -> Any:
+        """Return a number, or a tuple of numbers, of a dimension in SI."""
+        if isinstance(value, tuple):
+            numbers = cast("tuple[float, ...]", value)
+            return tuple(self.power(dimension, each) for each in numbers)
+        return self.angle.power(self.length.power(value, dimension.length), dimension.angle)
+
+    def place(self, value: Any) -> Any:
+        """Return a length, or a tuple of lengths or places, in SI."""
+        if isinstance(value, tuple):
+            return tuple(map(self.place, cast("tuple[Any, ...]", value)))
+        return self.length(value)
+
+    def in_si(self, each: Field[Any], value: Any, driver: Unit | None = None) -> Any:
+        """Return the value of a field of a joint, load or motion in SI; None for an omitted one.
+
+        Args:
+            driver: unit of the values of the driver of a motion.
+        """
+        if value is None:
+            return None
+        if dimension := dimension_of(each):
+            return self.power(dimension, value)
+        if (pair := dimensions_of(each)) is not None:
+            try:
+                return scaled(value, [self.power(dimension, 1.0) for dimension in pair])
+            except (TypeError, ValueError):  # a row of another length, or rows and numbers mixed
+                return value  # the element's own check names it
+        if each.metadata.get("kind") in (Kind.POSITION, Kind.POSITIONS, Kind.LENGTH):
+            return self.place(value)
+        measure = each.metadata.get("measure")
+        if measure is Measure.ANGLE:
+            return self.angle(value)
+        if driver is not None and measure in (Measure.DRIVER, Measure.DRIVER_RATE):
+            if isinstance(value, tuple):
+                return tuple(map(driver, cast("tuple[float, ...]", value)))
+            return driver(value)
+        return value
 
 
 def si_of(unit: Unit) -> str:

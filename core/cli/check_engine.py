@@ -14,7 +14,7 @@ from .verbosity import add_verbosity
 
 if TYPE_CHECKING:
     from ..harness.engine import Engine
-    from ..studies.findings import Report
+    from ..studies.checks.findings import Report
 
 TOPOLOGIES = {
     "one loop": "rssr",
@@ -60,7 +60,7 @@ def examined(engine: str | Engine, registry: Registry) -> Report:
     """
     from ..harness.standard import STANDARD
     from ..report.progress import progress
-    from ..studies.engine_check.check_engine import check_engine
+    from ..studies.checks.check_engine import check_engine
 
     problems = list[str]()
     found = (

@@ -40,7 +40,7 @@ def _check_joint(options: argparse.Namespace, registry: Registry) -> int:
     """Check a joint type: its equations against their derivatives, its branches, and a closed loop
     in every engine.
     """
-    from ..studies.joint_check.check_joint import check_joint
+    from ..studies.checks.check_joint import check_joint
     from .joint_loading import named_joint
 
     report = check_joint(

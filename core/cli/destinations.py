@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TextIO, TypeAlias
 
 from ..case.io.atomic_files import Content, Named, to_standard_output, unwritable, write_all
-from ..case.io.table_file import no_parquet
+from ..case.io.table_file import WRITERS, lack
 from ..harness.record import Results, to_json
 
 if TYPE_CHECKING:  # drawing code is imported only for a report
@@ -36,7 +36,8 @@ class Destinations:
         junit: a file.
         markdown: a file, for the matrix of cases and engines.
         store: a file, for values in bulk.
-        csv, parquet: files, for the curves.
+        csv, parquet, xlsx: files, for the curves.
+        long: whether curves of hardpoint tables have a row per output and sample too.
     """
 
     out: Path | None = None
@@ -46,16 +47,25 @@ class Destinations:
     store: Path | None = None
     csv: Path | None = None
     parquet: Path | None = None
+    xlsx: Path | None = None
+    long: bool = False
 
     @classmethod
     def of(cls, options: argparse.Namespace) -> Destinations:
         """Return the destinations named by a command's options."""
-        return cls(**{each.name: getattr(options, each.name, None) for each in fields(cls)})
+        names = [each.name for each in fields(cls)]
+        return cls(**{name: value for name, value in vars(options).items() if name in names})
 
     @property
     def wanted(self) -> bool:
         """Return whether any destination is wanted."""
-        return any(getattr(self, each.name) is not None for each in fields(self))
+        return self != Destinations(long=self.long)
+
+    @property
+    def curves(self) -> dict[str, Path]:
+        """Return the files for the curves by their kinds."""
+        files = {kind: getattr(self, kind) for kind in WRITERS}
+        return {kind: file for kind, file in files.items() if file is not None}
 
     def problems(self, names: Sequence[str] = REPORT, history: Path | None = None) -> list[str]:
         """Create the folder, and return messages on unwritable destinations, before the work
@@ -79,12 +89,11 @@ class Destinations:
             ("--junit", self.junit),
             ("--markdown", self.markdown),
             ("--store", self.store),
-            ("--csv", self.csv),
-            ("--parquet", self.parquet),
         ]
-        if self.parquet is not None:
-            lack = no_parquet(f"--parquet {self.parquet}", "or give --csv FILE")
-            found += [lack] if lack else []
+        for kind, file in self.curves.items():
+            files.append((f"--{kind}", file))
+            missing = lack(kind, f"--{kind} {file}", "or give --csv FILE")
+            found += [missing] if missing else []
         return found + unwritable(files, history)
 
 
@@ -137,11 +146,13 @@ def deliver(
         contents.append((to.markdown, lambda path: path.write_text(to_markdown(results), "utf-8")))
     if to.json not in (None, "-"):
         contents.append((Path(to.json), encoded))
-    if to.csv is not None or to.parquet is not None:
-        from ..report.curves import write_curves_csv, write_curves_parquet
+    if to.curves:
+        from ..report.curves import write_curves
 
-        kinds = (to.csv, write_curves_csv), (to.parquet, write_curves_parquet)
-        contents += [(file, partial(kind, results)) for file, kind in kinds if file is not None]
+        contents += [
+            (file, partial(write_curves, results, kind=kind, long=to.long))
+            for kind, file in to.curves.items()
+        ]
     if to.out is not None:
         contents.append((to.out / "results.json", encoded))
         contents.append(

@@ -166,7 +166,6 @@ def _cells(store: Store, row: RunRow) -> list[str]:
     told = [f"{counts[outcome]} {outcome.shown}" for outcome in Outcome if counts[outcome]]
     missing = len(row.plan) - len(found)
     versions = {engine: version for _, engine, version in found if version}
-    git: dict[str, Any] = row.circumstances.get("git") or {}
     told += [f"{missing} missing"] if missing else []
     return [
         str(row.id),
@@ -174,15 +173,15 @@ def _cells(store: Store, row: RunRow) -> list[str]:
         row.status,
         ", ".join(told) or "–",
         ", ".join(f"{engine} {version}" for engine, version in versions.items()) or "–",
-        str(git.get("commit") or "–")[:10] + ("+" if git.get("changed") else ""),
-        str(row.circumstances.get("host", "–")),
+        str(row.git.get("commit") or "–")[:10] + ("+" if row.git.get("changed") else ""),
+        str(row.key["host"] or "–"),
         row.command,
     ]
 
 
 def _print_trends(history: History) -> None:
     from ..harness.labels import number, product
-    from ..history.regression.change_points import steps
+    from ..history.steps import steps
     from ..report.regression_labels import step_says
     from ..report.terminal import columns, page
     from ..report.trends import largest_errors, run_name

@@ -92,13 +92,13 @@ def keeping(
 
 def _known(path: Path, facts: Mapping[str, Any]) -> bool:
     """Return whether a history has a run that was asked for the same."""
-    from ..history.selection import same
+    from ..history.queries import same
     from ..history.store import Store
 
     if not os.path.exists(path):
         return False
     with Store(path, writable=False) as store:
-        return any(same(row.circumstances, facts) for row in store.runs())
+        return any(same(row.key, facts) for row in store.runs())
 
 
 def past(keeping: Keeping, problems: list[str]) -> Trends:

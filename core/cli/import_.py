@@ -37,7 +37,7 @@ def _import(options: argparse.Namespace, registry: Registry) -> int:
     Numbers are in SI units and keep all their digits.
     """
     from ..case.io.atomic_files import require_writable, to_standard_output, write
-    from ..case.io.case_writer import case_text
+    from ..case.io.case_file import case_text
 
     require_writable([("--out", options.out)])
     import_options.return_cases(options)

@@ -132,10 +132,10 @@ def _print_references(options: argparse.Namespace, console: Console) -> None:
 
 def _keys() -> Iterator[str]:
     """Yield the lines on the keys of case and variation files, from their readers."""
-    from ..case.io import loads, schema
+    from ..case.io import schema
     from ..studies.variation import variation_schema
 
-    for module in (schema, loads, variation_schema):
+    for module in (schema, variation_schema):
         what, _, keys = (module.__doc__ or "").partition("Reference. ")
         yield from (what.splitlines()[0], "", *keys.splitlines(), "")
 

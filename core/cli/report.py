@@ -16,8 +16,8 @@ from .registry import Registry, Status
 from .verbosity import add_verbosity
 
 if TYPE_CHECKING:
-    from ..history.regression.findings import Regressions
-    from ..history.regression.run_selection import Subject
+    from ..history.findings import Regressions
+    from ..history.run_selection import Subject
     from ..history.store import Store
 
 OUT = ("regressions.json", "regressions.md", "junit.xml", "report.html")
@@ -82,9 +82,9 @@ def _report(options: argparse.Namespace, registry: Registry) -> int:
 
     Exit status: 0 no regression, 1 a regression, 2 the tool could not do its work.
     """
-    from ..history.regression.run_selection import find, find_against
+    from ..history.comparison import regressions
+    from ..history.run_selection import find, find_against
     from ..history.store import Store
-    from ..report.regression_report import regressions
     from ..report.regression_summary import to_markdown
     from ..report.regression_text import print_regressions
     from .destinations import Destinations

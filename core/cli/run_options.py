@@ -70,13 +70,21 @@ def add_options(run: argparse.ArgumentParser) -> None:
     run.add_argument(
         "--json", metavar="FILE", help="write the results as JSON; - for standard output"
     )
-    for kind in ("CSV", "Parquet"):
+    for kind, what in (("csv", "CSV"), ("parquet", "Parquet"), ("xlsx", "a workbook")):
         run.add_argument(
-            f"--{kind.lower()}",
+            f"--{kind}",
             type=Path,
             metavar="FILE",
-            help=f"write the curves of all engines and references as {kind}",
+            help=f"write the curves of all engines and references as {what}",
         )
+    run.add_argument(
+        "--long",
+        action="store_true",
+        help=(
+            "write curves of hardpoint tables as those of other files, a row per output and sample"
+            " in SI units; default: a row per sample and a column per output in the table's units"
+        ),
+    )
     run.add_argument("--junit", type=Path, metavar="FILE", help="write the results as JUnit XML")
     run.add_argument(
         "--markdown",

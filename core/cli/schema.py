@@ -13,7 +13,7 @@ from .registry import Registry, Status, add_joint_types
 
 
 def _case() -> dict[str, Any]:
-    from ..case.io.json_schema import case_schema
+    from ..case.io.catalogue import case_schema
 
     return case_schema()
 
@@ -31,7 +31,7 @@ def _results() -> dict[str, Any]:
 
 
 def _regression() -> dict[str, Any]:
-    from ..history.regression.findings import Regressions
+    from ..history.findings import Regressions
 
     return msgspec.json.schema(Regressions)
 

@@ -21,7 +21,7 @@ from .sweep_replay import checking_solver, replay, replay_problems
 
 if TYPE_CHECKING:
     from ..harness.engine import Engine
-    from ..studies.tolerance.part_file import Part
+    from ..studies.tolerance.chunk_files import Part
     from ..studies.tolerance.results import SweepResults
     from ..studies.tolerance.study import Study
     from ..studies.tolerance.sweep import Progress
@@ -138,7 +138,7 @@ def _part(options: argparse.Namespace) -> Part:
 
     from ..harness.provenance import processor
     from ..program.llvm.compiler import available
-    from ..studies.tolerance.part_file import Part
+    from ..studies.tolerance.chunk_files import Part
     from .joint_loading import sources
 
     facts = {
@@ -163,9 +163,8 @@ def _solve(
 ) -> SweepResults:
     from ..harness.resource_limits import default_jobs
     from ..report.meter import Meter
-    from ..studies.tolerance.chunk_execution import on_cluster
-    from ..studies.tolerance.parquet_store import ParquetStore
-    from ..studies.tolerance.sweep import Check, sweep_designs
+    from ..studies.tolerance.chunk_files import ParquetStore
+    from ..studies.tolerance.sweep import Check, on_cluster, sweep_designs
 
     def solved(progress: Progress) -> None:
         rate = f"{progress.solved / progress.seconds:.3g} variants/s"
@@ -214,9 +213,8 @@ def _deliver(options: argparse.Namespace, results: SweepResults) -> list[str]:
     """Print the table and write the requested files; return the problems in writing."""
     from ..case.io.atomic_files import to_standard_output, write_all
     from ..harness.record import to_json
-    from ..studies.tolerance.csv_tables import envelope_csv, gradient_csv, limits_csv
     from ..studies.tolerance.page import page
-    from ..studies.tolerance.tables import print_sweep
+    from ..studies.tolerance.tables import envelope_csv, gradient_csv, limits_csv, print_sweep
 
     encoded = to_json(results)
     contents = [(Path(options.json), encoded)] if options.json not in (None, "-") else []

@@ -28,7 +28,7 @@ def limited(
     """Return the variation with limits for the outputs of the case; limits of the options replace
     those of the file.
     """
-    from ..studies.variation.limits import limits_of_texts
+    from ..studies.variation.variation_file import limits_of_texts
 
     given = limits_of_texts(options.limit, whole, variation.units)
     limits = {each.output: each for each in (*variation.limits, *given)}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..studies.variation.modes import Incomplete, Sampling
+from ..studies.variation.study_choices import Incomplete, Sampling
 from . import import_options
 from .execution_options import SCHEDULER
 from .option_types import positive, whole

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import KincheckError
 from ..report.progress import complain, lacking, uncompared
-from ..studies.variation.modes import Sampling
+from ..studies.variation.study_choices import Sampling
 from .registry import Registry, Status
 
 if TYPE_CHECKING:

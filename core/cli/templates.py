@@ -29,7 +29,7 @@ def _templates(options: argparse.Namespace, registry: Registry) -> int:
     Its numbers are examples. Rows marked optional may be left out, and so may the column of
     meanings.
     """
-    from ..case.models.hardpoints.sample_table import sample_tables
+    from ..case.models.hardpoints.templates import sample_tables
 
     print(*sample_tables(options.template), sep="\n")
     return Status.WITHIN

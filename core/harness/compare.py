@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 from ..algebra import Vec3
 from ..case.case import HELD_BUT, ORDERS, Case, Quantity, Series, pace
 from ..case.measures import ForceMeasure
-from ..case.measures.turns import counted
+from ..case.turns import counted
 from ..errors import CaseError, number_of
 from ..jet import Jet
 from ..mechanism.mechanism import Vector

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..case.case import HELD_BUT, Case, size
-from ..case.held import held_case
+from ..case.closing import held_case
 from ..trajectory import Trajectory
 
 # Largest difference of a pose reached on two paths, over the mechanism's size: larger than any

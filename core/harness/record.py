@@ -201,6 +201,11 @@ class Record(RecordTable, msgspec.Struct, frozen=True, kw_only=True):
     faults: list[str] = []
 
     @property
+    def pair(self) -> tuple[str, str, str]:
+        """Case, engine and mode, which identify the record."""
+        return self.case, self.engine, self.mode
+
+    @property
     def validated(self) -> bool:
         """Return whether the pair passed and every output was judged against a cited reference from
         outside kincheck.

@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import msgspec
 
@@ -36,6 +36,13 @@ class _Driver(msgspec.Struct, frozen=True):
     motion: dict[str, str | bool | int | float | list[float] | None] = {}
 
 
+class _Units(msgspec.Struct, frozen=True):
+    """The units of a table of hardpoints."""
+
+    length: Literal["m", "mm", "cm", "inch", "foot"]
+    angle: Literal["rad", "deg"]
+
+
 class _About(msgspec.Struct):
     """The known keys of a case; further keys are allowed."""
 
@@ -45,6 +52,7 @@ class _About(msgspec.Struct):
     driver: _Driver = _Driver()
     motions: dict[str, _Driver] = {}
     outputs: dict[str, dict[str, Any]] = {}
+    units: _Units | None = None
 
 
 _FACTS: Mapping[str, Any] = {

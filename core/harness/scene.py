@@ -10,14 +10,14 @@ import msgspec
 import numpy as np
 
 from ..case.case import MARKER, Case
-from ..case.measures.force import DriverEffort, JointForce
+from ..case.measures import DriverEffort, JointForce
 from ..case.suspension import SuspensionOutput
 from ..errors import KincheckError
 from ..joints import Kind
 from ..joints.base import unit
 from ..kinematics import NativeSolver
-from ..mechanism.drivers import PointCoordinate
 from ..mechanism.mechanism import Vector
+from ..mechanism.motions import PointCoordinate
 from ..trajectory import Array, BodyMotion
 from .record import Record, Results
 from .scene_record import Scene, SceneBody, SceneForce, SceneJoint, ScenePoint, SceneWheel

@@ -9,22 +9,16 @@ from pathlib import Path
 from typing import Any
 
 from ..case.io.atomic_files import write
-from ..case.io.table_file import Kind, no_parquet, write_csv, write_parquet
+from ..case.io.table_file import WRITERS, Kind, lack
 from ..errors import KincheckError
-from .queries import readable
+from .queries import entries_of
 from .store import Store
 
 INTEGERS = ("run", "solved", "samples", "worst_step")
 TRUTHS = ("git_changed", "validated", "within")
+PHASES = ("calibration", "build", "first", "warm", "waited", "compare")
 NUMBERS = (
-    *(
-        "calibration_seconds",
-        "build_seconds",
-        "first_seconds",
-        "warm_seconds",
-        "waited_seconds",
-        "compare_seconds",
-    ),
+    *(f"{phase}_seconds" for phase in PHASES),
     *("us_per_step", "residual_max", "max_abs", "rms", "tolerance"),
 )
 """Columns of the view `measured` that are not text. Missing values are null, in CSV empty."""
@@ -59,14 +53,15 @@ def export(
             f"--export {path}: ends in {path.suffix or 'nothing'!r}; give a file that ends in"
             f" {' or '.join(SUFFIXES)}"
         )
-    if suffix == ".parquet" and (lack := no_parquet(f"--export {path}", "or give a .csv")):
-        raise KincheckError(lack)
+    kind = suffix.removeprefix(".")
+    if missing := lack(kind, f"--export {path}", "or give a .csv"):
+        raise KincheckError(missing)
 
     def put(part: Path) -> int:
         chunks = _rows(store, cases, engines)
         (names,) = next(chunks)
         columns = {name: KINDS.get(name, Kind.TEXT) for name in names}
-        return (write_parquet if suffix == ".parquet" else write_csv)(part, columns, chunks)
+        return WRITERS[kind](part, columns, chunks)
 
     return write("--export", path, put)
 
@@ -80,9 +75,13 @@ def _rows(
         " AND ".join(f'"{column}" IN ({", ".join("?" * len(names))})' for column, names in chosen)
         or "true"
     )
-    now = {row.id: row.status for row in readable(store)}
+    for row in store.runs():
+        with store.sparing():  # a damaged text would end the query
+            entries_of(store, row.id)
+    now = {row.id: row.status for row in store.runs()}
     with store.explained("read"):
-        _leave_out(store)
+        if store.passed_over:
+            _leave_out(store)
         values = [name for _, wanted in chosen for name in wanted]
         cursor = store.connection.execute(f"SELECT * FROM measured WHERE {where}", values)
         names = tuple(name for name, *_ in cursor.description)
@@ -93,13 +92,9 @@ def _rows(
 
 
 def _leave_out(store: Store) -> None:
-    """Exclude unreadable runs from the view: their texts would end the query."""
-    if store.passed_over:
-        (view,) = store.connection.execute(
-            "SELECT sql FROM sqlite_master WHERE name = 'measured'"
-        ).fetchone()
-        listed = ", ".join(str(run) for run in store.passed_over)
-        spared = view.replace("CREATE VIEW", "CREATE TEMP VIEW", 1).replace(
-            "FROM runs", f"FROM runs WHERE id NOT IN ({listed})", 1
-        )
-        store.connection.execute(spared)
+    """Exclude unreadable runs from the view."""
+    query = "SELECT sql FROM sqlite_master WHERE name = 'measured'"
+    (view,) = store.connection.execute(query).fetchone()
+    listed = ", ".join(map(str, store.passed_over))
+    spared = view.replace("FROM runs", f"FROM runs WHERE id NOT IN ({listed})", 1)
+    store.connection.execute(spared.replace("CREATE VIEW", "CREATE TEMP VIEW", 1))

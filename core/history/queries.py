@@ -1,26 +1,90 @@
-"""Series of each (case, engine) pair over the runs of a history, for trends, limits and steps."""
+"""Runs of the same selection, and the series of each (case, engine) pair over the runs of a
+history, for trends, limits and steps.
+
+`Results.run["selection"]`, the task of a run, holds the names of cases and engines as asked for
+(none: all), and the options of solution and judgement. Places of files and limits of processes are
+no part of it. Runs of older versions have none: their command line stands for it.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from itertools import islice
+from typing import Any
 
 import msgspec
 
 from ..harness.record import Deviations, Outcome, Seconds
 from .schema import OUTCOME
-from .selection import Facts, alike
-from .store import RunRow, Store
+from .store import Pair, RunRow, Store
+
+Facts = Mapping[str, Any]
+"""Circumstances of a run, as `Results.run`."""
+
+
+def same(a: Facts, b: Facts) -> bool:
+    """Return whether two runs were asked for the same cases and engines with the same options."""
+    if a.get("selection") and b.get("selection"):
+        return a["selection"] == b["selection"]
+    return a.get("command") == b.get("command")
+
+
+def alike(a: Facts, b: Facts) -> bool:
+    """Return whether two runs solve and judge alike, as far as both tell their options."""
+    ours, theirs = a.get("selection"), b.get("selection")
+    return not (ours and theirs) or ours["options"] == theirs["options"]
+
+
+def series(rows: Iterable[RunRow]) -> list[list[RunRow]]:
+    """Return the runs, given from the first to the last, as series of the same thing; of several,
+    the one with the earliest run first.
+
+    A run goes on with a series if it was asked for the same as its last run, or has all pairs of
+    this run and solves and judges alike.
+    """
+    found: list[list[RunRow]] = []
+    for row in rows:
+        going_on = [
+            each
+            for each in found
+            if same(row.key, each[-1].key)
+            or (alike(row.key, each[-1].key) and {*row.plan}.issuperset(each[-1].plan))
+        ]
+        for other in going_on[1:]:
+            going_on[0].extend(other)
+            found.remove(other)
+        if not going_on:
+            found.append([])
+        (going_on or found[-1:])[0].append(row)
+    return found
+
+
+def standing(rows: Sequence[RunRow], good: Collection[int], within: int) -> RunRow | None:
+    """Return the run for the state of a history: red until the same thing is green.
+
+    It is the latest red run at the end of a series; without one, the latest run. The series with
+    the first run of the history counts, and every other from its second run on: a run of something
+    else, once, changes nothing.
+
+    Args:
+        rows: ended runs, the latest first.
+        good: numbers of the green runs.
+        within: number of latest runs in which a run counts.
+    """
+    every = series(reversed(rows))
+    last = {each[-1].id for k, each in enumerate(every) if k == 0 or len(each) > 1}
+    counted = [row for row in rows[:within] if row.id in last]
+    red = [row for row in counted if row.id not in good]
+    return next(iter([*red, *counted, *rows]), None)
+
 
 NIGHTS = 60
 """Number of runs in trends and steps: two months, whose points remain distinct in a figure."""
 
 IDLE = Outcome.UNAVAILABLE, Outcome.UNSUPPORTED
 """Outcomes of a pair whose engine is missing or does not support the case: they have no results."""
-
-Pair: TypeAlias = tuple[str, str, str]
-"""Case, engine and mode."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +121,7 @@ NOTHING = History({}, {})
 def read(
     store: Store,
     *,
-    before: int | None = None,
+    before: float = math.inf,
     last: int | None = None,
     cases: Sequence[str] = (),
     engines: Sequence[str] = (),
@@ -74,88 +138,72 @@ def read(
     Raises:
         HistoryError: the file cannot be read.
     """
-    rows = [
+
+    def wanted(pair: Pair) -> bool:
+        return (not cases or pair[0] in cases) and (not engines or pair[1] in engines)
+
+    rows = (
         row
         for row in store.runs()
         if row.status != "running"
-        and (before is None or row.id < before)
-        and (like is None or alike(row.circumstances, like))
-    ]
-    if cases or engines:
-        rows = [row for row in rows if any(_wanted(pair, cases, engines) for pair in row.plan)]
-    runs = {row.id: row for row in reversed(rows[:last])}
+        and row.id < before
+        and (like is None or alike(row.key, like))
+        and (any(map(wanted, row.plan)) or not (cases or engines))
+    )
+    runs = {row.id: row for row in reversed([*islice(rows, last)])}
     pairs: dict[Pair, list[Entry]] = {}
-    for run in [*runs]:
+    for run in runs:
         with store.sparing():
-            for pair, entry in _entries(store, run):
-                if _wanted(pair, cases, engines):
+            for pair, entry in entries_of(store, run):
+                if wanted(pair):
                     pairs.setdefault(pair, []).append(entry)
     return History({run: row for run, row in runs.items() if run not in store.passed_over}, pairs)
 
 
-def readable(store: Store) -> list[RunRow]:
-    """Return the runs whose facts and columns of records are readable, the latest first; skip the
-    others.
+def entries_of(store: Store, run: int) -> list[tuple[Pair, Entry]]:
+    """Return the pairs of a run, in the order in which their records were added.
 
     Raises:
         HistoryError: the file cannot be read.
     """
-    rows = store.runs()
-    for row in rows:
-        with store.sparing():
-            _entries(store, row.id)
-    return [row for row in rows if row.id not in store.passed_over]
-
-
-def _wanted(pair: Pair, cases: Sequence[str], engines: Sequence[str]) -> bool:
-    return (not cases or pair[0] in cases) and (not engines or pair[1] in engines)
-
-
-def _entries(store: Store, run: int) -> list[tuple[Pair, Entry]]:
     columns = (
         f"case_name, engine, mode, {OUTCOME}, version, errors, warm_seconds, waited_seconds,"
         " CASE WHEN us_per_step IS NOT NULL THEN samples END, message, truth"
     )
+    query = f"SELECT {columns} FROM records WHERE run_id = ? ORDER BY rowid"
     found: list[tuple[Pair, Entry]] = []
     # unused texts are checked, too: no part of a damaged run counts
     with store.explained("read", run):
-        # rowid gives the order in which the records were added
-        for row in store.connection.execute(
-            f"SELECT {columns} FROM records WHERE run_id = ? ORDER BY rowid", (run,)
+        for *pair, outcome, version, text, warm, waited, samples, _, _ in store.connection.execute(
+            query, (run,)
         ):
-            errors = msgspec.json.decode(row[5], type=dict[str, Deviations])
-            own, samples = Seconds(warm=row[6], waited=row[7]).own, row[8]
+            errors = msgspec.json.decode(text, type=dict[str, Deviations])
+            own = Seconds(warm=warm, waited=waited).own
             # runs of older versions keep a time per sample that includes waiting
             per_step = 1e6 * own / samples if own is not None and samples else None
-            entry = Entry(run, Outcome(row[3]), row[4], errors, own, per_step)
-            found.append(((row[0], row[1], row[2]), entry))
+            entry = Entry(run, Outcome(outcome), version, errors, own, per_step)
+            found.append(((*pair,), entry))
     return found
 
 
-def green(store: Store, *, before: int | None = None) -> list[RunRow]:
-    """Return the complete runs with at least one pass and no fault, the latest first.
+def faultless(store: Store) -> set[int]:
+    """Return the numbers of the green runs, complete and with at least one pass and no fault, by
+    their outcomes alone: their records are not read.
 
     Raises:
         HistoryError: the file cannot be read.
     """
-    good = faultless(store, store.runs())
-    return [
-        row for row in readable(store) if row.id in good and (before is None or row.id < before)
-    ]
-
-
-def faultless(store: Store, rows: Sequence[RunRow]) -> set[int]:
-    """Return the numbers of the green runs, by their outcomes alone: their records are not read."""
-    bad = ", ".join(f"'{outcome}'" for outcome in Outcome if outcome.bad)
     query = (
-        f"SELECT run_id, count(*) FROM records GROUP BY run_id HAVING sum(outcome IN ({bad})) = 0"
+        f"SELECT run_id, count(*) FROM records GROUP BY run_id HAVING sum(outcome IN ({_BAD})) = 0"
         f" AND sum({OUTCOME} = 'pass') > 0"
     )
     with store.explained("read"):
         good: dict[int, int] = dict(store.connection.execute(query).fetchall())
     # a finished run lacks the pairs of unreadable cases: its status was 2
     return {
-        row.id for row in rows if row.status == "finished" and good.get(row.id) == len(row.plan)
+        row.id
+        for row in store.runs()
+        if row.status == "finished" and good.get(row.id) == len(row.plan)
     }
 
 
@@ -165,18 +213,37 @@ def compared(store: Store, run: int) -> dict[Pair, set[tuple[str, str]]]:
     Raises:
         HistoryError: the file cannot be read.
     """
-    able = (
-        (pair, entry.errors) for pair, entry in _entries(store, run) if entry.outcome not in IDLE
-    )
     return {
-        pair: {(output, motion) for output, each in errors.items() for motion, _ in each.items()}
-        for pair, errors in able
+        pair: {
+            (output, motion) for output, each in entry.errors.items() for motion, _ in each.items()
+        }
+        for pair, entry in entries_of(store, run)
+        if entry.outcome not in IDLE
     }
 
 
-def calibration(run: RunRow | Mapping[str, Any]) -> float | None:
+def most_compared(store: Store, pairs: Collection[Pair]) -> dict[int, int]:
+    """Return how many of these pairs each run compared, plus their outputs and motions, without
+    reading its records: pairs of idle engines count, too.
+
+    Raises:
+        HistoryError: the file cannot be read.
+    """
+    # no text in a JSON string looks like this key: its quotation marks are escaped
+    key = '"max_abs":'
+    keys = f"(length(errors) - length(replace(errors, '{key}', ''))) / {len(key)}"
+    columns = ", ".join(f"json_extract(value, '$[{k}]')" for k in range(3))
+    query = (
+        f"SELECT run_id, sum(1 + {keys}) FROM records WHERE (case_name, engine, mode) IN (SELECT"
+        f" {columns} FROM json_each(?)) GROUP BY run_id"
+    )
+    with store.explained("read"):
+        text = msgspec.json.encode([*pairs]).decode()
+        return dict(store.connection.execute(query, (text,)).fetchall())
+
+
+def calibration(facts: Facts) -> float | None:
     """Return the seconds of the calibration loop in a run; None if it was not measured."""
-    facts = run.circumstances if isinstance(run, RunRow) else run
     seconds = facts.get("calibration_seconds")
     return seconds if isinstance(seconds, float) and seconds > 0 else None
 
@@ -187,3 +254,6 @@ def unit_of(row: RunRow, case: str, output: str) -> str:
         row.circumstances.get("cases", {}).get(case, {}).get("outputs", {})
     )
     return outputs.get(output, {}).get("unit", "m")
+
+
+_BAD = ", ".join(f"'{outcome}'" for outcome in Outcome if outcome.bad)

@@ -1,12 +1,17 @@
-"""Recording of a run in progress, and continuation of a killed run."""
+"""Recording of a run in progress, and continuation of a killed run with the same identity: a digest
+of the content of cases and settings.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+import hashlib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields, is_dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from ..case.case import Case
 from ..harness.engine import Engine
@@ -14,8 +19,45 @@ from ..harness.engine_versions import PATIENCE, versions
 from ..harness.provenance import circumstances, conditions, plain, references
 from ..harness.record import Record, Results
 from ..harness.run import planned
-from .run_digest import digest
 from .store import HistoryError, Store
+
+
+def digest(*things: Any) -> str:
+    """Return the SHA-256 digest of data: dataclasses by class and fields, arrays by their bits.
+
+    A pickle is unsuitable: it depends on which equal parts are one object. Objects of other types
+    enter by their text; a text with a memory address makes every digest different.
+    """
+    whole = hashlib.sha256()
+    for piece in _pieces(things):
+        whole.update(piece)
+    return whole.hexdigest()
+
+
+def _pieces(thing: Any) -> Iterator[bytes]:
+    if isinstance(thing, np.ndarray):
+        values: Any = np.ascontiguousarray(thing)  # pyright: ignore
+        yield f"array{values.shape}{values.dtype.str}".encode()
+        yield values.tobytes()
+    elif is_dataclass(thing) and not isinstance(thing, type):
+        yield f"({type(thing).__qualname__}".encode()
+        for field in fields(thing):
+            yield f",{field.name}=".encode()
+            yield from _pieces(getattr(thing, field.name))
+        yield b")"
+    elif isinstance(thing, Mapping):
+        yield b"{"
+        for key, value in thing.items():  # pyright: ignore
+            yield from _pieces(key)
+            yield from _pieces(value)
+        yield b"}"
+    elif isinstance(thing, Sequence) and not isinstance(thing, str | bytes):
+        yield b"["
+        for each in thing:  # pyright: ignore
+            yield from _pieces(each)
+        yield b"]"
+    else:
+        yield f"{type(thing).__name__}:{thing!r};".encode("utf-8", "surrogatepass")
 
 
 @dataclass

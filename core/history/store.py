@@ -13,35 +13,69 @@ Other queries are SQL on `store.connection`; `schema` describes the tables.
 from __future__ import annotations
 
 import hashlib
+import os
+import platform
 import sqlite3
 import zlib
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal, Self, TypeAlias
 
 import msgspec
 
-from ..harness.provenance import missing, versions
-from ..harness.record import Record, Results, settled
-from .connections import readable_connection, writable_connection
-from .faults import DamagedRunError, HistoryError, damage_lines, explained
-from .process_identity import alive, owner
+from ..harness.provenance import missing, readable, versions
+from ..harness.record import Record, Results, Seconds, settled
+from .database import (
+    DamagedRunError,
+    HistoryError,
+    damage_lines,
+    explained,
+    readable_connection,
+    writable_connection,
+)
 
 Status: TypeAlias = Literal["running", "finished", "interrupted", "killed"]
 """The file marks a run as running until it ends; without its process, the run was killed."""
-Plan: TypeAlias = Sequence[tuple[str, str, str]]
+Pair: TypeAlias = tuple[str, str, str]
+"""Case, engine and mode."""
+Plan: TypeAlias = Sequence[Pair]
 
 # Level of compression: the best level makes a record of 73 kB 3 % smaller, and takes 6 ms instead
 # of 1.
 QUICK = 1
 
+FIELDS = ("engine", "mode", "message", "validated", "version", "solved", "samples")
+NUMBERS = ("residual_max", "us_per_step")
+"""Columns of `records` that are fields of a record."""
+
+# Long texts as bytes: a damaged one then spoils only its own run.
+_ROW = (
+    "SELECT id, started, finished, status, command, CAST(plan AS BLOB), CAST(circumstances AS"
+    " BLOB), owner FROM runs"
+)
+
+
+class _Key(msgspec.Struct, frozen=True):
+    """The circumstances that tell which task a run had, and where."""
+
+    selection: dict[str, Any] | None = None
+    command: Any = None
+    git: dict[str, Any] | None = None
+    host: Any = None
+
 
 @dataclass(frozen=True)
 class RunRow:
-    """A row of the table `runs`."""
+    """A row of the table `runs`.
+
+    Attributes:
+        key: those circumstances by which runs are chosen.
+        text: all circumstances, as JSON.
+    """
 
     id: int
     started: str
@@ -49,7 +83,18 @@ class RunRow:
     status: Status
     command: str
     plan: Plan
-    circumstances: dict[str, Any]
+    key: dict[str, Any]
+    text: bytes
+
+    @cached_property
+    def circumstances(self) -> dict[str, Any]:
+        """The circumstances of the run, as `Results.run`."""
+        return msgspec.json.decode(self.text)
+
+    @property
+    def git(self) -> dict[str, Any]:
+        """The state of the files of the run; empty without a repository."""
+        return self.key["git"] or {}
 
 
 class Store:
@@ -58,6 +103,7 @@ class Store:
     def __init__(self, path: Path, *, writable: bool = True) -> None:
         self.path = path
         self.passed_over: dict[int, str] = {}  # reasons of unreadable runs
+        self._runs: list[RunRow] | None = None
         with self.explained("opened"):
             self.connection = writable_connection(path) if writable else readable_connection(path)
 
@@ -89,17 +135,13 @@ class Store:
             circumstances: as `Results.run`, with the start time and the command.
             references: as `Results.references`, for readers of an unfinished run.
         """
-        started, command = circumstances["started"], circumstances["command"]
-        row = (started, "running", command, identity, owner(), _json(plan), _json(circumstances))
         with self._transaction():
-            done = self.connection.execute(
-                "INSERT INTO runs (started, status, command, identity, owner, plan, circumstances)"
-                " VALUES (?, ?, ?, ?, ?, ?, ?)",
-                row,
-            )
-            assert done.lastrowid is not None
-            self._attach(done.lastrowid, "references", references or {})
-        return done.lastrowid
+            row = {name: circumstances[name] for name in ("started", "command")}
+            row |= {"status": "running", "identity": identity, "owner": owner()}
+            row |= {"plan": _json(plan), "circumstances": _json(circumstances)}
+            run = self._insert("INTO runs", row)
+            self._attach(run, "references", references or {})
+        return run
 
     def resume_run(self, identity: str) -> RunRow | None:
         """Return the last run of an identity if it is unfinished and no other process writes it.
@@ -123,47 +165,26 @@ class Store:
 
     def add_record(self, run: int, record: Record) -> None:
         """Store a record. A second record of a pair is ignored."""
-        seconds = record.seconds
-        row: dict[str, Any] = {
-            "run_id": run,
-            "case_name": record.case,
-            "engine": record.engine,
-            "mode": record.mode,
-            "made": now(),
-            "outcome": str(record.outcome),
-            "message": record.message,
-            "validated": record.validated,
-            "truth": str(record.truth),
-            "version": record.version,
-            "solved": record.solved,
-            "samples": record.samples,
-            "residual_max": record.residual_max,
-            "build_seconds": seconds and seconds.build,
-            "first_seconds": seconds and seconds.first,
-            "warm_seconds": seconds and seconds.warm,
-            "waited_seconds": seconds and seconds.waited,
-            "compare_seconds": seconds and seconds.compare,
-            "us_per_step": record.us_per_step,
-            "errors": _json(record.errors),
-            "record": zlib.compress(msgspec.json.encode(record), QUICK),
-        }
-        names = ", ".join(row)
+        row = {name: getattr(record, name) for name in (*FIELDS, *NUMBERS)}
+        row |= {"run_id": run, "case_name": record.case, "made": now()}
+        row |= {"outcome": str(record.outcome), "truth": str(record.truth)}
+        seconds = msgspec.structs.asdict(record.seconds or Seconds())
+        row |= {f"{phase}_seconds": time for phase, time in seconds.items()}
+        row |= {"errors": _json(record.errors)}
+        row |= {"record": zlib.compress(msgspec.json.encode(record), QUICK)}
         with self._transaction():
-            places = ", ".join("?" * len(row))
-            self.connection.execute(
-                f"INSERT OR IGNORE INTO records ({names}) VALUES ({places})", [*row.values()]
-            )
+            self._insert("OR IGNORE INTO records", row)
+
+    def _insert(self, where: str, row: Mapping[str, Any]) -> int:
+        places = ", ".join("?" * len(row))
+        text = f"INSERT {where} ({', '.join(row)}) VALUES ({places})"
+        return self.connection.execute(text, [*row.values()]).lastrowid or 0
 
     def finish(self, run: int, results: Results | None = None, status: Status = "finished") -> None:
         """End the run, and store the other parts of the results, such as references."""
         with self._transaction():
-            if results is not None:
-                for kind in (
-                    name
-                    for name in results.__struct_fields__
-                    if name not in ("schema", "run", "records")
-                ):
-                    self._attach(run, kind, getattr(results, kind))
+            for kind in ("references", "scenes", "suspects") if results is not None else ():
+                self._attach(run, kind, getattr(results, kind))
             self.connection.execute(
                 "UPDATE runs SET status = ?, finished = ? WHERE id = ?", (status, now(), run)
             )
@@ -182,14 +203,28 @@ class Store:
             raise HistoryError(f"history {self.path}: there is no run {run}")
 
     def runs(self) -> list[RunRow]:
-        """Return all readable runs, the latest first."""
-        rows: list[RunRow] = []
-        with self.explained("read"):
-            numbers = self.connection.execute("SELECT id FROM runs ORDER BY id DESC").fetchall()
-        for (number,) in numbers:
-            with self.sparing():
-                rows.append(self.run(number))
-        return [row for row in rows if row.id not in self.passed_over]
+        """Return all readable runs, the latest first. They are read once until this store changes
+        them.
+        """
+        if self._runs is None:
+            self._runs = [*self._read_runs()]
+        return [row for row in self._runs if row.id not in self.passed_over]
+
+    def _read_runs(self) -> Iterator[RunRow]:
+        plans: dict[bytes, Plan] = {}
+        try:
+            rows = self.connection.execute(f"{_ROW} ORDER BY id DESC").fetchall()
+        except sqlite3.Error:  # a damaged run, which would hide all others
+            with self.explained("read"):
+                query = "SELECT id FROM runs ORDER BY id DESC"
+                numbers = self.connection.execute(query).fetchall()
+            for (number,) in numbers:
+                with self.sparing():
+                    yield self.run(number)
+            return
+        for row in rows:
+            with self.sparing(), self.explained("read", row[0]):
+                yield _run_row(row, plans)
 
     @contextmanager
     def sparing(self) -> Generator[None]:
@@ -211,21 +246,9 @@ class Store:
             HistoryError: there is none.
         """
         with self.explained("read", run):
-            query = (
-                "SELECT id, started, finished, status, command, plan, circumstances, owner FROM"
-                " runs WHERE id = ?"
-            )
-            row = self.connection.execute(query, (run,)).fetchone()
+            row = self.connection.execute(f"{_ROW} WHERE id = ?", (run,)).fetchone()
             if row is not None:
-                return RunRow(
-                    id=row[0],
-                    started=row[1],
-                    finished=row[2],
-                    status="killed" if row[3] == "running" and not alive(row[7]) else row[3],
-                    command=row[4],
-                    plan=msgspec.json.decode(row[5], type=list[tuple[str, str, str]]),
-                    circumstances=msgspec.json.decode(row[6], type=dict[str, Any]),
-                )
+                return _run_row(row, {})
         raise HistoryError(f"history {self.path}: there is no run {run}")
 
     def records(self, run: int) -> list[Record]:
@@ -273,21 +296,36 @@ class Store:
 
     @contextmanager
     def _transaction(self) -> Generator[None]:
+        self._runs = None
         with self.explained("written"):
             self.connection.execute("BEGIN IMMEDIATE")
             try:
                 yield
                 self.connection.execute("COMMIT")
             except BaseException:
-                if (
-                    self.connection.in_transaction
-                ):  # after some failures SQLite has already ended the transaction
+                # after some failures SQLite has already ended the transaction
+                if self.connection.in_transaction:
                     self.connection.execute("ROLLBACK")
                 raise
 
     def explained(self, what: str, run: int | None = None) -> AbstractContextManager[None]:
         """Raise faults of the database as a HistoryError; see `faults`."""
         return explained(self.path, what, run)
+
+
+def _run_row(row: Sequence[Any], plans: dict[bytes, Plan]) -> RunRow:
+    """Return a row of `_ROW`.
+
+    Args:
+        plans: those read so far, by their texts; most runs of a history have the same.
+    """
+    number, started, finished, status, command, plan, text, process = row
+    if plan not in plans:
+        plans[plan] = msgspec.json.decode(plan, type=list[Pair])
+    key = msgspec.structs.asdict(msgspec.json.decode(text, type=_Key))
+    killed = status == "running" and not alive(process)
+    status = "killed" if killed else status
+    return RunRow(number, started, finished, status, command, plans[plan], key, text)
 
 
 def _json(value: Any) -> str:
@@ -297,3 +335,37 @@ def _json(value: Any) -> str:
 def now() -> str:
     """Return the current time in the format of the history."""
     return datetime.now(UTC).isoformat(timespec="milliseconds")
+
+
+def owner() -> str:
+    """Return host, process id and start of this process; systems reuse process ids."""
+    return f"{readable(platform.node())}|{os.getpid()}|{_begun(os.getpid())}"
+
+
+def alive(owner: str) -> bool:
+    """Return whether a process still runs. A process of another host counts as ended."""
+    host, number, begun = owner.rsplit("|", 2)
+    if host != readable(platform.node()):
+        return False
+    try:
+        os.kill(int(number), 0)  # signal 0 only tests the process
+    except ProcessLookupError:
+        return False
+    except OSError:  # the process is another user's, or the system cannot tell
+        pass
+    return _begun(int(number)) == begun
+
+
+def _begun(number: int) -> str:
+    """Return the clock ticks from the start of the system to the start of the process.
+
+    Empty without /proc, and for an ended process whose exit status nobody has read.
+    """
+    try:
+        # the second field is the program's name in brackets, which may hold any character
+        state, *fields = (
+            Path(f"/proc/{number}/stat").read_text("utf-8", "replace").rpartition(")")[2].split()
+        )
+        return "" if state in "ZX" else fields[18]
+    except (OSError, ValueError, IndexError):
+        return ""

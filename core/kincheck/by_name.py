@@ -16,9 +16,9 @@ from kincheck.core.harness.engine import Engine
 from kincheck.core.harness.record import Results
 from kincheck.core.harness.scene import with_scenes
 from kincheck.core.harness.workers.pool import solver_for
+from kincheck.core.studies.checks.findings import Report
 from kincheck.core.studies.compliance import study
 from kincheck.core.studies.compliance.study import ComplianceResults
-from kincheck.core.studies.findings import Report
 
 _One = TypeVar("_One")
 

@@ -33,143 +33,90 @@ The folders:
 
     formulation      constraints as equations, in Cartesian or joint coordinates
     structure        degrees of freedom, redundant rows, components, sparse factors
-    compiled         one mechanism as compiled programs: request, programs, model, samples
-    continuation     the walk along a path, step halving, singular poses, curves by arc length
+    compiled         one mechanism as compiled programs: request, programs, model, routes
+    continuation     the walk along a path, singular poses, curves by arc length
     blocks           large mechanisms as lists of blocks: components, or one sparse system
-    forces           the equations of forces, and the forces of a solved motion
     statics          equilibria with springs, bushings and loads, and their compliance
-    sparse           the equations of large mechanisms as a sparse system
+    forces           the equations of forces, and the forces of a solved motion
     assembly         closed poses from estimates and random starts
     diagnosis        rank, conditioning and screws at a pose
     verified         samples enclosed in balls by Krawczyk's test
 """
 
+# pyright: reportUnusedImport=false
+
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .assembly.assemble import Assembled as Assembled
-    from .assembly.assemble import assemble as assemble
-    from .assembly.assembly_modes import Assemblies as Assemblies
-    from .assembly.assembly_modes import Assembly as Assembly
-    from .assembly.assembly_modes import find_assemblies as find_assemblies
-    from .compiled.motion_start import Start as Start
-    from .compiled.motion_start import notes_on_start as notes_on_start
-    from .compiled.motion_start import solve_from_start as solve_from_start
-    from .compiled.motion_start import start_of as start_of
-    from .compiled.request import LAST_ITERATION as LAST_ITERATION
-    from .continuation.curve import Curve as Curve
-    from .continuation.curve import Event as Event
-    from .continuation.trace import trace as trace
-    from .design_batch import Variants as Variants
-    from .design_forces import ForcesOfDesigns as ForcesOfDesigns
-    from .design_sweep import Designs as Designs
-    from .design_sweep import solve_designs as solve_designs
-    from .diagnosis.conditioning import Conditioning as Conditioning
-    from .diagnosis.conditioning import PoseConditioning as PoseConditioning
-    from .diagnosis.conditioning import conditioning as conditioning
-    from .diagnosis.freeing import freeing as freeing
-    from .diagnosis.instantaneous_screws import Screw as Screw
-    from .diagnosis.instantaneous_screws import describe_screws as describe_screws
-    from .diagnosis.position_gradients import Gradient as Gradient
-    from .diagnosis.rank import Blocked as Blocked
-    from .diagnosis.rank import ComponentCount as ComponentCount
-    from .diagnosis.rank import Dependency as Dependency
-    from .diagnosis.rank import NamedRow as NamedRow
-    from .diagnosis.rank import Ranks as Ranks
-    from .diagnosis.rank import Violation as Violation
-    from .followed_angles import in_doubt as in_doubt
-    from .followed_attitudes import DOUBTFUL as DOUBTFUL
-    from .followed_attitudes import agreement as agreement
-    from .followed_way import near_design as near_design
-    from .forces.motion_defects import motion_defects as motion_defects
-    from .forces.reactions import forces_of as forces_of
-    from .forces.reactions import with_forces as with_forces
-    from .formulation.acceptance_criteria import LONGEST_TURN as LONGEST_TURN
-    from .formulation.acceptance_criteria import ROUNDING as ROUNDING
-    from .formulation.acceptance_criteria import continued as continued
-    from .formulation.acceptance_criteria import continuous as continuous
-    from .formulation.acceptance_criteria import regular_between as regular_between
-    from .formulation.cartesian import COLUMNS as COLUMNS
-    from .formulation.cartesian import Cartesian as Cartesian
-    from .formulation.constraints import Frames as Frames
-    from .formulation.constraints import Relation as Relation
-    from .formulation.constraints import Style as Style
-    from .formulation.constraints import constraints as constraints
-    from .formulation.constraints import unit_near as unit_near
-    from .formulation.load_parameters import LoadPlace as LoadPlace
-    from .formulation.load_parameters import load_places as load_places
-    from .formulation.parameters import kinds as kinds
-    from .formulation.parameters import placed as placed
-    from .formulation.parameters import places as places
-    from .native_solver import Method as Method
-    from .native_solver import NativeSolver as NativeSolver
-    from .one_design import solve as solve
-    from .prepared_designs import PreparedDesigns as PreparedDesigns
-    from .program_size import ProgramSize as ProgramSize
-    from .solver_selection import Solver as Solver
-    from .solver_selection import followed_angle as followed_angle
-    from .solver_selection import followed_attitude as followed_attitude
-    from .solver_selection import follower as follower
-    from .statics.equations import LoadPoint as LoadPoint
-    from .statics.equilibrium import Equilibria as Equilibria
-    from .statics.equilibrium import StaticModel as StaticModel
-    from .structure.driver_count import degrees_of_freedom as degrees_of_freedom
-    from .structure.driver_count import require_driven as require_driven
-    from .structure.reduction import largest_residual as largest_residual
-    from .structure.reduction import reduce_rows as reduce_rows
-    from .verified.exact import Exact as Exact
-    from .verified.exact import Reading as Reading
-    from .verified.exact import as_decimal as as_decimal
-    from .verified.exact import as_double as as_double
-    from .verified.force_enclosure import EnclosedForces as EnclosedForces
-    from .verified.force_enclosure import UnprovedError as UnprovedError
-    from .verified.krawczyk import Enclosure as Enclosure
-    from .verified.pose_proof import PoseState as PoseState
-    from .verified.pose_proof import prove_pose as prove_pose
-    from .verified.verified_sweep import Drives as Drives
-    from .verified.verified_sweep import Proofs as Proofs
-    from .verified.verified_sweep import prove as prove
+    from .assembly.assemble import Assembled, assemble
+    from .assembly.assembly_modes import Assemblies, Assembly, find_assemblies
+    from .compiled.request import LAST_ITERATION
+    from .compiled.routes import Start, notes_on_start, solve_from_start, start_of
+    from .continuation.trace import Curve, Event, trace
+    from .design_batch import Designs, Variants, solve_designs
+    from .design_forces import ForcesOfDesigns
+    from .diagnosis.conditioning import Conditioning, Gradient, PoseConditioning, conditioning
+    from .diagnosis.instantaneous_screws import Screw, describe_screws
+    from .diagnosis.rank import (
+        Blocked,
+        ComponentCount,
+        Dependency,
+        NamedRow,
+        Ranks,
+        Violation,
+        freeing,
+    )
+    from .followed import DOUBTFUL, agreement, in_doubt, near_design
+    from .forces.reactions import forces_of, motion_defects, with_forces
+    from .formulation.acceptance_criteria import (
+        LONGEST_TURN,
+        ROUNDING,
+        continued,
+        continuous,
+        regular_between,
+    )
+    from .formulation.cartesian import COLUMNS, Cartesian
+    from .formulation.constraints import Frames, Relation, Style, constraints, unit_near
+    from .formulation.parameters import LoadPlace, kinds, load_places, placed, places
+    from .native_solver import Method, NativeSolver, PreparedDesigns, ProgramSize
+    from .one_design import Solver, followed_angle, followed_attitude, follower, solve
+    from .statics.equations import LoadPoint
+    from .statics.equilibrium import Equilibria, StaticModel
+    from .structure.degrees_of_freedom import degrees_of_freedom, require_driven
+    from .structure.redundancy import largest_residual, reduce_rows
+    from .verified.exact import Exact, Reading, as_decimal, as_double
+    from .verified.exact_forces import EnclosedForces, UnprovedError
+    from .verified.krawczyk import Enclosure
+    from .verified.proofs import Drives, PoseState, Proofs, prove, prove_pose
 
 _NAMES = {
     "assembly.assemble": "Assembled assemble",
     "assembly.assembly_modes": "Assemblies Assembly find_assemblies",
-    "compiled.motion_start": "Start notes_on_start solve_from_start start_of",
     "compiled.request": "LAST_ITERATION",
-    "continuation.curve": "Curve Event",
-    "continuation.trace": "trace",
-    "design_batch": "Variants",
+    "compiled.routes": "Start notes_on_start solve_from_start start_of",
+    "continuation.trace": "Curve Event trace",
+    "design_batch": "Designs Variants solve_designs",
     "design_forces": "ForcesOfDesigns",
-    "design_sweep": "Designs solve_designs",
-    "diagnosis.conditioning": "Conditioning PoseConditioning conditioning",
-    "diagnosis.freeing": "freeing",
+    "diagnosis.conditioning": "Conditioning Gradient PoseConditioning conditioning",
     "diagnosis.instantaneous_screws": "Screw describe_screws",
-    "diagnosis.position_gradients": "Gradient",
-    "diagnosis.rank": "Blocked ComponentCount Dependency NamedRow Ranks Violation",
-    "followed_angles": "in_doubt",
-    "followed_attitudes": "DOUBTFUL agreement",
-    "followed_way": "near_design",
-    "forces.motion_defects": "motion_defects",
-    "forces.reactions": "forces_of with_forces",
+    "diagnosis.rank": "Blocked ComponentCount Dependency NamedRow Ranks Violation freeing",
+    "followed": "DOUBTFUL agreement in_doubt near_design",
+    "forces.reactions": "forces_of motion_defects with_forces",
     "formulation.acceptance_criteria": "LONGEST_TURN ROUNDING continued continuous regular_between",
     "formulation.cartesian": "COLUMNS Cartesian",
     "formulation.constraints": "Frames Relation Style constraints unit_near",
-    "formulation.load_parameters": "LoadPlace load_places",
-    "formulation.parameters": "kinds placed places",
-    "native_solver": "Method NativeSolver",
-    "one_design": "solve",
-    "prepared_designs": "PreparedDesigns",
-    "program_size": "ProgramSize",
-    "solver_selection": "Solver followed_angle followed_attitude follower",
+    "formulation.parameters": "LoadPlace kinds load_places placed places",
+    "native_solver": "Method NativeSolver PreparedDesigns ProgramSize",
+    "one_design": "Solver followed_angle followed_attitude follower solve",
     "statics.equations": "LoadPoint",
     "statics.equilibrium": "Equilibria StaticModel",
-    "structure.driver_count": "degrees_of_freedom require_driven",
-    "structure.reduction": "largest_residual reduce_rows",
+    "structure.degrees_of_freedom": "degrees_of_freedom require_driven",
+    "structure.redundancy": "largest_residual reduce_rows",
     "verified.exact": "Exact Reading as_decimal as_double",
-    "verified.force_enclosure": "EnclosedForces UnprovedError",
+    "verified.exact_forces": "EnclosedForces UnprovedError",
     "verified.krawczyk": "Enclosure",
-    "verified.pose_proof": "PoseState prove_pose",
-    "verified.verified_sweep": "Drives Proofs prove",
+    "verified.proofs": "Drives PoseState Proofs prove prove_pose",
 }
 """Module: its public names. No module of this folder has such a name: once imported, it would take
 the place of the name.

@@ -19,15 +19,13 @@ from ..forces import Forces
 from ..mechanism.mechanism import Mechanism
 from ..trajectory import Array, BodyMotion, Motions, Trajectory
 from .compiled.compiled_model import Model, compile_model
-from .compiled.request import SIGMA, Request
-from .compiled.sample_rows import FORCE_SIGMA
-from .compiled.samples import Route
+from .compiled.request import FORCE_SIGMA, SIGMA, Request
+from .compiled.routes import Route
 from .compiled.traced_forces import can_trace
 from .design_batch import Variants, solve_variants, variant_of
-from .force_solver import motion_only
 from .forces.reactions import forces_of
 from .forces.wanted import WantedForces
-from .solver_selection import ONE_PROGRAM, follower, prepare
+from .one_design import ONE_PROGRAM, follower, motion_only, prepare
 
 
 @dataclass(frozen=True, eq=False)

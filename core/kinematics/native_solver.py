@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from typing import TYPE_CHECKING
 
 from ..errors import SolveError
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.motions import Path
-from ..trajectory import Array
+from ..program import ITERATIONS
+from ..trajectory import QUANTITIES, Array
 from .compiled.compiled_model import Model, compile_model
 from .compiled.request import LAST_ITERATION, Request
-from .compiled.samples import Route
+from .compiled.routes import Route, Start
+from .compiled.step_programs import ALONE, JOINED
 from .continuation.walk import marcher
-from .force_solver import Solver, by_motion, by_program, motion_only
+from .design_batch import RECYCLED, Variants, solve_variants
 from .formulation.constraints import Style
-from .prepared_designs import PreparedDesigns
-from .program_size import ProgramSize
-from .solver_selection import prepare
+from .one_design import Solver, by_blocks, by_motion, by_program, motion_only, prepare, start_notes
+
+if TYPE_CHECKING:
+    from .design_forces import DesignForces, ForcesOfDesigns
 
 
 class Method(StrEnum):
@@ -85,25 +89,10 @@ class NativeSolver:
                 request,
                 path,
                 lambda each: Route(compile_model(mechanism, each), path),
-                prepare,
             )
-        motion = motion_only(mechanism, request)
-        return by_motion(mechanism, request, path, self._large(mechanism, motion, path), prepare)
-
-    def _large(self, mechanism: Mechanism, request: Request, path: Path) -> Solver:
-        # few mechanisms are so large: the others need not wait for the import
-        from .blocks.cascade import Cascade
-        from .blocks.component_lanes import ComponentLanes
-        from .blocks.sparse_lanes import SparseLanes
-        from .blocks.sweep import BlockSweep
-        from .sparse.sparse_equations import SparseEquations
-
-        lanes = (
-            ComponentLanes(Cascade(mechanism, request))
-            if self.method is Method.BY_COMPONENTS
-            else SparseLanes(SparseEquations(mechanism, compiled=self.compiled), request)
-        )
-        return BlockSweep(lanes, path).solve
+        by_components = self.method is Method.BY_COMPONENTS
+        make = by_blocks(mechanism, motion_only(mechanism, request), by_components=by_components)
+        return by_motion(mechanism, request, path, make(path))
 
     def prepare_designs(
         self,
@@ -208,3 +197,118 @@ class NativeSolver:
             varied=tuple(varied),
             last_iteration=self.last_iteration,
         )
+
+
+@dataclass(frozen=True)
+class ProgramSize:
+    """The size of the programs of one mechanism.
+
+    Attributes:
+        unknowns: number of unknowns.
+        rows: number of solved rows.
+        redundant: rows only checked, as "joint: primitive".
+        flops: floating-point operations of each program.
+    """
+
+    unknowns: int
+    rows: int
+    redundant: Sequence[str]
+    flops: Mapping[str, int]
+
+    @staticmethod
+    def of(model: Model) -> ProgramSize:
+        """Return the size of the programs of a model."""
+        account = model.selection.account
+        return ProgramSize(
+            account.moving_coordinates,
+            len(model.selection.chosen),
+            account.redundant_rows,
+            {name: each["flops"] for name, each in model.sizes.items()},
+        )
+
+    def of_sample(self, iterations: float, *, motions: bool = False) -> float:
+        """Return the floating-point operations of a sample: predictor, Newton's iterations, rates,
+        outputs and the test of a solution.
+
+        Operations of rejected lanes, and further iterations for a neighbour's sake, do not count.
+
+        Args:
+            iterations: Newton's iterations of the sample.
+            motions: lanes are motions of their own, of varied geometry, and not samples of one
+                motion; the first few samples of a motion use other programs.
+        """
+        tests = ("extend", *ALONE) if motions else ("extrapolate", *JOINED)
+        once = sum(self.flops[name] for name in ("outputs", *tests))
+        return iterations * self.flops["newton"] + once
+
+
+# Designs solved at once at least: with fewer, the calls around them would be felt.
+FEWEST = 8
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedDesigns:
+    """A mechanism of varied geometry, made ready for a path.
+
+    Attributes:
+        route: the path made ready for the compiled model.
+        loads: computes the forces that are wanted; None without any.
+    """
+
+    route: Route
+    loads: DesignForces | None = None
+
+    def along(self, path: Path) -> PreparedDesigns:
+        """Return the same programs on another path of the same drivers."""
+        route = Route(self.route.model, path)
+        return PreparedDesigns(route, self.loads and self.loads.along(route))
+
+    @property
+    def start(self) -> Start:
+        """The start of the nominal design."""
+        return self.route.begin
+
+    @property
+    def size(self) -> ProgramSize:
+        """The size of the programs."""
+        return ProgramSize.of(self.route.model)
+
+    def at_once(self, most: int) -> int:
+        """Return the number of designs to solve together, at most the given one: the table of their
+        motions fits in recycled memory.
+        """
+        of_a_design = 8 * self.route.model.kept * len(self.route.path.times)
+        return max(FEWEST, min(most, RECYCLED // of_a_design))
+
+    def solve(self, geometry: Array, tol: float) -> Variants:
+        """Solve designs at all samples.
+
+        Args:
+            geometry: numbers of the varied places in their order, shape (numbers, V).
+            tol: as for `solve`.
+        """
+        return solve_variants(self.route, geometry, tol)
+
+    def motion(self, found: Variants, point: str) -> Sequence[Array]:
+        """Return position [m], velocity and acceleration of a point, as far as they were asked for,
+        each of shape (3, n, V).
+        """
+        rows, orders = self.route.model.rows, self.route.model.orders
+        return [found.kept[rows[f"{label} {point}"]] for label in QUANTITIES[:orders]]
+
+    def forces(self, found: Variants, geometry: Array, tol: float) -> ForcesOfDesigns | None:
+        """Return the forces of solved designs; None where none are wanted.
+
+        Args:
+            found: what `solve` returns for the geometry.
+        """
+        return self.loads and self.loads.of(found, geometry, tol)
+
+    def iterations(self, found: Variants) -> Array:
+        """Return Newton's iterations of each sample, shape (n, V)."""
+        return found.kept[self.route.model.rows[ITERATIONS].start]
+
+    def start_notes(self, tol: float) -> list[str]:
+        """Return notes on the assumed start of the nominal design; none if it is certain."""
+        model = self.route.model
+        return start_notes(model.mechanism, model.request, self.route.path, tol)

@@ -14,7 +14,7 @@ from typing import Any, TypeAlias
 
 from ..errors import MechanismError
 from ..input_checks import finite
-from .dimension import Dimension
+from .body import Dimension
 
 Curve: TypeAlias = tuple[tuple[float, float], ...]
 """Pairs of deflection and force, deflections increasing."""

@@ -15,8 +15,7 @@ from typing import Any, ClassVar, Self, cast
 from ..errors import MechanismError, Phrase
 from ..input_checks import finite, held, plain, require_direction, require_finite, triple
 from ..joints.base import Joint, Kind, position, positions, unit
-from .curves import checked_curve, curve, dimensions_of, scaled
-from .dimension import (
+from .body import (
     ANGLE,
     DAMPING,
     FORCE,
@@ -28,6 +27,7 @@ from .dimension import (
     dimension_of,
     quantity,
 )
+from .curves import checked_curve, curve, dimensions_of, scaled
 
 # Axes of a file have some digits; more than this apart from a right angle is no slip of digits.
 PERPENDICULAR = 1e-3

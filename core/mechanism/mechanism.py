@@ -1,14 +1,17 @@
 """Mechanism: bodies, points, joints and drivers as data, names and shapes checked, no numerics.
 
 All points and axes are global, at the design position, in SI units, as in a table of hardpoints.
+`spanning_tree` gives a tree from the ground and the joints it cuts, `with_equivalents` the same
+mechanism with joints of known types only, by the equivalents that joints declare.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from heapq import heapify, heappop, heappush
 from typing import Any
 
 from ..errors import MechanismError, Phrase, UnknownNameError, unknown, with_article
@@ -18,8 +21,8 @@ from ..joints.coupler import Coupler
 from ..joints.gap import gap
 from ..trajectory import MARKER
 from .body import Body, Vector
-from .drivers import Driver, JointDriver, PointCoordinate
 from .loads import Bushing, ForceElement, TorsionSpringDamper
+from .motions import Driver, JointDriver, PointCoordinate
 
 GROUND = "ground"
 """The name of the global frame; it can be used like a body and needs no declaration."""
@@ -418,3 +421,138 @@ def _known(who: str, what: str, name: str, known: Mapping[str, Any], key: str) -
     if name in known:
         return
     raise MechanismError(f"{who}: {unknown(what, name, known)}", key)
+
+
+@dataclass(frozen=True)
+class Branch:
+    """A body of the tree: its joint from the parent, or none if it moves freely relative to the
+    ground.
+    """
+
+    parent: str
+    child: str
+    joint: Joint | None
+
+
+@dataclass(frozen=True)
+class SpanningTree:
+    """Branches, every parent before its children, and the joints left over, which close the loops.
+
+    Fixed bodies appear only as parents, under the name "ground".
+    """
+
+    branches: tuple[Branch, ...]
+    cut: tuple[Joint, ...]
+
+
+def spanning_tree(mechanism: Mechanism, first: Collection[str] = ()) -> SpanningTree:
+    """Return the tree with the fewest coordinates: driven and coupled joints first, then those with
+    the most rows (Prim).
+
+    A joint with a driven or coupled freedom stays in the tree, so the freedom is a coordinate.
+    Joints of fewer than three rows (a distance) hold a body too loosely to carry it; a body with
+    such joints only is free.
+
+    Args:
+        first: further joints, taken as driven ones are.
+    """
+    named = {*first} | {
+        driver.joint for driver in mechanism.drivers if isinstance(driver, JointDriver)
+    }
+    named |= {joint for coupler in mechanism.couplers for joint in coupler.joints}
+    candidates = [joint for joint in mechanism.joints if joint.rows >= 3]
+    # the smallest is taken first
+    ranks = [(joint.name not in named, -joint.rows, k) for k, joint in enumerate(candidates)]
+    touching: dict[str, list[int]] = {}
+    for k, joint in enumerate(candidates):
+        for body in joint.bodies:
+            touching.setdefault(body, []).append(k)
+    placed = {GROUND} | {body.name for body in mechanism.bodies if body.fixed}
+    # a heap of the joints with one end placed, and some with both; a search through all joints for
+    # every body is quadratic
+    reaching = [ranks[k] for body in placed for k in touching.get(body, ())]
+    heapify(reaching)
+    waiting, count = iter(mechanism.moving), len(mechanism.moving)
+    branches: list[Branch] = []
+    used: set[str] = set()
+    while len(branches) < count:
+        joint = _next(reaching, candidates, placed)
+        if joint is not None:
+            parent, child = joint.bodies if joint.i in placed else (joint.j, joint.i)
+            used.add(joint.name)
+        else:
+            parent, child = GROUND, next(body.name for body in waiting if body.name not in placed)
+        placed.add(child)
+        for k in touching.get(child, ()):
+            heappush(reaching, ranks[k])
+        branches.append(Branch(GROUND if mechanism.is_fixed(parent) else parent, child, joint))
+    return SpanningTree(
+        tuple(branches), tuple(joint for joint in mechanism.joints if joint.name not in used)
+    )
+
+
+def _next(
+    reaching: list[tuple[bool, int, int]], candidates: Sequence[Joint], placed: Collection[str]
+) -> Joint | None:
+    """Return the first joint of the heap from a placed body to an unplaced one."""
+    while reaching:
+        joint = candidates[heappop(reaching)[-1]]
+        if joint.i not in placed or joint.j not in placed:
+            return joint
+    return None
+
+
+def with_equivalents(mechanism: Mechanism, known: Collection[type[Joint]]) -> Mechanism:
+    """Return the mechanism with joints of other types replaced by their equivalents.
+
+    Bodies that are added have no mass. Joints without an equivalent stay. A driver or a coupler
+    that names a joint needs a joint of this name among the equivalents.
+
+    Args:
+        known: exact types of the joints that stay.
+    """
+    if all(type(joint) in known for joint in mechanism.joints):
+        return mechanism
+    parts = [part for joint in mechanism.joints for part in _parts(joint, known)]
+    added = [part for part in parts if isinstance(part, Body)]
+    joints = [part for part in parts if isinstance(part, Joint)]
+    if joints == list(mechanism.joints):
+        return mechanism
+    return replace(mechanism, bodies=[*mechanism.bodies, *added], joints=joints)
+
+
+def replaced_joints(mechanism: Mechanism, known: Collection[type[Joint]]) -> dict[str, list[str]]:
+    """Return the joints that have equivalents in place, by name: the types of those joints."""
+    return {
+        joint.name: [part.type for part in _parts(joint, known) if isinstance(part, Joint)]
+        for joint in mechanism.joints
+        if type(joint) not in known and declared_equivalent(joint) is not None
+    }
+
+
+def _parts(
+    joint: Joint, known: Collection[type[Joint]], inside: tuple[type[Joint], ...] = ()
+) -> Iterator[Body | Joint]:
+    """Yield the bodies and joints in place of a joint, or the joint itself."""
+    offered = None if type(joint) in (*known, *inside) else declared_equivalent(joint)
+    if offered is None:
+        yield joint
+        return
+    bodies, joints = offered
+    yield from bodies
+    for each in joints:
+        yield from _parts(each, known, (*inside, type(joint)))
+
+
+def declared_equivalent(joint: Joint) -> tuple[list[Body], list[Joint]] | None:
+    """Return the equivalent of a joint; None if its type declares none.
+
+    An equivalent is of the primitives beside it: a subclass with other primitives inherits none.
+    """
+    for cls in type(joint).__mro__:
+        if "equivalent" in vars(cls):
+            found = joint.equivalent()
+            return None if found is None else ([*found[0]], [*found[1]])
+        if "primitives" in vars(cls):
+            return None
+    return None

@@ -1,6 +1,7 @@
-"""Motions: a driver's value over time, with its first two derivatives.
+"""Drivers of a mechanism, and their motions: a value over time, with its first two derivatives.
 
-Values are measured from the design position [m or rad]; times are in seconds.
+A driver adds one equation  Phi(q) - c(t) = 0  per driven coordinate. Values are measured from the
+design position [m or rad]; times are in seconds.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import MechanismError
-from ..input_checks import finite, held
+from ..input_checks import finite, held, require_direction, require_finite, triple
+from ..joints.base import Joint, Kind
 from ..trajectory import Array
 
 ROUNDED_TIME = 1e-12
@@ -250,14 +252,11 @@ class Path:
         """Return value, velocity and acceleration of the drivers at times t, shape (3, names,
         *t.shape).
         """
-        still = (np.zeros_like(t),) * 3
-        return np.stack(
-            [
-                np.stack(self.motions[name].at(t) if name in self.motions else still)
-                for name in names
-            ],
-            axis=1,
-        )
+        found = np.zeros((3, len(names), *t.shape), np.result_type(t, np.float64))
+        for k, name in enumerate(names):
+            if name in self.motions:
+                found[:, k] = self.motions[name].at(t)
+        return found
 
     def values(self, t: Array) -> Array:
         """Return the moving drivers' values from the design at times t, shape (drivers, n)."""
@@ -298,3 +297,109 @@ def _finite(who: str, **numbers: Any) -> None:
     for name, value in numbers.items():
         if not finite(value):
             raise MechanismError(f"{who} motion: {name} is {value!r}; give a finite number")
+
+
+@dataclass(frozen=True)
+class Waypoints(Motion):
+    """Twice differentiable motion through values at increasing times, with the same rate and
+    without acceleration at each.
+
+    Between two times it is a quintic, outside of them a ramp.
+
+    Attributes:
+        times: of the values [s].
+        values: from the design [m or rad].
+        rate: at each of the times [driver units per second].
+    """
+
+    times: tuple[float, ...]
+    values: tuple[float, ...]
+    rate: float
+
+    def at(self, t: Array) -> tuple[Array, Array, Array]:
+        """Return value, velocity and acceleration; they are exact at the times given."""
+        times, values = np.array(self.times), np.array(self.values)
+        k = np.clip(np.searchsorted(times, t, side="right") - 1, 0, len(times) - 1)
+        lengths = np.append(np.diff(times), 1.0)
+        surplus = np.append(np.diff(values) - self.rate * lengths[:-1], 0.0)[k]
+        h, since = lengths[k], t - times[k]
+        part = np.maximum(since / h, 0.0)
+        rest = 1.0 - part
+        return (
+            values[k] + surplus * part**3 * (10.0 + part * (6.0 * part - 15.0)) + self.rate * since,
+            self.rate + surplus * 30.0 * (part * rest) ** 2 / h,
+            surplus * 60.0 * part * rest * (rest - part) / h**2,
+        )
+
+
+@dataclass(frozen=True)
+class Driver:
+    """Base of the drivers. Values are in radians if it turns, else in metres."""
+
+    type: ClassVar[str]
+    turns: ClassVar[bool] = False
+    name: str
+
+
+@dataclass(frozen=True)
+class PointCoordinate(Driver):
+    """Drives the coordinate of a point along a fixed global direction.
+
+    Attributes:
+        point: name of the driven point.
+        direction: global direction, any length but zero [-].
+        relative: the value is the change from the design position (default), else the coordinate
+            itself [m]; see `Mechanism.design_value`.
+    """
+
+    type: ClassVar[str] = "point_coordinate"
+    point: str
+    direction: tuple[float, float, float]
+    relative: bool = True
+
+    def __post_init__(self) -> None:
+        who = f"driver {self.name!r}: direction"
+        object.__setattr__(self, "direction", triple(who, self.direction, Kind.DIRECTION.value))
+        require_finite(who, self.direction, Kind.DIRECTION.value)
+        require_direction(who, self.direction)
+
+
+@dataclass(frozen=True)
+class JointDriver(Driver):
+    """Base of the drivers of a joint's own freedom: second body relative to first, zero at
+    design.
+    """
+
+    freedom: ClassVar[str]
+    joint: str
+    relative: bool = True
+
+    def check(self, joint: Joint) -> None:
+        """Raise MechanismError unless the joint has the freedom this driver drives."""
+        if self.freedom not in joint.freedoms:
+            raise MechanismError(
+                f"driver {self.name!r} ({self.type}): joint {joint.name!r} is {joint.type} and has"
+                f" no {self.freedom} to drive; its freedoms: {', '.join(joint.freedoms) or 'none'}",
+                f"drivers.{self.name}.joint",
+            )
+
+
+@dataclass(frozen=True)
+class JointAngle(JointDriver):
+    """Drives the rotation of a joint's second body relative to its first, about the axis by the
+    right hand [rad].
+    """
+
+    type: ClassVar[str] = "joint_angle"
+    turns: ClassVar[bool] = True
+    freedom: ClassVar[str] = "rotation"
+
+
+@dataclass(frozen=True)
+class JointDisplacement(JointDriver):
+    """Drives the displacement of a joint's second body relative to its first, along the axis
+    [m].
+    """
+
+    type: ClassVar[str] = "joint_displacement"
+    freedom: ClassVar[str] = "translation"

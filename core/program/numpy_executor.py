@@ -1,38 +1,230 @@
-"""Execution of plans with numpy: no start-up cost; the oracle of the tests."""
+"""Execution of plans with numpy: one ufunc call per operation, over all lanes at once.
+
+No start-up cost; the oracle of the tests.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..trajectory import Array
-from .executor_protocol import Parts, Side
-from .numpy_lanes import NumpyLanes
-from .numpy_track import NumpyTrack
-from .plan import MARGIN
-from .tape import NODES
+from .plan import DONE, ITERATIONS, MARGIN, Parts, Plan, Side, Table
+from .straight_line import Program
+from .tape import LEAVES, NODES, operands, place_of
 
 
-class NumpyExecutor(NumpyLanes):
-    """Loops over the lanes of a plan; see `Executor`."""
+def _min(a: Array, b: Array, out: Array) -> None:
+    np.minimum(a, b, out=out)  # by keyword: numpy rejects a third positional array
+
+
+def _max(a: Array, b: Array, out: Array) -> None:
+    np.maximum(a, b, out=out)
+
+
+_UFUNCS: dict[str, Callable[..., Any]] = {
+    "+": np.add,
+    "-": np.subtract,
+    "*": np.multiply,
+    "/": np.divide,
+    "neg": np.negative,
+    "sqrt": np.sqrt,
+    "sin": np.sin,
+    "cos": np.cos,
+    "abs": np.absolute,
+    "min": _min,
+    "max": _max,
+}
+
+Call = tuple[Callable[..., Any], tuple[Any, ...]]
+
+
+def _larger(a: Array, b: Array, size_a: Array, size_b: Array, out: Array) -> None:
+    np.greater(np.absolute(a, size_a), np.absolute(b, size_b), out=out)
+
+
+def _largest(out: Array, values: Array) -> None:
+    np.maximum.reduce(values, axis=0, out=out)
+
+
+class NumpyExecutor:
+    """A plan bound to a number of lanes, here a block of shape (slots, lanes). Every executor has
+    these methods. Lanes that divide by zero hold inf or nan; no error is raised.
+
+    Attributes:
+        lanes, group: number of lanes, and of those that a track attempts together.
+        margin: samples that a track may read beyond the last.
+        heads: lanes without a lane before them.
+    """
+
+    margin = 0
+
+    def __init__(self, plan: Plan, lanes: int) -> None:
+        self.lanes = self.group = lanes
+        self.block: Array = np.zeros((len(plan.slots), lanes))
+        self.plan = plan
+        self.heads: list[int] = [0]
+        self._calls: dict[str, list[Call]] = {}
+
+    def clear(self) -> None:
+        """Set all slots of all lanes to zero."""
+        self.block[:] = 0.0
+
+    def put(self, slots: Sequence[int], values: Array) -> None:
+        """Set slots of all lanes, shape (slots, lanes) or (slots, 1)."""
+        self.block[slots] = values
+
+    def get(self, slots: Sequence[int]) -> Array:
+        """Return a copy of slots of all lanes, shape (slots, lanes)."""
+        return self.block[slots]
+
+    def window(self, slots: range) -> Array:
+        """Return a view of slots in memory, shaped as the result of `arranged`."""
+        return self.block[slots.start : slots.stop]
+
+    def arranged(self, table: Table) -> Table:
+        """Return a table of slots by lanes in memory layout; the last lane fills up the last
+        vector.
+        """
+        return table
+
+    def run(self, name: str) -> None:
+        """Run one of `Plan.programs` over all lanes."""
+        if name not in self._calls:
+            self._calls[name] = self._bind(self.plan.programs[name])
+        with np.errstate(all="ignore"):
+            for call, arguments in self._calls[name]:
+                call(*arguments)
+
+    def attempt(self) -> None:
+        """Attempt all lanes, each alone."""
+        self.settle("predict", self.plan.alone)
+
+    def settle(self, start: str, tests: Sequence[str]) -> None:
+        """Attempt all lanes: predict by `start`, iterate Newton, run the tests."""
+        slots = self.plan.slots
+        residual, iterations = (self.block[slots[name]] for name in ("residual", ITERATIONS))
+        done = np.zeros(self.lanes, dtype=np.bool_)
+        iterations[:] = 0.0
+        self.run(start)
+        for _ in range(self.plan.most):
+            self.run("newton")
+            iterations += ~done
+            done |= residual < self.plan.tolerance
+            if (done | ~np.isfinite(residual)).all():
+                break
+        for name in self.plan.after:
+            self.run(name)
+        self.block[slots[DONE]] = done
+        for name in tests:
+            self.run(name)
+
+    def carry(self) -> None:
+        """Copy `Plan.carried` of all lanes, for the next prediction."""
+        source, target = np.array(self.plan.carried).T
+        self.block[target] = self.block[source]
+
+    def go_back(self, sample: Array) -> None:
+        """Restore the lanes to the state they were predicted from, ready for a new prediction.
+
+        Args:
+            sample: values of `Plan.sampled` there, shape (sampled, 1).
+        """
+        source, target = np.array(self.plan.carried).T
+        self.block[source], self.block[list(self.plan.sampled)] = self.block[target], sample
+        for name in self.plan.onward:
+            self.run(name)
+
+    def _before(self, x: Array, first: Array, out: Array) -> None:
+        out[..., 1:] = x[..., :-1]
+        out[..., self.heads] = first[..., self.heads]
+
+    def _bind(self, program: Program) -> list[Call]:
+        """Return the calls of a program; a register is free again after its last reader."""
+        times, block, functions = (
+            program.times,
+            self.block,
+            {**_UFUNCS, "before": self._before},
+        )
+        shape = self.lanes if times == 1 else (times, self.lanes)
+        scratch = np.empty((2, self.lanes)) if times == 1 else np.empty((2, times, self.lanes))
+        last = {x: k for k, node in enumerate(program.nodes) for x in operands(node)}
+        kept = set(program.outputs.values())
+        place: list[Any] = []
+        free: dict[type, list[Array]] = {np.float64: [], np.bool_: []}
+        calls: list[Call] = []
+        for k, (op, *rest) in enumerate(program.nodes):
+            if op == "input":
+                slot = int(rest[0])
+                place.append(block[slot] if times == 1 else block[slot : slot + times])
+                continue
+            if op == "node":
+                _, lane = place_of(int(rest[1]), self.lanes)
+                place.append(self.block[int(rest[0]), lane : lane + 1])
+                continue
+            if op == "const":
+                place.append(np.float64(rest[0]))
+                continue
+            arguments = [int(x) for x in rest]
+            kind = np.bool_ if op == "larger" else np.float64
+            out = free[kind].pop() if free[kind] else np.empty(shape, kind)
+            place.append(out)
+            read = [place[x] for x in arguments]
+            if op == "larger":
+                calls.append((_larger, (*read, *scratch, out)))
+            elif op == "where":  # every other operation where rows are chosen; two calls are
+                decision, chosen, otherwise = read  # quicker than one of Python around them
+                calls += [
+                    (np.copyto, (out, otherwise)),
+                    (np.putmask, (out, decision, chosen)),
+                ]
+            else:
+                calls.append((functions[op], (*read, out)))
+            for x in set(arguments):
+                if last[x] == k and x not in kept and program.nodes[x][0] not in LEAVES:
+                    free[np.bool_ if program.nodes[x][0] == "larger" else np.float64].append(
+                        place[x]
+                    )
+        # an input that goes to another slot must survive the output that overwrites its own
+        for node in kept:
+            if program.nodes[node][0] in ("input", "node"):
+                copy = np.empty(shape)
+                calls.append((np.copyto, (copy, place[node])))
+                place[node] = copy
+        write = np.copyto if times == 1 else _largest
+        return calls + [
+            (write, (block[slot], place[node])) for slot, node in program.outputs.items()
+        ]
 
     def track(self, sides: Sequence[Side], start: Array, n: int) -> NumpyTrack:
-        """See `Executor`."""
+        """Bind the samples of one motion, n in all, and its start: values of the targets in
+        `Plan.carried`, in order.
+        """
         return NumpyTrack(self, sides, start, n)
 
     @property
     def room(self) -> int:
-        """See `Executor`."""
+        """Lanes with those that fill up the last vector."""
         return self.lanes
 
     def table(self, columns: int) -> Array:
-        """See `Executor`."""
+        """Return an empty output array of `fan`, shape (kept, columns, room)."""
         return np.empty((len(self.plan.kept), columns, self.room))
 
     def fan(self, samples: Array, out: Array, worst: Array, first: int, step: int) -> None:
-        """See `Executor`."""
+        """Follow one motion per lane through the same samples, each lane alone.
+
+        Args:
+            samples: `Plan.sampled`, shape (sampled, n).
+            out: output table of `Plan.kept`; NaN from the first rejected sample of a lane.
+            worst: in and out: the largest of `Plan.largest` and the smallest of `Plan.smallest` per
+                lane, over its previous value and all samples; NaN for a lane with a rejected
+                sample. Shape (largest and smallest, room).
+            first, step: column of the first sample, and the step to the next: 1 or -1.
+        """
         plan, block = self.plan, self.block
         kept, remembered = list(plan.kept), list(plan.remembered)
         source, target = np.array(plan.carried_on).T
@@ -68,7 +260,17 @@ class NumpyExecutor(NumpyLanes):
         return self.block[self.plan.slots[MARGIN]] > 0.0
 
     def fold(self, table: Array, totals: Array) -> None:
-        """See `Executor`."""
+        """Reduce numbers into totals, column by column, in the first group of lanes.
+
+        Per column: set `Plan.kept` to the totals; read groups of numbers into `Plan.taken`, as many
+        at a time as it has slots, and run the programs in `after`; at the end write `Plan.kept` to
+        the totals.
+
+        Args:
+            table: shape (columns, room), contiguous; room is a multiple of the numbers read at a
+                time.
+            totals: shape (kept, columns, group), contiguous.
+        """
         plan, block = self.plan, self.block
         for column, row in enumerate(table):
             block[list(plan.kept)] = totals[:, column]
@@ -79,11 +281,15 @@ class NumpyExecutor(NumpyLanes):
             totals[:, column] = block[list(plan.kept)]
 
     def groups(self, lanes: int) -> int:
-        """See `Executor`; always one, because programs are bound to all lanes."""
+        """Return the number of vector groups that hold so many lanes."""
         return 1
 
     def parts(self, parts: Parts) -> Callable[[int], object]:
-        """See `Executor`."""
+        """Return a call that attempts the parts of a large mechanism in order, on the current
+        values of their arrays.
+
+        Its argument is the number of groups; each lane is attempted alone.
+        """
         plan, block = self.plan, self.block
 
         def call(groups: int) -> None:
@@ -99,3 +305,126 @@ class NumpyExecutor(NumpyLanes):
                     parts.ahead[member, k] = block[slot, -1]
 
         return call
+
+
+def _leading(margins: Array) -> int:
+    """Return the number of accepted lanes before the first rejected one."""
+    good = margins > 0.0
+    return len(good) if good.all() else int(good.argmin())
+
+
+class NumpyTrack:
+    """One motion, followed along both sides of its start, through known samples.
+
+    Attributes:
+        anchors: current state of each side: values of the targets in `Plan.carried`, a row per
+            side.
+        worst: the largest of `Plan.largest`, or zero, and the smallest of `Plan.smallest`, over all
+            samples stored since `begin`.
+    """
+
+    def __init__(
+        self, executor: NumpyExecutor, sides: Sequence[Side], start: Array, n: int
+    ) -> None:
+        self._executor, self._sides, self._start, self._n = executor, sides, start, n
+        self.anchors = np.tile(start, (len(sides), 1))
+
+    def begin(self) -> Array:
+        """Return an array for `Plan.kept` of all samples, shape (kept, n), filled from now on.
+
+        The caller must hold it during the motion: it may be large, so the track keeps no reference.
+        """
+        plan = self._executor.plan
+        self.worst = np.repeat([0.0, np.inf], [len(plan.largest), len(plan.smallest)])
+        self._kept = np.empty((len(plan.kept), self._n))
+        return self._kept
+
+    def run(self) -> Sequence[int]:
+        """Follow every side from the start to its end; return the first rejected sample of each, or
+        its count.
+
+        The anchor of a completed side is invalid: no program prepares it for a continuation.
+        """
+        executor, counts = self._executor, [side.count for side in self._sides]
+        if sum(counts) > executor.lanes:
+            return [self.follow(k, 0, count, anew=True) for k, count in enumerate(counts)]
+        plan, block = executor.plan, executor.block
+        source, target = np.array(plan.carried).T
+        ends = np.cumsum(counts)
+        block[target] = self._start[:, None]
+        for side, end in zip(self._sides, ends, strict=True):
+            block[list(plan.sampled), end - side.count :] = side.samples[:, -1:]
+            block[list(plan.sampled), end - side.count : end] = side.samples
+        executor.heads[:] = [0, *ends[:-1]]
+        try:
+            executor.settle("predict", plan.joined)
+        finally:  # after an interrupt the executor is used again
+            executor.heads[:] = [0]
+        lanes = [block[:, end - count : end] for count, end in zip(counts, ends, strict=True)]
+        reached = [_leading(each[plan.slots[MARGIN]]) for each in lanes]
+        for side, each, accepted in zip(self._sides, lanes, reached, strict=True):
+            if accepted:
+                self._keep(side, 0, each[:, :accepted])
+        if reached == counts:
+            return counts
+        for name in plan.remaining:
+            executor.run(name)
+        for anchor, each, accepted in zip(self.anchors, lanes, reached, strict=True):
+            anchor[:] = each[source, accepted - 1] if accepted else self._start
+        return [
+            self.follow(k, at, count, anew=False) if 0 < at < count else at
+            for k, (at, count) in enumerate(zip(reached, counts, strict=True))
+        ]
+
+    def follow(self, side: int, at: int, stop: int, *, anew: bool) -> int:
+        """Attempt the next samples of a side as neighbouring lanes, and go on from the last
+        accepted one.
+
+        Args:
+            at, stop: the next sample, and the one before which to end.
+            anew: begin at the start instead of the side's anchor. The anchor moves along.
+
+        Returns:
+            The first rejected sample, or stop.
+        """
+        executor, samples = self._executor, self._sides[side].samples
+        plan, block, lanes = executor.plan, executor.block, executor.lanes
+        extrapolates = plan.extrapolates(lanes)
+        carried, moved = (
+            np.array(each).T
+            for each in (plan.carried, plan.moved if extrapolates else plan.carried)
+        )
+        sampled, smooth, whole = list(plan.sampled), False, False
+        block[carried[1]] = (self._start if anew else self.anchors[side])[:, None]
+        while at < stop:
+            # extrapolation needs groups that begin at a multiple of the lanes: a shorter group
+            # goes up to there
+            count = min(lanes - at % lanes if whole and extrapolates else lanes, stop - at)
+            block[sampled, :count] = samples[:, at : at + count]
+            block[sampled, count:] = samples[:, stop - 1 : stop]
+            executor.settle("extrapolate" if smooth else "predict", plan.joined)
+            accepted = _leading(block[plan.slots[MARGIN], :count])
+            if accepted:
+                self._keep(self._sides[side], at, block[:, :accepted])
+            elif smooth:  # continue from the last accepted sample by its rates
+                executor.go_back(samples[:, at - 1 : at])
+            else:
+                break
+            whole = accepted == lanes
+            smooth = extrapolates and whole and at % lanes == 0 and at + accepted < stop
+            for name in () if smooth or not accepted else plan.remaining:
+                executor.run(name)
+            source, target = moved if smooth else carried
+            block[target] = block[source, max(accepted - 1, 0), None]
+            at += accepted
+        self.anchors[side] = block[carried[1], 0]
+        return at
+
+    def _keep(self, side: Side, at: int, found: Array) -> None:
+        plan = self._executor.plan
+        self._kept[:, side.first + side.step * np.arange(at, at + found.shape[1])] = found[
+            list(plan.kept)
+        ]
+        largest, smallest = np.split(self.worst, [len(plan.largest)])
+        np.maximum(largest, found[list(plan.largest)].max(axis=1), out=largest)
+        np.minimum(smallest, found[list(plan.smallest)].min(axis=1), out=smallest)

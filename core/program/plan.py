@@ -1,13 +1,16 @@
 """Plans: the programs of a model, the slots of its lanes, and the order in which executors run
-them.
+them; the data of executors.
 """
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..trajectory import Array
 from .straight_line import Program
@@ -120,3 +123,68 @@ def shifted(past: int, remembered: Sequence[int], behind: int) -> Sequence[tuple
     count = len(remembered)
     places = [*range(past, past + (behind - 1) * count), *remembered]
     return list(zip(places[count:], places, strict=False))
+
+
+Table = TypeVar("Table", bound=NDArray[Any])
+
+
+@dataclass(frozen=True, eq=False)
+class Side:
+    """The samples on one side of the start of a motion, outwards.
+
+    Attributes:
+        samples: `Plan.sampled` of each, shape (sampled, count + margin), contiguous; the last
+            column is repeated at the end.
+        count: number of samples.
+        first, step: column of the first among all samples, and the step to the next: 1 or -1.
+    """
+
+    samples: Array
+    count: int
+    first: int
+    step: int
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """Parts of a large mechanism with a common plan. All arrays are contiguous, and must outlive
+    the call made from them.
+
+    Attributes:
+        members: rows of `fixed` of these parts, in order.
+        fixed: values of `Plan.fixed`, shape (all members, fixed).
+        ahead: output: the values of `fixed` for the lanes after the last one, same shape; carried
+            slots take their source.
+        samples: values of `Plan.sampled`, shape (sampled, room).
+        taken: rows of the world that `Plan.taken` read, shape (parts, taken).
+        world: all solved values, shape (rows, room); output `Plan.kept` of a member from row `base
+            + member * kept`.
+        worst: in and out: the largest of `Plan.largest` and the smallest of `Plan.smallest` per
+            lane, over its previous value and all parts, NaN if any is; shape (largest and smallest,
+            room).
+    """
+
+    members: NDArray[np.int64]
+    fixed: Array
+    ahead: Array
+    samples: Array
+    taken: NDArray[np.int64]
+    world: Array
+    base: int
+    worst: Array
+
+
+BYTES = 8
+"""Bytes of a number."""
+
+
+def aligned(count: int) -> Array:
+    """Return an array that starts at a cache line, so no vector crosses two lines."""
+    room = np.empty(count + LINE)
+    start = -(address(room) // BYTES) % LINE
+    return room[start : start + count]
+
+
+def address(array: NDArray[Any]) -> int:
+    """Return the address of a contiguous array; four times faster than its own `ctypes`."""
+    return ctypes.addressof(ctypes.c_char.from_buffer(array.data))

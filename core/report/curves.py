@@ -1,15 +1,17 @@
-"""Curves of a run as a table for other programs: one row per output, engine (or reference) and
-sample.
+"""Curves of a run as a table for other programs. Curves of hardpoint tables are wide, a row per
+sample and a column per output in the table's units, as people read them. All others are long, a row
+per output, engine (or reference) and sample, because their outputs and samples differ.
 """
 
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..case.io.table_file import Kind, Rows, put_csv, write_csv, write_parquet
+from ..case.io.table_file import WRITERS, Kind, Rows, put_csv
+from ..case.units import ANGLES, LENGTHS
 from ..harness.record import OutputSeries, Record, Results
 from .axis import DRIVER_UNITS
 
@@ -40,14 +42,80 @@ REFERENCE = "reference"
 """Engine in the rows of the reference; their mode is the kind of the reference."""
 
 
-def write_curves_csv(results: Results, path: Path) -> int:
-    """Write the curves of a run as CSV and return the number of rows."""
-    return write_csv(path, COLUMNS, curves(results))
+def write_curves(results: Results, path: Path, kind: str, *, long: bool) -> int:
+    """Write the curves of a run as a file of a kind of `WRITERS` and return the number of rows.
+
+    Args:
+        long: whether curves of hardpoint tables are long too.
+    """
+    columns, rows = (None if long else wide(results)) or (COLUMNS, curves(results))
+    return WRITERS[kind](path, columns, rows)
 
 
-def write_curves_parquet(results: Results, path: Path) -> int:
-    """Write the curves of a run as Parquet and return the number of rows."""
-    return write_parquet(path, COLUMNS, curves(results))
+def wide(results: Results) -> tuple[Mapping[str, Kind], Iterator[Rows]] | None:
+    """Return columns and rows of a run of hardpoint tables, in the units of the tables; None if a
+    case is none, or another unit stands in a column.
+
+    The columns are the drivers and the outputs, behind the names of cases and engines where there
+    are several. Rates of change per metre of travel stay per metre.
+    """
+    facts: Mapping[str, Any] = results.run.get("cases", {})
+    if not facts or not all(each.get("units") for each in facts.values()):
+        return None
+    tables = list[tuple[str, str, dict[str, list[float | None]]]]()
+    known = set[str]()
+    for record in results.records:
+        if not record.driver:
+            continue
+        about = facts.get(record.case, {})
+        if record.case not in known:
+            known.add(record.case)
+            if reference := results.references.get(record.case):
+                tables.append((record.case, REFERENCE, _columns(about, record, reference)))
+        tables.append((record.case, record.engine, _columns(about, record, record.outputs)))
+    several = {"case": {case for case, *_ in tables}, "engine": {name for _, name, _ in tables}}
+    labels = [name for name, among in several.items() if len(among) > 1]
+    heads = dict.fromkeys(head for *_, columns in tables for head in columns)
+    if len({head.split(" [")[0] for head in heads}) < len(heads):
+        return None
+    rows = (_wide_rows(labels, heads, *table) for table in tables)
+    return dict.fromkeys(labels, Kind.TEXT) | dict.fromkeys(heads, Kind.NUMBER), rows
+
+
+def _columns(
+    about: Mapping[str, Any], record: Record, outputs: Mapping[str, OutputSeries]
+) -> dict[str, list[float | None]]:
+    """Return the values of drivers and outputs in the units of the table, by their heads."""
+    units = {"m": LENGTHS[about["units"]["length"]], "rad": ANGLES[about["units"]["angle"]]}
+    drivers = {about["driver"]["name"]: about["driver"], **about["motions"]}
+    found = dict[str, list[float | None]]()
+
+    def add(name: str, unit: str, values: Sequence[float | None]) -> None:
+        measure, *per = unit.split("/", 1)
+        into = units.get(measure)
+        size, text = (into.size, into.name) if into else (1.0, measure)
+        head = f"{name} [{'/'.join([text, *per])}]" if unit not in ("", "1") else name
+        found[head] = [None if each is None else each / size for each in values]
+
+    for name, values in record.driver.items():
+        add(name, DRIVER_UNITS.get(drivers.get(name, {}).get("type", ""), ""), values)
+    for name, series in outputs.items():
+        add(name, series.unit, series.position or [None] * len(next(iter(record.driver.values()))))
+    return found
+
+
+def _wide_rows(
+    labels: Sequence[str],
+    heads: Iterable[str],
+    case: str,
+    engine: str,
+    columns: Mapping[str, Sequence[float | None]],
+) -> Rows:
+    count = len(next(iter(columns.values())))
+    names = [{"case": case, "engine": engine}[label] for label in labels]
+    empty = [None] * count
+    values = zip(*(columns.get(head, empty) for head in heads), strict=True)
+    return [(*names, *row) for row in values]
 
 
 def downloads(results: Results, cases: Mapping[str, str]) -> dict[str, str]:

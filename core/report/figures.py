@@ -15,7 +15,7 @@ from typing import Any, TypeAlias
 
 from ..harness.labels import output_label
 from ..harness.record import OutputSeries
-from ..palette import COLOURS
+from ..notebook_view import COLOURS
 from ..unit_text import with_unit
 from .axis import DISPLAY, Axis
 

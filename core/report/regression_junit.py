@@ -7,7 +7,7 @@ from __future__ import annotations
 from xml.etree import ElementTree
 
 from ..harness.record import Results
-from ..history.regression.findings import Finding, Kind, Regressions
+from ..history.findings import Finding, Kind, Regressions
 from .junit import FORBIDDEN, count_tests, to_junit
 
 

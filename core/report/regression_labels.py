@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from ..errors import shortened
 from ..harness.labels import motion_unit, number, product, unread_count
-from ..history.regression.findings import Finding, Kind, Loose, Regressions, Step
+from ..history.findings import Finding, Kind, Loose, Regressions, Step
 from ..unit_text import value_text
 
 LONGEST = 12

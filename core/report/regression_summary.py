@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from markupsafe import Markup
 
 from ..errors import number_of
-from ..history.regression.findings import WHY, Kind, Regressions
+from ..history.findings import WHY, Kind, Regressions
 from .markdown import escaped, row
 from .page_parts import environment
 from .regression_labels import (

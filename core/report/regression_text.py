@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.text import Text
 
 from ..case.io.escape import visible
-from ..history.regression.findings import WHY, Kind, Regressions
+from ..history.findings import WHY, Kind, Regressions
 from . import terminal
 from .regression_labels import (
     LONGEST,

@@ -17,6 +17,7 @@ from ..harness.record import Deviation, Outcome, Record, Results
 from ..trajectory import QUANTITIES
 from ..unit_text import motion_word
 from . import terminal
+from .travel_table import print_travel
 
 COLOURS = {
     Outcome.PASS: "green",
@@ -53,6 +54,7 @@ def print_table(results: Results, file: TextIO, *, reactions: bool = False) -> N
         console.print(table)
     elif rows:
         _print_by_case(rows, console, _heads(reactions))
+    print_travel(results, console)
     print_messages(results, console)
 
 

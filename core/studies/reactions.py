@@ -5,10 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ..case.case import TIME, Case, Series, Truth, pace, size
-from ..case.io.measures import largest_load
-from ..case.io.tolerance import default
-from ..case.measures import DriverEffort, ElementForce, ForceMeasure, JointForce, JointMoment
-from ..case.measures.force import Axis
+from ..case.io.outputs import default, largest_load
+from ..case.measures import (
+    Axis,
+    DriverEffort,
+    ElementForce,
+    ForceMeasure,
+    JointForce,
+    JointMoment,
+)
 from ..case.quantity import with_markers
 from ..errors import KincheckError
 from ..harness.native_engine import NativeEngine

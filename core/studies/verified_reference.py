@@ -18,7 +18,7 @@ from ..algebra import Vec3
 from ..case.case import HELD_BUT, Case, Quantity
 from ..case.io.reference_file import ProvedSeries, Reference, Sample
 from ..case.measures import Orientation
-from ..case.measures.turns import oriented, turns_of
+from ..case.turns import oriented, turns_of
 from ..jet import Jet
 from ..kinematics import (
     Drives,

@@ -14,7 +14,7 @@ from kincheck.core.case.case import Case, Output, Sweep, Truth
 from kincheck.core.case.io.model_writer import written
 from kincheck.core.joints import Planar
 from kincheck.core.joints.base import directions, position, triad, unit
-from kincheck.core.mechanism.equivalents import with_equivalents
+from kincheck.core.mechanism.mechanism import with_equivalents
 
 UP, ALONG = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
 CRANK, PIVOT, REACH, RATE = 0.3, -1.0, 1.4, 2.0

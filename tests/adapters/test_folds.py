@@ -14,9 +14,9 @@ from kincheck.core.studies.stress.families.folds import Folds
 from kincheck.core.studies.stress.families.planar import any_plane, slider_crank
 from kincheck.core.studies.stress.run import specimen
 from kincheck.core.studies.stress.solving import once
-from kincheck.core.studies.stress.truth.first_fold import turning
-from kincheck.core.studies.stress.truth.reference_motion import Reach, followed
 from kincheck.core.studies.stress.verdicts import Verdict, judged
+from kincheck.core.studies.truth.fold import first_fold
+from kincheck.core.studies.truth.motion import Reach, followed
 
 BEYOND = Path(__file__).parents[1] / "data" / "beyond_a_fold.toml"
 SIMULATORS = ["mujoco", "pinocchio", "exudyn", "drake", "dart", "simbody"]
@@ -44,8 +44,8 @@ def test_two_continuations_find_the_same_fold():
     """By arclength, and by steps of the driver in extended precision."""
     case = load_case(BEYOND)
     assert followed(case).reach.tolist() == [Reach.REACHED, Reach.REACHED, Reach.BEYOND]
-    assert turning(case, 0.143) == pytest.approx(0.05341366, rel=1e-6)
-    assert turning(case, 0.053) is None
+    assert first_fold(case, 0.143) == pytest.approx(0.05341366, rel=1e-6)
+    assert first_fold(case, 0.053) is None
 
 
 def test_the_end_of_a_stroke_is_a_fold():
@@ -55,8 +55,8 @@ def test_the_end_of_a_stroke_is_a_fold():
     c = (float(b[0] + np.sqrt(rod**2 - b[1] ** 2)), 0.0)
     plane = any_plane(np.random.default_rng(2))
     case = as_case(slider_crank(plane, b, c, "rod", "slide"), "slide", np.array([0.1]))
-    assert turning(case, 1.0) == pytest.approx(crank + rod - c[0], abs=1e-8)
-    assert turning(case, -1.0) == pytest.approx(rod - crank - c[0], abs=1e-8)
+    assert first_fold(case, 1.0) == pytest.approx(crank + rod - c[0], abs=1e-8)
+    assert first_fold(case, -1.0) == pytest.approx(rod - crank - c[0], abs=1e-8)
 
 
 @pytest.fixture(scope="module")
@@ -67,6 +67,7 @@ def past_folds():
     return [specimen(Folds(), 0, number, 5) for number in (0, 16, 21)]
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", SIMULATORS)
 def test_no_simulator_steps_over_a_fold(name, past_folds):
     """A small part of a campaign: `kincheck stress --family folds --engine mujoco --samples

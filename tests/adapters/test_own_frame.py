@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from kincheck import adapters
 from kincheck.adapters.native import Native
-from kincheck.adapters.shared.length_scaling import in_own_frame, own_frame
+from kincheck.adapters.shared.equivalents import in_own_frame, own_frame
 from kincheck.adapters.shared.projection import Walk
 from kincheck.core import (
     Body,

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from kincheck import adapters
-from kincheck.adapters.shared.joint_equivalents import jointed
+from kincheck.adapters.shared.equivalents import jointed
 from kincheck.core import (
     Body,
     Distance,

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from kincheck import adapters
-from kincheck.adapters.shared.start_pose import at_start
+from kincheck.adapters.shared.poses import at_start
 from kincheck.core import (
     GROUND,
     Body,
@@ -19,7 +19,7 @@ from kincheck.core import (
 )
 from kincheck.core.case.io.model_writer import way_to
 from kincheck.core.case.joint_probe import probes
-from kincheck.core.mechanism.topology import Branch, SpanningTree, spanning_tree
+from kincheck.core.mechanism.mechanism import Branch, SpanningTree, spanning_tree
 
 from ..support.exported import READERS, read
 from ..support.mechanisms import mcpherson
@@ -79,8 +79,7 @@ def cut_elsewhere(mechanism):
 def test_a_joint_closes_a_loop_as_it_carries_a_body(to, name, tmp_path, monkeypatch):
     if name == "polynomial" and to in NO_POLYNOMIAL:
         return  # refused above
-    module = "hung_tree" if to in ("sdf", "osim") else to
-    monkeypatch.setattr(f"kincheck.adapters.writers.{module}.spanning_tree", cut_elsewhere)
+    monkeypatch.setattr("kincheck.adapters.shared.tree_plan.spanning_tree", cut_elsewhere)
     found, path = reading(to, name, tmp_path)
     assert_read(found, CASES[name].mechanism, path, True)
 

@@ -14,9 +14,9 @@ from kincheck.core.case.case import Case, Sweep, Truth
 from kincheck.core.case.io.model_writer import way_to, written
 from kincheck.core.joints import Revolute
 from kincheck.core.mechanism.body import Body
-from kincheck.core.mechanism.drivers import JointAngle
 from kincheck.core.mechanism.loads import Force, SpringDamper, Torque, TorsionSpringDamper
 from kincheck.core.mechanism.mechanism import Mechanism, Point
+from kincheck.core.mechanism.motions import JointAngle
 
 # The arm: masses [kg] and their places, global at design [m].
 MASSES = np.array([0.5, 0.75, 1.25, 0.3])

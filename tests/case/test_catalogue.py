@@ -1,18 +1,25 @@
-"""The list of types is that of the registries, and its keys are those that case files take."""
+"""The catalogue of types, and the JSON Schema of case files."""
 
+import json
 import re
+import tomllib
 from dataclasses import dataclass
+from pathlib import Path
 
+import kincheck.cases
 import msgspec
+import pytest
 from kincheck.core.case.io import schema
-from kincheck.core.case.io.catalogue import catalogue, rows_of
-from kincheck.core.case.io.class_keys import driver_keys, joint_keys, motion_keys
-from kincheck.core.case.io.driving import DRIVERS
-from kincheck.core.case.io.loads import force_keys
+from kincheck.core.case.io.case_file import load_case
+from kincheck.core.case.io.catalogue import case_schema, catalogue, rows_of
+from kincheck.core.case.io.mechanism_sections import DRIVERS
+from kincheck.core.case.io.schema import keys_of
 from kincheck.core.cli import main
-from kincheck.core.errors import MechanismError
+from kincheck.core.cli.schema import SCHEMAS
+from kincheck.core.errors import CaseError, MechanismError
+from kincheck.core.harness.record import to_json
 from kincheck.core.joints import Coupler, Joint, Spherical
-from kincheck.core.joints.base import directions
+from kincheck.core.joints.base import directions, position
 from kincheck.core.mechanism.loads import ELEMENTS
 from kincheck.core.mechanism.motions import Motion
 from kincheck.core.studies.variation import variation_schema
@@ -52,10 +59,10 @@ def test_every_type_is_printed(capsys):
 
 def test_every_key_is_printed():
     for registry, keys in (
-        (Joint.registry | Coupler.registry, joint_keys),
-        (DRIVERS, driver_keys),
-        (Motion.registry, motion_keys),
-        (ELEMENTS, force_keys),
+        (Joint.registry | Coupler.registry, keys_of),
+        (DRIVERS, keys_of),
+        (Motion.registry, keys_of),
+        (ELEMENTS, keys_of),
     ):
         for name, cls in registry.items():
             for key in set(keys(cls).__struct_fields__) - {"type", "bodies", "joints", "motion"}:
@@ -137,8 +144,137 @@ def test_every_key_of_a_file_is_in_the_reference_that_is_printed(capsys):
         if issubclass(each, msgspec.Struct) and each is not msgspec.Struct
     ]
     assert len(keys) >= 8
-    keys += [*map(force_keys, ELEMENTS.values())]
+    keys += [*map(keys_of, ELEMENTS.values())]
     for name in [name for each in keys for name in msgspec.structs.fields(each)]:
         assert re.search(rf"[\[( ]{name.encode_name}\b", said), name.encode_name
     assert "kincheck-case/1" in said
     assert "kincheck-vary/1" in said
+
+
+jsonschema = pytest.importorskip("jsonschema")
+CASES = sorted(kincheck.cases.FOLDER.glob("*.toml"))
+DATA = Path(__file__).parents[1] / "data"
+OURS = [*CASES, *sorted((DATA / "case_files").glob("*.toml")), *sorted(DATA.glob("stress/*.toml"))]
+
+
+def validator(name):
+    schema = SCHEMAS[name]()
+    jsonschema.Draft202012Validator.check_schema(schema)
+    return jsonschema.Draft202012Validator(schema)
+
+
+@pytest.fixture(scope="module")
+def case():
+    return validator("case")
+
+
+def read(path):
+    return tomllib.loads(path.read_text(encoding="utf-8"))
+
+
+def test_every_case_file_is_valid(case):
+    assert len(CASES) >= 32
+    assert {path.name: found for path in OURS if (found := [*case.iter_errors(read(path))])} == {}
+
+
+FAULTS = [
+    ("drivers", "crank", "joint", 3),
+    ("drivers", "crank", "type", "joint_angel"),
+    ("joints", "rod", "points", [[0, 0, 0]]),
+    ("joints", "rod", "axis", [0, 0, 1]),
+    ("joints", "rod", "type", "distanse"),
+    ("bodies", "crank", "origin", [0, 0]),
+    ("points", "rocker_tip", "position", "here"),
+    ("sweep", "steps", 0),
+    ("sweep", "stop", "far"),
+    ("units", {"length": "inch"}),
+    ("outputs", "rocker_tip_y", "component", "w"),
+    ("schema", "kincheck-case/2"),
+    ("colour", "red"),
+    ("outputs", "crank_torque", "driver", 3),
+    ("outputs", "rod_force_y", "joints", "rod"),
+    ("outputs", "rod_force_y", "type", "joint_fource"),
+    ("forces", {"spring": {"type": "spring_damper", "bodies": ["crank"], "stiffness": 1.0}}),
+    ("closure", "tolerance", "small"),
+    ("drivers", "crank", "motion", {"type": "sine", "amplitude": 1.0}),
+]
+
+
+@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: ".".join(map(str, fault[:-1])))
+def test_what_the_reader_refuses_is_invalid(case, tmp_path, fault):
+    """Each fault by itself, in a file that is valid without it."""
+    *places, last, value = fault
+    tables = read(kincheck.cases.FOLDER / "rssr.toml")
+    at = tables
+    for place in places:
+        at = at[place] if place in at else at.setdefault(place, {})
+    at[last] = value
+    file = tmp_path / "case.json"
+    file.write_text(json.dumps(tables))
+    with pytest.raises(CaseError):
+        load_case(file)
+    assert [*case.iter_errors(tables)]
+
+
+def test_every_type_has_its_keys():
+    defined = case_schema()["$defs"]
+    assert set(Joint.registry) <= {
+        name.removeprefix("joints.") for name in defined if name.startswith("joints.")
+    }
+    assert {f"motion.{name}" for name in Motion.registry} <= set(defined)
+    assert defined["joints.revolute"]["properties"]["type"] == {"const": "revolute"}
+    assert defined["bodies"]["properties"]["fixed"]["description"] == "true or false"
+
+
+def test_a_joint_of_a_user_is_in_the_schema(own_joint_types):
+    @dataclass(frozen=True)
+    class Own(Joint):
+        type = "own"
+        point: tuple[float, float, float] = position()
+
+        def primitives(self, i, j):
+            return ()
+
+    assert "point" in case_schema()["$defs"]["joints.own"]["properties"]
+
+
+def test_variations_are_valid():
+    vary = validator("variation")
+    tables = {
+        "schema": "kincheck-vary/1",
+        "mode": "monte_carlo",
+        "units": {"length": "mm"},
+        "hardpoints": {"ball": {"at": "joints.ball.point", "sigma": [0.5, 0.5, 0]}},
+        "lines": {"slide": {"axis": "joints.slide.axis", "through": ["a", "b"]}},
+    }
+    assert [*vary.iter_errors(tables)] == []
+    for wrong in ({"mode": "many"}, {"hardpoints": {"ball": {"sigma": 0.5}}}, {"lines": {"a": {}}}):
+        assert [*vary.iter_errors(tables | wrong)]
+
+
+def test_results_and_regressions_are_valid(tmp_path, capfdbinary):
+    found = kincheck.run(["rssr", "mcpherson_suspension"], "native")
+    written = json.loads(to_json(found))
+    results = validator("results")
+    assert [*results.iter_errors(written)] == []
+    written["records"][0]["outcome"] = "passed"
+    assert [*results.iter_errors(written)]
+    worse = [msgspec.structs.replace(each, outcome="fail") for each in found.records]
+    for name, each in (("was", found), ("now", msgspec.structs.replace(found, records=worse))):
+        (tmp_path / f"{name}.json").write_bytes(to_json(each))
+    now, was = str(tmp_path / "now.json"), str(tmp_path / "was.json")
+    assert main.main(["report", now, "--against", was, "--json", "-"]) == 1
+    compared = json.loads(capfdbinary.readouterr().out)
+    assert compared["findings"]
+    assert [*validator("regression").iter_errors(compared)] == []
+
+
+@pytest.mark.parametrize("name", SCHEMAS)
+def test_command(name, capfdbinary):
+    assert main.main(["schema", name]) == 0
+    assert json.loads(capfdbinary.readouterr().out) == json.loads(json.dumps(SCHEMAS[name]()))
+
+
+def test_an_unknown_schema_is_named(capsys):
+    assert main.main(["schema", "cases"]) == 2
+    assert "none of case, variation, results, regression" in capsys.readouterr().err

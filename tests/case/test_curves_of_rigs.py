@@ -10,18 +10,17 @@ from kincheck.adapters.native import Native
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.io.reference_curve import CurveOptions, with_curve
 from kincheck.core.case.models.files import load
-from kincheck.core.case.models.hardpoints.sample_table import sample_table
-from kincheck.core.case.models.hardpoints.templates import TEMPLATES
+from kincheck.core.case.models.hardpoints.templates import TEMPLATES, sample_table
 from kincheck.core.cli.main import main
 from kincheck.core.errors import CaseError
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.run import run
 
-from .test_measured_curves import GRID
-from .test_published_suspensions import solved
+from ..support.rods_of_templates import solved
 
 # Two minutes of arc: the repeatability of a rig, made up; its noise is an eighth of that.
 ATOL = 2.0 / 60.0
+GRID = np.linspace(-0.0437, 0.0312, 23)
 ACCURACY = (f"toe={ATOL} deg", "camber=2 arcmin")
 
 
@@ -54,7 +53,8 @@ def rig(folder, rows, head="Travel [mm],toe [deg],camber [deg]", form="{},{},{}"
 
 def judged(car, file, **options):
     case, notes = with_curve(car[0], file, CurveOptions(accuracy=ACCURACY, **options))
-    return run([case], [Native()], tol=1e-12).records[0], notes
+    results = run([case], [Native()], tol=1e-12)
+    return results.records[0], notes, results.suspects.get(case.name)
 
 
 FORMS = {
@@ -80,13 +80,15 @@ FORMS = {
 
 @pytest.mark.parametrize("kind", FORMS)
 def test_a_curve_is_judged(tmp_path, car, kind):
-    record, notes = judged(car, rig(tmp_path, car[1], **FORMS[kind]), citation="made up")
+    record, notes, suspect = judged(car, rig(tmp_path, car[1], **FORMS[kind]), citation="made up")
     assert record.outcome is Outcome.PASS
+    assert suspect is None
+    assert "no value at 6 of 21 samples" in record.message
     assert record.evidence.sound
     assert {record.errors[name].position.against for name in ("toe", "camber")} == {record.truth}
     assert ATOL < np.degrees(record.errors["toe"].position.tolerance) < 2.0 * ATOL
-    assert "interpolated between 23 rows" in record.evidence.limits["toe"]
-    assert "printed to 6 digits" in record.evidence.limits["toe"]
+    for part in ("printed to 6 digits", "driver values printed to", "interpolated between 23 rows"):
+        assert part in record.evidence.limits["toe"]
     assert record.evidence.units["stroke"] == "mm"
     assert record.evidence.units["toe"].startswith(("deg", "°"))
     assert record.evidence.signs == "iso8855 (assumed: the file names none)"
@@ -100,7 +102,7 @@ def test_what_the_user_states(tmp_path, car):
     toe, camber = car[1]
     file = rig(tmp_path, (-toe, camber), "z [mm],Spur,Sturz [deg]")
     columns = ("z=stroke", "Spur=-toe [deg]", "Sturz=camber")
-    record, _ = judged(car, file, columns=columns, signs="iso8855", own_samples=True)
+    record, *_ = judged(car, file, columns=columns, signs="iso8855", own_samples=True)
     assert record.outcome is Outcome.PASS
     assert not record.evidence.sound  # no citation
     assert len(record.driver["stroke"]) == len(GRID)
@@ -111,13 +113,29 @@ def test_what_the_user_states(tmp_path, car):
 
 @pytest.mark.parametrize("k", [0, 1])
 def test_a_shift_of_two_tolerances_is_found(tmp_path, car, k):
-    record, _ = judged(car, rig(tmp_path, car[1]))
+    record, *_ = judged(car, rig(tmp_path, car[1]))
     name = ("toe", "camber")[k]
     shift = np.zeros((2, 1))
     shift[k] = np.degrees(2.0 * record.errors[name].position.tolerance)
-    record, _ = judged(car, rig(tmp_path, car[1] + shift))
+    record, *_ = judged(car, rig(tmp_path, car[1] + shift))
     assert record.outcome is Outcome.FAIL
     assert f"{name}: position is off by" in record.message
+
+
+SLIPS = {
+    "with the other sign": lambda values: -values,
+    "times pi/180": np.degrees,
+    "times 180/pi": np.radians,
+    "times 1000": lambda values: values / 1000.0,
+    "taken as that of output camber": lambda values: values[::-1],
+}
+
+
+@pytest.mark.parametrize("change", SLIPS)
+def test_slips_are_named(tmp_path, car, change):
+    record, _, suspect = judged(car, rig(tmp_path, SLIPS[change](car[1])))
+    assert record.outcome is Outcome.FAIL
+    assert f"the reference {change} fits" in suspect.message
 
 
 FAULTS = {

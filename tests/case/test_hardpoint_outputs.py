@@ -4,11 +4,10 @@ rods and lines.
 
 import numpy as np
 import pytest
-from kincheck.core.case.io.case_writer import case_text
+from kincheck.core.case.io.case_file import case_text
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
-from kincheck.core.case.models.hardpoints.sample_table import sample_table
-from kincheck.core.case.models.hardpoints.templates import TEMPLATES
+from kincheck.core.case.models.hardpoints.templates import TEMPLATES, sample_table
 from kincheck.core.cli.main import main
 from kincheck.core.errors import CaseError
 

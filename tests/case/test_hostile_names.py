@@ -21,7 +21,7 @@ from kincheck.core.report.page_model import Material
 from kincheck.core.report.progress import complain, progress
 from kincheck.core.report.report import render
 from kincheck.core.report.table import print_table
-from kincheck.core.studies.tolerance.csv_tables import _csv
+from kincheck.core.studies.tolerance.tables import _csv
 from markdown_it import MarkdownIt
 
 from ..report.page import Page

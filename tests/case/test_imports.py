@@ -7,12 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from kincheck import cases
-from kincheck.core.case.io.case_file import load_case
-from kincheck.core.case.io.case_writer import case_text
+from kincheck.core.case.io.case_file import case_text, load_case
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
-from kincheck.core.case.models.hardpoints.sample_table import sample_table
-from kincheck.core.case.models.hardpoints.templates import TEMPLATES
+from kincheck.core.case.models.hardpoints.templates import TEMPLATES, sample_table
 from kincheck.core.cli.main import main
 from kincheck.core.errors import CaseError
 

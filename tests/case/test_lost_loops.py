@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from kincheck.core.case.io.reader_options import LEFT_OUT, Supplied
 from kincheck.core.case.models.files import load
-from kincheck.core.case.models.mjcf.attributes import require_known_attributes
-from kincheck.core.case.models.mjcf.elements import parse_xml
+from kincheck.core.case.models.trees.element import parse_xml
+from kincheck.core.case.models.trees.mjcf_language import require_known_attributes
 from kincheck.core.errors import CaseError
 
 from ..support.model_poses import coordinate, solution

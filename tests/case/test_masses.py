@@ -7,13 +7,11 @@ from kincheck.adapters.writers import mjcf, sdf
 from kincheck.core.algebra import vec
 from kincheck.core.case.io.model_writer import written
 from kincheck.core.case.io.reader_options import Supplied
-from kincheck.core.case.models.files import load
-from kincheck.core.case.models.mjcf.masses import Mass, together
+from kincheck.core.case.models.files import load, read_tree
+from kincheck.core.case.models.trees.tree import Mass, together
 from kincheck.core.errors import CaseError
 from kincheck.core.kinematics import NativeSolver
 from kincheck.core.mechanism.body import inertia_matrix
-
-from .test_mjcf_start import tree_of
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -53,9 +51,9 @@ def test_masses_are_those_of_mujoco(tmp_path, settings):
     model = mujoco.MjModel.from_xml_path(str(file))
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    _, tree = tree_of(file)
+    tree = read_tree(file)
     assert not tree.unweighed
-    for joint, k in zip(tree.chain, model.jnt_bodyid, strict=True):
+    for joint, k in zip(tree.moves.values(), model.jnt_bodyid, strict=True):
         parts = []
         for body in np.flatnonzero(model.body_weldid == k):
             axes = data.ximat[body].reshape(3, 3)
@@ -104,6 +102,14 @@ def test_all_formats_have_the_same_masses(tmp_path):
         assert body.mass == 3.0
         assert np.allclose(body.center_of_mass, bodies[0].center_of_mass, rtol=0, atol=EXACT)
         assert np.allclose(body.inertia, bodies[0].inertia, rtol=0, atol=EXACT)
+
+
+@pytest.mark.parametrize("text", [URDF, SDF], ids=["urdf", "sdf"])
+def test_fixed_link_with_mass_is_output(tmp_path, text):
+    """Its place is asked for as that of a fixed link without a mass."""
+    case = case_of(tmp_path, text)
+    assert case.mechanism.point("tip").body == "arm"
+    assert case.outputs[3].point == "tip"
 
 
 def test_the_effort_of_a_robot_is_that_of_mujoco(tmp_path):

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from kincheck.adapters.native import Native
 from kincheck.core.case.case import Case, Sweep
-from kincheck.core.case.io.case_file import load_case
-from kincheck.core.case.io.case_writer import case_text
+from kincheck.core.case.io.case_file import case_text, load_case
 from kincheck.core.case.measures import (
     Angle,
     Component,

@@ -102,7 +102,7 @@ def test_bodies_made_of_several_joints_are_no_others(tmp_path):
       <body name="arm.x"><joint name="z" axis="1 0 0"/></body><body name="arm.x'"></body>
     </worldbody></mujoco>"""
     tree = agree(model(tmp_path, text))
-    assert list(tree.moving) == ["arm.x''", "arm", "arm.x"]
+    assert list(tree.moving) == ["arm.x'2", "arm", "arm.x"]
     assert tree.joints["z"].inner == "arm.x"
     with pytest.raises(CaseError, match="the model has 3 degrees of freedom"):
         load(model(tmp_path, text), Supplied(drive=("y:0:1",), hold=("x",)))

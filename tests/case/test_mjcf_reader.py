@@ -110,7 +110,7 @@ def test_classes_of_joints_and_bodies_without_joints(tmp_path):
       </worldbody>
     </mujoco>"""  # noqa: E501
     tree = agree(model(tmp_path, text))
-    assert [joint.type for joint in tree.joints.values()] == [
+    assert [joint.kind for joint in tree.joints.values()] == [
         "hinge",
         "slide",
         "hinge",

@@ -5,13 +5,8 @@ what is driven and held; rods; includes and replicates.
 import numpy as np
 import pytest
 from kincheck.core.case.io.reader_options import Supplied
-from kincheck.core.case.models.files import load
-from kincheck.core.case.models.mjcf.classes import read_classes
-from kincheck.core.case.models.mjcf.elements import parse_xml
-from kincheck.core.case.models.mjcf.expand import expanded
-from kincheck.core.case.models.mjcf.frames import read_compiler
-from kincheck.core.case.models.mjcf.start import read_start
-from kincheck.core.case.models.mjcf.tree import read_tree
+from kincheck.core.case.models.files import load, read_tree
+from kincheck.core.case.models.trees.driving import read_start
 from kincheck.core.errors import CaseError
 from kincheck.core.kinematics import NativeSolver
 
@@ -26,11 +21,6 @@ def written(tmp_path, text, name="model.xml"):
     file = tmp_path / name
     file.write_text(text.replace("<geom/>", BODY))
     return file
-
-
-def tree_of(file):
-    root = expanded(file, parse_xml(file, file.read_text()))
-    return root, read_tree(root, read_classes(root), read_compiler(root))
 
 
 def solved(case):
@@ -57,8 +47,8 @@ ALL_KINDS = """<mujoco><compiler angle="degree" eulerseq="zyx"/><worldbody>
 @pytest.mark.parametrize("said", [("keyframe:bent",), ("keyframe:bent", "push=-0.1", "lone=0.7")])
 def test_a_start_is_mujocos_pose(tmp_path, said):
     file = written(tmp_path, ALL_KINDS)
-    root, tree = tree_of(file)
-    there = read_start(file, root, tree, said).pose.settled()
+    tree = read_tree(file)
+    there = read_start(tree, said).pose.settled()
     model = mujoco.MjModel.from_xml_path(str(file))
     data = mujoco.MjData(model)
     data.qpos[:] = model.key("bent").qpos
@@ -91,9 +81,9 @@ def test_a_start_is_mujocos_pose(tmp_path, said):
 )
 def test_a_start_that_is_none(tmp_path, said, fragments):
     file = written(tmp_path, ALL_KINDS)
-    root, tree = tree_of(file)
+    tree = read_tree(file)
     with pytest.raises(CaseError) as caught:
-        read_start(file, root, tree, said)
+        read_start(tree, said)
     assert [each for each in ["--start", *fragments] if each not in str(caught.value)] == []
 
 
@@ -247,7 +237,7 @@ def test_includes_and_replicates_are_as_in_mujoco(tmp_path):
         <joint name="j" axis="0 1 0"/><geom/><site name="s" pos="0 1 0"/></body></replicate></body>
       </worldbody></mujoco>"""
     file = written(tmp_path, text)
-    _, tree = tree_of(file)
+    tree = read_tree(file)
     spec = mujoco.MjSpec.from_file(str(file))  # the parser alone, before it is compiled
     assert {body.name for body in spec.bodies} == {*tree.places}
     model = spec.compile()
@@ -268,7 +258,7 @@ def test_an_include_may_be_in_a_folder_beside_the_model(tmp_path):
     part = f'<mujocoinclude><body name="b"><joint name="j"/>{BODY}</body></mujocoinclude>'
     (tmp_path / "scene" / "part.xml").write_text(part)
     text = '<mujoco><worldbody><include file="../scene/part.xml"/></worldbody></mujoco>'
-    _, tree = tree_of(written(tmp_path / "leg", text))
+    tree = read_tree(written(tmp_path / "leg", text))
     assert [*tree.joints] == ["j"]
 
 

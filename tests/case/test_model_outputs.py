@@ -7,7 +7,7 @@ import kincheck.cases
 import numpy as np
 from kincheck import adapters
 from kincheck.core.case.io.case_file import load_case
-from kincheck.core.case.io.coordinates import with_all_coordinates, with_all_motions
+from kincheck.core.case.io.outputs import with_all_coordinates, with_all_motions
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
 from kincheck.core.case.notes import notes

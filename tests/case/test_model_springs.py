@@ -138,3 +138,6 @@ def test_dynamics_of_other_formats_are_the_same(tmp_path: Path):
         SpringDamper("strut", "arm", "wheel", ((1, 0, 0), (0, 2, 0)), 7.0, 0.0, 1.5),
     )
     assert "dynamics of joints (1)" in counted
+    (hinge,), counted = read(tmp_path, sdf.replace(">7\n", ">0\n"), "a.sdf")
+    assert hinge.name == "hinge"
+    assert "drake:linear_spring_damper (1)" in counted

@@ -16,9 +16,8 @@ import pytest
 from kincheck.core.case.case import Case
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
-from kincheck.core.case.models.hardpoints.chrono import without_comments
-from kincheck.core.case.models.hardpoints.sample_table import sample_table
-from kincheck.core.case.models.hardpoints.templates import TEMPLATES
+from kincheck.core.case.models.hardpoints.programs import without_comments
+from kincheck.core.case.models.hardpoints.templates import TEMPLATES, sample_table
 from kincheck.core.errors import CaseError
 from kincheck.core.kinematics import NativeSolver
 

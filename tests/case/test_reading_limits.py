@@ -6,14 +6,14 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
-from kincheck.core.case.io import workbook
+from kincheck.core.case.io import table
 from kincheck.core.case.io.foreign import MOST_MEMBERS
 from kincheck.core.case.io.reader_options import Supplied
-from kincheck.core.case.io.reference_table import from_table
+from kincheck.core.case.io.reference_samples import read_table, samples_of
 from kincheck.core.case.models.files import load
-from kincheck.core.case.models.hardpoints.plain import MOST_LINES
-from kincheck.core.case.models.mjcf.elements import MOST_ELEMENTS, parse_xml
-from kincheck.core.case.models.mjcf.equalities import MOST_EQUALITIES
+from kincheck.core.case.models.hardpoints.rows import MOST_LINES
+from kincheck.core.case.models.trees.element import DEEPEST, MOST_ELEMENTS, parse_xml
+from kincheck.core.case.models.trees.tree import MOST_TIES
 from kincheck.core.errors import CaseError
 
 openpyxl = pytest.importorskip("openpyxl")
@@ -42,25 +42,25 @@ def book(folder: Path, part: str, content: bytes, more: int = 0) -> Path:
 
 def refused(file: Path) -> str:
     with pytest.raises(CaseError) as caught:
-        from_table(file, None, "sheet")
+        samples_of(read_table(file, None, "sheet"))
     return str(caught.value)
 
 
 TOO_MUCH = {
     "a row of many cells": (
         SHEET,
-        HEAD + b"<row>" + b"<c/>" * workbook.MOST_TAGS + b"</row>" + END,
-        f"tags in {SHEET}, expected {workbook.MOST_TAGS} at most",
+        HEAD + b"<row>" + b"<c/>" * table.MOST_TAGS + b"</row>" + END,
+        f"tags in {SHEET}, expected {table.MOST_TAGS} at most",
     ),
     "many styles": (
         STYLES,
-        b"<styleSheet>" + b"<xf/>" * workbook.MOST_TAGS_ELSEWHERE + b"</styleSheet>",
-        f"tags in {STYLES}, expected {workbook.MOST_TAGS_ELSEWHERE} at most",
+        b"<styleSheet>" + b"<xf/>" * table.MOST_TAGS_ELSEWHERE + b"</styleSheet>",
+        f"tags in {STYLES}, expected {table.MOST_TAGS_ELSEWHERE} at most",
     ),
     "a bomb": (
         STYLES,
-        bytes(workbook.MOST_BYTES),
-        f"expected {workbook.MOST_BYTES} at most",
+        bytes(table.MOST_BYTES),
+        f"expected {table.MOST_BYTES} at most",
     ),
 }
 
@@ -102,20 +102,20 @@ def test_blank_rows_and_cells_are_counted(rows, said, tmp_path, monkeypatch):
 
     monkeypatch.setattr(sheet, "_cells_by_row", counting)
     assert said in refused(book(tmp_path, SHEET, HEAD + ONE + rows + END))
-    assert read["rows"] <= workbook.MOST_ROWS + 1
-    assert read["cells"] <= workbook.MOST_CELLS + 16_384
+    assert read["rows"] <= table.MOST_ROWS + 1
+    assert read["cells"] <= table.MOST_CELLS + 16_384
 
 
 def test_a_gap_of_a_sheet_is_read(tmp_path):
-    last = f'<row r="{workbook.MOST_ROWS}"><c r="A1"><v>2</v></c></row>'.encode()
-    (sheet,) = workbook.read_sheets(book(tmp_path, SHEET, HEAD + ONE + last + END), None, 10)
-    assert [row for _, row in sheet.rows] == [[1.0], [2.0]]
+    last = f'<row r="{table.MOST_ROWS}"><c r="A1"><v>2</v></c></row>'.encode()
+    (sheet,) = table.read_sheets(book(tmp_path, SHEET, HEAD + ONE + last + END), None, 10)
+    assert [row for _, row in sheet.sheet] == [[1.0], [2.0]]
 
 
 def test_a_table_of_many_columns_is_refused(tmp_path):
     file = tmp_path / "table.csv"
-    file.write_text("a,b\n1" + "," * workbook.MOST_COLUMNS_OF_TEXT)
-    said = f"line 2: found more than {workbook.MOST_COLUMNS_OF_TEXT} columns"
+    file.write_text("a,b\n1" + "," * table.MOST_COLUMNS_OF_TEXT)
+    said = f"line 2: found more than {table.MOST_COLUMNS_OF_TEXT} columns"
     assert said in refused(file)
     with pytest.raises(CaseError, match=said):
         load(file, Supplied(template="mcpherson"))
@@ -155,9 +155,22 @@ TIE = {
 @pytest.mark.parametrize("name", TIES)
 def test_closures_are_read_up_to_a_number(name: str, tmp_path: Path):
     file = tmp_path / name
-    file.write_text(TIES[name].format(TIE[name] * (MOST_EQUALITIES + 1)))
-    with pytest.raises(CaseError, match=rf"line {MOST_EQUALITIES + 3}: .*found more than"):
+    file.write_text(TIES[name].format(TIE[name] * (MOST_TIES + 1)))
+    with pytest.raises(CaseError, match=rf"line {MOST_TIES + 3}: .*found more than"):
         load(file, Supplied(drive=("j:0:1",)))
+
+
+def test_long_chain_of_fixed_links_is_read(tmp_path: Path):
+    base = LINKS.replace('"b"', '"l-1"')
+    chain = "".join(
+        f'<link name="l{k}"/><joint name="f{k}" type="fixed"><parent link="l{k - 1}"/>'
+        f'<child link="l{k}"/></joint>'
+        for k in range(2 * DEEPEST)
+    )
+    file = tmp_path / "chain.urdf"
+    file.write_text(f"{base}{chain}</robot>")
+    case = load(file, Supplied(drive=("j:0:1",)))
+    assert case.mechanism.point(f"l{2 * DEEPEST - 1}").body == "l-1"
 
 
 def test_springs_without_a_length_are_left_out(tmp_path: Path):

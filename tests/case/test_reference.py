@@ -1,11 +1,34 @@
-"""References of a case file: columns, grid, and files that may be opened."""
+"""References of a case file: columns, dialects, files that may be opened; and grids of their own:
+matched, interpolated, rounded, shorter, and judged.
+"""
 
+import hashlib
+import math
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
+from kincheck.adapters.native import Native
 from kincheck.core.case.case import Truth
-from kincheck.core.case.io import reference_table
+from kincheck.core.case.curves import (
+    Printed,
+    bounded,
+    even,
+    interpolated,
+    matched,
+    multiples,
+    slopes,
+)
+from kincheck.core.case.io import reference_samples
 from kincheck.core.case.io.case_file import load_case
+from kincheck.core.case.notes import notes
+from kincheck.core.errors import CaseError
+from kincheck.core.harness.compare import deviation
+from kincheck.core.harness.record import Outcome, from_json, to_json
+from kincheck.core.harness.run import run
+from kincheck.core.harness.slips import Held, Uncertain, slips
+from scipy.interpolate import CubicSpline
 
 from ..support.case_texts import BASE, BY_FILE, CSV, INLINE, complains, edited, write
 
@@ -39,6 +62,19 @@ def test_dialects_of_spreadsheets(tmp_path: Path, kind: str):
     assert series.position.tolist() == [1.4, 1.5, 1.6]
     assert series.velocity is not None
     assert series.velocity.tolist() == [2.0, 2.0, 2.0]
+
+
+def test_tables_of_recordings_have_gaps(tmp_path: Path):
+    """And lines above them, to a last one; without gaps, an empty cell is a fault."""
+    text = "run 3\nversion=1\nendheader\ntime\ta\tb\n0\t1.5\n1\tNaN\t2\n"
+    file = write(tmp_path, text, "run.sto")
+    table = reference_samples.read_table(file, None, "--sheet", above="endheader")
+    samples = reference_samples.samples_of(table, gaps=True)
+    expected = [[0.0, 1.5, np.nan], [1.0, np.nan, 2.0]]
+    np.testing.assert_array_equal(samples.numbers, expected)
+    assert samples.places == ["line 5", "line 6"]
+    with pytest.raises(CaseError, match="line 5: found 2 numbers, expected 3"):
+        reference_samples.samples_of(table)
 
 
 def test_outputs_may_lack_a_reference(tmp_path: Path):
@@ -124,7 +160,7 @@ def test_references_below_the_folder_are_fine(tmp_path: Path):
 
 
 def test_a_large_reference_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(reference_table, "LARGEST_FILE", 20)
+    monkeypatch.setattr(reference_samples, "LARGEST_FILE", 20)
     write(tmp_path, CSV, "tip.csv")
     complains(write(tmp_path, BASE + BY_FILE), ["tip.csv", "larger than 20 bytes", "thin out"])
 
@@ -176,3 +212,362 @@ def test_units_of_rows_in_the_case_file(tmp_path: Path):
 def test_wrong_units_of_columns(tmp_path: Path, head: str, fragments: list[str]):
     write(tmp_path, f"{head}\n-0.1, 1.4\n0, 1.5\n0.1, 1.6\n", "tip.csv")
     complains(write(tmp_path, BASE + BY_FILE), ["tip.csv", *fragments])
+
+
+CRANK = """
+schema = "kincheck-case/1"
+name = "crank"
+source = "made up for this test"
+truth = "third_party_data"
+[units]
+length = "mm"
+[bodies.crank]
+[joints.pin]
+type = "revolute"
+bodies = ["ground", "crank"]
+point = [0, 0, 0]
+axis = [0, 0, 1]
+[points.tip]
+body = "crank"
+position = [100, 0, 0]
+[drivers.turn]
+type = "joint_angle"
+joint = "pin"
+[sweep]
+driver = "turn"
+SWEEP
+[outputs.x]
+point = "tip"
+component = "x"
+atol = ATOL
+why = "repeatability of the rig"
+[outputs.y]
+point = "tip"
+component = "y"
+atol = ATOL
+why = "repeatability of the rig"
+[reference]
+file = "rig.csv"
+citation = "a rig that was made up for this test"
+"""
+EVEN = "start = -1.0\nstop = 1.0\nsteps = 21"
+AT = 'at = "reference"'
+
+
+def case_of(folder: Path, rows, sweep=EVEN, atol="1e-6", form="{:.6f}"):
+    lines = ["turn,x,y", *(",".join(form.format(value) for value in row) for row in rows)]
+    write(folder, "\n".join(lines) + "\n", "rig.csv")
+    return load_case(write(folder, CRANK.replace("SWEEP", sweep).replace("ATOL", atol)))
+
+
+def curve(t, x=0.0, y=0.0):
+    return [(each, 100.0 * math.cos(each) + x, 100.0 * math.sin(each) + y) for each in t]
+
+
+def judged(case):
+    (record,) = run([case], [Native()], tol=1e-12).records
+    return record
+
+
+OWN = np.linspace(-1.03, 1.021, 53)
+"""Driver values of a rig: none is at a sample."""
+
+
+def test_a_curve_on_its_own_grid_is_judged_by_its_own_accuracy(tmp_path):
+    case = case_of(tmp_path, curve(OWN))
+    record = judged(case)
+    assert record.outcome is Outcome.PASS
+    assert record.validated
+    off = record.errors["x"].position
+    # 1e-6 mm are asked; half of the sixth digit, 5e-7 mm, and 40 nrad of the driver's are more
+    assert 1e-9 + 5e-10 < off.tolerance < 2e-7
+    assert record.evidence.limits.keys() == {"x", "y"}
+    # between rows, the spline has up to 1.97 times the half unit of a row, at its ends
+    for part in ("printed to 8 digits: 9.", "driver values printed to 7", "between 53 rows"):
+        assert part in record.evidence.limits["x"]
+    assert record.evidence.units == {"turn": "rad", "x": "mm", "y": "mm"}
+    digest = hashlib.sha256((tmp_path / "rig.csv").read_bytes()).hexdigest()
+    assert (record.evidence.of, record.evidence.sha256) == ("rig.csv", digest)
+    grid = "53 rows on a grid of their own, interpolated at 21 of 21 samples"
+    assert record.evidence.grid == grid
+    assert f"the reference has {grid}" in notes(case)
+    results = run([case], [Native()], tol=1e-12)
+    assert from_json(to_json(results)).records[0].evidence == record.evidence
+
+
+@pytest.mark.parametrize("sweep", [EVEN, AT])
+@pytest.mark.parametrize("noise", [0.0, 0.004])
+@pytest.mark.parametrize("first", [0, 20])
+def test_a_shift_of_two_tolerances_is_found(tmp_path, sweep, noise, first):
+    """As measured: own grid, shorter than the sweep, noisy, and six digits."""
+    rng = np.random.default_rng(7)
+    rows = np.array(curve(OWN[first:]))
+    rows[:, 1:] += rng.normal(scale=noise / 4.0, size=rows[:, 1:].shape)
+    atol = "0.01" if noise else "1e-4"
+    right = judged(case_of(tmp_path, rows, sweep, atol, "{:.6g}"))
+    assert right.outcome is Outcome.PASS
+    tolerance = max(each.position.tolerance for each in right.errors.values())
+    assert tolerance < (3e-5 if noise else 2e-6)
+    rows[:, 2] += 2e3 * tolerance
+    wrong = judged(case_of(tmp_path, rows, sweep, atol, "{:.6g}"))
+    assert wrong.outcome is Outcome.FAIL
+    assert "y: position is off by" in wrong.message
+
+
+def test_a_shorter_reference_is_compared_where_it_is(tmp_path):
+    case = case_of(tmp_path, curve(np.linspace(-1.0, 1.0, 21)[3:18:2]), form="{:.17g}")
+    assert np.flatnonzero(np.isfinite(case.reference["x"].position)).tolist() == [*range(3, 18, 2)]
+    assert case.reference["x"].uncertainty == {}
+    assert case.origin.grid == "rows for 8 of 21 samples"
+    record = judged(case)
+    assert record.outcome is Outcome.PASS
+    assert "third-party data has no value at 13 of 21 samples" in record.message
+    wrong = curve(np.linspace(-1.0, 1.0, 21)[3:18:2])
+    wrong[2] = (wrong[2][0], wrong[2][1] + 1e-3, wrong[2][2])
+    failed = judged(case_of(tmp_path, wrong, form="{:.17g}"))
+    assert failed.errors["x"].position.worst_step == 7
+
+
+def test_samples_of_the_reference_are_taken_in_its_order(tmp_path):
+    """Up and down, as a rig measures hysteresis; one value twice."""
+    t = np.array([0.0, 0.31, 0.72, 0.9, 0.72, -0.2, -0.55])
+    case = case_of(tmp_path, curve(t), AT, form="{:.17g}")
+    assert case.sweep.values.tolist() == t.tolist()
+    record = judged(case)
+    assert record.outcome is Outcome.PASS
+    assert record.errors["y"].position.max_abs < 1e-15
+
+
+def test_reversed_rows_are_at_the_samples_of_their_driver_values(tmp_path):
+    case = case_of(tmp_path, curve(np.linspace(-1.0, 1.0, 21))[::-1], form="{:.17g}")
+    assert judged(case).outcome is Outcome.PASS
+    assert case.origin.grid == ""
+
+
+def test_a_rounded_reference_on_the_grid_is_judged_by_its_digits(tmp_path):
+    rows = curve(np.linspace(-1.0, 1.0, 21))
+    case = case_of(tmp_path, rows, atol="1e-9", form="{:.6g}")
+    assert judged(case).outcome is Outcome.PASS
+    half = case.reference["x"].uncertainty["position"]
+    assert half[0] == pytest.approx(5e-8)  # of 54.0302 mm
+    assert half[10] == pytest.approx(5e-7)  # of 100 mm
+    rows[0] = (-1.0, rows[0][1] + 2e-4, rows[0][2])
+    off = judged(case_of(tmp_path, rows, atol="1e-9", form="{:.6g}"))
+    assert off.outcome is Outcome.FAIL
+    assert off.errors["x"].position.worst_step == 0
+
+
+def test_a_slip_of_a_rounded_reference_is_named(tmp_path):
+    """Metres in a file of millimetres, with six digits: times 1000 it fits within a sixth digit."""
+    rows = [(t, x / 1000.0, y) for t, x, y in curve(np.linspace(-1.0, 1.0, 21))]
+    case = case_of(tmp_path, rows, atol="1e-9", form="{:.6g}")
+    results = run([case], [Native()], tol=1e-12)
+    assert results.records[0].outcome is Outcome.FAIL
+    assert "times 1000" in results.suspects["crank"].message
+
+
+WRONG = [
+    (curve(OWN[:3]), EVEN, ["rig.csv", "line 4", "-0.951115 rad", "nearest is -1 rad", "found 3"]),
+    (curve(OWN + 5.0), EVEN, ["found driver values from 3.97 rad to", "-1 rad to 1 rad"]),
+    (curve([*OWN, OWN[7]]), EVEN, ["line 55", "driver value", "twice", "at = "]),
+    (curve(OWN), AT + "\nsteps = 3", ["sweep.steps", "beside at", "remove steps or at"]),
+    (curve(OWN), "start = 1\nstop = 2", ["sweep.steps", "missing", 'at = "reference"']),
+    (curve(OWN), 'at = "rig"', ["sweep.at", "'rig'", '"reference"']),
+]
+
+
+@pytest.mark.parametrize(("rows", "sweep", "fragments"), WRONG)
+def test_wrong_grids_are_refused(tmp_path, rows, sweep, fragments):
+    case_text = CRANK.replace("SWEEP", sweep).replace("ATOL", "1e-6")
+    lines = ["turn,x,y", *(",".join(f"{value:.6f}" for value in row) for row in rows)]
+    write(tmp_path, "\n".join(lines), "rig.csv")
+    complains(write(tmp_path, case_text), fragments)
+
+
+def test_samples_of_a_missing_reference_are_refused(tmp_path):
+    text = CRANK.partition("[reference]")[0].replace("SWEEP", AT).replace("ATOL", "1e-6")
+    complains(write(tmp_path, text), ["sweep.at", "no [reference]"])
+
+
+@pytest.mark.parametrize(
+    ("texts", "half"),
+    [
+        (["0.123457", "0.500000", "-12.345678"], [5e-7] * 3),
+        (["0.123457", "0.5", "-12.3457"], [5e-7, 5e-7, 5e-5]),
+        (["1.23457e-03", "5.00000e+02"], [5e-9, 5e-4]),
+        (["0.4", "0.412", "0.05"], [5e-4] * 3),  # a spreadsheet leaves out zeros at the end
+        (["12.3", "0.412", "1.57"], [5e-2, 5e-4, 5e-3]),
+        (["12.3", "0.412", "0.05", "1.571"], [5e-4] * 4),
+        (["1.5e-3", "2.25e-2"], [5e-5] * 2),
+        (["0.25", "0.5", "1.75"], [5e-3] * 3),
+        (["100", "1234", "1200"], [0.5] * 3),
+        (["1", "0", "-1"], [0.5] * 3),
+        (["123457", "7.5"], [0.05] * 2),
+        (["0", "0.0"], [0.0] * 2),  # no digit that anything could be rounded to
+        (["0.000", "0.000"], [5e-4] * 2),
+        (["0.1234567890123456", "0.5"], [0.0] * 2),
+        (["0.0", "0.00012"], [5e-6] * 2),
+        (["0.00000", "0.12345"], [5e-6, 5e-6]),
+    ],
+)
+def test_printed_digits(texts, half):
+    column = Printed()
+    for text in texts:
+        column.add(text)
+    assert column.half(np.array([*map(float, texts)])) == pytest.approx(half, rel=1e-9)
+
+
+def test_driver_values_that_somebody_set_are_exact():
+    assert even(np.array([0.0625, 0.125, 0.1875]))
+    assert not even(np.round(np.arange(9) / 7.0, 6))
+    assert multiples(np.array([-80.0, -65.0, -5.0, 0.0]), 0)
+    assert multiples(np.array([0.25, 0.5, 1.75]), 2)
+    assert not multiples(np.array([-79.9, -65.2, -5.1]), 1)
+    assert not multiples(np.array([1e60, 3e60]), 2)
+
+
+def stripped(decimals: int):
+    """Return the writer of a spreadsheet that rounds to some decimals."""
+    return lambda value: repr(round(float(value), decimals)).removesuffix(".0")
+
+
+WRITERS = {
+    **{f"{n} decimals": (f"{{:.{n}f}}".format, n, 0) for n in (0, 1, 2, 3, 5)},
+    **{f"{n} decimals without zeros": (stripped(n), n, 0) for n in (1, 2, 3, 4)},
+    **{f"{n} digits": (f"{{:.{n}g}}".format, 0, n) for n in (2, 3, 4, 6)},
+    **{f"{n} digits, exponent": (f"{{:.{n - 1}e}}".format, 0, n) for n in (2, 3, 5)},
+}
+"""By name, the writer, its decimals or else its digits."""
+ARM = np.array([97.31, 11.7])
+
+
+def rounded(folder: Path, form, grid, shifts):
+    """Return the verdict on the rounded curve of a tip at `ARM`, shifted in y."""
+    lines = ["turn,x,y"]
+    for t, shift in zip(grid, np.broadcast_to(shifts, len(grid)), strict=True):
+        cos, sin = math.cos(t), math.sin(t)
+        x, y = ARM[0] * cos - ARM[1] * sin, ARM[0] * sin + ARM[1] * cos
+        lines.append(f"{t:.17g},{form(x)},{form(y + shift)}")
+    write(folder, "\n".join(lines) + "\n", "rig.csv")
+    text = CRANK.replace("SWEEP", EVEN).replace("ATOL", "1e-6")
+    return judged(load_case(write(folder, text.replace("100, 0, 0", "97.31, 11.7, 0"))))
+
+
+@pytest.mark.parametrize(("form", "decimals", "digits"), WRITERS.values(), ids=WRITERS)
+def test_a_rightly_rounded_curve_passes(form, decimals, digits, tmp_path):
+    """And one that is off by a whole unit of a last digit fails, in one row or in all."""
+    grid = np.linspace(-1.0, 1.0, 21)
+    assert rounded(tmp_path, form, grid, 0.0).outcome is Outcome.PASS
+    assert rounded(tmp_path, form, OWN, 0.0).outcome is Outcome.PASS
+    place = 2 - digits if digits else -decimals  # numbers of the last rows have two whole digits
+    shift = 1.01 * 10.0**place
+    for row in (0, 20):
+        off = rounded(tmp_path, form, grid, np.where(np.arange(21) == row, shift, 0.0))
+        assert off.outcome is Outcome.FAIL, off.message
+        assert off.errors["y"].position.worst_step == row
+    assert rounded(tmp_path, form, grid, shift).outcome is Outcome.FAIL
+
+
+@pytest.mark.parametrize("count", [4, 7, 30, 400])
+def test_rounding_of_rows_moves_a_spline_by_no_more(count):
+    """Against the splines of rows of nothing and one, and the whole matrix of weights."""
+    rng = np.random.default_rng(count)
+    x = np.arange(count) + rng.uniform(-0.3, 0.3, count)
+    half = rng.uniform(0.5, 1.0, count)
+    at = rng.uniform(x[0], x[-1], 50)
+    within = at > 1.0
+    weights = np.abs(CubicSpline(x, np.eye(count))(at))
+    expected = np.where(within, weights @ half, 0.0)
+    assert bounded(x, half, at, within) == pytest.approx(expected, rel=1e-9)
+
+
+VELOCITIES = """
+[reference]
+columns = ["driver", "x", "x.velocity", "x.acceleration"]
+rows = ROWS
+citation = "made up"
+"""
+
+
+@pytest.mark.parametrize("name", ["velocity", "acceleration"])
+def test_rates_are_judged_by_their_own_digits(name, tmp_path):
+    text = CRANK.partition("[reference]")[0].replace("SWEEP", EVEN).replace("ATOL", "1e-6")
+    rows = [
+        [t, round(100 * math.cos(t), 3), round(-100 * math.sin(t), 1), round(-100 * math.cos(t))]
+        for t in np.linspace(-1.0, 1.0, 21).tolist()
+    ]
+    case = load_case(write(tmp_path, text + VELOCITIES.replace("ROWS", repr(rows))))
+    assert judged(case).outcome is Outcome.PASS
+    rows[3][2 + (name == "acceleration")] += 0.1 if name == "velocity" else 1
+    off = judged(load_case(write(tmp_path, text + VELOCITIES.replace("ROWS", repr(rows)))))
+    assert off.outcome is Outcome.FAIL
+    assert f"x: {name} is off" in off.message
+
+
+@pytest.mark.parametrize(("truth", "half"), [("closed_form", 0.0), ("third_party_data", 0.05)])
+def test_rows_of_a_formula_are_exact(truth, half, tmp_path):
+    """A wrong result would pass as the rounding of 1.0 and 0.0; data may be printed so."""
+    text = CRANK.partition("[reference]")[0].replace("SWEEP", EVEN).replace("ATOL", "1e-6")
+    rows = '[reference]\nrows = [[0.0, 99.9]]\ncolumns = ["turn", "x"]\ncitation = "made up"\n'
+    case = load_case(write(tmp_path, text.replace("third_party_data", truth) + rows))
+    known = case.reference["x"].uncertainty.get("position", np.zeros(1))
+    assert known.max() == pytest.approx(half / 1000.0)
+    assert judged(case).outcome is Outcome.FAIL
+
+
+def test_a_column_of_all_digits_is_exact_beside_short_numbers(tmp_path):
+    """Zeros, constants and even numbers of a file of all digits are no rounded ones."""
+    t = np.linspace(-1.0, 1.0, 21)
+    lines = ["turn,x,y", *(f"{a:.17g},{100 * math.cos(a):.17g},{0.5 + k}" for k, a in enumerate(t))]
+    write(tmp_path, "\n".join(lines) + "\n", "rig.csv")
+    case = load_case(write(tmp_path, CRANK.replace("SWEEP", EVEN).replace("ATOL", "1e-6")))
+    assert case.reference["x"].uncertainty == case.reference["y"].uncertainty == {}
+
+
+def test_a_reference_of_too_few_digits_is_told(tmp_path):
+    rows = curve(np.linspace(-1.0, 1.0, 21))
+    told = [note for note in notes(case_of(tmp_path, rows, form="{:.0e}")) if "too few" in note]
+    assert [note.partition(": ")[0] for note in told] == ["x"]  # 100 mm, known to 50 mm
+    assert not any("too few" in note for note in notes(case_of(tmp_path, rows, form="{:.2e}")))
+
+
+def test_rows_are_matched_by_driver_value():
+    at = np.array([0.0, 0.1, 0.2, 0.3])
+    assert matched(at, at, 1e-12).tolist() == [0, 1, 2, 3]
+    assert matched(np.array([0.3, 0.1]), at, 1e-12).tolist() == [-1, 1, -1, 0]
+    assert matched(np.array([0.3, 0.11]), at, 1e-12) is None
+    assert matched(np.array([0.3, 0.3]), at, 1e-12) is None
+
+
+@pytest.mark.parametrize("count", [4, 5, 9, 30])
+def test_the_estimate_bounds_the_error_of_interpolation(count):
+    jitter = np.random.default_rng(count).uniform(-0.3, 0.3, count)
+    x = 2.0 * (np.arange(count) + jitter) / count
+    at = np.linspace(x[0], x[-1], 101)
+    found, error = interpolated(x, np.sin(3.0 * x), at)
+    assert (np.abs(found - np.sin(3.0 * at)) <= error + 1e-12).all()
+    if count == 30:
+        assert error.max() < 1e-2
+
+
+def test_slopes_are_not_those_of_noise():
+    x = np.repeat(np.linspace(0.0, 1.0, 101), 2) + np.tile([0.0, 1e-9], 101)
+    noise = np.tile([0.0, 1e-3], 101)
+    assert slopes(x, 2.0 * x + noise, np.array([0.0, 0.503, 1.0])).max() < 2.2
+
+
+def test_a_deviation_counts_in_tolerances_where_accuracy_differs():
+    off = deviation(np.array([1.0, 2.0]), np.zeros(2), 0.5, 0.0, "data", np.array([0.0, 2.0]))
+    assert (off.worst_step, off.max_abs, off.tolerance, off.within) == (0, 1.0, 0.5, False)
+    off = deviation(np.array([0.0, 2.0]), np.zeros(2), 0.0, 0.0, "data", np.array([0.0, 2.0]))
+    assert (off.worst_step, off.max_abs, off.tolerance, off.within) == (1, 2.0, 2.0, True)
+
+
+def test_a_slip_scales_the_accuracy_with_the_reference():
+    values = np.linspace(1.0, 2.0, 9)
+    reference = Uncertain(values / 1000.0 + 4e-7, np.full(9, 5e-7))
+    (slip,) = slips(Held(values, 1e-9, 0.0, "m"), reference, {}, offsets=False)
+    assert (slip.change, slip.tolerance) == ("times 1000", pytest.approx(5e-4, rel=1e-5))
+    assert (
+        slips(Held(values, 1e-9, 0.0, "m"), replace(reference, half=None), {}, offsets=False) == []
+    )

@@ -5,9 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from kincheck.core.case.io.reader_options import LEFT_OUT, Supplied
-from kincheck.core.case.models.files import load
-from kincheck.core.case.models.mjcf.elements import parse_xml
-from kincheck.core.case.models.robots.sdf import read_sdf
+from kincheck.core.case.models.files import load, read_tree
 from kincheck.core.errors import CaseError
 
 from ..fuzz import sdf as seeds
@@ -85,11 +83,6 @@ def test_a_screw_advances_by_its_pitch_in_a_turn(tmp_path: Path):
     assert solution(case).bodies["nut"].r[:, 2] == pytest.approx([0, 0.005, 0.01], abs=EXACT)
 
 
-def links(text: str, folder: Path):
-    file = folder / "model.sdf"
-    return read_sdf(parse_xml(file, text))
-
-
 AXES = {
     "in the joint": ('<sdf version="1.7">', "", "<xyz>1 0 0</xyz>", (0, 1, 0)),
     "in a link": ('<sdf version="1.7">', "", '<xyz expressed_in="a">1 0 0</xyz>', (0, 0, -1)),
@@ -122,9 +115,9 @@ def test_an_axis_is_in_the_frame_it_says(root, more, xyz, expected, tmp_path: Pa
     text = f"""{root}<model name="m"><link name="a"><pose>0 0 0 0 {half} 0</pose></link>
     <link name="b"><pose>1 0 0 0 0 {half}</pose></link><joint name="j" type="revolute">
     <parent>a</parent><child>b</child><axis>{xyz}{more}</axis></joint></model></sdf>"""
-    (joint,) = links(text, tmp_path).joints
-    assert [*joint.moves[0].axis] == pytest.approx(expected, abs=EXACT)
-    assert [*joint.moves[0].point] == pytest.approx((1, 0, 0), abs=EXACT)
+    hinge = read_tree(model(tmp_path, text)).moves["j"]
+    assert [*hinge.axis] == pytest.approx(expected, abs=EXACT)
+    assert [*hinge.point] == pytest.approx((1, 0, 0), abs=EXACT)
 
 
 def test_links_without_a_joint_above_are_free(tmp_path: Path):

@@ -8,7 +8,7 @@ from datetime import datetime
 import numpy as np
 import pytest
 from kincheck.adapters.native import Native
-from kincheck.core.case.io import workbook
+from kincheck.core.case.io import table as tables
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.io.reader_options import LEFT_OUT
 from kincheck.core.case.models.files import load
@@ -20,7 +20,7 @@ from kincheck.core.harness.run import run
 
 from ..support.case_texts import write
 from .test_hardpoint_dialects import POINTS, SAID, read, table
-from .test_reference_grid import AT, CRANK, OWN, curve
+from .test_reference import AT, CRANK, OWN, curve
 
 openpyxl = pytest.importorskip("openpyxl")
 HEAD = ["name", "x", "y", "z"]
@@ -181,7 +181,7 @@ def test_a_damaged_workbook(tmp_path):
 
 
 def test_a_workbook_that_unpacks_to_much(tmp_path, monkeypatch):
-    monkeypatch.setattr(workbook, "MOST_BYTES", 10_000)
+    monkeypatch.setattr(tables, "MOST_BYTES", 10_000)
     file = tmp_path / "car.xlsx"
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("xl/workbook.xml", " " * 10_001)

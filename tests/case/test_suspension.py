@@ -1,26 +1,39 @@
-"""Suspension outputs against closed forms, a 60-digit solution, third numbers, the mirror image and
-the other convention.
-"""
+"""Suspension outputs: formulas, conventions of signs, and samples without a value."""
 
 import csv
 import tomllib
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from itertools import islice
 
+import mpmath as mp
 import numpy as np
 import pytest
 from kincheck import cases
+from kincheck.adapters.native import Native
+from kincheck.cases import (
+    chrono_double_wishbone_arm,
+    chrono_macpherson_arm,
+    chrono_sedan_double_wishbone_arm,
+    mcpherson_arm,
+)
+from kincheck.cases.jet import Jet
+from kincheck.cases.vectors import Vec
+from kincheck.core import Distance
+from kincheck.core.case.case import Case, Output
 from kincheck.core.case.suspension import (
     Axle,
+    Convention,
     Reaction,
     Side,
 )
-from kincheck.core.harness.compare import deviations
+from kincheck.core.harness.compare import deviations, output_series
 from kincheck.core.mechanism.mechanism import Point
 from mpmath import mpf
 
 from ..oracles import strut_oracle
-from ..support.suspension_files import AXES, STRUT, loaded, unreferenced
-from ..support.suspension_outputs import ROUND_OFF, hinged, solved
+from ..support.suspension_files import AXES, STRUT, loaded, mirrored, unreferenced
+from ..support.suspension_outputs import ROUND_OFF, TOL, hinged, solved
 
 ANGLES = np.linspace(-0.3, 0.4, 8)
 
@@ -263,3 +276,249 @@ def test_chrono_strut_toes_out_in_jounce():
     s = np.array([*CHRONO.values()])
     assert found["toe"].position == pytest.approx(np.arctan(s[:, 0] / s[:, 1]), abs=ROUND_OFF)
     assert found["camber"].position == pytest.approx(-np.arcsin(s[:, 2]), abs=ROUND_OFF)
+
+
+ONE_SIGN = {"steer_angle", "wheel_center_y"}
+"""Outputs that tell left from right, or one convention from the other."""
+
+
+def test_mirror_image_is_the_other_wheel():
+    right, left = solved(loaded(STRUT)), solved(loaded(mirrored(STRUT)))
+    assert right.keys() == left.keys()
+    for name, series in right.items():
+        sign = -1.0 if name.split(".")[0] in ONE_SIGN else 1.0
+        for here, there in (
+            (series.position, left[name].position),
+            (series.velocity, left[name].velocity),
+        ):
+            if here is not None:
+                assert there == pytest.approx(sign * here, abs=ROUND_OFF)
+    assert np.ptp(right["toe"].position) > 0.05  # and it is no strut at rest
+
+
+def test_sae_turns_what_has_axes():
+    iso, sae = (
+        loaded(unreferenced(STRUT | {"suspension": STRUT["suspension"] | {"convention": each}}))
+        for each in Convention
+    )
+    assert "y left, z up" in iso.signs
+    assert "y right, z down" in sae.signs
+    found, turned = solved(iso), solved(sae)
+    for name, series in found.items():
+        assert turned[name].position == pytest.approx(
+            (-1.0 if name.split(".")[0] in ONE_SIGN else 1.0) * series.position, abs=1e-15
+        )
+    senses = [{output.name: output.sense for output in case.outputs} for case in (iso, sae)]
+    assert {name for name, sense in senses[0].items() if senses[1][name] != sense} == {
+        name for name in found if name.split(".")[0] in ONE_SIGN
+    }
+
+
+def test_axes_of_the_file_do_not_matter():
+    """The same car drawn with x to the left, y rearward and z up, or with z down."""
+    for turn in (np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1]]), np.diag([1, -1, -1])):
+        turned = mirrored(STRUT, turn)
+        turned["suspension"] |= {"side": "right"}
+        found, expected = solved(loaded(turned)), solved(loaded(STRUT))
+        for name, series in expected.items():
+            assert found[name].position == pytest.approx(series.position, abs=ROUND_OFF)
+
+
+def test_without_velocities_there_are_positions_and_no_slopes():
+    case = loaded(STRUT)
+    engine = Native()
+    full = engine.solve(engine.build(case), case, TOL)
+    bare = replace(
+        full,
+        points={
+            name: replace(each, velocity=None, acceleration=None)
+            for name, each in full.points.items()
+        },
+    )
+    found = {output.name: output_series(case, output, bare) for output in case.outputs}
+    assert np.isfinite(found["toe"].position).all()
+    assert found["toe"].velocity is None
+    for name in ("toe.per_travel", "roll_center_height", "motion_ratio"):
+        assert np.isnan(found[name].position).all()
+
+
+def test_slopes_where_the_wheel_stands_still_are_unknown():
+    """A swing axle whose wheel passes the top of its way: travel stops there, and camber does
+    not.
+    """
+    angles = np.linspace(np.pi / 2 - 0.2, np.pi / 2 + 0.2, 5)
+    found = hinged(
+        (0.0, 0.75, 0.0), (0.0, 0.2, 0.0), (1, 0, 0), angles, ["camber", "roll_center_height"]
+    )
+    assert np.isfinite(found["camber"].position).all()
+    for name in ("camber.per_travel", "roll_center_height"):
+        assert np.isnan(found[name].position).tolist() == [False, False, True, False, False]
+
+
+def test_markers_do_not_widen_tolerances():
+    case = loaded(STRUT)
+    plain = replace(
+        case,
+        outputs=(
+            Output("x", "wheel_center", (1.0, 0.0, 0.0), True, 1e-9, case.outputs[0].rtol, "test"),
+        ),
+    )
+    one = next(islice((output for output in case.outputs if output.name == "toe.per_travel"), 1))
+    series = solved(case)["toe"]
+    tolerance = deviations(plain, plain.outputs[0], series, [("x", series)]).velocity.tolerance
+    assert deviations(
+        case, case.outputs[0], series, [("x", series)]
+    ).velocity.tolerance == pytest.approx(tolerance)
+    assert one.atol == pytest.approx(1e-9 / 0.61)  # the strut from ball to top
+
+
+def test_relative_is_measured_from_the_design():
+    """A wheel with static angles, each output once as it is and once relative."""
+    data = STRUT | {
+        "suspension": STRUT["suspension"] | {"static_toe": 0.02, "static_camber": -0.03}
+    }
+    types = ("toe", "camber", "caster", "scrub_radius")
+    outputs = {
+        f"{each}{end}": {"type": each, "relative": bool(end)}
+        for each in types
+        for end in ("", "_change")
+    }
+    found = solved(loaded(unreferenced(data | {"outputs": outputs})))
+    middle = 16  # the design is the middle of the sweep
+    for each, design in zip(types, (0.02, -0.03, 0.05306489, 0.0), strict=True):
+        absolute, relative = found[each], found[f"{each}_change"]
+        assert relative.position == pytest.approx(
+            absolute.position - absolute.position[middle], abs=ROUND_OFF
+        )
+        assert relative.velocity == pytest.approx(absolute.velocity, abs=ROUND_OFF)
+        if design:
+            assert absolute.position[middle] == pytest.approx(design, abs=1e-8)  # the digits above
+
+
+# Round-off of metres, through a division by the wheel's rate of rise over the arm's angle, 0.3 m,
+# for each derivative.
+LIMITS = {"position": 1e-15, "velocity": 1e-14, "acceleration": 1e-13}
+
+
+ARMS = {
+    "chrono_double_wishbone": lambda turn, rack: chrono_double_wishbone_arm.motion(turn),
+    "chrono_macpherson": lambda turn, rack: chrono_macpherson_arm.motion(turn),
+    "chrono_sedan_double_wishbone": lambda turn, rack: chrono_sedan_double_wishbone_arm.motion(
+        turn
+    ),
+    "mcpherson_steered": mcpherson_arm.motion,
+    "mcpherson_strut": mcpherson_arm.motion,
+}
+
+
+def turned(motion: Callable[[Jet], Mapping[str, Vec]], height: Jet) -> Jet:
+    """The arm's motion that lifts the wheel to that height: Newton's iteration for its angle, then
+    twice the chain rule.
+    """
+    angle, still = np.zeros_like(height.x), np.zeros_like(height.x)
+
+    def z(rate: np.ndarray) -> Jet:
+        return motion(Jet(angle, rate, still))["wheel_center"].z
+
+    for _ in range(8):
+        slope = z(still + 1.0).v - z(still).v
+        angle = angle - (z(still).x - height.x) / slope
+    slope = z(still + 1.0).v - z(still).v
+    rate = (height.v - z(still).v) / slope
+    return Jet(angle, rate, (height.a - z(rate).a) / slope)
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_samples_by_the_closed_form_of_the_arm(name: str):
+    case = cases.load(name)
+    design = case.mechanism.point("wheel_center").position
+    stroke, rack = (
+        Jet(*each)
+        for each in case.sweep.path.drive(["stroke", "rack"], case.sweep.path.times).swapaxes(0, 1)
+    )
+
+    def motion(turn: Jet) -> Mapping[str, Vec]:
+        return ARMS[name](turn, rack)
+
+    turn = turned(motion, stroke + design[2])
+    assert np.ptp(turn.x) > 0.2
+    wheel = motion(turn)["wheel_center"]
+    for output, found in (
+        ("wheelbase_change", wheel.x - design[0]),
+        ("half_track_change", wheel.y - design[1]),
+    ):
+        for (order, limit), values in zip(LIMITS.items(), (found.x, found.v, found.a), strict=True):
+            truth = getattr(case.reference[output], order)
+            assert np.abs(values - truth).max() <= limit * max(1.0, np.abs(truth).max()), (
+                output,
+                order,
+            )
+
+
+def test_the_decompositions_have_one_truth():
+    for one, other in (
+        ("chrono_macpherson", "chrono_macpherson_cylindrical"),
+        ("chrono_multi_link", "chrono_multi_link_bodies"),
+    ):
+        (first, second) = (cases.load(name) for name in (one, other))
+        assert {type(joint) for joint in first.mechanism.joints} != {
+            type(joint) for joint in second.mechanism.joints
+        }
+        for name, series in first.reference.items():
+            assert (series.position == second.reference[name].position).all()
+
+
+# The multi-link by five distances
+
+
+def rods(case: Case) -> list[tuple[mp.matrix, mp.matrix]]:
+    """Both ends of each, the inner first; the arm is two rods from its hinge to its ball."""
+    hinge, ball = case.mechanism.joint("upper_pivot"), case.mechanism.joint("upper_ball")
+    found = [
+        (joint.points[0], joint.points[1])
+        for joint in case.mechanism.joints
+        if isinstance(joint, Distance)
+    ]
+    found += [
+        (hinge.point, ball.point),
+        (np.subtract(hinge.point, hinge.axis).tolist(), ball.point),
+    ]
+    return [(mp.matrix([*inner]), mp.matrix([*outer])) for inner, outer in found]
+
+
+def upright(case: Case, stroke: mp.mpf, near: list) -> list:
+    """Shift and half of the rotation's vector (Cayley's) of the upright with the wheel centre
+    lifted by the stroke.
+    """
+    centre, links = mp.matrix([*case.mechanism.point("wheel_center").position]), rods(case)
+
+    def closure(*x):
+        a, b, c = x[3:]
+        skew = mp.matrix([[0, -c, b], [c, 0, -a], [-b, a, 0]])
+        turn = mp.inverse(mp.eye(3) - skew) * (mp.eye(3) + skew)
+        arms = [
+            (centre + mp.matrix(x[:3]) + turn * (outer - centre) - inner, outer - inner)
+            for inner, outer in links
+        ]
+        return [*((now.T * now)[0] - (before.T * before)[0] for now, before in arms), x[2] - stroke]
+
+    return list(mp.findroot(closure, near))
+
+
+@pytest.mark.parametrize("sample", [3, 24])
+def test_the_multi_link_by_five_distances(sample: int):
+    case = cases.load("chrono_multi_link")
+    with mp.workdps(40):
+        stroke, near = mp.mpf(case.sweep.values[sample]), [0] * 6
+        for part in range(1, 5):
+            near = upright(case, stroke * part / 4, near)
+        for k, name in enumerate(("wheelbase_change", "half_track_change")):
+            for order, limit in LIMITS.items():
+
+                def coordinate(t: mp.mpf, k: int = k) -> mp.mpf:
+                    return upright(case, t, near)[k]
+
+                expected = float(mp.diff(coordinate, stroke, list(LIMITS).index(order)))
+                assert getattr(case.reference[name], order)[sample] == pytest.approx(
+                    expected, abs=limit
+                ), (name, order)

@@ -1,17 +1,30 @@
-"""Suspension outputs in case files, reference tables, results and reports: units, signs in every
-header, and clear refusals.
-"""
+"""[suspension] of a case file, points of its wheel, and reports of its outputs."""
 
-from dataclasses import dataclass
+import json
+from copy import deepcopy
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
+from kincheck.adapters.native import Native
+from kincheck.core.case.io.case_file import case_text
 from kincheck.core.case.io.catalogue import output_catalogue
+from kincheck.core.case.io.reader_options import Supplied
+from kincheck.core.case.models.files import load
+from kincheck.core.case.models.hardpoints.templates import TEMPLATES, sample_table
 from kincheck.core.case.suspension import SuspensionOutput
 from kincheck.core.case.suspension.base import Attitude
 from kincheck.core.cli import main
 from kincheck.core.errors import CaseError
+from kincheck.core.harness.record import Outcome, from_json, to_json
+from kincheck.core.harness.run import run
+from kincheck.core.report.junit import to_junit
+from kincheck.core.report.matrix import print_matrix, to_markdown
+from kincheck.core.report.report import write_report
+from kincheck.core.report.table import print_table
 
+from ..studies.test_vary import HEAD
+from ..support.rods_of_templates import solved
 from ..support.suspension_changes import TOE, changed
 from ..support.suspension_files import STRUT, TABLE, loaded, unreferenced
 
@@ -275,3 +288,184 @@ def test_a_new_type_is_a_short_class(capsys):
         assert [output.name for output in case.outputs] == ["lead", "lead.per_travel"]
     finally:
         del SuspensionOutput.registry[Lead.type]
+
+
+SIGNS = (
+    "ISO 8855 (x forward, y left, z up); front right wheel; forward is [-1, 0, 0] and up [0, 0, 1]"
+    " in the case's axes"
+)
+
+
+HEADING = f"Signs of mcpherson_suspension: {SIGNS}"
+
+
+@dataclass(frozen=True)
+class Bent:
+    """The native engine with a wheel that is twisted by a micrometre at its axis."""
+
+    native: Native = field(default_factory=Native)
+    name: str = "bent"
+    mode: str = "projection"
+    loop: str = "python"
+
+    def __getattr__(self, name):
+        return getattr(self.native, name)
+
+    def solve(self, model, case, tol):
+        found = self.native.solve(model, case, tol)
+        spin = found.points["~wheel_center.spin"]
+        twisted = replace(spin, position=spin.position + np.array([1e-6, 0.0, 0.0]))
+        return replace(found, points={**found.points, "~wheel_center.spin": twisted})
+
+
+@pytest.fixture(scope="module")
+def results():
+    return run([loaded(STRUT)], [Native(), Bent()], tol=1e-12)
+
+
+def test_a_twisted_wheel_fails_in_radians(results):
+    native, bent = results.records
+    assert (native.outcome, bent.outcome) == (Outcome.PASS, Outcome.FAIL)
+    error = bent.errors["toe"].position
+    assert error.max_abs == pytest.approx(1e-6 / 0.25, rel=0.02)
+    assert " rad at sample" in bent.message or " rad/m at sample" in bent.message
+    assert 'message="toe: position is off by 4e-06 rad at sample' in to_junit(results).decode()
+
+
+def test_signs_head_everything(results, tmp_path):
+    again = from_json(to_json(results))
+    assert again.run["cases"]["mcpherson_suspension"]["signs"] == SIGNS
+    assert again.records[0].outputs["steer_angle"].sense == "positive: to the left"
+    assert again.records[0].outputs["toe.per_travel"].unit == "rad/m"
+    with (tmp_path / "table").open("w+") as file:
+        print_table(results, file)
+        print_matrix(results, file)
+        file.seek(0)
+        assert [line.startswith(HEADING) for line in file].count(True) == 2
+        file.seek(0)
+        assert next(file).startswith(HEADING)
+    assert to_markdown(results).startswith(f"{HEADING}.\n\n|")
+    write_report(results, tmp_path / "report.html")
+    page = (tmp_path / "report.html").read_text().replace("&#39;", "'")
+    assert SIGNS in page
+    assert "Positive: toe-in." in page
+    assert "# signs: iso8855" in TABLE
+
+
+def test_signs_head_the_tables_of_other_commands(tmp_path, capsys):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    file = tmp_path / "strut.json"
+    file.write_text(json.dumps(unreferenced(changed("sweep", steps=3)) | TOE))
+    varied = {"ball": {"at": "ball", "sigma": 1.0}}
+    (tmp_path / "vary.json").write_text(
+        json.dumps({**HEAD, "mode": "monte_carlo", "hardpoints": varied})
+    )
+    sweep = [
+        "sweep",
+        "--samples",
+        "2",
+        "--out",
+        str(tmp_path),
+        "--store",
+        str(tmp_path / "all.parquet"),
+        "--vary",
+    ]
+    for command, first in (
+        (["explain"], "output "),
+        (["reference"], "native error"),
+        ([*sweep, str(tmp_path / "vary.json")], "output"),
+    ):
+        assert main.main([*command, str(file)]) == 0
+        lines = capsys.readouterr().out.splitlines()
+        tables = [k for k, line in enumerate(lines) if line.strip().startswith(first)]
+        assert tables
+        assert all(any(SIGNS in line for line in lines[k - 3 : k]) for k in tables), command
+    assert SIGNS in (tmp_path / "sweep.html").read_text().replace("&#39;", "'")
+    assert (
+        json.loads(parquet.read_schema(tmp_path / "all.parquet").metadata[b"kincheck"])["signs"]
+        == SIGNS
+    )
+
+
+def test_tables_keep_lengths_and_angles_apart(results):
+    """Lengths are shown where there are any; errors in other units have theirs beside them."""
+    assert "[" not in cells(results)[1]
+    native, bent = cells(run([loaded(unreferenced(STRUT | TOE))], [Native(), Bent()], tol=1e-12))
+    # no truth, and nothing else to be compared with
+    assert native.startswith("not judged, residual")
+    assert bent.startswith("fail: 4e-06 [rad] · ")
+
+
+def cells(results):
+    row = next(
+        line
+        for line in to_markdown(results).splitlines()
+        if line.startswith("| `mcpherson_suspension`")
+    )
+    return [cell.strip() for cell in row.split("|")[2:-1]]
+
+
+CENTER = np.array(STRUT["points"]["wheel_center"]["position"])
+STATIC_TOE, STATIC_CAMBER = 0.01, -0.02
+
+
+def pointed(**changes):
+    """The strut's wheel, a right one with x rearward, with points for its radius and axis."""
+    data = deepcopy(unreferenced(STRUT))
+    spin = [
+        -np.cos(STATIC_CAMBER) * np.sin(STATIC_TOE),
+        np.cos(STATIC_CAMBER) * np.cos(STATIC_TOE),
+        -np.sin(STATIC_CAMBER),
+    ]
+    for name, place in {
+        "hub": CENTER + 0.1 * np.array(spin),
+        "road": CENTER - [0.0, 0.0, 0.3],
+        "inboard": CENTER - [0.0, 0.1, 0.0],
+    }.items():
+        data["points"][name] = {"body": "knuckle", "position": place.tolist()}
+    del data["suspension"]["wheel_radius"]
+    data["suspension"] |= {"wheel_axis": "hub", "wheel_contact": "road"} | changes
+    return data
+
+
+def test_points_give_what_the_numbers_give():
+    data = deepcopy(unreferenced(STRUT))
+    data["suspension"] |= {"static_toe": STATIC_TOE, "static_camber": STATIC_CAMBER}
+    expected = solved(loaded(data))
+    for name, values in solved(loaded(pointed())).items():
+        np.testing.assert_allclose(values, expected[name], rtol=1e-12, atol=1e-12, err_msg=name)
+
+
+FAULTS = [
+    ({"wheel_axis": "hubb"}, "suspension.wheel_axis", "did you mean 'hub'"),
+    ({"static_toe": 0.01}, "suspension.wheel_axis", "beside static_toe and static_camber"),
+    ({"wheel_radius": 0.3}, "suspension.wheel_contact", "beside wheel_radius"),
+    ({"wheel_axis": "inboard"}, "suspension.wheel_axis", "not outboard of the wheel's centre"),
+    ({"wheel_contact": "strut_top"}, "suspension.wheel_contact", "'strut', expected a point of"),
+    ({"wheel_contact": "wheel_center"}, "suspension.wheel_contact", "at the wheel's centre"),
+]
+
+
+@pytest.mark.parametrize(("changes", "key", "words"), FAULTS)
+def test_wrong_point_is_told(changes, key, words):
+    with pytest.raises(CaseError) as caught:
+        loaded(pointed(**changes))
+    assert key in str(caught.value)
+    assert words in str(caught.value)
+
+
+@pytest.mark.parametrize("axle", [None, "roll"])
+def test_case_file_of_a_table_keeps_the_points(tmp_path, axle):
+    table, file = tmp_path / "car.csv", tmp_path / "car.toml"
+    table.write_text(sample_table(TEMPLATES["mcpherson"]) + "wheel_axis,1,790,309,\n")
+    case = load(table, Supplied(travel="0.04:3", axle=axle))
+    file.write_text(case_text(case))
+    again = load(file)
+    assert (again.mechanism, again.outputs) == (case.mechanism, case.outputs)
+    vehicle = again.outputs[0].vehicle
+    side = "left_" if axle else ""
+    assert (vehicle.wheel_axis, vehicle.wheel_contact) == (
+        f"{side}wheel_axis",
+        f"{side}wheel_contact",
+    )
+    assert vehicle.wheel_radius == pytest.approx(0.31)

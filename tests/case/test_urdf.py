@@ -10,12 +10,10 @@ from kincheck.core.algebra import X, Y, Z
 from kincheck.core.case.case import Case, Sweep, Truth
 from kincheck.core.case.io.model_writer import written
 from kincheck.core.case.io.reader_options import LEFT_OUT, Supplied
-from kincheck.core.case.models.files import load
-from kincheck.core.case.models.mjcf.elements import parse_xml
-from kincheck.core.case.models.robots.urdf import read_urdf
+from kincheck.core.case.models.files import load, read_tree
 from kincheck.core.joints import Polynomial, Revolute
-from kincheck.core.mechanism.drivers import JointAngle
 from kincheck.core.mechanism.mechanism import Body, Mechanism
+from kincheck.core.mechanism.motions import JointAngle
 
 from ..fuzz import urdf as seeds
 from ..support.exported_again import same_motion
@@ -48,11 +46,12 @@ def random_tree(seed: int) -> str:
 def test_links_of_any_tree_stand_where_pinocchio_has_them(seed: int, tmp_path: Path):
     pin = pytest.importorskip("pinocchio")
     text = random_tree(seed)
-    found = read_urdf(tmp_path / "robot.urdf", parse_xml(tmp_path / "robot.urdf", text))
+    found = read_tree(robot(tmp_path, text)).places
     model = pin.buildModelFromXML(text)
     data = model.createData()
     pin.framesForwardKinematics(model, data, pin.neutral(model))
-    for name, place in found.links.items():
+    for name in (f"l{k}" for k in range(9)):
+        place = found[name]
         frame = data.oMf[model.getFrameId(name)]
         assert np.allclose([*place.at], frame.translation, rtol=0, atol=EXACT)
         turned = [[*place.direction(axis)] for axis in (X, Y, Z)]

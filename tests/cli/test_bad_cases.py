@@ -17,7 +17,7 @@ from ..support.fakes import Fake, crank
 from .test_cli import RIGHT
 
 
-def test_all_bad_case_files_are_named_before_anything_is_computed(kincheck_main, capsys, tmp_path):
+def test_bad_case_files_are_named_first(kincheck_main, capsys, tmp_path):
     first, second = tmp_path / "first.toml", tmp_path / "second.json"
     first.write_text('schema = "kincheck-case/9"\n')
     second.write_text("{")
@@ -33,13 +33,11 @@ def test_all_bad_case_files_are_named_before_anything_is_computed(kincheck_main,
     assert RIGHT.solves == 0
 
 
-def test_the_other_cases_of_a_bad_one_are_run_and_recorded(
-    kincheck_main, capsys, tmp_path, monkeypatch
-):
+def test_cases_beside_a_bad_one_run(kincheck_main, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     bad = "bad.toml"
     Path(bad).write_text('schema = "kincheck-case/9"\n')
-    files = ["--out", "out", "--junit", "junit.xml", "--history", "history"]
+    files = "--out out --junit junit.xml --history history".split()
     for _ in range(2):
         assert kincheck_main("run", "crank", bad, "crank_two", *files) == 2
     captured = capsys.readouterr()
@@ -78,23 +76,12 @@ def test_the_other_cases_of_a_bad_one_are_run_and_recorded(
     assert told == "## run 4 against run 3 (last green): 1 case could not be read"
 
 
-def test_a_night_in_which_no_case_can_be_read_is_recorded(
-    kincheck_main, capsys, tmp_path, monkeypatch
-):
+def test_run_without_readable_case_is_stored(kincheck_main, capsys, tmp_path, monkeypatch):
     """Else the report would judge the night before, and its files would stand there as those of
     this one.
     """
     monkeypatch.chdir(tmp_path)
-    files = [
-        "--out",
-        "out",
-        "--junit",
-        "junit.xml",
-        "--markdown",
-        "cases.md",
-        "--history",
-        "history",
-    ]
+    files = "--out out --junit junit.xml --markdown cases.md --history history".split()
     for _ in range(2):
         assert kincheck_main("run", "crank", *files) == 0
     assert kincheck_main("run", "crank", *files, cases={"rod": crank("rod")}) == 2
@@ -113,7 +100,7 @@ def test_a_night_in_which_no_case_can_be_read_is_recorded(
     )
 
 
-def test_an_option_that_is_wrong_ends_a_run_and_the_bad_cases_are_told_too(kincheck_main, capsys):
+def test_bad_option_and_cases_are_told(kincheck_main, capsys):
     RIGHT.solves = 0
     assert kincheck_main("run", "crank", "nosuch", "--engine", "nativ", engines=[RIGHT]) == 2
     assert [line[:29] for line in capsys.readouterr().err.splitlines()] == [

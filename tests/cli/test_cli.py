@@ -46,9 +46,7 @@ def test_exit_status_of_a_run(kincheck_main, engine, status):
         "missing",
     ],
 )
-def test_a_run_of_which_nothing_came_but_errors_has_not_found_that_something_deviates(
-    kincheck_main, capsys, engines, status
-):
+def test_run_with_only_errors_has_status_2(kincheck_main, capsys, engines, status):
     assert kincheck_main("run", engines=engines) == status
     told = capsys.readouterr().err
     solved, tried = status != 2, BROKEN in engines
@@ -79,7 +77,7 @@ def test_all_cases_and_engines_are_the_default(kincheck_main, capsys):
     ],
     ids=["native", "native, limited", "both"],
 )
-def test_what_is_not_ours_alone_is_solved_in_worker_processes(
+def test_simulators_run_in_worker_processes(
     kincheck_main, capsys, monkeypatch, engines, options, inside
 ):
     monkeypatch.syspath_prepend(str(Path(__file__).parents[2]))
@@ -91,15 +89,13 @@ def test_what_is_not_ours_alone_is_solved_in_worker_processes(
     assert (RIGHT.solves > 0) is inside
 
 
-def test_an_adapter_that_cannot_be_loaded_is_an_error_of_its_pairs(
-    kincheck_main, capsys, monkeypatch
-):
+def test_unloadable_adapter_is_an_error(kincheck_main, capsys, monkeypatch):
     def load(name):
         if name == "other":
             raise ImportError("libother.so: no such file")
         return RIGHT
 
-    argv = ["run", "crank", "--json", "-"]
+    argv = "run crank --json -".split()
     assert kincheck_main(*argv, engines=[RIGHT, Fake("other")]) == 0
     capsys.readouterr()
     monkeypatch.setattr(kincheck.adapters, "engine", load)
@@ -131,9 +127,7 @@ def test_cases_and_engines_can_be_chosen(kincheck_main, capsys):
     ]
 
 
-def test_a_case_without_reference_is_compared_with_the_native_engine_even_if_that_was_not_asked_for(
-    kincheck_main, capsys
-):
+def test_unselected_native_is_the_standard(kincheck_main, capsys):
     cases = {"crank": crank(reference=False)}
     assert (
         kincheck_main(
@@ -147,44 +141,44 @@ def test_a_case_without_reference_is_compared_with_the_native_engine_even_if_tha
 
 
 @pytest.mark.parametrize(
-    ("argv", "said"),
+    ("line", "said"),
     [
-        (["crnk"], "there is no case 'crnk'; did you mean 'crank'?"),
-        (["crank", "--engine", "nativ"], "there is no engine 'nativ'; did you mean 'native'?"),
-        (["crank", "--require", "zzz"], "there is no engine 'zzz'; known: native"),
-        (["crank", "--tol", "nan"], "'nan' is not a positive number"),
-        (["crank", "--tol", "0"], "'0' is not a positive number"),
-        (["crank", "--tol", "inf"], "'inf' is not a positive number"),
-        (["crank", "--tol=-1e-9"], "'-1e-9' is not a positive number"),
-        (["crank", "--tol", "tight"], "'tight' is not a positive number"),
-        (["crank", "--mode", "dream"], "'dream' is none of projection, simulate"),
-        (["crank", "--mode", "simulate"], "no engine has the mode 'simulate'"),
+        ("crnk", "there is no case 'crnk'; did you mean 'crank'?"),
+        ("crank --engine nativ", "there is no engine 'nativ'; did you mean 'native'?"),
+        ("crank --require zzz", "there is no engine 'zzz'; known: native"),
+        ("crank --tol nan", "'nan' is not a positive number"),
+        ("crank --tol 0", "'0' is not a positive number"),
+        ("crank --tol inf", "'inf' is not a positive number"),
+        ("crank --tol=-1e-9", "'-1e-9' is not a positive number"),
+        ("crank --tol tight", "'tight' is not a positive number"),
+        ("crank --mode dream", "'dream' is none of projection, simulate"),
+        ("crank --mode simulate", "no engine has the mode 'simulate'"),
         (
-            ["crank", "--engine", "native", "--mode", "simulate"],
+            "crank --engine native --mode simulate",
             "engine 'native' has the mode 'projection', not 'simulate'",
         ),
-        (["--unknown"], "kincheck run: error: there is no option '--unknown'"),
-        (["--engin", "native", "--ttol=1"], "there is no option '--ttol'; did you mean '--tol'?"),
-        (["-x"], "there is no option '-x'"),
-        (["cran[q]"], "no built-in case and no file matches 'cran[q]'"),
-        (["--jobs", "-1"], "'-1' is not a whole number of 0 or more; give one"),
+        ("--unknown", "kincheck run: error: there is no option '--unknown'"),
+        ("--engin native --ttol=1", "there is no option '--ttol'; did you mean '--tol'?"),
+        ("-x", "there is no option '-x'"),
+        ("cran[q]", "no built-in case and no file matches 'cran[q]'"),
+        ("--jobs -1", "'-1' is not a whole number of 0 or more; give one"),
         (
-            ["--timeout", "5"],
+            "--timeout 5",
             (
                 "--jobs 0 solves in this process, which cannot be limited; leave out --timeout and"
                 " --memory, or --jobs"
             ),
         ),
         (
-            ["--scheduler", "tcp://there:8786"],
+            "--scheduler tcp://there:8786",
             "--scheduler: the cluster decides how many pairs run at a time; leave out --jobs",
         ),
-        (["--resume"], "--resume needs a history: give --history FILE, or set KINCHECK_HISTORY"),
+        ("--resume", "--resume needs a history: give --history FILE, or set KINCHECK_HISTORY"),
     ],
 )
-def test_bad_options_are_one_message_and_status_2(kincheck_main, capsys, argv, said):
+def test_bad_options_are_one_message_and_status_2(kincheck_main, capsys, line, said):
     RIGHT.solves = 0
-    assert kincheck_main("run", *argv) == 2
+    assert kincheck_main("run", *line.split()) == 2
     captured = capsys.readouterr()
     assert said in captured.err
     assert "Traceback" not in captured.err
@@ -192,13 +186,10 @@ def test_bad_options_are_one_message_and_status_2(kincheck_main, capsys, argv, s
     assert RIGHT.solves == 0
 
 
-def test_no_command_is_status_2_and_help_and_version_are_status_0(capsys):
+def test_status_of_help_and_no_command(capsys):
     assert main.main([]) == 2
     assert main.main(["--help"]) == 0
     assert main.main(["run", "--help"]) == 0
-    capsys.readouterr()
-    assert main.main(["--version"]) == 0
-    assert capsys.readouterr().out.startswith("kincheck 0.")
 
 
 @pytest.mark.parametrize(
@@ -215,9 +206,7 @@ def test_no_command_is_status_2_and_help_and_version_are_status_0(capsys):
     ],
     ids=["missing", "unable"],
 )
-def test_a_required_engine_that_cannot_is_status_2_and_the_results_are_kept(
-    kincheck_main, capsys, engine, said
-):
+def test_unable_required_engine_has_status_2(kincheck_main, capsys, engine, said):
     assert (
         kincheck_main(
             "run", "crank", "--require", engine.name, "--json", "-", engines=[RIGHT, engine]
@@ -229,8 +218,8 @@ def test_a_required_engine_that_cannot_is_status_2_and_the_results_are_kept(
     assert json.loads(captured.out)["records"][0]["outcome"] == "pass"
 
 
-def test_a_required_engine_is_run_even_if_others_were_asked_for(kincheck_main, capsys):
-    argv = ["run", "crank", "--engine", "native", "--require", "wrong", "--json", "-"]
+def test_required_engine_is_always_run(kincheck_main, capsys):
+    argv = "run crank --engine native --require wrong --json -".split()
     assert kincheck_main(*argv, engines=[RIGHT, WRONG]) == 1
     assert [each["engine"] for each in json.loads(capsys.readouterr().out)["records"]] == [
         "native",

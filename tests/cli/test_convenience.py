@@ -27,7 +27,7 @@ def test_whole_numbers_in_any_notation(text, value):
 
 
 @pytest.mark.parametrize("text", ["1.5", "1e-3", "nan", "inf", "0", "ten", "1e3000"])
-def test_what_is_no_whole_number_is_refused(text):
+def test_whole_numbers_refuse_other_values(text):
     with pytest.raises(Exception, match="is not a whole number of 1 or more"):
         whole(1)(text)
 
@@ -64,21 +64,21 @@ def test_quiet_and_verbose(kincheck_main, capsys):
 
 
 @pytest.mark.parametrize(
-    ("argv", "said"),
+    ("line", "said"),
     [
-        (["runn"], "kincheck: error: there is no command 'runn'; did you mean 'run'?"),
-        (["--engine", "native", "run"], "it belongs to kincheck run"),
-        (["bench", "--rounds", "3"], "'--rounds'; it belongs to kincheck bench engines"),
-        (["sweep", "--sample", "1e3", "--vari", "f"], "kincheck sweep: error: "),
-        (["run", "--mode", "projecton"], "projection, simulate; did you mean 'projection'?\n"),
-        (["run", "--mode", "dream"], "'dream' is none of projection, simulate\n"),
-        (["sweep", "--varry", "f"], "no option '--varry'; did you mean '--vary'?"),
-        (["explain", "rssr", "bennett"], "kincheck explain: error: too many arguments: bennett"),
-        (["export", "rssr", "--at", "nan"], "'nan' is not a number"),
+        ("runn", "kincheck: error: there is no command 'runn'; did you mean 'run'?"),
+        ("--engine native run", "it belongs to kincheck run"),
+        ("bench --rounds 3", "'--rounds'; it belongs to kincheck bench engines"),
+        ("sweep --sample 1e3 --vari f", "kincheck sweep: error: "),
+        ("run --mode projecton", "projection, simulate; did you mean 'projection'?\n"),
+        ("run --mode dream", "'dream' is none of projection, simulate\n"),
+        ("sweep --varry f", "no option '--varry'; did you mean '--vary'?"),
+        ("explain rssr bennett", "kincheck explain: error: too many arguments: bennett"),
+        ("export rssr --at nan", "'nan' is not a number"),
     ],
 )
-def test_mistakes_name_the_command_and_the_remedy(argv, said, capsys):
-    assert main.main(argv) == 2
+def test_mistakes_name_the_command_and_the_remedy(line, said, capsys):
+    assert main.main(line.split()) == 2
     found = capsys.readouterr().err
     assert said in found
     assert len(found.splitlines()) == 2
@@ -246,16 +246,16 @@ half_width = 0.1
 
 def test_run_and_study_say_why_a_force_has_no_value(tmp_path, capsys):
     (case := tmp_path / "two_hinges.toml").write_text(UNDETERMINED)
-    main.main(["run", str(case), "--engine", "native", "-v"])
+    main.main(f"run {case} --engine native -v".split())
     assert "hinge: samples without a value are null; rigid bodies do not" in capsys.readouterr().out
     (varied := tmp_path / "mass.toml").write_text(VARIED)
-    assert main.main(["sweep", str(case), "--vary", str(varied), "--samples", "4", "-q"]) == 0
+    assert main.main(f"sweep {case} --vary {varied} --samples 4 -q".split()) == 0
     out = capsys.readouterr().out
     assert "no variant has a value of hinge; kincheck run CASE --engine native --verbose" in out
     assert "None" not in out
 
 
-def test_mechanisms_and_cases_print_as_one_line_without_points_of_the_reader():
+def test_repr_of_case_is_one_line():
     case = cases.load("mcpherson_suspension")
     assert any(point.name.startswith("~") for point in case.mechanism.points)
     assert "~" not in repr(case.mechanism)

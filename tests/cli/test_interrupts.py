@@ -69,7 +69,7 @@ def test_during_imports(count, number, status, said):
 
 
 @pytest.mark.parametrize(
-    "command", [["list"], ["run", "rssr", "--engine", "native"], ["trace", "four_bar"], ["doctor"]]
+    "command", [["list"], "run rssr --engine native".split(), ["trace", "four_bar"], ["doctor"]]
 )
 def test_an_interrupt_of_any_command_is_one_line(command):
     """Texts that imports compile, which make Python end by the signal if it is left to itself."""
@@ -78,12 +78,12 @@ def test_an_interrupt_of_any_command_is_one_line(command):
         assert (status, lines(err)) == (130, ["kincheck: interrupted"])
 
 
-def test_what_was_made_is_written(tmp_path):
+def test_interrupted_run_writes_records(tmp_path):
     """While records come, and once more while they are written."""
     out = tmp_path / "out"
     # the strut and MuJoCo take long enough to be interrupted in time
     command = [sys.executable, "-m", "kincheck", "run", "rssr", "mcpherson_strut"]
-    command += ["--engine", "native", "mujoco", "--jobs", "1", "--out", str(out)]
+    command += f"--engine native mujoco --jobs 1 --out {out}".split()
     process = subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=listening
     )
@@ -102,10 +102,10 @@ def test_what_was_made_is_written(tmp_path):
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_while_results_are_written_they_are_written_to_the_end(tmp_path, number):
+def test_interrupt_while_writing_completes_files(tmp_path, number):
     """A file is renamed when it is whole: the signal comes with the first of three."""
     names = ["junit.xml", "results.json", "report.html"]
-    command = ["run", "rssr", "--engine", "native"]
+    command = "run rssr --engine native".split()
     command += ["--junit", tmp_path / "junit.xml", "--out", tmp_path]
     status, out, err = stopped_at("os.rename", 1, number, *command, text=str(tmp_path))
     assert status == 128 + number
@@ -119,7 +119,7 @@ def test_while_results_are_written_they_are_written_to_the_end(tmp_path, number)
 @pytest.mark.parametrize("seconds", [0.3, 0.7, 1.4])
 def test_at_any_moment(tmp_path, seconds):
     """From when Python has begun to the end of the run, workers and history included."""
-    command = ["run", "rssr", "--engine", "native", "--jobs", "1"]
+    command = "run rssr --engine native --jobs 1".split()
     command += ["--history", tmp_path / "h.sqlite", "--out", tmp_path]
     begun = tmp_path / "begun"
     code = (
@@ -152,7 +152,7 @@ def test_a_second_interrupt_is_noted_and_a_third_stops():
         heard(signal.SIGINT, None)
 
 
-def test_what_is_deferred_is_done_whole():
+def test_deferred_interrupt_waits_for_work():
     heard, done = interrupts.Interrupts(), []
 
     def work():

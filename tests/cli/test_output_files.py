@@ -50,7 +50,7 @@ def here(tmp_path, monkeypatch):
 @pytest.mark.skipif(os.name == "nt", reason="Windows lets few users make links")
 @pytest.mark.parametrize("name", ["loop.csv", "gone.csv", f"{'x' * 300}.csv"], ids=lambda x: x[:4])
 @pytest.mark.parametrize(("command", "option"), OPTIONS, ids=lambda x: "".join(x[:1]))
-def test_a_file_that_cannot_be_is_one_message(here, capsys, command, option, name):
+def test_impossible_output_file_is_refused(here, capsys, command, option, name):
     assert main([*command, option, name]) == 2
     captured = capsys.readouterr()
     (message,) = captured.err.splitlines()
@@ -77,7 +77,7 @@ def test_a_full_disk_costs_no_answer(capsys, command, said):
 def test_proofs_go_on_without_a_file(here, capsys):
     Path("out").mkdir()
     Path("out", "five_bar.reference.json").symlink_to("/dev/full")
-    assert main(["reference", "five_bar", "rssr", "--digits", "17", "--out", "out", "-q"]) == 2
+    assert main("reference five_bar rssr --digits 17 --out out -q".split()) == 2
     captured = capsys.readouterr()
     assert len(captured.out.splitlines()) == 2
     assert captured.err.count("cannot be written") == 1
@@ -87,7 +87,7 @@ def test_proofs_go_on_without_a_file(here, capsys):
 def test_a_reader_of_the_old_file_keeps_it_whole(here):
     Path("all.json").write_text("an earlier answer")
     with Path("all.json").open() as old:
-        assert main(["trace", "five_bar", "--json", "all.json"]) == 0
+        assert main("trace five_bar --json all.json".split()) == 0
         assert old.read() == "an earlier answer"
     assert json.loads(Path("all.json").read_text())["schema"] == "kincheck-trace/1"
 
@@ -123,7 +123,7 @@ def test_a_full_disk_leaves_the_stored_values_as_they_were(here):
 KILLED = """
 import os, signal, sys
 from kincheck.core.cli.main import main
-from kincheck.core.studies.tolerance.parquet_store import ParquetStore
+from kincheck.core.studies.tolerance.chunk_files import ParquetStore
 
 write = ParquetStore.write
 
@@ -151,7 +151,7 @@ def test_a_killed_study_leaves_the_stored_values_as_they_were(here):
     assert Path("all.parquet").read_bytes() == b"an earlier study"
 
 
-def test_names_too_long_for_a_file_are_names_of_nothing(here, capsys):
+def test_overlong_names_are_unknown(here, capsys):
     name = "x" * 300
     Path("model.xml").write_text(f'<mujoco><include file="{name}"/></mujoco>')
     for command in (["run", name], ["explain", name], ["report", name], ["run", "model.xml"]):

@@ -78,9 +78,7 @@ def test_a_printed_id_runs_that_case_with_that_engine(repository, pytest_there):
         assert "1 passed" in out
 
 
-def test_an_engine_passes_and_a_wrong_reference_fails_with_the_worst_sample(
-    repository, pytest_there
-):
+def test_plugin_reports_worst_sample(repository, pytest_there):
     (repository / "wrong.toml").write_text(edited(('name = "slider"', 'name = "wrong"')) + WRONG)
     out, status = pytest_there("--kincheck", "--kincheck-engine", "native")
     assert status == 1
@@ -91,7 +89,7 @@ def test_an_engine_passes_and_a_wrong_reference_fails_with_the_worst_sample(
     assert "Traceback" not in out
 
 
-def test_what_is_not_judged_is_skipped_and_says_so(repository, pytest_there):
+def test_plugin_skips_unjudged_case(repository, pytest_there):
     (repository / "slider.toml").write_text(BASE)
     out, status = pytest_there("--kincheck", "--kincheck-engine", "native")
     assert (status, "1 skipped" in out) == (0, True)
@@ -118,7 +116,7 @@ def bad_engines(monkeypatch):
     monkeypatch.setattr(pytest_plugin, "_solved", solved)
 
 
-def test_what_becomes_of_each_outcome(bad_engines, pytest_there):
+def test_plugin_maps_each_outcome(bad_engines, pytest_there):
     rest = [f"--deselect=slider.toml::{name}" for name in ENGINES[3:]]
     out, status = pytest_there("--kincheck", *rest)
     assert status == 1
@@ -128,7 +126,7 @@ def test_what_becomes_of_each_outcome(bad_engines, pytest_there):
     assert "unsupported: pinocchio cannot" in out
 
 
-def test_an_engine_that_is_asked_for_must_be_there(bad_engines, pytest_there):
+def test_plugin_requires_named_engines(bad_engines, pytest_there):
     out, status = pytest_there(
         "--kincheck", "--kincheck-engine", "mujoco", "--kincheck-engine", "pinocchio"
     )
@@ -137,7 +135,7 @@ def test_an_engine_that_is_asked_for_must_be_there(bad_engines, pytest_there):
     assert "slider.toml: mujoco: mujoco cannot: pip install 'mujoco" in out
 
 
-def test_a_simulator_is_run_in_a_process_of_its_own(repository):
+def test_plugin_isolates_simulators(repository):
     pytest.importorskip("mujoco")
     here = "def pytest_sessionfinish():\n    import sys\n    assert 'mujoco' not in sys.modules\n"
     (repository / "conftest.py").write_text(here)
@@ -145,7 +143,7 @@ def test_a_simulator_is_run_in_a_process_of_its_own(repository):
     assert (status, "1 passed" in out) == (0, True), out
 
 
-def test_a_file_that_makes_no_sense_is_an_error_with_its_message(repository, pytest_there):
+def test_plugin_reports_invalid_file(repository, pytest_there):
     (repository / "broken.json").write_text('{"schema": "kincheck-case/7", "name": "a"}')
     out, status = pytest_there("--kincheck", "--kincheck-engine", "native")
     assert status == 2
@@ -163,13 +161,13 @@ def test_a_file_that_makes_no_sense_is_an_error_with_its_message(repository, pyt
         (["--kincheck-engine", "native"], "--kincheck-engine: give --kincheck too"),
     ],
 )
-def test_options_that_make_no_sense_are_refused(pytest_there, argv, message):
+def test_plugin_refuses_invalid_options(pytest_there, argv, message):
     out, status = pytest_there(*argv)
     assert status == 4
     assert message in out
 
 
-def test_without_the_option_nothing_is_collected_and_nothing_heavy_loaded(repository):
+def test_plugin_without_option_is_light(repository):
     heavy = {"numpy", "scipy", "msgspec", "rich", "kincheck.core.mechanism.mechanism"}
     light = f"import sys\ndef test_light():\n    assert not {heavy} & {{*sys.modules}}\n"
     (repository / "test_light.py").write_text(

@@ -10,7 +10,7 @@ from kincheck.core.harness.record import from_json
 
 ROOT = Path(__file__).parents[2]
 KINCHECK = "import sys; from tests.support.drill import main; sys.exit(main())"
-RUN = ["run", "first", "--engine", "native", "--jobs", "0"]
+RUN = "run first --engine native --jobs 0".split()
 
 
 def kincheck(*arguments, out=subprocess.PIPE, **env):
@@ -24,7 +24,7 @@ def kincheck(*arguments, out=subprocess.PIPE, **env):
 
 
 @pytest.mark.parametrize("encoding", ["ascii", "utf-16"])
-def test_an_encoding_that_lacks_letters_ends_no_finished_run(encoding):
+def test_output_encoding_without_letters(encoding):
     done = kincheck(*RUN, PYTHONIOENCODING=encoding)
     assert done.returncode == 0, done.stderr
     assert "1 pass" in done.stdout.decode(encoding)
@@ -48,7 +48,7 @@ def test_a_full_standard_output_is_one_message(asked):
 
 
 @pytest.mark.skipif(os.name != "posix", reason="closes a stream as a POSIX shell does")
-def test_a_closed_standard_output_has_nobody_to_read_it(tmp_path):
+def test_closed_standard_output_is_no_failure(tmp_path):
     code = (
         "import os, sys; os.close(1); os.execv(sys.executable, [sys.executable, '-c',"
         f" {KINCHECK!r}, *sys.argv[1:]])"
@@ -63,7 +63,7 @@ def test_a_closed_standard_output_has_nobody_to_read_it(tmp_path):
 
 @pytest.mark.skipif(os.name != "posix", reason="closes a pipe as a shell does")
 @pytest.mark.parametrize("command", [["list"], RUN, ["explain", "first"]])
-def test_a_reader_that_has_gone_is_no_failure(command):
+def test_broken_pipe_is_no_failure(command):
     """As for `kincheck list | head`, whose head has what it wanted."""
     read, write = os.pipe()
     os.close(read)
@@ -75,7 +75,7 @@ def test_a_reader_that_has_gone_is_no_failure(command):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="has /dev/stdout")
-def test_a_file_that_standard_output_goes_to_is_not_written_over(tmp_path):
+def test_output_file_equals_standard_output_refused(tmp_path):
     for name in ("/dev/stdout", str(tmp_path / "printed")):
         with open(tmp_path / "printed", "w") as printed:
             done = kincheck(*RUN, "--junit", name, out=printed)

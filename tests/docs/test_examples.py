@@ -13,7 +13,8 @@ import pytest
 from ..support.sources import ROOT
 from .page import LANGUAGES, blocks, commands, differences
 
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+README = ROOT / "README.md"
+PAGES = sorted((ROOT / "docs").rglob("*.md"))
 SHELL = """
 set -eu -o pipefail
 if [ -e "$SAVED" ]; then . "$SAVED"; fi
@@ -84,7 +85,11 @@ class Reader:
         return printed.getvalue()
 
 
-@pytest.mark.parametrize("path", PAGES, ids=lambda path: str(path.relative_to(ROOT)))
+@pytest.mark.parametrize(
+    "path",
+    [README, *(pytest.param(page, marks=pytest.mark.nightly) for page in PAGES)],
+    ids=lambda path: str(path.relative_to(ROOT)),
+)
 def test_examples_run_as_printed(path, tmp_path, commands_folder, monkeypatch, own_joint_types):
     reader = Reader(tmp_path, commands_folder)
     monkeypatch.chdir(reader.folder)

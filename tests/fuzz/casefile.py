@@ -3,7 +3,7 @@
 import kincheck.cases
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.io.document import fault
-from kincheck.core.case.io.driving import DRIVERS
+from kincheck.core.case.io.mechanism_sections import DRIVERS
 from kincheck.core.case.measures import Measure
 from kincheck.core.case.suspension import SuspensionOutput
 from kincheck.core.errors import KincheckError

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from kincheck.core.case.case import Case
-from kincheck.core.case.io.case_writer import case_text
+from kincheck.core.case.io.case_file import case_text
 from kincheck.core.errors import CaseError, KincheckError
 
 from ..support.written_again import written_again

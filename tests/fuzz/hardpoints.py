@@ -12,7 +12,7 @@ from pathlib import Path
 
 from kincheck.core.case.case import Case
 from kincheck.core.case.io.reader_options import Supplied
-from kincheck.core.case.io.workbook import Cell
+from kincheck.core.case.io.table import Cell, Table
 from kincheck.core.case.models.files import load
 from kincheck.core.case.models.hardpoints.read import case_of_hardpoints
 from kincheck.core.case.models.hardpoints.rows import read_rows
@@ -90,7 +90,7 @@ def of_cells(data: bytes) -> Case:
     rows = [(f"row {k}", [*map(cell_of, line.split("\t"))]) for k, line in enumerate(lines, 1)] or [
         ("row 1", [""])
     ]
-    table = read_rows(FOLDER / "car.xlsx", "Excel", rows, {})
+    table = read_rows(Table(FOLDER / "car.xlsx", sheet=rows), "Excel", {})
     return case_of_hardpoints(table, Supplied("double_wishbone", None, None))
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
-from kincheck.core.case.models.mjcf.attributes import DYNAMIC, IN_BODY, KNOWN, MAKE_BODIES, ROOT
+from kincheck.core.case.models.trees.mjcf_language import DYNAMIC, IN_BODY, KNOWN, MAKE_BODIES, ROOT
 
 from .fuzzing import changing, read_or_refused, written
 from .trees import changed_xml

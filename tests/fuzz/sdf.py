@@ -4,8 +4,8 @@ import re
 
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
-from kincheck.core.case.models.robots.drake import STRUT
-from kincheck.core.case.models.robots.sdf import IN_AXIS, IN_JOINT, IN_LINK, IN_MODEL, TYPES
+from kincheck.core.case.models.trees.robot_elements import STRUT
+from kincheck.core.case.models.trees.sdf import IN_AXIS, IN_JOINT, IN_LINK, IN_MODEL, TYPES
 
 from .fuzzing import changing, read_or_refused, written
 from .trees import changed_xml

@@ -7,7 +7,7 @@ import re
 
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
-from kincheck.core.case.models.robots.urdf import CLOSING, IN_CONSTRAINT, IN_JOINT, IN_ROBOT, TYPES
+from kincheck.core.case.models.trees.urdf import CLOSING, IN_CONSTRAINT, IN_JOINT, IN_ROBOT, TYPES
 
 from .fuzzing import FOLDER, changing, read_or_refused, written
 from .trees import changed_xml

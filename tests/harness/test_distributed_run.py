@@ -35,7 +35,8 @@ pytestmark = [
 ]
 
 
-def test_pairs_are_solved_on_a_cluster_as_here_though_a_worker_is_lost_until_it_goes(cluster):
+@pytest.mark.nightly
+def test_cluster_run_survives_lost_worker(cluster):
     """A worker is killed in the middle, with a pair on it: another has it, nothing is lost and
     nothing comes twice. A cluster that goes is a message.
     """
@@ -95,7 +96,7 @@ def test_pairs_are_solved_on_a_cluster_as_here_though_a_worker_is_lost_until_it_
         )
 
 
-def test_a_frozen_worker_costs_no_pair_and_no_more_than_its_limit(cluster):
+def test_cluster_run_survives_frozen_worker(cluster):
     cases = [crank(f"c{k}") for k in range(8)]
     workers = [nanny.pid for nanny in cluster.workers.values()]
 
@@ -129,7 +130,7 @@ input()
 """
 
 
-def test_a_lost_scheduler_is_one_message_and_no_traceback():
+def test_lost_scheduler_is_one_message():
     with subprocess.Popen(
         [sys.executable, "-c", SCHEDULER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     ) as scheduler:
@@ -187,7 +188,7 @@ def test_no_scheduler_is_a_message(monkeypatch):
         "inproc://x",
     ],
 )
-def test_what_cannot_be_an_address_is_said_at_once(address, monkeypatch):
+def test_invalid_scheduler_address_is_refused(address, monkeypatch):
     """Who had waited in vain would be told that nobody answers."""
     forbid_clients(monkeypatch)
     with pytest.raises(ClusterError) as caught:
@@ -200,9 +201,7 @@ def test_what_cannot_be_an_address_is_said_at_once(address, monkeypatch):
 
 
 @pytest.mark.parametrize("command", ["run", "sweep"])
-def test_a_command_without_its_cluster_is_one_message(
-    kincheck_main, capsys, tmp_path, monkeypatch, command
-):
+def test_commands_refuse_invalid_scheduler(kincheck_main, capsys, tmp_path, monkeypatch, command):
     """And no client is made, for whose end the process would wait."""
     forbid_clients(monkeypatch)
     (tmp_path / "vary.toml").write_text(

@@ -74,7 +74,7 @@ def test_closed_forms_hold_over_a_full_turn(case, name):
 
 
 @pytest.mark.parametrize("name", adapters.ENGINES)
-def test_a_hardpoint_moved_by_a_micrometre_fails_and_is_named(name):
+def test_moved_hardpoint_fails_in_every_engine(name):
     case = built_in("mcpherson_strut")
     joints = list(case.mechanism.joints)
     k = [joint.name for joint in joints].index("tie_rod")
@@ -87,7 +87,7 @@ def test_a_hardpoint_moved_by_a_micrometre_fails_and_is_named(name):
 
 
 @pytest.mark.parametrize("name", adapters.ENGINES)
-def test_a_stroke_out_of_reach_gives_the_last_sample_and_no_numbers_beyond(name):
+def test_stroke_out_of_reach_names_end(name):
     case = built_in("mcpherson_strut")
     sweep = replace(case.sweep, values=np.linspace(0.0, 0.6, 61))
     found = record(replace(case, sweep=sweep, reference={}), name)
@@ -101,7 +101,7 @@ def test_a_stroke_out_of_reach_gives_the_last_sample_and_no_numbers_beyond(name)
 
 
 @pytest.mark.parametrize("name", adapters.ENGINES)
-def test_a_world_turned_and_a_hundred_metres_away_keeps_its_digits(name):
+def test_far_turned_world_keeps_digits(name):
     """Bodies without an origin of their own, as case files leave them: no engine may hang them on
     arms of a hundred metres.
     """
@@ -136,7 +136,7 @@ def test_a_world_turned_and_a_hundred_metres_away_keeps_its_digits(name):
 # How much round-off there is depends on the processor and on the steps that lead to the pose:
 # 2e-11 to 2e-10 m/s^2 were seen.
 @pytest.mark.parametrize("name", ["pinocchio", "exudyn"])
-def test_round_off_near_a_singular_pose_is_within_the_default_tolerance(name):
+def test_round_off_near_singular_pose_passes(name):
     """The default is a nanometre at the driver's pace; the rod's end accelerates seven thousand
     times as fast there, and so does the round-off.
     """

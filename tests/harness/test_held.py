@@ -1,17 +1,16 @@
 """Derivatives by wheel travel at every sample of a combined sweep: other drivers are held."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from kincheck.adapters import engine
-from kincheck.core.case.held import held_case
+from kincheck.core.case.closing import held_case
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.case.models.hardpoints.templates import TEMPLATES
 from kincheck.core.errors import CaseError
 from kincheck.core.harness.execution import Answer, Pair, attempt
-from kincheck.core.mechanism.waypoints import Waypoints
+from kincheck.core.mechanism.motions import Waypoints
 from kincheck.core.studies.tolerance.study import Study
 
 from ..oracles.rods import Carrier
@@ -29,91 +28,80 @@ RODS = [
 
 def arm(name):
     front, rear = (np.array(AT[f"{name}_{end}"]) for end in ("front", "rear"))
-    return {
-        "type": "revolute",
-        "bodies": ["ground", name],
-        "point": AT[f"{name}_rear"],
-        "axis": (front - rear).tolist(),
-    }
+    return f"""
+[bodies.{name}]
+[joints.{name}_pivot]
+type = "revolute"
+bodies = ["ground", "{name}"]
+point = {rear.tolist()}
+axis = {(front - rear).tolist()}
+[joints.{name}_ball]
+type = "spherical"
+bodies = ["{name}", "knuckle"]
+point = {[*AT[f"{name}_outer"]]}
+"""
 
 
-def ball(name):
-    return {"type": "spherical", "bodies": [name, "knuckle"], "point": AT[f"{name}_outer"]}
-
-
-CASE = {
-    "schema": "kincheck-case/1",
-    "name": "steered",
-    "source": "made up",
-    "bodies": {name: {} for name in ("lca", "uca", "knuckle", "rack")},
-    "joints": {
-        "lca_pivot": arm("lca"),
-        "uca_pivot": arm("uca"),
-        "low": ball("lca"),
-        "up": ball("uca"),
-        "slide": {
-            "type": "translational",
-            "bodies": ["ground", "rack"],
-            "point": AT["tierod_inner"],
-            "axis": [0, 1, 0],
-        },
-        "tie": {
-            "type": "distance",
-            "bodies": ["rack", "knuckle"],
-            "points": [AT["tierod_inner"], AT["tierod_outer"]],
-        },
-    },
-    "points": {"wheel_center": {"body": "knuckle", "position": AT["wheel_center"]}},
-    "drivers": {
-        "rack": {"type": "joint_displacement", "joint": "slide"},
-        "stroke": {"type": "point_coordinate", "point": "wheel_center", "direction": [0, 0, 1]},
-    },
-    "suspension": {
-        "convention": "iso8855",
-        "side": "left",
-        "forward": [1, 0, 0],
-        "up": [0, 0, 1],
-        "axle": "front",
-        "wheel_radius": RADIUS,
-        "wheelbase": WHEELBASE,
-        "cg_height": HEIGHT,
-        "brake_share": SHARE,
-    },
-    "outputs": {
-        "toe": {"type": "toe"},
-        "rc": {"type": "roll_center_height"},
-        "dive": {"type": "anti_dive"},
-    },
-}
-
-
-def case_of(folder, rack, stroke, sweep, **suspension):
-    data = json.loads(json.dumps(CASE))
-    for name, motion in (("rack", rack), ("stroke", stroke)):
-        if motion:
-            data["drivers"][name]["motion"] = motion
-    data["sweep"] = sweep
-    data["suspension"] |= suspension
-    file = folder / "case.json"
-    file.write_text(json.dumps(data))
-    return load_case(file)
-
-
-RAMP, SINE = {"type": "ramp", "rate": 0.01}, {"type": "sine", "amplitude": 0.02, "frequency": 1.0}
-TIME = {"start": -1.0, "stop": 1.0, "steps": 9}
+CASE = f"""
+schema = "kincheck-case/1"
+name = "steered"
+source = "made up"
+[bodies.knuckle]
+[bodies.rack]
+{arm("lca")}{arm("uca")}
+[joints.slide]
+type = "translational"
+bodies = ["ground", "rack"]
+point = {[*AT["tierod_inner"]]}
+axis = [0, 1, 0]
+[joints.tie]
+type = "distance"
+bodies = ["rack", "knuckle"]
+points = [{[*AT["tierod_inner"]]}, {[*AT["tierod_outer"]]}]
+[points.wheel_center]
+body = "knuckle"
+position = {[*AT["wheel_center"]]}
+[drivers.rack]
+type = "joint_displacement"
+joint = "slide"
+[drivers.stroke]
+type = "point_coordinate"
+point = "wheel_center"
+direction = [0, 0, 1]
+[suspension]
+convention = "iso8855"
+side = "left"
+forward = [1, 0, 0]
+up = [0, 0, 1]
+axle = "front"
+wheel_radius = {RADIUS}
+wheelbase = {WHEELBASE}
+cg_height = {HEIGHT}
+brake_share = {SHARE}
+[outputs]
+toe.type = "toe"
+rc.type = "roll_center_height"
+dive.type = "anti_dive"
+"""
+RAMP = '[drivers.rack.motion]\ntype = "ramp"\nrate = 0.01\n'
+SINE = '[drivers.stroke.motion]\ntype = "sine"\namplitude = 0.02\nfrequency = 1.0\n'
+TIME = "[sweep]\nstart = -1.0\nstop = 1.0\nsteps = 9\n"
+STROKE = '[sweep]\ndriver = "stroke"\nstart = -0.03\nstop = 0.04\nsteps = 8\nrate = 0.1\n'
 SWEEPS = {
-    "both": (RAMP, {"type": "ramp", "rate": 0.02}, TIME),
+    "both": f'{RAMP}[drivers.stroke.motion]\ntype = "ramp"\nrate = 0.02\n{TIME}',
     # at the quarters of its period the wheel stands still
-    "sine": (RAMP, SINE, TIME),
-    "rack alone": (None, None, {"driver": "rack", "start": -0.02, "stop": 0.02, "steps": 9}),
-    "rack, late": (None, None, {"driver": "rack", "start": 0.005, "stop": 0.02, "steps": 4}),
-    "stroke swept": (
-        RAMP,
-        None,
-        {"driver": "stroke", "start": -0.03, "stop": 0.04, "steps": 8, "rate": 0.1},
-    ),
-    "one sample": (RAMP, SINE, {"start": 0.3, "stop": 0.3, "steps": 1}),
+    "sine": RAMP + SINE + TIME,
+    "rack alone": '[sweep]\ndriver = "rack"\nstart = -0.02\nstop = 0.02\nsteps = 9\n',
+    "rack, late": '[sweep]\ndriver = "rack"\nstart = 0.005\nstop = 0.02\nsteps = 4\n',
+    "stroke swept": RAMP + STROKE,
+    "one sample": f"{RAMP}{SINE}[sweep]\nstart = 0.3\nstop = 0.3\nsteps = 1\n",
 }
+
+
+def case_of(folder, sweep):
+    file = folder / "case.toml"
+    file.write_text(CASE + sweep)
+    return load_case(file)
 
 
 def answer(case, name, mode="projection"):
@@ -149,7 +137,7 @@ def expected(rack, stroke):
 
 @pytest.mark.parametrize("kind", SWEEPS)
 def test_derivatives_by_travel_at_every_sample(tmp_path, kind):
-    case = case_of(tmp_path, *SWEEPS[kind])
+    case = case_of(tmp_path, SWEEPS[kind])
     found = answer(case, "native")
     assert found.message == ""
     path = case.sweep.path
@@ -165,7 +153,7 @@ def test_derivatives_by_travel_at_every_sample(tmp_path, kind):
 @pytest.mark.parametrize("name", ["mujoco", "pinocchio", "exudyn"])
 def test_in_every_engine(tmp_path, name):
     pytest.importorskip(name)
-    case = case_of(tmp_path, *SWEEPS["sine"])
+    case = case_of(tmp_path, SWEEPS["sine"])
     found, native = answer(case, name), answer(case, "native")
     for output in case.outputs:
         off = found.outputs[output.name].position - native.outputs[output.name].position
@@ -174,7 +162,7 @@ def test_in_every_engine(tmp_path, name):
 
 def test_a_slope_of_a_quotient(tmp_path):
     """The roll centre by travel, against its difference over two wheel heights."""
-    case = case_of(tmp_path, *SWEEPS["both"])
+    case = case_of(tmp_path, SWEEPS["both"])
     slope = answer(case, "native").outputs["rc.per_travel"].position
     for k in (0, 6):
         rack, stroke = 0.01 * case.sweep.values[k], 0.02 * case.sweep.values[k]
@@ -182,17 +170,17 @@ def test_a_slope_of_a_quotient(tmp_path):
         assert slope[k] == pytest.approx((high - low) / 2e-5, rel=1e-6)
 
 
-def test_without_a_driver_of_travel_the_slope_is_along_the_sweep(tmp_path):
+def test_slope_without_travel_driver(tmp_path):
     """A reference point of the same carrier is no driver of travel unless it is named."""
-    data_path = case_of(tmp_path, *SWEEPS["both"])
+    data_path = case_of(tmp_path, SWEEPS["both"])
     assert data_path.outputs[0].vehicle.travel == ("stroke",)
-    alone = case_of(tmp_path, None, None, {**SWEEPS["stroke swept"][2]})
+    alone = case_of(tmp_path, STROKE)
     assert alone.outputs[0].vehicle.travel == ()
 
 
 def test_unsolved_samples_say_so(tmp_path):
     """A pose that the other path does not find has no derivative, and the reason is given."""
-    case = case_of(tmp_path, *SWEEPS["both"])
+    case = case_of(tmp_path, SWEEPS["both"])
 
     class Elsewhere(type(engine("native"))):
         def solve(self, model, case, tol):
@@ -212,28 +200,23 @@ def test_unsolved_samples_say_so(tmp_path):
 
 
 def test_no_tolerance_study_of_held_derivatives(tmp_path):
-    case = case_of(tmp_path, *SWEEPS["both"])
+    case = case_of(tmp_path, SWEEPS["both"])
     with pytest.raises(CaseError, match=r"rc, .* choose others by --output"):
         Study(case, None, 10, 1)
 
 
 def test_waypoints_are_a_smooth_motion():
     motion = Waypoints((0.0, 1.0, 1.5), (0.2, -0.3, 0.4), 0.05)
-    t = np.array([-0.5, 0.0, 0.3, 0.999999, 1.0, 1.3, 1.5, 2.0])
-    h = 1e-6
-    x, v, a = motion.at(t)
-    before, after = motion.at(t - h), motion.at(t + h)
+    assert np.array_equal(motion.at(np.array(motion.times)), [motion.values, [0.05] * 3, [0.0] * 3])
+    t, h = np.array([-0.5, 0.0, 0.3, 0.999999, 1.0, 1.3, 1.5, 2.0]), 1e-6
+    (x, v, a), before, after = (motion.at(t + step) for step in (0.0, -h, h))
     assert np.abs((after[0] - before[0]) / (2 * h) - v).max() < 1e-8
     assert np.abs((after[1] - before[1]) / (2 * h) - a).max() < 1e-3
-    at = np.array(motion.times)
-    assert np.array_equal(motion.at(at)[0], motion.values)
-    assert np.array_equal(motion.at(at)[1], [0.05] * 3)
-    assert np.array_equal(motion.at(at)[2], [0.0] * 3)
     assert x[0] == 0.2 - 0.025
 
 
 def test_the_held_path_has_the_values_of_the_sweep(tmp_path):
-    case = case_of(tmp_path, *SWEEPS["sine"])
+    case = case_of(tmp_path, SWEEPS["sine"])
     path, again = case.sweep.path, held_case(case, ["stroke"]).sweep.path
     names = ["rack", "stroke"]
     assert np.array_equal(path.times, again.times)

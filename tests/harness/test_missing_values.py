@@ -44,7 +44,7 @@ class UndefinedRate(Rate):
 
 
 @pytest.mark.parametrize("complete", [True, False])
-def test_an_output_without_any_value_fails_where_all_samples_were_solved(complete):
+def test_output_without_values_fails(complete):
     x, y = crank().outputs
     case = replace(crank(), outputs=(Undefined(**vars(x)), y))
     results = run([case], [Fake(answer=solution if complete else partial)], tol=1e-12)
@@ -64,7 +64,7 @@ def test_an_output_without_any_value_fails_where_all_samples_were_solved(complet
     assert [test.get("name") for test in failed] == (["x"] if complete else ["x", "y"])
 
 
-def test_an_engine_that_solves_no_sample_is_in_the_headline_and_in_the_overview(tmp_path):
+def test_engine_without_samples_in_headline(tmp_path):
     def nothing(case):
         return solution(
             case, solved=np.zeros(SAMPLES, dtype=bool), position=np.full((SAMPLES, 3), np.nan)
@@ -83,7 +83,7 @@ def test_an_engine_that_solves_no_sample_is_in_the_headline_and_in_the_overview(
     [(), ("velocity",), ("velocity", "acceleration")],
     ids=["positions", "velocities", "all"],
 )
-def test_a_derivative_has_one_less_of_what_the_engine_gives(rates):
+def test_derivative_output_has_one_order_less(rates):
     case = crank()
     right, missing = (
         case.reference["x"],
@@ -108,7 +108,7 @@ def test_a_derivative_has_one_less_of_what_the_engine_gives(rates):
     ) is not bool(rates)
 
 
-def test_a_reference_of_all_there_is_needs_no_native_engine():
+def test_complete_reference_needs_no_native():
     """Of outputs that are derivatives there is no acceleration."""
     case, native = cases.load("mcpherson_suspension"), Fake("native")
     assert any(output.orders < ORDERS for output in case.outputs)

@@ -10,8 +10,8 @@ import msgspec
 from kincheck.core.cli import main
 from kincheck.core.harness.record import Outcome, from_json, to_json
 from kincheck.core.harness.results_file import read_results
-from kincheck.core.history.queries import green, read
-from kincheck.core.history.regression.findings import Kind
+from kincheck.core.history.findings import Kind
+from kincheck.core.history.queries import faultless, read
 from kincheck.core.history.store import Store
 from kincheck.core.report.regression_junit import to_regression_junit
 from kincheck.core.report.regression_summary import to_markdown
@@ -29,7 +29,7 @@ def as_of_before(results):
     return msgspec.structs.replace(results, records=passed)
 
 
-def test_results_of_before_are_read_as_what_they_are(tmp_path):
+def test_old_results_are_read_as_unjudged(tmp_path):
     file = tmp_path / "old.json"
     file.write_bytes(to_json(as_of_before(unjudged())))
     assert [each.outcome for each in read_results(file).records] == ["unjudged", "pass"]
@@ -46,7 +46,7 @@ def bare(all_records, engine="mujoco", *, outcome=Outcome.UNJUDGED):
     return changed(all_records, engine=engine, outcome=outcome, message=WHY, errors=emptied)
 
 
-def test_a_history_of_before_is_read_as_what_it_is(path, capsys):
+def test_old_history_is_read_as_unjudged(path, capsys):
     keep(
         path,
         [
@@ -63,10 +63,10 @@ def test_a_history_of_before_is_read_as_what_it_is(path, capsys):
         assert [entry.outcome for entries in read(store).pairs.values() for entry in entries] == [
             "unjudged"
         ]
-        assert green(store) == []
+        assert faultless(store) == set()
     assert main.main(["history", "--history", str(path)]) == 0
     assert "1 not judged" in capsys.readouterr().out
-    assert main.main(["history", "--history", str(path), "--case", "first"]) == 0
+    assert main.main(f"history --history {path} --case first".split()) == 0
     assert "not judged" in capsys.readouterr().out
 
 
@@ -88,10 +88,10 @@ def test_runs_of_unjudged_pairs_alone_are_not_green(path):
     all_bare = bare(records(), "native")
     keep(path, [each for each in all_bare if each.outcome is Outcome.UNJUDGED])
     with Store(path) as store:
-        assert green(store) == []
+        assert faultless(store) == set()
     keep(path, all_bare)
     with Store(path) as store:
-        assert [row.id for row in green(store)] == [2]
+        assert faultless(store) == {2}
 
 
 # Reports
@@ -125,7 +125,7 @@ def test_a_failure_that_is_no_longer_judged_is_not_fixed(path):
     assert not found.steps or all(step.quantity != "outcome" or step.worse for step in found.steps)
 
 
-def test_what_is_judged_again_says_so_and_is_no_regression(path):
+def test_judged_again_is_no_regression(path):
     keep(path, bare(records()))
     keep(path, records())
     found = reported(path, against="1")

@@ -92,36 +92,6 @@ def test_a_deviation_at_one_sample_is_located():
     assert record.errors["y"].position.worst_step == 6
 
 
-@pytest.mark.parametrize("value", [math.nan, math.inf])
-@pytest.mark.parametrize("quantity", ["position", "velocity", "acceleration"])
-def test_a_solved_sample_that_is_not_finite_is_an_error(quantity, value):
-    record = record_of(Fake(answer=off(quantity, at(3, 2, value))))
-    assert record.outcome is Outcome.ERROR
-    assert f"fake: {quantity} of point 'tip'" in record.message
-    assert "at sample 3 (angle = -0.25), which is called solved" in record.message
-
-
-@pytest.mark.parametrize("quantity", ["position", "velocity", "acceleration"])
-def test_a_wrong_shape_is_an_error(quantity):
-    record = record_of(Fake(answer=off(quantity, lambda values: values[1:])))
-    assert record.outcome is Outcome.ERROR
-    assert f"{quantity} of point 'tip' has shape (8, 3), expected (9, 3)" in record.message
-    transposed = record_of(Fake(answer=off(quantity, lambda values: values.T)))
-    assert "has shape (3, 9), expected (9, 3)" in transposed.message
-
-
-def test_other_breaches_of_the_protocol_are_errors():
-    no_point = record_of(Fake(answer=lambda case: replace(solution(case), points={})))
-    assert "no motion of point 'tip'; found: none" in no_point.message
-    short = record_of(Fake(answer=lambda case: solution(case, solved=np.ones(3, dtype=bool))))
-    assert "solved has shape (3,), expected (9,)" in short.message
-    blind = record_of(Fake(answer=lambda case: replace(solution(case), residual=math.nan)))
-    assert "residual is nan although 9 samples are called solved" in blind.message
-    nothing = record_of(Fake(answer=lambda case: None))
-    assert nothing.outcome is Outcome.ERROR
-    assert "solve returned NoneType, expected a Trajectory" in nothing.message
-
-
 @pytest.mark.parametrize("count", [0, 1, 3])
 def test_an_exception_costs_only_its_own_pair(count, monkeypatch):
     monkeypatch.setattr(execution, "WARM_SOLVES", 5)  # as in a user's run: one of them fails
@@ -168,7 +138,7 @@ def test_missing_and_unable_engines_have_records_with_reasons():
         assert record.errors["x"].items() == []
 
 
-def test_missing_samples_fail_and_the_others_are_kept_and_compared():
+def test_missing_samples_fail_others_are_compared():
     record = record_of(Fake(answer=partial))
     assert record.outcome is Outcome.FAIL
     assert (
@@ -203,7 +173,7 @@ def test_missing_samples_fail_and_the_others_are_kept_and_compared():
     ],
     ids=["all", "some samples", "no sample", "no details", "error", "unavailable"],
 )
-def test_every_number_that_is_null_says_why(engine, reasons):
+def test_null_numbers_have_reasons(engine, reasons):
     record = record_of(engine)
     assert record.reasons == reasons
     assert {key for key in NULL_REASONS if getattr(record, key) is None} == set(reasons)

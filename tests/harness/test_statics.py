@@ -6,8 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from kincheck import adapters, cases
-from kincheck.core.case.io.case_file import load_case
-from kincheck.core.case.io.case_writer import case_text
+from kincheck.core.case.io.case_file import case_text, load_case
 from kincheck.core.case.measures import DriverEffort, JointForce, JointMoment
 from kincheck.core.case.quantity import with_markers
 from kincheck.core.cli.main import main

@@ -63,7 +63,7 @@ CHANGES = {
 
 
 @pytest.mark.parametrize("words", CHANGES)
-def test_a_slip_is_named_with_how_well_it_explains(words):
+def test_slip_of_reference_is_named(words):
     results, found = suspected(CHANGES[words])
     assert found is not None
     assert found.engines == ["native", "other", "third"]
@@ -82,7 +82,7 @@ def test_a_slip_is_named_with_how_well_it_explains(words):
     [("angle", "deg", "angle = 28.64788976 deg"), ("angle", "rad", "angle = 0.5 rad")]
     + [("time", "deg", "time = 0.5 s")],
 )
-def test_a_suspected_sample_is_told_in_the_unit_of_its_file(driver, unit, written):
+def test_suspected_sample_has_unit_of_file(driver, unit, written):
     bump = np.where(np.arange(9) == 6, 0.01, 0.0)
     case = with_reference(lambda name, x, _: Series(x.position + bump, x.velocity, x.acceleration))
     sweep = replace(case.sweep, driver=driver)
@@ -92,7 +92,7 @@ def test_a_suspected_sample_is_told_in_the_unit_of_its_file(driver, unit, writte
     assert f"at sample 6 ({written}) of output" in suspects["crank"].message
 
 
-def test_reversed_samples_are_told_from_another_sign_by_the_derivatives():
+def test_reversed_samples_differ_from_sign():
     """The crank's y is odd: its reversed positions are its negative ones, its velocities are
     even.
     """
@@ -107,7 +107,7 @@ def test_reversed_samples_are_told_from_another_sign_by_the_derivatives():
     ].explanations[0].change == ("with the other sign")
 
 
-def test_it_is_said_once_on_every_surface(tmp_path):
+def test_suspected_reference_is_named_once(tmp_path):
     results, _ = suspected(CHANGES["with the other sign"])
     assert messages(results) == {}
     assert to_markdown(results).count("Suspect: crank: all 3 engines agree") == 1
@@ -122,7 +122,7 @@ def test_it_is_said_once_on_every_surface(tmp_path):
     assert junit.count("suspect the reference rather than the engine") == 6
 
 
-def test_the_command_says_it_once(kincheck_main, capsys):
+def test_run_names_suspected_reference_once(kincheck_main, capsys):
     case = with_reference(CHANGES["with the other sign"])
     assert kincheck_main("run", "crank", engines=ENGINES, cases={"crank": case}) == 1
     out = capsys.readouterr().out
@@ -132,7 +132,7 @@ def test_the_command_says_it_once(kincheck_main, capsys):
     assert "fail: crank" not in out
 
 
-def test_what_no_slip_explains_is_said_to_be_unexplained():
+def test_suspicion_without_slip_is_unexplained():
     bump = np.zeros(9)
     bump[4] = 0.01
     _, found = suspected(
@@ -147,14 +147,14 @@ def test_what_no_slip_explains_is_said_to_be_unexplained():
     assert "explains it" in found.message
 
 
-def test_engines_that_disagree_are_to_blame_themselves():
+def test_disagreeing_engines_suspect_nobody():
     wrong = Fake("wrong", off("position", lambda p: p + 1e-6))
     results, found = suspected(CHANGES["with the other sign"], [Fake("native"), wrong])
     assert found is None
     assert len(messages(results)) == 2
 
 
-def test_a_right_reference_and_a_wrong_engine_are_not_suspected():
+def test_one_wrong_engine_suspects_nobody():
     assert (
         run(
             [crank()], [Fake("native"), Fake("wrong", off("position", lambda p: -p))], tol=1e-12
@@ -208,7 +208,7 @@ def test_pairs_are_tried_where_nothing_alone_fits():
     ]
 
 
-def test_another_definition_is_tried_with_other_signs_and_units():
+def test_other_output_is_tried_with_signs():
     toe = 0.3 * S
     seen = np.arctan(np.tan(WAVY) / np.cos(toe))
     definitions = [("taken as another", lambda x: camber_of_front_view(x, toe))]

@@ -1,24 +1,21 @@
 """Where most engines agree with each other and not with native, it is native that is suspected."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from kincheck.adapters import engine
-from kincheck.core import Body, JointDisplacement, Mechanism, Translational
-from kincheck.core import primitives as p
-from kincheck.core.algebra import ZERO, cross, vec
 from kincheck.core.case.case import Series
 from kincheck.core.harness.native_engine import NativeEngine
 from kincheck.core.harness.record import Outcome, from_json, to_json
 from kincheck.core.harness.run import run
-from kincheck.core.joints.base import unit
 from kincheck.core.report.junit import to_junit
 from kincheck.core.report.matrix import to_markdown
 from kincheck.core.report.report import headline, write_report
 from kincheck.core.report.table import messages
 from kincheck.core.trajectory import Trajectory
 
+from ..support.engine_faults import changed
 from ..support.engine_forces import force_case
 from ..support.fakes import Fake, crank, off
 from ..support.loaded import loaded
@@ -70,14 +67,6 @@ def test_native_is_suspected_once_on_every_surface(tmp_path):
     assert junit.count("suspect native rather than the engine") == 6
 
 
-def test_the_command_suspects_native_once(kincheck_main, capsys):
-    cases = {"crank": crank(reference=False)}
-    assert kincheck_main("run", "crank", engines=[WRONG, *OTHERS], cases=cases) == 1
-    out = capsys.readouterr().out
-    assert out.count("suspect: crank: 3 of 3 other") == out.count("suspect native") == 1
-    assert "fail: crank" not in out
-
-
 def test_native_outside_the_run_is_suspected():
     """It is the standard without a record."""
     results = run([crank(reference=False)], OTHERS, tol=1e-12, baseline=WRONG)
@@ -102,7 +91,7 @@ def test_without_a_majority_nobody_is_suspected(engines):
     assert any(outcome is Outcome.FAIL for _, outcome, _ in messages(results))
 
 
-def test_most_engines_suffice_and_the_odd_one_keeps_its_message():
+def test_majority_suspects_native():
     odd = Fake("odd", off("velocity", lambda v: 3.0 * v))
     results, found = suspected([WRONG, *OTHERS, odd])
     assert found.engines == ["one", "two", "three"]
@@ -124,7 +113,7 @@ def test_agreement_is_within_the_sum_of_tolerances():
     assert suspected([native, shifted("one", 0.9), shifted("two", 0.8)])[1] is None
 
 
-def test_another_fault_of_an_engine_is_told_beside():
+def test_suspect_keeps_other_faults_of_engines():
     """Its residual, or another output, is no fault of native."""
 
     def unconverged(case):
@@ -142,61 +131,19 @@ def test_another_fault_of_an_engine_is_told_beside():
         ]
 
 
-def test_what_a_reference_judges_is_not_held_against_native():
+def test_reference_clears_native():
     """All pass by the reference, except native."""
     results, found = suspected([WRONG, *OTHERS], crank())
     assert found is None
     assert [record.outcome for record in results.records][1:] == [Outcome.PASS] * 3
 
 
-def test_beside_a_reference_of_positions_native_is_suspected_of_the_rest():
+def test_native_is_suspected_beside_position_reference():
     case = crank()
     case = replace(case, reference={k: Series(each.position) for k, each in case.reference.items()})
     results, found = suspected([WRONG, *OTHERS], case)
     assert found.subject == "native"
     assert results.records[0].outcome is Outcome.PASS
-
-
-class Beside(p.Dot20):
-    """A displacement whose force acts beside the axis."""
-
-    def rows(self, i, j):
-        aside = i.turn(vec((0.1, 0.2, -0.1)))
-        return tuple(
-            row._replace(pi=row.pi + cross(aside, row.ri), pj=row.pj + cross(aside, row.rj))
-            for row in super().rows(i, j)
-        )
-
-
-def test_a_joint_type_with_a_wrong_lever_makes_native_suspect(own_joint_types):
-    """Simulators solve its equivalent; native drives it beside its axis."""
-
-    @dataclass(frozen=True)
-    class LooseSlide(Translational):
-        type = "loose_slide"
-
-        def measured(self, freedom, i, j):
-            P = vec(self.point)
-            return Beside(unit(self.axis), i.arm(P), j.arm(P), ZERO)
-
-        def equivalent(self):
-            return [], [Translational(self.name, self.i, self.j, self.point, self.axis)]
-
-    mechanism = Mechanism(
-        "slide",
-        [Body("block", mass=1.0, center_of_mass=(0.0, 0.0, 0.0))],
-        [LooseSlide("guide", "ground", "block", (0.4, -0.2, 0.3), (0.3, 0.5, 1.0))],
-        drivers=[JointDisplacement("d", "guide")],
-        gravity=(0.0, 0.0, -10.0),
-    )
-    case = force_case(mechanism, [-0.5, 0.0, 0.5, 1.0])
-    case = replace(case, outputs=tuple(replace(each, atol=1e-8) for each in case.outputs))
-    simulators = [engine(name) for name in ("mujoco", "pinocchio", "exudyn")]
-    results = run([case], [NativeEngine(), *simulators], tol=1e-12)
-    assert results.suspects["slide"].engines == ["mujoco", "pinocchio", "exudyn"]
-    assert {*results.suspects["slide"].outputs} == {f"guide joint_moment {axis}" for axis in "xyz"}
-    # the effort itself is right
-    assert results.record("slide", "mujoco").errors["effort d"].within
 
 
 class OtherMoments(NativeEngine):
@@ -208,16 +155,10 @@ class OtherMoments(NativeEngine):
             name: replace(each, moment=each.moment + 1e-3 * np.roll(each.force, 1, axis=1))
             for name, each in found.forces.joints.items()
         }
-        return replaced(found, forces=replace(found.forces, joints=joints))
+        return changed(found, forces=replace(found.forces, joints=joints))
 
 
-def replaced(found, **changes):
-    other = object.__new__(Trajectory)
-    other.__dict__.update(found.__dict__, **changes)
-    return other
-
-
-def test_simulators_that_agree_suspect_native_of_its_moments():
+def test_simulators_suspect_native_moments():
     case = force_case(loaded(), [0.0, 0.25, 0.5])
     case = replace(case, outputs=tuple(replace(each, atol=1e-7) for each in case.outputs))
     simulators = [engine(name) for name in ("mujoco", "pinocchio", "exudyn")]

@@ -33,7 +33,7 @@ def timed(monkeypatch, build, *solves, waits=()):
     return engine, record_of(engine)
 
 
-def test_times_are_of_warm_solves_and_the_answer_is_the_timed_one():
+def test_times_are_of_warm_solves():
     engine = Fake()
     record = record_of(engine)
     assert engine.solves == 6  # one cold, five warm: they take no time
@@ -54,7 +54,7 @@ def test_an_interruption_moves_no_time(monkeypatch):
     assert seconds.warm == pytest.approx(0.002)
 
 
-def test_what_others_take_is_told(monkeypatch):
+def test_waiting_time_is_reported(monkeypatch):
     _, record = timed(monkeypatch, 0.5, *[0.003] * 6, waits=[0.002] * 6)
     assert record.seconds.warm == pytest.approx(0.003)
     assert record.seconds.waited == pytest.approx(0.002)

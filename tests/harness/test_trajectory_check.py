@@ -10,20 +10,13 @@ from kincheck.core.harness.native_engine import NativeEngine
 from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.run import run
 from kincheck.core.harness.trajectory_check import BadTrajectoryError, check
-from kincheck.core.trajectory import Trajectory
 
+from ..support.engine_faults import changed
 from ..support.engine_forces import force_case
-from ..support.fakes import SAMPLES, Fake, crank, solution
+from ..support.fakes import SAMPLES, Fake, at, crank, solution
 from ..support.loaded import loaded
 
 NATIVE = NativeEngine(every_body=True)
-
-
-def changed(found, **parts):
-    """The trajectory with other parts."""
-    other = object.__new__(Trajectory)
-    other.__dict__.update(found.__dict__, **parts)
-    return other
 
 
 def with_point(found, **parts):
@@ -89,6 +82,17 @@ FORMS = {
     "not a number": (
         lambda found: with_point(found, position=np.full((SAMPLES, 3), math.nan)),
         "which is called solved; 9 of 9 samples are so",
+    ),
+    "infinite at one sample": (
+        lambda found: with_point(
+            found, acceleration=at(3, 2, math.inf)(found.points["tip"].acceleration)
+        ),
+        "at sample 3 (angle = -0.25), which is called solved",
+    ),
+    "no points": (lambda found: changed(found, points={}), "no motion of point 'tip'; found: none"),
+    "solved of too few": (
+        lambda found: changed(found, solved=found.solved[1:]),
+        "solved has shape (8,), expected (9,)",
     ),
     "numbers for solved": (
         lambda found: changed(found, solved=np.ones(SAMPLES)),
@@ -227,7 +231,7 @@ def test_a_balance_within_round_off_or_tolerance_passes(case, found):
     assert outcome(case, unbalanced(found, 0.5))[0] is Outcome.UNJUDGED
 
 
-def test_a_case_with_third_party_data_is_not_validated_without_balance(kincheck_main, capsys):
+def test_unbalanced_power_is_not_validated(kincheck_main, capsys):
     from kincheck import cases
 
     strut = cases.load("mcpherson_strut_loaded")
@@ -240,7 +244,7 @@ def test_a_case_with_third_party_data_is_not_validated_without_balance(kincheck_
     assert "(validated)" not in out
 
 
-def test_power_that_is_nowhere_known_is_not_called_zero(found):
+def test_unknown_power_is_not_zero(found):
     none = np.full(3, math.nan)
     unknown = replace(found.forces, power=none, largest_power=none)
     assert unknown.account()["power_missing"] is None
@@ -270,7 +274,7 @@ def test_bodies_off_their_constraints_fail(fault, case, found):
     assert outcome(case, wrong, "simulate")[0] is not Outcome.FAIL
 
 
-def test_bodies_that_do_not_carry_their_points_fail(case, found):
+def test_points_off_their_bodies_fail(case, found):
     (name, moved), *rest = found.points.items()
     points = {name: replace(moved, position=moved.position + 1e-6), **dict(rest)}
     result, message = outcome(case, changed(found, points=points))
@@ -285,7 +289,7 @@ def test_bodies_without_rates_are_judged_by_positions(case, found):
     assert outcome(case, changed(found, bodies=still))[0] is Outcome.FAIL
 
 
-def test_an_engine_without_forces_or_bodies_is_judged_by_points():
+def test_engine_with_points_alone_passes():
     free = Forces({}, {}, {}, np.zeros(SAMPLES), np.zeros(SAMPLES))
     engine = Fake(answer=lambda case: changed(solution(case), forces=free, residual=0))
     (record,) = run([crank()], [engine], tol=1e-12).records

@@ -17,7 +17,7 @@ from kincheck.core.errors import CaseError, KincheckError
 from kincheck.core.harness.execution import here
 from kincheck.core.harness.record import Outcome, Results, to_json
 from kincheck.core.harness.results_file import read_results
-from kincheck.core.history.regression.findings import Kind
+from kincheck.core.history.findings import Kind
 from kincheck.core.history.store import HistoryError, Store
 from kincheck.core.report.caveats import caveats
 from kincheck.core.report.junit import to_junit
@@ -50,7 +50,7 @@ def killed(path, made, *, owner="a-host-that-is-no-more|1|1"):
 # Runs that were killed
 
 
-def test_a_run_that_was_killed_is_judged_and_not_the_one_before(path, capsys):
+def test_killed_run_is_reported(path, capsys):
     nights(path, 2)
     killed(path, 3)
     found = reported(path)
@@ -65,13 +65,13 @@ def test_a_run_that_was_killed_is_judged_and_not_the_one_before(path, capsys):
     )
 
 
-def test_a_run_that_goes_on_is_left_alone(path):
+def test_running_run_is_not_reported(path):
     nights(path, 2)
     killed(path, 3, owner=None)
     assert reported(path).run.name == "run 2"
 
 
-def test_a_run_of_which_nothing_was_made_is_judged_too(path):
+def test_killed_run_without_records_is_reported(path):
     nights(path, 1)
     killed(path, 0)
     found = reported(path)
@@ -81,13 +81,13 @@ def test_a_run_of_which_nothing_was_made_is_judged_too(path):
     )
 
 
-def test_what_was_never_made_counts_with_nothing_to_compare_with(path, capsys):
+def test_missing_pairs_without_earlier_run(path, capsys):
     killed(path, 1)
     assert main.main(["report", "--history", str(path)]) == 1
     assert "all 1 right, 3 not run; nothing to compare with" in capsys.readouterr().out
 
 
-def test_every_format_tells_of_pairs_that_were_never_made(path):
+def test_every_format_names_missing_pairs(path):
     nights(path, 1)
     killed(path, 1)
     with Store(path) as store:
@@ -118,7 +118,7 @@ def test_every_format_tells_of_pairs_that_were_never_made(path):
         } == {UNMADE}
 
 
-def test_a_file_of_a_run_that_ended_early_is_judged_likewise(path, tmp_path):
+def test_file_of_interrupted_run_is_reported(path, tmp_path):
     """What the command writes where it is interrupted."""
     nights(path, 1)
     pairs = [[each.case, each.engine, each.mode] for each in records()[1:]]
@@ -133,21 +133,21 @@ def test_a_file_of_a_run_that_ended_early_is_judged_likewise(path, tmp_path):
             reported(path, str(file), "1")
 
 
-def test_the_command_says_what_it_did_not_come_to(tmp_path, monkeypatch):
+def test_interrupted_run_lists_missing_pairs(tmp_path, monkeypatch):
     def stopped(pairs):
         yield from islice(here(pairs), 1)
         raise KeyboardInterrupt
 
     monkeypatch.setattr("kincheck.core.cli.execution_options.solver", lambda *_: (stopped, {}))
     file = tmp_path / "results.json"
-    assert main.main(["run", "rssr", "bennett", "--engine", "native", "--json", str(file)]) == 130
+    assert main.main(f"run rssr bennett --engine native --json {file}".split()) == 130
     assert read_results(file).missing == [("bennett", "native", "projection")]
 
 
 # Engines that are gone
 
 
-def test_an_engine_that_stays_away_is_told_every_night(path):
+def test_missing_engine_is_reported_every_night(path):
     nights(path, 2)
     for night in range(3):
         keep(path, changed(changed(records(), **GONE), case="second", **GONE))
@@ -162,14 +162,14 @@ def test_an_engine_that_stays_away_is_told_every_night(path):
     assert reported(path).against.name == "run 6 (last green)"
 
 
-def test_an_engine_that_was_never_there_is_no_regression(path):
+def test_engine_never_installed_is_no_regression(path):
     for _ in range(3):
         keep(path, changed(changed(records(), **GONE), case="second", **GONE))
     found = reported(path)
     assert (found.against.name, found.findings) == ("run 2 (last green)", [])
 
 
-def test_a_branch_that_is_not_there_is_told_those_that_are(path):
+def test_unknown_branch_lists_known_ones(path):
     nights(path, 2)
     assert (
         reported(path, against="mian-baseline").reason
@@ -198,7 +198,7 @@ def unwritable(folder):
 
 @pytest.mark.skipif(os.name != "posix", reason="folders have other permissions there")
 @pytest.mark.parametrize("merged", [True, False])
-def test_a_history_where_nothing_can_be_written_is_read_whole_or_not_at_all(path, merged):
+def test_unwritable_history_is_read_whole(path, merged):
     nights(path, 1)
     with tempfile.TemporaryDirectory() as name:
         there = Path(name) / path.name
@@ -237,7 +237,7 @@ def test_a_step_has_the_unit_of_its_output(path, capsys):
     nights(path, 2)
     grown = {"errors": lambda errors: errors | {"x": _grown(errors["x"])}}
     keep(path, changed(records(), **grown), cases=facts)
-    assert main.main(["history", "--history", str(path), "--case", "first"]) == 0
+    assert main.main(f"history --history {path} --case first".split()) == 0
     assert " → 1e-10 deg/s² since run 3" in capsys.readouterr().out
 
 

@@ -73,7 +73,7 @@ def main(argv: Sequence[str]) -> int:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--series", type=int, default=1000)
-    parser.add_argument("--rule", default="kincheck.core.history.regression.segmentation")
+    parser.add_argument("--rule", default="kincheck.core.history.steps")
     options = parser.parse_args(argv)
     rule = importlib.import_module(options.rule).change_points
     print(f"{'found in noise [%]':34}{'any':>8}{'stands':>8}")

@@ -12,7 +12,7 @@ import msgspec
 import pytest
 from kincheck.core.cli import main
 from kincheck.core.harness.record import Outcome
-from kincheck.core.history.queries import green, read
+from kincheck.core.history.queries import faultless, read
 from kincheck.core.history.store import Store
 from kincheck.core.report.figure_data import Past, trend_figures
 from kincheck.core.report.trends import trends
@@ -30,7 +30,7 @@ def history(path, *argv):
 # Files of another time
 
 
-def test_a_file_of_the_first_schema_is_migrated_and_keeps_all_it_had(path):
+def test_first_schema_file_is_migrated(path):
     old = sqlite3.connect(FIRST_SCHEMA)
     assert old.execute("PRAGMA user_version").fetchone() == (1,)
     before = {
@@ -114,7 +114,7 @@ def test_trends_of_a_pair_and_its_steps(path, capsys):
     assert "second" not in out
 
 
-def test_names_and_files_that_are_not_there_are_messages(path, capsys, monkeypatch):
+def test_history_refuses_unknown_names_and_files(path, capsys, monkeypatch):
     monkeypatch.delenv("KINCHECK_HISTORY", raising=False)
     assert main.main(["history"]) == 2
     assert "no file is given; give --history FILE, or set KINCHECK_HIST" in capsys.readouterr().err
@@ -127,15 +127,14 @@ def test_names_and_files_that_are_not_there_are_messages(path, capsys, monkeypat
     assert main.main(["history"]) == 0
 
 
-def test_green_runs_are_those_in_which_something_passed_and_nothing_went_wrong(path):
+def test_green_runs_have_passes_only(path):
     nights(path, 1)
     keep(path, changed(records(), outcome=Outcome.TIMEOUT))
     keep(path, changed(records(), outcome=Outcome.UNSUPPORTED))
     keep(path, [msgspec.structs.replace(each, outcome=Outcome.UNAVAILABLE) for each in records()])
     keep(path, records(), status="interrupted")
     with Store(path) as store:
-        assert [row.id for row in green(store)] == [3, 1]
-        assert [row.id for row in green(store, before=3)] == [1]
+        assert faultless(store) == {1, 3}
 
 
 # Plots
@@ -168,7 +167,7 @@ def test_the_plot_holds_the_numbers_of_the_history(path, tmp_path):
     assert mine[0].run == "2026-11-01 03:00 #1"
 
 
-def test_errors_of_exactly_zero_have_a_floor_to_be_drawn_on(path, tmp_path):
+def test_zero_errors_are_drawn_on_floor(path, tmp_path):
     nights(path, 1)
     page = tmp_path / "trends.html"
     history(path, "--engine", "native", "--plot", page)
@@ -177,7 +176,7 @@ def test_errors_of_exactly_zero_have_a_floor_to_be_drawn_on(path, tmp_path):
     assert figure["layout"]["meta"]["floor"] > 0.0
 
 
-def test_a_run_keeps_how_long_it_was_kept_waiting(path):
+def test_waiting_time_is_subtracted(path):
     made = [
         msgspec.structs.replace(each, seconds=msgspec.structs.replace(each.seconds, waited=0.004))
         for each in records()
@@ -188,7 +187,7 @@ def test_a_run_keeps_how_long_it_was_kept_waiting(path):
     assert math.isclose(entry.seconds, 0.006)
 
 
-def test_what_has_no_value_in_any_run_is_not_drawn(path, tmp_path):
+def test_quantities_without_values_are_not_drawn(path, tmp_path):
     def past(error, time):
         return [
             Past(run=run, engine="native", max_error=error, us_per_step=time) for run in ("1", "2")
@@ -205,7 +204,7 @@ def test_what_has_no_value_in_any_run_is_not_drawn(path, tmp_path):
     assert "data-figure" not in text.partition("<script")[0]
 
 
-def test_times_that_are_close_are_drawn_over_a_decade():
+def test_close_times_span_a_decade():
     """Else a tenth looks like a step; a decade or more is drawn as it is."""
     for factor, spread, ticks in ((1.1, 1.0, "D2"), (20.0, None, "D2"), (2000.0, None, 1)):
         past = [

@@ -47,7 +47,7 @@ def cut_off(path, monkeypatch):
 
 def locked(path, monkeypatch):
     nights(path, 1)
-    monkeypatch.setattr("kincheck.core.history.faults.BUSY", 0.2)
+    monkeypatch.setattr("kincheck.core.history.database.BUSY", 0.2)
     holder = sqlite3.connect(path, isolation_level=None, check_same_thread=False)
     holder.execute("BEGIN EXCLUSIVE")
     HELD.append(holder)
@@ -69,7 +69,7 @@ WHOLE_FILE = [directory, no_database, of_another_program, of_a_later_version, cu
 
 
 @pytest.mark.parametrize("fault", WHOLE_FILE)
-def test_a_history_that_cannot_be_used_costs_no_result(
+def test_unusable_history_costs_no_result(
     kincheck_main, path, tmp_path, capsys, monkeypatch, fault
 ):
     fault(path, monkeypatch)
@@ -121,7 +121,7 @@ def passed_over(capsys, path):
     return told
 
 
-def test_the_other_runs_are_drawn_and_the_new_one_is_kept(kincheck_main, damaged, tmp_path, capsys):
+def test_run_beside_damaged_run_is_stored(kincheck_main, damaged, tmp_path, capsys):
     out = tmp_path / "out"
     assert kincheck_main("run", "crank", "--history", damaged, "--out", out) == 2
     assert "1 pass" in passed_over(capsys, damaged)
@@ -131,7 +131,7 @@ def test_the_other_runs_are_drawn_and_the_new_one_is_kept(kincheck_main, damaged
         assert len(store.records(4)) == 1
 
 
-def test_the_other_runs_are_listed_plotted_and_exported(damaged, tmp_path, capsys):
+def test_history_passes_over_damaged_run(damaged, tmp_path, capsys):
     table, plot = tmp_path / "all.csv", tmp_path / "plot.html"
     command = ["history", "--history", str(damaged)]
     assert main([*command, "--export", str(table), "--plot", str(plot)]) == 2
@@ -145,23 +145,23 @@ def test_the_other_runs_are_listed_plotted_and_exported(damaged, tmp_path, capsy
     passed_over(capsys, damaged)
 
 
-def test_a_report_is_made_of_the_others(damaged, tmp_path, capsys):
-    assert main(["report", "--history", str(damaged), "--out", str(tmp_path / "out")]) == 2
+def test_report_passes_over_damaged_run(damaged, tmp_path, capsys):
+    assert main(f"report --history {damaged} --out {tmp_path / 'out'}".split()) == 2
     assert "run 3 against run 1 (last green)" in passed_over(capsys, damaged)
     assert (tmp_path / "out" / "report.html").exists()
 
 
-def test_a_damaged_record_is_no_run_to_compare_with(path, capsys):
+def test_report_skips_run_with_damaged_record(path, capsys):
     nights(path, 3)
     change(path, "UPDATE records SET record = x'00' WHERE run_id = 2")
     assert main(["report", "--history", str(path)]) == 2
     assert "run 3 against run 1 (last green)" in passed_over(capsys, path)
-    assert main(["report", "2", "--history", str(path)]) == 2
+    assert main(f"report 2 --history {path}".split()) == 2
     passed_over(capsys, path)
 
 
-def test_a_run_that_is_removed_is_passed_over_no_more(damaged, capsys):
-    assert main(["history", "--history", str(damaged), "--remove", "2"]) == 0
+def test_removed_run_is_not_reported(damaged, capsys):
+    assert main(f"history --history {damaged} --remove 2".split()) == 0
     assert "run 2 is removed" in capsys.readouterr().out
     with Store(damaged) as store:
         assert [row.id for row in store.runs()] == [3, 1]
@@ -169,11 +169,11 @@ def test_a_run_that_is_removed_is_passed_over_no_more(damaged, capsys):
             "SELECT count(*) FROM records WHERE run_id = 2"
         ).fetchone() == (0,)
         assert len(store.records(3)) == 4
-    assert main(["history", "--history", str(damaged), "--remove", "2"]) == 2
+    assert main(f"history --history {damaged} --remove 2".split()) == 2
     assert "there is no run 2" in capsys.readouterr().err
 
 
-def test_many_damaged_runs_are_not_told_one_by_one(path, capsys):
+def test_many_damaged_runs_are_summed_up(path, capsys):
     nights(path, 9)
     change(path, "UPDATE runs SET plan = '(' WHERE id > 1")
     assert main(["history", "--history", str(path)]) == 2
@@ -182,9 +182,7 @@ def test_many_damaged_runs_are_not_told_one_by_one(path, capsys):
     assert "3 more runs cannot be read: 4, 3, 2" in said[-1]
 
 
-def test_damage_that_comes_while_records_are_added_costs_no_result(
-    kincheck_main, path, tmp_path, capsys, monkeypatch
-):
+def test_damage_during_run_costs_no_result(kincheck_main, path, tmp_path, capsys, monkeypatch):
     add = Store.add_record
 
     def damage_then_add(self, run, record):
@@ -203,7 +201,7 @@ def test_damage_that_comes_while_records_are_added_costs_no_result(
     assert NO_TRENDS in (out / "report.html").read_text()
 
 
-def test_a_run_to_be_resumed_that_is_damaged_is_made_anew(kincheck_main, path, capsys):
+def test_damaged_run_is_not_resumed(kincheck_main, path, capsys):
     command = ["run", "crank", "--history", path]
     assert kincheck_main(*command) == 0
     change(path, "UPDATE runs SET status = 'interrupted', plan = '('")

@@ -69,7 +69,7 @@ def test_an_export_can_be_of_a_case_and_an_engine(path, tmp_path):
         )
 
 
-def test_what_cannot_be_exported_is_a_message(path, tmp_path, monkeypatch):
+def test_impossible_exports_are_refused(path, tmp_path, monkeypatch):
     nights(path, 1)
     with Store(path) as store:
         with pytest.raises(

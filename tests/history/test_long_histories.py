@@ -10,9 +10,9 @@ import pytest
 from kincheck.core.case.io.atomic_files import written
 from kincheck.core.cli import main
 from kincheck.core.harness.record import Outcome, to_json
-from kincheck.core.history.regression.findings import Kind
-from kincheck.core.history.regression.run_selection import find, find_against
+from kincheck.core.history.findings import Kind
 from kincheck.core.history.run_recorder import keep as begin
+from kincheck.core.history.run_selection import find, find_against
 from kincheck.core.history.store import Store
 
 from ..harness.test_unfinished import killed
@@ -71,17 +71,7 @@ def test_another_tolerance_is_no_step_of_the_error(path):
     assert {each.since for each in found.findings} == {None}
 
 
-def test_a_step_has_the_errors_that_were_found(path):
-    for factor in (1e-4, 1e-4, 1e-4, 100.0, 100.0):
-        keep(path, changed(records(), **worse(factor)))
-    (step,) = reported(path).steps
-    least = changed(records(), **worse(1e-4))
-    (record,) = [each for each in least if (each.case, each.engine) == FIRST]
-    assert step.before == pytest.approx(record.errors["x"].position.max_abs, rel=1e-12)
-    assert step.now == pytest.approx(1e6 * step.before, rel=1e-9)
-
-
-def test_a_file_is_the_run_of_the_history_that_it_came_from(path, tmp_path):
+def test_results_file_is_found_in_history(path, tmp_path):
     nights(path, 1)
     keep(path, changed(records(), **worse(450.0)))
     nights(path, 1)
@@ -103,13 +93,18 @@ def test_a_file_is_the_run_of_the_history_that_it_came_from(path, tmp_path):
 @pytest.mark.parametrize(
     "gone",
     [
-        {"outcome": Outcome.UNAVAILABLE, "errors": {}, "solved": None, "seconds": None},
-        {"outcome": Outcome.UNSUPPORTED, "errors": {}, "solved": None, "seconds": None},
-        without("acceleration"),
+        *(
+            pytest.param(
+                {"outcome": outcome, "errors": {}, "solved": None, "seconds": None},
+                marks=pytest.mark.nightly,
+                id=outcome.value,
+            )
+            for outcome in (Outcome.UNAVAILABLE, Outcome.UNSUPPORTED)
+        ),
+        pytest.param(without("acceleration"), id="acceleration"),
     ],
-    ids=["unavailable", "unsupported", "acceleration"],
 )
-def test_what_is_gone_is_told_for_as_long_as_it_is(path, gone):
+def test_lost_results_stay_reported(path, gone):
     nights(path, 1)
     for _ in range(62):
         keep(path, changed(records(), **gone))
@@ -118,7 +113,7 @@ def test_what_is_gone_is_told_for_as_long_as_it_is(path, gone):
         assert (found.against.number, told(found)) == (1, {(Kind.LOST, *FIRST)})
 
 
-def test_an_output_that_the_case_has_no_more_is_told_once(path):
+def test_removed_output_is_reported_once(path):
     nights(path, 1)
     fewer = {
         "errors": lambda errors: {"x": errors["x"]},
@@ -138,7 +133,7 @@ def test_small_runs_in_between_hide_nothing(path):
     assert told(reported(path)) == {(Kind.DRIFTED, *FIRST)}
 
 
-def test_an_error_that_grows_little_by_little_is_told(path):
+def test_slow_drift_is_reported(path):
     for night in range(4):
         keep(path, changed(records(), **worse(5.0**night)))
     assert told(reported(path, "2")) == set()
@@ -150,7 +145,7 @@ def test_an_error_that_grows_little_by_little_is_told(path):
     assert finding.now == pytest.approx(125.0 * finding.before)
 
 
-def test_a_step_that_was_told_is_not_told_again(path):
+def test_step_is_reported_once(path):
     nights(path, 3)
     for _ in range(3):
         keep(path, changed(records(), **worse(100.0)))
@@ -171,7 +166,7 @@ def test_a_wide_tolerance_later_does_not_hide_a_step(path):
     ]
 
 
-def test_the_first_bad_run_may_be_one_that_was_killed(path, capsys):
+def test_first_bad_run_may_be_killed(path, capsys):
     nights(path, 2)
     bad = changed(records(), outcome=Outcome.FAIL)
     run = keep(path, bad, status="running")
@@ -185,18 +180,18 @@ def test_the_first_bad_run_may_be_one_that_was_killed(path, capsys):
     assert main.main(["history", "--history", str(path)]) == 0
     assert " killed " in capsys.readouterr().out
     export = path.with_suffix(".csv")
-    assert main.main(["history", "--history", str(path), "--export", str(export)]) == 0
+    assert main.main(f"history --history {path} --export {export}".split()) == 0
     assert ",killed," in export.read_text("utf-8")
 
 
-def test_a_run_that_is_being_made_is_not_reported(path, capsys):
+def test_report_refuses_running_run(path, capsys):
     nights(path, 1)
     killed(path, 3, owner=None)
-    assert main.main(["report", "2", "--history", str(path)]) == 2
+    assert main.main(f"report 2 --history {path}".split()) == 2
     assert "run 2 is still running; report it when it has ended" in capsys.readouterr().err
 
 
-def test_the_page_of_a_killed_run_says_what_was_never_made_and_has_the_references(path, tmp_path):
+def test_page_of_killed_run_names_missing_pairs(path, tmp_path):
     case, engines = crank("first"), [Fake("native"), Fake("mujoco")]
     kept = begin(
         path,
@@ -212,20 +207,11 @@ def test_the_page_of_a_killed_run_says_what_was_never_made_and_has_the_reference
     kept.store.close()
     with Store(path, writable=False) as store:
         assert store.results(1).references["first"].keys() == case.reference.keys()
-    assert main.main(["report", "--history", str(path), "--out", str(tmp_path)]) == 1
+    assert main.main(f"report --history {path} --out {tmp_path}".split()) == 1
     page = (tmp_path / "report.html").read_text("utf-8")
     assert "not run" in page
     assert "not requested" not in page
     assert "Lost (3)" in page  # in two rows
-
-
-def test_a_run_of_another_version_is_not_gone_on_with(path):
-    case, settings = crank("first"), {"tol": 1e-12, "command": "kincheck run", "settings": {}}
-    for version, resumed in (("1.0", False), ("2.0", False), ("2.0", True)):
-        kept = begin(path, [case], [Fake("native", installed=version)], resume=True, **settings)
-        assert kept.resumed is resumed
-        kept.store.connection.execute("UPDATE runs SET owner = 'a-host-that-is-no-more|1|1'")
-        kept.store.close()
 
 
 def test_other_edits_are_named(path):
@@ -242,15 +228,7 @@ def test_errors_of_zero_leave_any_tolerance_loose(path):
     assert (loose.case, loose.output, loose.factor) == ("first", "x", None)
 
 
-def test_an_interrupt_is_no_traceback(capsys, monkeypatch):
-    monkeypatch.setattr(
-        "kincheck.core.cli.list._list", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt)
-    )
-    assert main.main(["list"]) == 130
-    assert capsys.readouterr().err == "kincheck: interrupted\n"
-
-
-def test_a_file_that_cannot_be_finished_leaves_what_stood_there(tmp_path):
+def test_failed_write_keeps_old_file(tmp_path):
     def half(path):
         path.write_text("half of it")
         raise OSError(28, "No space left on device")

@@ -6,7 +6,7 @@ import msgspec
 import pytest
 from kincheck.core.cli import main
 from kincheck.core.harness.record import Outcome, Seconds, to_json
-from kincheck.core.history.regression.findings import Kind
+from kincheck.core.history.findings import Kind
 from kincheck.core.report.regression_summary import to_markdown
 
 from ..support.nights import FACTS, RESULTS, changed, keep, nights, records, reported, times, worse
@@ -50,7 +50,7 @@ def test_one_slow_machine_is_no_slow_engine(path):
     assert kinds(reported(path)) == []
 
 
-def test_a_machine_whose_times_scatter_is_given_more(path):
+def test_scattered_times_widen_the_limit(path):
     noise = random.Random(1)
     for _ in range(10):
         keep(
@@ -90,7 +90,7 @@ def test_round_off_that_grows_is_no_drift(path):
     assert kinds(reported(path)) == []
 
 
-def test_on_another_processor_only_the_calibration_loop_is_compared_with(path):
+def test_other_processor_compares_calibrated_times(path):
     nights(path, 6)
     keep(path, changed(records(), **times(3.0)), processor="another", calibration_seconds=0.06)
     slower = [each.engine + each.case for each in reported(path).findings]
@@ -151,7 +151,7 @@ PLANTED = {
 
 
 @pytest.mark.parametrize("what", PLANTED)
-def test_what_is_planted_is_reported_and_named(path, what):
+def test_planted_regressions_are_reported(path, what):
     changes, kind, message = PLANTED[what]
     nights(path, 8)
     keep(path, changed(records(), **changes))
@@ -184,7 +184,7 @@ def test_a_changed_engine_version_is_named(path):
     assert [str(each) for each in step.changes[:1]] == ["mujoco 4.0.0 → 4.1.0"]
 
 
-def test_fixed_added_and_absent_are_said_and_no_regression(path):
+def test_fixed_added_absent_are_no_regressions(path):
     broken = changed(records(), outcome=Outcome.CRASHED, message="signal 11")
     keep(path, broken[:3])
     keep(path, records()[:2] + records()[3:])
@@ -212,7 +212,7 @@ def test_a_changed_tolerance_is_said(path):
     assert (finding.kind, finding.message) == (Kind.TOLERANCE, "x position: 1e-9 → 1e-6")
 
 
-def test_a_changed_reference_is_said_and_no_regression(tmp_path, capsys):
+def test_changed_reference_is_reported(tmp_path, capsys):
     """Somebody has edited the table beside the case, by less than any tolerance or by more."""
     files = [tmp_path / name for name in ("before.json", "now.json")]
     truth = RESULTS.references["first"]["x"]
@@ -229,9 +229,9 @@ def test_a_changed_reference_is_said_and_no_regression(tmp_path, capsys):
                 msgspec.structs.replace(RESULTS, run={**FACTS, "started": file.name}, **changes)
             )
         )
-    assert main.main(["report", str(files[0]), "--against", str(files[0])]) == 0
+    assert main.main(f"report {files[0]} --against {files[0]}".split()) == 0
     assert "Reference changed" not in capsys.readouterr().out
-    assert main.main(["report", str(files[1]), "--against", str(files[0])]) == 0
+    assert main.main(f"report {files[1]} --against {files[0]}".split()) == 0
     said = capsys.readouterr().out
     assert "Reference changed (2): results are judged by other reference values" in said
     assert (
@@ -240,7 +240,7 @@ def test_a_changed_reference_is_said_and_no_regression(tmp_path, capsys):
     )
 
 
-def test_tolerances_that_nothing_needed_are_named_after_ten_runs(path):
+def test_loose_tolerances_are_named(path):
     nights(path, 9)
     assert reported(path).loose == []
     nights(path, 1)

@@ -5,7 +5,7 @@ import xml.etree.ElementTree as ET
 import msgspec
 from kincheck.core.cli import main
 from kincheck.core.harness.record import Outcome
-from kincheck.core.history.regression.findings import Regressions
+from kincheck.core.history.findings import Regressions
 from kincheck.core.history.store import Store
 from kincheck.core.report.regression_junit import to_regression_junit
 from kincheck.core.report.regression_labels import headline, rows
@@ -20,7 +20,7 @@ def test_the_command_writes_every_format(path, tmp_path, capsys):
     nights(path, 6)
     keep(path, changed(records(), **worse(20.0), message="<script>alert(1)</script> | *x*"))
     out = tmp_path / "report"
-    assert main.main(["report", "--history", str(path), "--out", str(out)]) == 1
+    assert main.main(f"report --history {path} --out {out}".split()) == 1
     text = (out / "regressions.md").read_text()
     assert capsys.readouterr().out == text
     found = msgspec.json.decode((out / "regressions.json").read_bytes(), type=Regressions)
@@ -40,7 +40,7 @@ def test_the_command_writes_every_format(path, tmp_path, capsys):
     assert len(list(root.iter("testcase"))) == 8
 
 
-def test_junit_names_what_is_about_a_pair_and_keeps_skips(path):
+def test_regression_junit_keeps_skips(path):
     nights(path, 6)
     made = changed(
         changed(records(), **times(2.0)),
@@ -67,7 +67,7 @@ def test_junit_names_what_is_about_a_pair_and_keeps_skips(path):
     assert [(suite.get("tests"), suite.get("errors")) for suite in root] == [("5", "2"), ("5", "0")]
 
 
-def test_markdown_takes_foreign_text_as_text_and_folds_what_is_alike(path):
+def test_regression_markdown_escapes_and_folds(path):
     nights(path, 1)
     message = "</details> | `x` @team"
     keep(

@@ -8,7 +8,7 @@ import msgspec
 import pytest
 from kincheck.core.cli import main
 from kincheck.core.harness.record import Outcome
-from kincheck.core.history.regression.findings import WHY, Kind
+from kincheck.core.history.findings import WHY, Kind
 
 from ..support.nights import changed, keep, nights, records, reported
 
@@ -78,7 +78,7 @@ TOLD = {
 
 
 @pytest.mark.parametrize("what", TOLD)
-def test_what_differs_is_told_in_every_format(path, tmp_path, capsys, what):
+def test_solution_changes_are_in_every_format(path, tmp_path, capsys, what):
     before, now, kind, message = TOLD[what]
     keep(path, changed(records(), **before))
     keep(path, changed(records(), **{**before, **now}))
@@ -87,7 +87,7 @@ def test_what_differs_is_told_in_every_format(path, tmp_path, capsys, what):
     assert (finding.kind, finding.case, finding.engine) == (kind, *FIRST)
     assert finding.message.startswith(message)
     assert found.regressed is kind.regression is (kind is not Kind.RANK)
-    assert main.main(["report", "--history", str(path), "--out", str(tmp_path)]) == kind.regression
+    assert main.main(f"report --history {path} --out {tmp_path}".split()) == kind.regression
     capsys.readouterr()
     title = f"{kind.capitalize()} (1): {WHY[kind]}"
     assert title in (tmp_path / "regressions.md").read_text("utf-8")
@@ -115,13 +115,13 @@ def test_what_differs_is_told_in_every_format(path, tmp_path, capsys, what):
     ],
     ids=["rounding", "the last place", "less than three digits", "better", "nothing known before"],
 )
-def test_what_means_nothing_is_not_told(path, before, now):
+def test_meaningless_changes_are_not_reported(path, before, now):
     keep(path, changed(records(), **before))
     keep(path, changed(records(), **now))
     assert reported(path).findings == []
 
 
-def test_samples_that_are_lost_are_told_once(path):
+def test_lost_samples_are_reported_once(path):
     keep(path, records())
     all_null = {name: without(7, 8) for name in ("position", "velocity", "acceleration")}
 
@@ -143,21 +143,14 @@ def test_samples_that_are_lost_are_told_once(path):
 # Pairs that are missing
 
 
-def test_missing_cases_and_engines_are_told_and_status_1_where_that_is_asked(
-    path, tmp_path, capsys
-):
+def test_missing_pairs_are_failures_on_request(path, tmp_path, capsys):
     nights(path, 2)
     keep(path, [each for each in records() if each.case == "first" and each.engine == "native"])
     assert main.main(["report", "--history", str(path)]) == 0
     said = capsys.readouterr().out
     assert "nothing regressed; 3 not in this run" in said
     assert "| mujoco | first, second | pass there |" in said
-    assert (
-        main.main(
-            ["report", "--history", str(path), "--missing-is-failure", "--out", str(tmp_path)]
-        )
-        == 1
-    )
+    assert main.main(f"report --history {path} --missing-is-failure --out {tmp_path}".split()) == 1
     said = capsys.readouterr().out
     assert said.startswith("## run 3 against run 2 (last green): 3 not in this run")
     assert "**Not in this run (3): " in said
@@ -169,7 +162,7 @@ def test_missing_cases_and_engines_are_told_and_status_1_where_that_is_asked(
     ]
 
 
-def test_a_pair_that_only_the_last_run_had_is_missing_though_that_was_not_green(path, capsys):
+def test_pair_of_last_run_is_missing(path, capsys):
     keep(path, records()[:2])
     keep(path, changed(records(), case="second", outcome=Outcome.FAIL))
     keep(path, records()[:2])
@@ -179,11 +172,11 @@ def test_a_pair_that_only_the_last_run_had_is_missing_though_that_was_not_green(
         (Kind.ABSENT, "second", "in run 2, by the same command")
     ] * 2
     assert main.main(["report", "--history", str(path)]) == 0
-    assert main.main(["report", "--history", str(path), "--missing-is-failure"]) == 1
+    assert main.main(f"report --history {path} --missing-is-failure".split()) == 1
     capsys.readouterr()
 
 
-def test_a_run_of_another_command_was_asked_for_something_else(path, capsys):
+def test_other_command_has_no_missing_pairs(path, capsys):
     keep(path, records()[:2])
     keep(
         path,
@@ -191,7 +184,7 @@ def test_a_run_of_another_command_was_asked_for_something_else(path, capsys):
         command="kincheck run mine.toml",
     )
     keep(path, records()[:2])
-    assert main.main(["report", "--history", str(path), "--missing-is-failure"]) == 0
+    assert main.main(f"report --history {path} --missing-is-failure".split()) == 0
     assert "not in this run" not in capsys.readouterr().out
 
 
@@ -200,4 +193,4 @@ def test_missing_pairs_count_with_nothing_to_compare_with(path, capsys):
     keep(path, records()[:2])
     assert main.main(["report", "--history", str(path)]) == 0
     assert "2 not in this run; nothing to compare with" in capsys.readouterr().out
-    assert main.main(["report", "--history", str(path), "--missing-is-failure"]) == 1
+    assert main.main(f"report --history {path} --missing-is-failure".split()) == 1

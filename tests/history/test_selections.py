@@ -73,7 +73,7 @@ def test_another_selection_turns_no_night_red(run, report):
     ],
     ids=["tolerance", "places", "more", "more and tolerance", "all"],
 )
-def test_a_night_is_repaired_by_the_same_thing(run, report, monkeypatch, tmp_path, again, status):
+def test_same_selection_repairs_a_night(run, report, monkeypatch, tmp_path, again, status):
     monkeypatch.chdir(tmp_path)
     run(*NIGHT)
     run(*NIGHT, right=False)
@@ -92,7 +92,7 @@ def test_a_mistyped_case_is_not_in_the_history(run, report, capsys, tmp_path):
         assert [row.plan for row in store.runs()] == [[("crank", "native", "projection")]]
 
 
-def test_names_that_are_no_text_are_stored(run, tmp_path, monkeypatch):
+def test_undecodable_names_are_stored(run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     run(*NIGHT, "--reference", "\udcff.csv")
     (tmp_path / "\udcff.toml").write_text("no case")

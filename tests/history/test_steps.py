@@ -11,41 +11,21 @@ import pytest
 from kincheck.core.cli import main
 from kincheck.core.harness.record import Outcome
 from kincheck.core.history.queries import read
-from kincheck.core.history.regression.change_points import change_points, steps
+from kincheck.core.history.steps import change_points, lasting, steps
 from kincheck.core.history.store import Store
 
 from ..support.nights import changed, keep, nights, records, times, worse
 
 
-def found(path, **options):
+def found(path, standing=False):
     with Store(path) as store:
-        return steps(read(store), **options)
+        every = steps(read(store))
+    return lasting(every) if standing else every
 
 
 def noisy(levels, spread=0.05, seed=3):
     noise = random.Random(seed)
     return np.array([level + noise.gauss(0.0, spread) for level in levels])
-
-
-SHAPES = {
-    "comes and goes": ([8, 8, 8, 8], [8, 16, 24]),
-    "three slow runs": ([18, 3, 15], [18, 21]),
-    "three at the end": ([37, 3], [37]),
-    "one step": ([25, 8], [25]),
-}
-
-
-@pytest.mark.parametrize("shape", SHAPES)
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_what_comes_and_goes_is_found_exactly(shape, sign):
-    """Steps of ten standard deviations, a factor of two in time, up first or down first."""
-    lengths, expected = SHAPES[shape]
-    level = sign * math.log(2.0) * np.repeat([k % 2 for k in range(len(lengths))], lengths)
-    found = [
-        change_points(noisy(level, 0.0693, seed), least=math.log(1.5), lasting=3)
-        for seed in range(100)
-    ]
-    assert sum(each == expected for each in found) >= 95
 
 
 def test_a_slow_drift_is_no_step():
@@ -54,7 +34,7 @@ def test_a_slow_drift_is_no_step():
         assert change_points(noisy(drift, seed=seed), least=math.log(1.5), lasting=3) == []
 
 
-def test_values_that_go_to_and_fro_are_no_steps():
+def test_alternating_values_are_no_steps():
     """As errors on two kinds of hosted processors are."""
     for seed in range(20):
         chance = random.Random(seed)
@@ -93,7 +73,7 @@ def test_noise_has_no_steps():
         assert change_points(values, least=math.log(1.5), lasting=3) == []
 
 
-def test_a_step_of_time_names_its_first_run_and_the_versions_that_changed(path):
+def test_time_step_names_changed_versions(path):
     noise = random.Random(5)
     for _ in range(8):
         keep(path, records(noise=noise))
@@ -116,7 +96,7 @@ def test_a_step_of_time_names_its_first_run_and_the_versions_that_changed(path):
     ]
 
 
-def test_a_step_of_error_needs_one_run_and_names_the_output_that_moved_most(path):
+def test_error_step_names_worst_output(path):
     nights(path, 3)
     both = changed(changed(records(), **worse(20.0, "x")), **worse(200.0, "y"))
     keep(
@@ -132,7 +112,7 @@ def test_a_step_of_error_needs_one_run_and_names_the_output_that_moved_most(path
     assert str(step.changes[0]) == "mujoco 4.0.0 → 4.1.0"
 
 
-def test_an_outcome_has_a_first_bad_run_and_what_is_over_does_not_stand(path):
+def test_outcome_step_ends_with_repair(path):
     nights(path, 2)
     for _ in range(2):
         keep(path, changed(records(), outcome=Outcome.CRASHED, message="signal 11"))
@@ -151,7 +131,7 @@ def test_slow_nights_are_no_step_of_time(path):
     assert found(path) == []
 
 
-def test_the_present_bad_stretch_has_its_own_first_run_and_an_earlier_one_its_repair(path, capsys):
+def test_repeated_slow_stretches_are_separate(path, capsys):
     noise = random.Random(3)
     for night in range(32):
         keep(path, changed(records(noise=noise), **times(2.0 if night // 8 % 2 else 1.0)))
@@ -161,33 +141,18 @@ def test_the_present_bad_stretch_has_its_own_first_run_and_an_earlier_one_its_re
         (9, True, 17),
     ]
     assert [(each.first, each.last) for each in found(path, standing=True)] == [(25, 24)]
-    assert main.main(["report", "--against", "20", "--history", str(path)]) == 1
+    assert main.main(f"report --against 20 --history {path}".split()) == 1
     said = capsys.readouterr().out
     assert " · since run 25 |" in said
     assert "ms a sweep since run 25 (" in said
     assert "steps that came and went" in said.lower()
     assert "since run 9 (2026-11-09 03:00), repaired in run 17; after run 8: " in said
-    assert (
-        main.main(
-            [
-                "history",
-                "--case",
-                "first",
-                "--engine",
-                "mujoco",
-                "--last",
-                "0",
-                "--history",
-                str(path),
-            ]
-        )
-        == 0
-    )
+    assert main.main(f"history --case first --engine mujoco --last 0 --history {path}".split()) == 0
     said = capsys.readouterr().out
     assert "since run 9 (2026-11-09 03:00), repaired in run 17; after run 8: " in said
 
 
-def test_what_is_only_partly_repaired_stands(path):
+def test_partly_repaired_step_stands(path):
     noise = random.Random(3)
     for night in range(24):
         keep(path, changed(records(noise=noise), **times((1.0, 8.0, 3.0)[night // 8])))
@@ -205,7 +170,7 @@ def test_one_bad_night_of_error_is_a_step_and_its_repair(path):
     assert found(path, standing=True) == []
 
 
-def test_outputs_that_became_worse_one_after_the_other_both_stand(path):
+def test_successive_error_steps_both_stand(path):
     nights(path, 4)
     for _ in range(4):
         keep(path, changed(records(), **worse(100.0, "x")))

@@ -8,7 +8,7 @@ import pytest
 from kincheck.core import (
     JointAngle,
 )
-from kincheck.core.kinematics.compiled.motion_start import start_of
+from kincheck.core.kinematics.compiled.routes import start_of
 from kincheck.core.mechanism.motions import Path, Ramp, Sine
 
 from .test_start import TIMES, WAYS, arm, by_style, case_of, circling, phases_of

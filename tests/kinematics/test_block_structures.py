@@ -7,7 +7,7 @@ from kincheck.core import solve
 from kincheck.core.kinematics import Method, NativeSolver
 from kincheck.core.kinematics.compiled.compiled_model import recent_model
 from kincheck.core.kinematics.compiled.request import Request
-from kincheck.core.kinematics.compiled.samples import Route
+from kincheck.core.kinematics.compiled.routes import Route
 from kincheck.core.kinematics.continuation.singular_samples import scrutinise
 from kincheck.core.kinematics.continuation.walk import march
 from kincheck.core.mechanism.motions import Path, Ramp

@@ -9,14 +9,12 @@ import re
 import numpy as np
 import pytest
 from kincheck import adapters
-from kincheck.adapters.shared.force_elements import curve_force, elastic_torque
+from kincheck.adapters.shared.force_solution import curve_force, elastic_torque
 from kincheck.core.algebra import ZERO, Quat, vec
-from kincheck.core.case.io.case_file import load_case
-from kincheck.core.case.io.case_writer import case_text
+from kincheck.core.case.io.case_file import case_text, load_case
 from kincheck.core.case.io.model_writer import written
 from kincheck.core.errors import KincheckError, MechanismError
-from kincheck.core.kinematics.forces.demand import BodyStates
-from kincheck.core.kinematics.forces.elements import bushing, force_of
+from kincheck.core.kinematics.forces.equations import BodyStates, bushing, force_of
 from kincheck.core.kinematics.formulation.constraints import frames
 from kincheck.core.mechanism.body import Body
 from kincheck.core.mechanism.loads import Bushing

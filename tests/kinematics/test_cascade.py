@@ -7,15 +7,13 @@ import pytest
 from kincheck import cases
 from kincheck.core import Body, Point, solve
 from kincheck.core.kinematics import Method, NativeSolver
-from kincheck.core.kinematics.blocks.cascade import Cascade
-from kincheck.core.kinematics.blocks.component_lanes import LANES, ComponentLanes
-from kincheck.core.kinematics.blocks.lanes import WORST
+from kincheck.core.kinematics.blocks.component_lanes import LANES, Cascade, ComponentLanes
+from kincheck.core.kinematics.blocks.sweep import WORST
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
-from kincheck.core.kinematics.compiled.motion_start import start_of
 from kincheck.core.kinematics.compiled.request import FROM, SIGMA, TIME, Request
-from kincheck.core.kinematics.compiled.samples import Route
-from kincheck.core.kinematics.continuation.step_halving import HALVINGS, part_of_step
+from kincheck.core.kinematics.compiled.routes import Route, start_of
 from kincheck.core.kinematics.continuation.sweep import follow
+from kincheck.core.kinematics.continuation.walk import HALVINGS, part_of_step
 from kincheck.core.mechanism.motions import Path, Ramp, Sine
 from kincheck.core.program import MARGIN
 

@@ -7,7 +7,7 @@ import pytest
 from kincheck.core import Body, Gear, JointAngle, Mechanism, Point, Revolute, SolveError
 from kincheck.core.case.io.case_file import load_case
 from kincheck.core.kinematics import Method, NativeSolver
-from kincheck.core.kinematics.blocks.cascade import Cascade
+from kincheck.core.kinematics.blocks.component_lanes import Cascade
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.mechanism.motions import Path, Ramp
 

@@ -12,7 +12,7 @@ from kincheck.cases.jet import Jet
 from kincheck.core import Body, JointAngle, Mechanism, Point, Revolute, Universal
 from kincheck.core.kinematics.compiled.compiled_model import recent_model
 from kincheck.core.kinematics.compiled.request import Request
-from kincheck.core.kinematics.compiled.samples import Route
+from kincheck.core.kinematics.compiled.routes import Route
 from kincheck.core.kinematics.continuation.sweep import follow
 from kincheck.core.kinematics.diagnosis.conditioning import conditioning
 from kincheck.core.kinematics.one_design import solve

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.request import Request
-from kincheck.core.kinematics.continuation import side_follower
-from kincheck.core.kinematics.continuation.side_follower import FINER, SideWalk
+from kincheck.core.kinematics.continuation import walk
 from kincheck.core.kinematics.continuation.sweep import sweep
+from kincheck.core.kinematics.continuation.walk import FINER, SideWalk
 from kincheck.core.mechanism.motions import Path, Ramp
 
 from ..support.mechanisms import slider_crank, slider_crank_motion
@@ -70,7 +70,7 @@ def test_a_coarse_sweep_goes_in_equal_parts(values, compiled, divided):
 
 @pytest.mark.parametrize("values", COARSE.values(), ids=COARSE)
 def test_or_in_parts_that_are_looked_for_one_by_one(values, divided, monkeypatch):
-    monkeypatch.setattr(side_follower, "FINER", ())
+    monkeypatch.setattr(walk, "FINER", ())
     assert_right(swept(values), values)
     assert divided
 
@@ -80,13 +80,13 @@ def test_a_step_too_long_for_all_equal_parts_is_divided(divided, monkeypatch):
     value = np.array([1.2 * FINER[1]])
     assert_right(swept(value), value)
     assert not divided
-    monkeypatch.setattr(side_follower, "FINER", FINER[:2])
+    monkeypatch.setattr(walk, "FINER", FINER[:2])
     assert_right(swept(value), value)
     assert divided
 
 
 def test_longer_sweeps_than_are_kept_ready_are_divided(divided, monkeypatch):
-    monkeypatch.setattr(side_follower, "ROOM", 8)
+    monkeypatch.setattr(walk, "ROOM", 8)
     values = np.array([0.0, 6.0])
     assert_right(swept(values), values)
     assert divided

@@ -14,7 +14,7 @@ from kincheck.core import (
     solve,
     solve_designs,
 )
-from kincheck.core.kinematics import design_sweep
+from kincheck.core.kinematics import design_batch
 from kincheck.core.kinematics.formulation.parameters import placed
 
 from ..support.mechanisms import four_bar
@@ -37,9 +37,9 @@ def test_a_variant_that_cannot_move_is_not_solved_at_its_design_either(values):
 
 
 # of their table: many at once, or the least
-@pytest.mark.parametrize("room", [design_sweep.ROOM, 0])
+@pytest.mark.parametrize("room", [design_batch.BYTES, 0])
 def test_designs_are_solved_as_one_by_one(monkeypatch, room):
-    monkeypatch.setattr(design_sweep, "ROOM", room)
+    monkeypatch.setattr(design_batch, "BYTES", room)
     mechanism, _ = strut()
     values = np.linspace(-0.05, 0.05, 7)
     moved = np.array([1.115, 0.665, 0.118]) + np.random.default_rng(3).normal(size=(300, 3)) * 1e-3

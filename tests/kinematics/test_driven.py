@@ -18,7 +18,7 @@ from kincheck.core import (
 )
 from kincheck.core.cli import main
 from kincheck.core.kinematics.formulation.constraints import frames
-from kincheck.core.kinematics.structure import driver_count
+from kincheck.core.kinematics.structure import degrees_of_freedom
 from kincheck.core.kinematics.structure.degrees_of_freedom import account
 
 from ..support.case_texts import write
@@ -31,7 +31,7 @@ LOOPS = 14  # 29 bodies
 @pytest.fixture
 def sparse(monkeypatch):
     """Every mechanism counts as a large one."""
-    monkeypatch.setattr(driver_count, "DENSE", 0)
+    monkeypatch.setattr(degrees_of_freedom, "DENSE", 0)
 
 
 @pytest.mark.parametrize("name", cases.names())
@@ -41,10 +41,10 @@ def test_the_sparse_count_is_the_dense_one(name, sparse):
     undriven, twice = (
         replace(mechanism, drivers=each) for each in ((), (*mechanism.drivers, *again(mechanism)))
     )
-    assert [driver_count.degrees_of_freedom(each) for each in (mechanism, undriven, twice)] == [
-        dof
-    ] * 3
-    driver_count.require_driven(mechanism)
+    assert [
+        degrees_of_freedom.degrees_of_freedom(each) for each in (mechanism, undriven, twice)
+    ] == [dof] * 3
+    degrees_of_freedom.require_driven(mechanism)
 
 
 def again(mechanism):
@@ -57,14 +57,14 @@ def test_many_freedoms_are_counted_one_by_one(count, sparse):
     bodies = [Body(f"b{k}", (float(k), 0.0, 0.0)) for k in range(count)]
     balls = [Spherical(f"s{k}", "ground", f"b{k}", (float(k), 0.0, 0.0)) for k in range(count)]
     free = Mechanism("loose", bodies, balls, [], [])
-    assert driver_count.degrees_of_freedom(free) == 3 * count
+    assert degrees_of_freedom.degrees_of_freedom(free) == 3 * count
     with pytest.raises(
         SolveError,
         match=(
             rf"{3 * count} degrees of freedom \({6 * count} coordinates - rank {3 * count}\) but 0 "
         ),
     ):
-        driver_count.require_driven(free)
+        degrees_of_freedom.require_driven(free)
 
 
 def test_what_only_couplers_tie_is_counted(sparse):
@@ -80,31 +80,31 @@ def test_what_only_couplers_tie_is_counted(sparse):
         [],
         [Gear("mesh", ("first", "second"), -2.0)],
     )
-    assert driver_count.degrees_of_freedom(wheels) == 1
-    assert driver_count.degrees_of_freedom(replace(wheels, couplers=())) == 2
+    assert degrees_of_freedom.degrees_of_freedom(wheels) == 1
+    assert degrees_of_freedom.degrees_of_freedom(replace(wheels, couplers=())) == 2
 
 
 def test_a_driver_that_is_locked_at_the_design_is_left_to_the_solver(sparse):
     stretched = slider_crank()
-    driver_count.require_driven(
+    degrees_of_freedom.require_driven(
         replace(stretched, drivers=[PointCoordinate("push", "end", (1.0, 0.0, 0.0))])
     )
 
 
 def test_a_large_mechanism_is_refused_with_names():
     whole = chain(LOOPS)
-    driver_count.require_driven(whole)
+    degrees_of_freedom.require_driven(whole)
     with pytest.raises(
         SolveError,
         match=r"1 degree of freedom \(174 coordinates - rank 173\) but 0 drivers; what can still",
     ):
-        driver_count.require_driven(replace(whole, drivers=()))
+        degrees_of_freedom.require_driven(replace(whole, drivers=()))
     twice = replace(whole, drivers=(*whole.drivers, JointAngle("second", "pivot7")))
     with pytest.raises(
         SolveError,
         match=r"but 2 drivers; not independent are '(turn|second)', '(turn|second)'; remove 1 or",
     ):
-        driver_count.require_driven(twice)
+        degrees_of_freedom.require_driven(twice)
     spinning = replace(
         whole,
         bodies=[*whole.bodies, Body("stray")],
@@ -116,7 +116,7 @@ def test_a_large_mechanism_is_refused_with_names():
             r"4 degrees of freedom .* but 1 driver; what can still move is most of all 'stray'; add"
         ),
     ):
-        driver_count.require_driven(spinning)
+        degrees_of_freedom.require_driven(spinning)
 
 
 def written(mechanism, drivers):

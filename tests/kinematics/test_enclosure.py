@@ -30,11 +30,11 @@ from kincheck.core.kinematics.verified import krawczyk
 from kincheck.core.kinematics.verified.exact import (
     as_decimal,
     as_double,
+    equations,
     exact_mechanism,
 )
-from kincheck.core.kinematics.verified.exact_equations import equations
 from kincheck.core.kinematics.verified.krawczyk import Enclosure, UnprovedError
-from kincheck.core.kinematics.verified.verified_sweep import _states, prove
+from kincheck.core.kinematics.verified.proofs import _states, prove
 from kincheck.core.mechanism.motions import Path as Way
 from kincheck.core.mechanism.motions import Ramp
 from kincheck.core.program.ball_executor import precision

@@ -15,9 +15,9 @@ from kincheck.core.errors import SolveError
 from kincheck.core.joints import Revolute, Translational
 from kincheck.core.kinematics import LoadPoint, StaticModel
 from kincheck.core.mechanism.body import Body
-from kincheck.core.mechanism.drivers import JointAngle, PointCoordinate
 from kincheck.core.mechanism.loads import Bushing, SpringDamper, TorsionSpringDamper
 from kincheck.core.mechanism.mechanism import GROUND, Mechanism, Point
+from kincheck.core.mechanism.motions import JointAngle, PointCoordinate
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 

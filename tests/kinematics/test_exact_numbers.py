@@ -16,7 +16,7 @@ from kincheck.core.kinematics.verified.exact import (
 )
 from kincheck.core.program import Tape, absolute, cos, program, sin, where_larger
 from kincheck.core.program.ball_executor import UndecidedError, evaluate, precision
-from kincheck.core.program.derivative import jacobian
+from kincheck.core.program.tape import jacobian
 
 from .test_enclosure import BITS, flint
 

@@ -5,7 +5,6 @@ where that fails, by their rates.
 import numpy as np
 import pytest
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
-from kincheck.core.kinematics.compiled.interpolation import weights_of_groups, weights_of_samples
 from kincheck.core.kinematics.compiled.request import (
     ACCEPT,
     EARLIER,
@@ -16,6 +15,7 @@ from kincheck.core.kinematics.compiled.request import (
     TIME,
     Request,
 )
+from kincheck.core.kinematics.compiled.routes import weights_of_groups, weights_of_samples
 from kincheck.core.kinematics.continuation.sweep import sweep
 from kincheck.core.mechanism.motions import Path, Ramp
 from kincheck.core.program import NODES, groups_behind, place_of
@@ -75,7 +75,7 @@ def positions(values, order=0, *, compiled=False):
 
 @pytest.fixture
 def eight_lanes(monkeypatch):
-    monkeypatch.setattr("kincheck.core.kinematics.compiled.samples.LANES", 8)
+    monkeypatch.setattr("kincheck.core.kinematics.compiled.routes.LANES", 8)
     # whatever the processor's
     monkeypatch.setattr("kincheck.core.program.llvm.compiler.vector_width", lambda: 8)
 
@@ -170,7 +170,7 @@ def test_where_extrapolation_fails_the_rates_take_over(values, order, monkeypatc
     extrapolated.
     """
     both = [positions(values, order, compiled=compiled) for compiled in (False, True)]
-    monkeypatch.setattr("kincheck.core.kinematics.compiled.samples.LANES", 1)
+    monkeypatch.setattr("kincheck.core.kinematics.compiled.routes.LANES", 1)
     expected = positions(values, order, compiled=False).points["wheel"]
     for found in both:
         assert np.abs(found.points["wheel"].position - expected.position).max() <= 4e-16

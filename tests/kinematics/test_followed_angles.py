@@ -18,10 +18,9 @@ from kincheck.core.kinematics import (
     in_doubt,
     near_design,
 )
-from kincheck.core.mechanism.drivers import JointAngle, JointDisplacement
 from kincheck.core.mechanism.loads import TorsionSpringDamper
 from kincheck.core.mechanism.mechanism import Body, Mechanism, Point
-from kincheck.core.mechanism.motions import Path, Ramp, Sine
+from kincheck.core.mechanism.motions import JointAngle, JointDisplacement, Path, Ramp, Sine
 
 BEND = 0.8  # cosine of the angle between the shafts
 

@@ -14,9 +14,8 @@ from kincheck.core.harness.record import Outcome
 from kincheck.core.harness.run import run
 from kincheck.core.joints import Gear, Revolute
 from kincheck.core.kinematics import NativeSolver
-from kincheck.core.mechanism.drivers import JointAngle
 from kincheck.core.mechanism.mechanism import Body, Mechanism
-from kincheck.core.mechanism.motions import Ramp, Sine
+from kincheck.core.mechanism.motions import JointAngle, Ramp, Sine
 from kincheck.core.studies.verified_reference import prove_case
 
 RATIO = -2.5

@@ -14,7 +14,7 @@ from kincheck.core.joints.base import AxialJoint, unit
 from kincheck.core.kinematics.forces import equations
 from kincheck.core.kinematics.verified import exact_forces
 from kincheck.core.kinematics.verified.exact import as_decimal, as_double
-from kincheck.core.kinematics.verified.verified_sweep import prove
+from kincheck.core.kinematics.verified.proofs import prove
 from kincheck.core.mechanism.mechanism import Mechanism
 from kincheck.core.mechanism.motions import Path, Ramp
 from kincheck.core.program.ball_executor import precision

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from kincheck import cases
 from kincheck.core.algebra import ZERO
-from kincheck.core.kinematics.forces import demand, equations
+from kincheck.core.kinematics.forces import equations
+from kincheck.core.kinematics.forces import equations as demand
 from kincheck.core.mechanism.loads import SpringDamper
 from kincheck.core.primitives.base import GROUND_POSE, Pose, Twist
 from kincheck.core.program import elimination

@@ -22,12 +22,12 @@ from kincheck.core.joints import (
 )
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.forces.reactions import forces_of
-from kincheck.core.kinematics.solver_selection import prepare
+from kincheck.core.kinematics.one_design import prepare
 from kincheck.core.mechanism import motions
 from kincheck.core.mechanism.body import Body
-from kincheck.core.mechanism.drivers import JointAngle
 from kincheck.core.mechanism.loads import Force, SpringDamper, Torque, TorsionSpringDamper
 from kincheck.core.mechanism.mechanism import Mechanism, Point
+from kincheck.core.mechanism.motions import JointAngle
 from kincheck.core.trajectory import BodyMotion, Trajectory
 
 from ..oracles import naive, newton_euler

@@ -21,7 +21,7 @@ from kincheck.core import (
     solve,
     solve_designs,
 )
-from kincheck.core.kinematics.blocks import sparse_lanes
+from kincheck.core.kinematics.blocks.sparse_lanes import SparseLanes
 from kincheck.core.kinematics.formulation.parameters import placed
 from kincheck.core.studies.bench.ring import ring
 
@@ -188,7 +188,7 @@ def test_what_residuals_leave_uncertain_beside_a_singular_pose_is_refused(short,
     mechanism, begin = stretched(crank, rod, 0.3)
     (value,) = values = [(crank + rod - begin) * (1.0 - short)]
     found = solve(mechanism, "push", values)
-    assert "smallest_pivot" in found.details
+    assert "factor_entries" in found.details
     assert found.solved.tolist() == [solved]
     if not solved:
         assert (
@@ -212,9 +212,9 @@ def test_uncertainty_that_is_no_number_is_refused(monkeypatch):
     mechanism, begin = stretched(0.5, 1.5, 0.3)
     values = [(2.0 - begin) * (1.0 - 1e-7)]
     for found in (np.nan, np.inf):
-        bounds = lambda poses, state, *_, found=found: np.full(state.shape[1], found)  # noqa: E731
-        monkeypatch.setattr(sparse_lanes, "error_bounds", bounds)
+        bounds = lambda lanes, state, *_, found=found: np.full(state.shape[1], found)  # noqa: E731
+        monkeypatch.setattr(SparseLanes, "error_bounds", bounds)
         assert not solve(mechanism, "push", values).solved.any()
-    bounds = lambda poses, state, *_: np.zeros(state.shape[1])  # noqa: E731
-    monkeypatch.setattr(sparse_lanes, "error_bounds", bounds)
+    bounds = lambda lanes, state, *_: np.zeros(state.shape[1])  # noqa: E731
+    monkeypatch.setattr(SparseLanes, "error_bounds", bounds)
     assert solve(mechanism, "push", values).solved.all()

@@ -6,10 +6,9 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from kincheck import cases
-from kincheck.adapters.shared.joint_equivalents import jointed
-from kincheck.adapters.shared.length_scaling import in_own_frame, own_frame
+from kincheck.adapters.shared.equivalents import in_own_frame, jointed, own_frame
 from kincheck.core.case.case import Case, Sweep, Truth
-from kincheck.core.case.io.coordinates import with_all_coordinates
+from kincheck.core.case.io.outputs import with_all_coordinates
 from kincheck.core.kinematics.formulation.constraints import frames
 from kincheck.core.kinematics.formulation.parameters import placed, places
 from kincheck.core.kinematics.structure.components import components, section

@@ -8,9 +8,8 @@ from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.program import Tape, program
 from kincheck.core.program.llvm import programs
-from kincheck.core.program.llvm.ordering import AT_ONCE, CYCLES, OTHERS, ordered
-from kincheck.core.program.llvm.programs import _Straight
-from kincheck.core.program.lowering import lowered
+from kincheck.core.program.llvm.programs import AT_ONCE, CYCLES, OTHERS, _Straight, ordered
+from kincheck.core.program.straight_line import lowered
 from kincheck.core.program.tape import LEAVES, operands
 
 from ..support.mechanisms import mcpherson

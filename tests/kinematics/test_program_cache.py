@@ -3,19 +3,19 @@
 import subprocess
 import sys
 
-from kincheck.core.kinematics.compiled.program_cache import source_files
+from kincheck.core.kinematics.compiled.compiled_model import source_files
 
 TRACE = """
 import sys
 from kincheck import cases
-from kincheck.core.kinematics.compiled import program_cache
+from kincheck.core.kinematics.compiled import compiled_model
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.formulation.constraints import Style
 
 case = cases.load("mcpherson_strut")
 for style in Style:
     request = Request(tuple(case.sweep.path.motions), tuple(case.points), style=style)
-    program_cache._trace(case.mechanism, request, None, 4)
+    compiled_model._trace(case.mechanism, request, None, 4)
 for name, module in sys.modules.items():
     if name.startswith("kincheck.core.") and getattr(module, "__file__", None):
         print(name, module.__file__)

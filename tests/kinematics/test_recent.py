@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 from kincheck.core import Revolute, Spherical, solve, solve_designs
 from kincheck.core.caches import clear_caches
-from kincheck.core.kinematics.blocks import cascade
+from kincheck.core.kinematics.blocks import component_lanes as cascade
+from kincheck.core.kinematics.blocks import sparse_lanes
 from kincheck.core.kinematics.blocks import sweep as block_sweep
-from kincheck.core.kinematics.compiled import compiled_model, samples
-from kincheck.core.kinematics.continuation import side_follower, walk
-from kincheck.core.kinematics.solver_selection import prepare
-from kincheck.core.kinematics.sparse import sparse_equations as sparse
+from kincheck.core.kinematics.compiled import compiled_model
+from kincheck.core.kinematics.compiled import routes as samples
+from kincheck.core.kinematics.continuation import walk
+from kincheck.core.kinematics.one_design import prepare
 from kincheck.core.mechanism.motions import Absolute, Motion, Path, Ramp, Sine, Table
 from kincheck.core.studies.bench.size import circle
 
@@ -157,9 +158,9 @@ def test_joints_of_a_users_own_are_made_anew(made):
 @pytest.fixture
 def bound(monkeypatch):
     """What was bound to lanes, a route each."""
-    routes, bind = [], side_follower.Marcher.__init__
+    routes, bind = [], walk.Marcher.__init__
     monkeypatch.setattr(
-        side_follower.Marcher,
+        walk.Marcher,
         "__init__",
         lambda self, *given: (routes.append(given[0]), bind(self, *given))[1],
     )
@@ -231,7 +232,7 @@ def test_of_very_many_samples_nothing_is_kept(bound, monkeypatch):
     ("large", "kind"),
     [
         (chain(21), (cascade.Cascade, "__init__")),
-        (circle(22).mechanism, (sparse.SparseEquations, "__init__")),
+        (circle(22).mechanism, (sparse_lanes.SparseLanes, "__init__")),
     ],
 )
 def test_of_large_mechanisms_the_last_is_kept(large, kind, monkeypatch):

@@ -7,13 +7,11 @@ import pytest
 from kincheck import cases
 from kincheck.core.kinematics.compiled.compiled_model import recent_model
 from kincheck.core.kinematics.compiled.request import SIGMA, Request
-from kincheck.core.kinematics.compiled.samples import Route
-from kincheck.core.kinematics.continuation import row_exchange, segments, singular_samples, sweep
-from kincheck.core.kinematics.continuation.row_exchange import Choice, chosen
-from kincheck.core.kinematics.continuation.segments import Followed
-from kincheck.core.kinematics.continuation.side_follower import SideWalk
+from kincheck.core.kinematics.compiled.routes import Route
+from kincheck.core.kinematics.continuation import segments, singular_samples, sweep
+from kincheck.core.kinematics.continuation.segments import Choice, Followed, chosen
 from kincheck.core.kinematics.continuation.sweep import follow
-from kincheck.core.kinematics.continuation.walk import march
+from kincheck.core.kinematics.continuation.walk import SideWalk, march
 from kincheck.core.kinematics.one_design import solve
 from kincheck.core.mechanism.motions import Path, Ramp
 
@@ -103,9 +101,9 @@ def test_a_pose_that_other_rows_lead_away_from_is_not_taken():
     assert standing is not None
     before = {name: lane[model.vectors[f"from {name}"]] for name in model.state}
     sample = beside.sampled(np.array([ALONG - 1e-3]))
-    assert row_exchange._standing(standing.model, before, sample, 1e-6) is not None
+    assert segments._standing(standing.model, before, sample, 1e-6) is not None
     off = {name: value + 1e-3 * (name == "u coupler") for name, value in before.items()}
-    assert row_exchange._standing(standing.model, off, sample, 1e-6) is None
+    assert segments._standing(standing.model, off, sample, 1e-6) is None
 
 
 def test_a_pose_that_contradicts_other_rows_is_not_taken(monkeypatch):
@@ -119,9 +117,9 @@ def test_a_pose_that_contradicts_other_rows_is_not_taken(monkeypatch):
     model = recent_model(mechanism, Request(("turn",), ()))
     state = {name: np.array(value) for name, value in model.state.items()}
     sample = Route(model, Path({"turn": Ramp(1.0)}, np.array([0.3]))).sampled(np.array([0.3]))
-    assert row_exchange._standing(model, state, sample, 1.0) is not None
-    monkeypatch.setattr(row_exchange, "CONSISTENT", 1e-12)
-    assert row_exchange._standing(model, state, sample, 1.0) is None
+    assert segments._standing(model, state, sample, 1.0) is not None
+    monkeypatch.setattr(segments, "CONSISTENT", 1e-12)
+    assert segments._standing(model, state, sample, 1.0) is None
 
 
 @pytest.mark.parametrize("part", [2.0, 4.0])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from kincheck.core.program import Elimination, Tape, program
-from kincheck.core.program.dense_core import COMPARED
+from kincheck.core.program.elimination import COMPARED
 
 from ..support.running import run_on
 
@@ -78,7 +78,7 @@ def test_of_a_large_core_sigma_is_no_less_than_by_its_comparison_matrix(monkeypa
     """And not by a little: of 24 random rows it would be a hundredth."""
     matrices = np.random.default_rng(5).normal(size=(50, 24, 24))
     exact, _ = estimated(matrices)
-    monkeypatch.setattr("kincheck.core.program.dense_core.COMPARED", 24)
+    monkeypatch.setattr("kincheck.core.program.elimination.COMPARED", 24)
     compared, _ = estimated(matrices)
     assert (compared <= exact * (1.0 + 1e-12)).all()
     assert np.median(exact / compared) > 10.0

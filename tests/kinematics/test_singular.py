@@ -16,10 +16,9 @@ from kincheck.core.kinematics.compiled import dense_equations
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.dense_equations import System
 from kincheck.core.kinematics.compiled.request import SIGMA, Request
-from kincheck.core.kinematics.compiled.samples import Route
-from kincheck.core.kinematics.continuation.step_halving import longest
+from kincheck.core.kinematics.compiled.routes import Route
 from kincheck.core.kinematics.continuation.sweep import follow
-from kincheck.core.kinematics.continuation.walk import march
+from kincheck.core.kinematics.continuation.walk import longest, march
 from kincheck.core.kinematics.formulation.acceptance_criteria import doubtful
 from kincheck.core.kinematics.one_design import solve
 from mpmath import mp, mpf

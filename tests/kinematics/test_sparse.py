@@ -22,11 +22,10 @@ from kincheck.core import (
 from kincheck.core.kinematics.blocks.sparse_lanes import SparseLanes
 from kincheck.core.kinematics.compiled.compiled_model import recent_model
 from kincheck.core.kinematics.compiled.request import Request
-from kincheck.core.kinematics.compiled.samples import Route
+from kincheck.core.kinematics.compiled.routes import Route
 from kincheck.core.kinematics.continuation.sweep import follow
 from kincheck.core.kinematics.formulation.constraints import frames
-from kincheck.core.kinematics.solver_selection import ONE_PROGRAM
-from kincheck.core.kinematics.sparse.sparse_equations import SparseEquations
+from kincheck.core.kinematics.one_design import ONE_PROGRAM
 from kincheck.core.kinematics.structure.components import components
 from kincheck.core.mechanism.motions import Path, Ramp, Sine
 from kincheck.core.studies.bench import scaling
@@ -143,11 +142,6 @@ def test_a_motion_that_begins_beyond_the_travel_ends_on_the_way_to_its_first_sam
     )
 
 
-def test_small_steps_take_one_iteration_each():
-    found = solve_sparse(ring(12), turning(*np.linspace(0.0, 0.8, 33)), compiled=False)
-    assert (found.iterations[8:] <= 2).all()  # after the samples from which the predictor learns
-
-
 CRANK = Mechanism(
     "crank",
     [Body("b")],
@@ -163,12 +157,18 @@ def test_turns_are_counted_and_no_step_is_longer_than_can_be_told_from_another()
     assert found.bodies["b"].p[0] == pytest.approx(
         [-np.cos(0.15), 0.0, 0.0, -np.sin(0.15)], abs=1e-14
     )
-    lanes = SparseLanes(SparseEquations(CRANK, compiled=False), Request(("turn",), ()))
+    lanes = SparseLanes(CRANK, Request(("turn",), ()))
     lanes.accept(1e-12)
     lanes.depart(0.0, path)
     here = lanes.anchor(0.0)
     lanes.restore(
-        replace(here, pose=replace(here.pose, slopes=np.full_like(here.pose.sigmas, 1e-3)))
+        replace(
+            here,
+            pose=(
+                replace(here.pose[0], slopes=np.full_like(here.pose[0].sigmas, 1e-3)),
+                here.pose[1],
+            ),
+        )
     )
     for time, accepted in ((0.9, True), (1.1, False)):
         assert (lanes.attempt(np.array([time]), path)[0] > 0.0) == accepted
@@ -202,7 +202,7 @@ def test_a_ring_cannot_be_taken_apart_and_its_factors_grow_with_it():
     sizes = [len(part.bodies) for part in components(ring(20), frames(ring(20)))]
     assert sorted(sizes) == [1, 38]  # the driven crank, and all others
     small, large = (
-        SparseEquations(ring(n), compiled=False).details["factor_entries"] for n in (40, 160)
+        SparseLanes(ring(n), Request(("turn",), ())).details["factor_entries"] for n in (40, 160)
     )
     assert large < 4.4 * small
 

@@ -22,9 +22,9 @@ from kincheck.core import (
     solve,
 )
 from kincheck.core.case.case import Case, Output, Sweep, Truth
-from kincheck.core.kinematics.compiled.motion_start import start_of
 from kincheck.core.kinematics.compiled.request import Request
-from kincheck.core.kinematics.solver_selection import prepare
+from kincheck.core.kinematics.compiled.routes import start_of
+from kincheck.core.kinematics.one_design import prepare
 from kincheck.core.mechanism.motions import Absolute, Path, Ramp, Sine, Table
 
 from ..support.block_structures import solve_sparse

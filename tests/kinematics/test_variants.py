@@ -14,7 +14,7 @@ from kincheck.core import (
 from kincheck.core.kinematics import design_batch
 from kincheck.core.kinematics.compiled.compiled_model import compile_model, recent_model
 from kincheck.core.kinematics.compiled.request import Request
-from kincheck.core.kinematics.compiled.samples import Route
+from kincheck.core.kinematics.compiled.routes import Route
 from kincheck.core.kinematics.continuation.sweep import follow
 from kincheck.core.kinematics.design_batch import solve_variants
 from kincheck.core.kinematics.formulation.parameters import placed, places
@@ -111,7 +111,7 @@ def test_lanes_go_by_the_samples_before_and_where_that_fails_by_their_rates(
     iterations = found.kept[model.rows["iterations"].start]
     assert values is not FINE or (iterations[NODES:] == 1).all()
     monkeypatch.setattr(
-        "kincheck.core.kinematics.compiled.samples.weights_of_samples",
+        "kincheck.core.kinematics.compiled.routes.weights_of_samples",
         lambda times: np.full((NODES, len(times)), np.nan),
     )
     by_rates = solve_variants(Route(model, path), numbers, TOL)

@@ -141,7 +141,7 @@ class Sandbox:
                 "PYTHONPYCACHEPREFIX": str(self._numbers.with_name("bytecode")),
             }
         command = [self._python, "-m", "pytest", "-n0", "-psitecustomize", "-pno:cacheprovider"]
-        command += ["--hypothesis-seed=0", "--tb=short", f"@{self._work / 'tests'}"]
+        command += ["-m", "", "--hypothesis-seed=0", "--tb=short", f"@{self._work / 'tests'}"]
         with (
             tempfile.TemporaryFile("w+", encoding="utf-8") as output,
             subprocess.Popen(

@@ -2,6 +2,8 @@
 
 import ast
 
+import pytest
+
 from ..support.sources import ROOT, files
 from .__main__ import sample, table
 from .sites import mutants
@@ -63,6 +65,7 @@ def test_mutants_change_one_token_of_what_runs():
     assert functions["continue"] == "Case.chosen"
 
 
+@pytest.mark.nightly
 def test_sample_has_its_share_of_every_room_and_stays():
     sources = {str(path): (ROOT / path).read_text("utf-8") for path in files("core", "adapters")}
     sites = {path: mutants(path, text) for path, text in sources.items()}

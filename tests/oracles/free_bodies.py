@@ -19,7 +19,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from kincheck.core.mechanism.drivers import PointCoordinate
+from kincheck.core.mechanism.motions import PointCoordinate
 
 
 def turned(axis, angle):

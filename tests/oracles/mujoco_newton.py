@@ -8,7 +8,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from kincheck.core.case.models.mjcf.assembly import Assembled
+from kincheck.core.case.models.trees.assembly import Assembled
 
 from .newton import least_squares
 
@@ -54,21 +54,22 @@ class MujocoNewton:
     def __init__(self, file: Path, assembled: Assembled, fixed: Collection[str]) -> None:
         self.model, self.residual = compiled(file), 0.0
         self.data = mujoco.MjData(self.model)
-        self.weak = max(1e-7, 10.0 * assembled.digits.tolerance / assembled.size)
+        self.weak = max(1e-7, 10.0 * assembled.closing.tolerance / assembled.closing.size)
         tree = assembled.tree
-        assert len(tree.chain) == self.model.njnt
-        self.joints = {joint.name: k for k, joint in enumerate(tree.chain)}
-        self.bodies = {joint.inner: self.model.jnt_bodyid[k] for k, joint in enumerate(tree.chain)}
-        for joint in tree.chain:
+        moves = tree.moves.values()
+        assert len(moves) == self.model.njnt
+        self.joints = {name: k for k, name in enumerate(tree.moves)}
+        self.bodies = {joint.inner: self.model.jnt_bodyid[k] for k, joint in enumerate(moves)}
+        for joint in moves:
             at = self.model.jnt_qposadr[self.joints[joint.name]]
-            if joint.type in ("hinge", "slide"):
+            if joint.is_axial:
                 self.data.qpos[at] = joint.value
-            elif joint.type == "free":
+            elif joint.kind == "free":
                 place = tree.moving[joint.inner]
                 self.data.qpos[at : at + 7] = [*place.at, *place.turn]
             elif joint.inner not in tree.massless:
                 self._turn(self.joints[joint.name], np.array([*tree.moving[joint.inner].turn]))
-        names = {joint.name for joint in tree.chain if {joint.name, joint.inner} & {*fixed}}
+        names = {joint.name for joint in moves if {joint.name, joint.inner} & {*fixed}}
         self.fixed = {self.joints[name]: self._coordinates(self.joints[name]) for name in names}
 
     @property

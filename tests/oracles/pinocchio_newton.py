@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import yaml
-from kincheck.core.case.models.mjcf.assembly import Assembled
+from kincheck.core.case.models.trees.assembly import Assembled
 
 from .newton import least_squares
 
@@ -71,7 +71,7 @@ class PinocchioNewton:
         ]
         self.joints = {name: k for k, name in enumerate(self.model.names)}
         self.state = pin.neutral(self.model)
-        hinges = [each for each in assembled.tree.chain if each.type in ("hinge", "slide")]
+        hinges = [each for each in assembled.tree.moves.values() if each.is_axial]
         known = {each.name: each.value for each in hinges if each.name in self.joints}
         for name, value in known.items():  # Newton's steps from zero might end elsewhere
             joint = self.model.joints[self.joints[name]]

@@ -19,10 +19,10 @@ from pathlib import Path
 import numpy as np
 from kincheck.core.case.case import Case
 from kincheck.core.case.io.reader_options import LEFT_OUT, Supplied
-from kincheck.core.case.models.files import load
-from kincheck.core.case.models.mjcf import read
-from kincheck.core.case.models.mjcf.assembly import Assembled
-from kincheck.core.case.models.mjcf.driving import Driving
+from kincheck.core.case.models.files import load, read_tree
+from kincheck.core.case.models.trees import case as trees
+from kincheck.core.case.models.trees.assembly import Assembled
+from kincheck.core.case.models.trees.driving import Driving
 from kincheck.core.errors import KincheckError
 from kincheck.core.kinematics import NativeSolver
 
@@ -112,7 +112,7 @@ def compared(file: Path, drive: str = "") -> Sequence[str]:
     return (
         str(dof),
         f"{len(mechanism.moving)}, {len(mechanism.joints)}",
-        str(len(assembled.equalities)),
+        str(len(assembled.tree.ties)),
         left_out.strip(", ") or "nothing",
         f"{int(found.solved.sum())}, {reached} of {SAMPLES}",
         *(f"{each:.0e}" for each in differences),
@@ -134,19 +134,8 @@ def _freedoms(file: Path, drive: str) -> tuple[int, str]:
 
 def posed(file: Path, supplied: Supplied) -> tuple[Case, Driving, Assembled]:
     """Return the case of a model, its driven and held joints, and its start."""
-    found: list[tuple[Driving, Assembled]] = []
-    own = read.taken
-
-    def taken(*arguments, **options):
-        found.append((own(*arguments, **options), arguments[2]))
-        return found[-1][0]
-
-    read.taken = taken
-    try:
-        case = load(file, supplied)
-    finally:
-        read.taken = own
-    return case, *found[-1]
+    assembled, driving, _ = trees.posed(read_tree(file), supplied)
+    return load(file, supplied), driving, assembled
 
 
 def _differences(file, found, case, driving, assembled):
@@ -157,7 +146,7 @@ def _differences(file, found, case, driving, assembled):
     ((swept, values),) = driving.driven.items()
     held = {name: assembled.tree.joints[name].value for name in driving.held}
     start, at = oracle.state, assembled.tree.joints[swept].value
-    closed = max(CLOSED, 10.0 * assembled.digits.tolerance)
+    closed = max(CLOSED, 10.0 * assembled.closing.tolerance)
     reached, worst = 0, np.zeros(3)
     for side in (1.0, -1.0):
         oracle.state, last = start, at

@@ -11,11 +11,10 @@ from kincheck import cases
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.program import Plan, Tape, absolute, before, program
-from kincheck.core.program.bytecode import bytecode
 from kincheck.core.program.llvm import compiler
 from kincheck.core.program.llvm.executor import LlvmExecutor
 from kincheck.core.program.llvm.jit import LlvmCode
-from kincheck.core.program.lowering import lowered, unrolled
+from kincheck.core.program.straight_line import bytecode, lowered, unrolled
 
 from ..support.mechanisms import four_bar, mcpherson
 from .test_llvm import OPERATIONS

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from kincheck.core import Body, JointAngle, Mechanism, Point, Revolute, solve
 from kincheck.core.caches import clear_caches
-from kincheck.core.kinematics.compiled import program_cache
+from kincheck.core.kinematics.compiled import compiled_model
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.request import Request
 from kincheck.core.kinematics.continuation.sweep import sweep
@@ -72,7 +72,7 @@ def test_cached_code_is_used_and_a_damaged_entry_is_rebuilt(tmp_path, monkeypatc
     entries = [*(tmp_path / "kincheck").iterdir()]
     assert len(entries) == 5  # and its machine code
     for name in ("_trace", "bytecode", "_text"):
-        owner = {"_trace": program_cache, "bytecode": jit.bytecode, "_text": LlvmCode}[name]
+        owner = {"_trace": compiled_model, "bytecode": jit, "_text": LlvmCode}[name]
         monkeypatch.setattr(owner, name, None)
     np.testing.assert_array_equal(positions(), fresh)
     monkeypatch.undo()
@@ -123,9 +123,9 @@ def test_planted_entries_are_not_run(tmp_path, monkeypatch):
 def test_what_was_traced_is_not_taken_for_anything_else(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     times: list[str] = []
-    trace = program_cache._trace
+    trace = compiled_model._trace
     monkeypatch.setattr(
-        program_cache, "_trace", lambda *given: times.append("traced") or trace(*given)
+        compiled_model, "_trace", lambda *given: times.append("traced") or trace(*given)
     )
     mechanism = four_bar()
     request = Request((mechanism.drivers[0].name,), ())
@@ -135,13 +135,13 @@ def test_what_was_traced_is_not_taken_for_anything_else(tmp_path, monkeypatch):
         lambda: (mechanism, replace(request, order=1)),
         lambda: (replace(mechanism, bodies=[moved, *mechanism.bodies[1:]]), request),
         lambda: (
-            monkeypatch.setattr(program_cache, "_source", lambda: b"changed")
+            monkeypatch.setattr(compiled_model, "_source", lambda: b"changed")
             or (mechanism, request)
         ),
     ):
         times.clear()
         for _ in range(2):
-            program_cache.traced(*different())
+            compiled_model.traced(*different())
         assert times == ["traced"]
 
 
@@ -158,7 +158,7 @@ def test_joints_of_the_users_own_are_traced_every_time(tmp_path, monkeypatch):
     )
     mine = Mine(**{each.name: getattr(hinge, each.name) for each in fields(hinge)})
     mechanism = replace(known, joints=[mine if joint is hinge else joint for joint in known.joints])
-    program_cache.traced(mechanism, Request((known.drivers[0].name,), ()))
+    compiled_model.traced(mechanism, Request((known.drivers[0].name,), ()))
     assert not (tmp_path / "kincheck").exists()
 
 

@@ -10,20 +10,18 @@ import numpy as np
 import pytest
 from kincheck.core import solve, solve_designs
 from kincheck.core.caches import clear_caches
-from kincheck.core.kinematics.blocks.cascade import Cascade
-from kincheck.core.kinematics.blocks.component_lanes import ComponentLanes
+from kincheck.core.kinematics.blocks.component_lanes import Cascade, ComponentLanes
 from kincheck.core.kinematics.blocks.sweep import BlockSweep
 from kincheck.core.kinematics.compiled import compiled_model as models
 from kincheck.core.kinematics.compiled.compiled_model import Model, compile_model
 from kincheck.core.kinematics.compiled.request import Request
-from kincheck.core.kinematics.compiled.samples import Route
+from kincheck.core.kinematics.compiled.routes import Route
 from kincheck.core.kinematics.continuation.sweep import follow
 from kincheck.core.kinematics.design_batch import solve_variants
 from kincheck.core.kinematics.formulation.constraints import frames
 from kincheck.core.kinematics.structure.components import components
 from kincheck.core.mechanism.motions import Path, Ramp
 from kincheck.core.program import Plan, Program, Tape, program
-from kincheck.core.program.llvm import code_cache
 from kincheck.core.program.llvm import jit as llvm
 from kincheck.core.program.llvm.jit import LlvmCode
 
@@ -160,7 +158,7 @@ def test_an_interrupted_compilation_is_made_up_for(monkeypatch):
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(code_cache, "load", interrupted)
+        patch.setattr(llvm, "load", interrupted)
         with pytest.raises(KeyboardInterrupt):
             made.count(10**9)
     assert made.interpreted
@@ -173,7 +171,7 @@ def test_an_interrupted_compilation_is_made_up_for(monkeypatch):
 def test_threads_that_come_at_once_compile_once(monkeypatch):
     """The code of the first would be gone while it runs."""
     made = LlvmCode(compile_model(four_bar(), Request((four_bar().drivers[0].name,), ())).plan)
-    load, loaded, meet = code_cache.load, list[str](), Barrier(4)
+    load, loaded, meet = llvm.load, list[str](), Barrier(4)
 
     def slowly(*given):
         loaded.append("once")
@@ -184,7 +182,7 @@ def test_threads_that_come_at_once_compile_once(monkeypatch):
         meet.wait()
         made.count(10**9)
 
-    monkeypatch.setattr(code_cache, "load", slowly)
+    monkeypatch.setattr(llvm, "load", slowly)
     threads = [Thread(target=count) for _ in range(4)]
     for each in threads:
         each.start()

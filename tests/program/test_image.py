@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from kincheck.core import solve
 from kincheck.core.caches import clear_caches
-from kincheck.core.program.llvm import code_cache, compiler, elf_loader, jit
+from kincheck.core.program.llvm import compiler, jit
 
 from ..support.mechanisms import mcpherson
 
 pytest.importorskip("llvmlite", reason="llvmlite is not installed")
-images = pytest.mark.skipif(not elf_loader.possible(), reason="images run on x86-64 under Linux")
+images = pytest.mark.skipif(not compiler.possible(), reason="images run on x86-64 under Linux")
 
 TEXT = """
 define i64 @chosen(i64 %k) noinline {
@@ -54,7 +54,7 @@ define double @scaled(double %x) {
 
 @images
 def test_an_image_does_what_its_text_says():
-    code = code_cache.load(TEXT, lambda: TEXT, {"chosen": 1, "of_next": 1})
+    code = jit.load(TEXT, lambda: TEXT, {"chosen": 1, "of_next": 1})
     assert [code.calls["chosen"](k) for k in range(6)] == [7, 21, -7, 3 << 33, ~4, -1]
     assert [code.calls["of_next"](k) for k in range(5)] == [21, -7, 3 << 33, ~4, -1]
     assert CFUNCTYPE(c_double, c_double)(code.address("scaled"))(2.0) == 2.0 * np.pi
@@ -63,7 +63,7 @@ def test_an_image_does_what_its_text_says():
 @images
 def test_many_images_stand_side_by_side():
     text = "define i64 @f(i64 %k) {{ %sum = add i64 %k, {} ret i64 %sum }}".format
-    made = [elf_loader.placed(elf_loader.joined(compiler.emitted(text(k)))) for k in range(5)]
+    made = [compiler.placed(compiler.joined(compiler.emitted(text(k)))) for k in range(5)]
     assert [CFUNCTYPE(c_int64, c_int64)(address("f"))(100) for address in made] == [
         100,
         101,
@@ -80,7 +80,7 @@ def test_code_that_calls_something_outside_makes_no_image():
         " @outside(double %x) ret double %y }"
     )
     with pytest.raises(ValueError, match="'outside'"):
-        elf_loader.joined(compiler.emitted(text))
+        compiler.joined(compiler.emitted(text))
 
 
 def positions() -> np.ndarray:
@@ -92,7 +92,7 @@ def test_where_images_do_not_run_llvm_loads_what_it_compiled(tmp_path, monkeypat
     expected = positions()
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     loaded, load = list[str](), compiler.loaded
-    monkeypatch.setattr(elf_loader, "possible", lambda: False)
+    monkeypatch.setattr(compiler, "possible", lambda: False)
     monkeypatch.setattr(compiler, "loaded", lambda file: loaded.append("once") or load(file))
     monkeypatch.setattr(jit, "OFTEN", 0)
     for _ in range(2):  # compiled, then kept
@@ -166,6 +166,6 @@ def test_a_processor_is_described_by_what_llvm_goes_by(monkeypatch):
 
 
 def test_code_is_known_by_how_it_is_made(monkeypatch):
-    before = code_cache.cache_key(TEXT)
-    monkeypatch.setattr(code_cache, "_sources", lambda: "another way")
-    assert code_cache.cache_key(TEXT) != before
+    before = jit.cache_key(TEXT)
+    monkeypatch.setattr(jit, "_compiling", lambda: "another way")
+    assert jit.cache_key(TEXT) != before

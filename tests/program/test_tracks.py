@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from kincheck.core.kinematics.compiled.compiled_model import compile_model
 from kincheck.core.kinematics.compiled.request import FROM, SIGMA, TIME, Request
-from kincheck.core.kinematics.compiled.samples import Route
+from kincheck.core.kinematics.compiled.routes import Route
 from kincheck.core.kinematics.continuation.sweep import follow
 from kincheck.core.kinematics.continuation.walk import march, marcher
 from kincheck.core.mechanism.motions import Path, Ramp

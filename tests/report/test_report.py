@@ -27,7 +27,7 @@ HOSTILE = "<script>alert('x')</script><a href='https://example.org'>&amp;</a>"
 
 
 @pytest.mark.parametrize("mechanism", [chain(21), ring(24)], ids=["components", "sparse"])
-def test_large_mechanisms_have_their_programs_and_their_freedoms_on_the_page(mechanism, tmp_path):
+def test_page_of_large_mechanism_has_programs(mechanism, tmp_path):
     """What the native engine really tells of them."""
     details = solve(mechanism, "turn", [0.0], points=()).details
     assert ("components" in details) != ("factor_entries" in details)
@@ -90,15 +90,13 @@ def test_the_worst_case_leads(tmp_path: Path) -> None:
     ("truth", "said"),
     [("closed_form", 1), ("third_party_data", 1), ("in_house_oracle", 0), ("consensus_only", 0)],
 )
-def test_validated_is_said_of_a_pass_against_foreign_truth_only(
-    tmp_path: Path, truth: str, said: int
-) -> None:
+def test_page_says_validated_for_foreign_truth(tmp_path: Path, truth: str, said: int) -> None:
     page = report(results(truth), tmp_path)
     assert len(re.findall("validated", page.text)) == said
     assert ("our own oracle is not validation" in page.text) == (truth == "in_house_oracle")
 
 
-def test_validated_names_what_was_not_judged_against_the_truth(tmp_path: Path) -> None:
+def test_page_says_validated_positions_only(tmp_path: Path) -> None:
     assert "validated, positions only" in report(results("closed_form"), tmp_path).text
 
 
@@ -157,7 +155,7 @@ def test_nothing_is_fetched(tmp_path: Path) -> None:
     assert "http" not in str(policy[0])
 
 
-def test_a_page_has_every_script_without_comments_and_its_syntax_is_right(tmp_path: Path) -> None:
+def test_page_scripts_are_stripped_and_valid(tmp_path: Path) -> None:
     folder = Path(page_parts.__file__).parent
     assert sorted(page_parts.SCRIPTS) == sorted(path.name for path in folder.glob("*.js"))
     script = page_parts.figure_parts({})["script"]
@@ -168,7 +166,7 @@ def test_a_page_has_every_script_without_comments_and_its_syntax_is_right(tmp_pa
         subprocess.run([node, "--check", file], check=True)
 
 
-def test_what_could_not_be_read_comes_first_and_how_it_was_made_last(tmp_path: Path) -> None:
+def test_page_order_of_sections(tmp_path: Path) -> None:
     run = {
         **results().run,
         "unread": {"gone.toml": "gone.toml: schema: found 'x'"},

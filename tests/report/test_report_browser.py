@@ -41,7 +41,7 @@ def several() -> Results:
     return Results(run={"cases": {"good": {"source": "a yellow book"}}}, records=records)
 
 
-def test_the_overview_is_filtered_by_outcome_engine_and_words_and_worked_by_keyboard(
+def test_overview_filters_in_browser(
     visit: Any,
 ) -> None:
     told = visit(
@@ -100,7 +100,7 @@ def lies_on_a_line(pixels: Any, values: Any) -> bool:
     return np.abs(slope * np.asarray(values) + start - pixels).max() < 0.1
 
 
-def test_figures_draw_and_show_the_numbers_of_the_results(visit: Any) -> None:
+def test_figures_draw_numbers_in_browser(visit: Any) -> None:
     run = results()
     told = visit(
         run,
@@ -139,7 +139,7 @@ def test_figures_draw_and_show_the_numbers_of_the_results(visit: Any) -> None:
         assert float(error.replace("−", "-")) == pytest.approx(errors[k], rel=5e-3)
 
 
-def test_curves_are_switched_and_figures_zoomed_saved_and_unfolded(visit: Any) -> None:
+def test_figures_zoom_and_save_in_browser(visit: Any) -> None:
     told = visit(
         results(),
         READ
@@ -180,7 +180,7 @@ def test_curves_are_switched_and_figures_zoomed_saved_and_unfolded(visit: Any) -
     assert "var(--" not in told["file"]  # it stands by itself, in the colours of the screen
 
 
-def test_earlier_runs_and_work_precision_are_drawn_where_there_are_any(visit: Any) -> None:
+def test_trends_are_drawn_in_browser(visit: Any) -> None:
     past = [
         Past(run, "one", error, 10.0)
         for run, error in (("2026-11-01", 1e-12), ("2026-11-02", 0.0), ("2026-11-03", None))

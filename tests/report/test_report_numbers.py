@@ -82,7 +82,7 @@ def answered(found):
     return [record for record in found["records"] if record["outcome"] != "unavailable"]
 
 
-def test_deviations_are_on_the_page_as_json_has_them(shown):
+def test_page_deviations_equal_json(shown):
     found, _, page = shown
     rows = page.rows("Largest deviations")
     names = dict.fromkeys(name for record in answered(found) for name in record["errors"])
@@ -106,7 +106,7 @@ def test_deviations_are_on_the_page_as_json_has_them(shown):
             assert cells[7:] == ["closed form" if errors["position"] else errors["reason"]]
 
 
-def test_engines_are_on_the_page_as_json_has_them(shown):
+def test_page_engines_equal_json(shown):
     found, _, page = shown
     rows = page.rows("Engines")
     for (engine, outcome, *cells), record in zip(rows, found["records"], strict=True):
@@ -148,7 +148,7 @@ def test_overview_has_the_worst_errors_of_json(shown):
     assert (error[1].strip(","), error[4].strip(",")) == ("m/s", "m/s")
 
 
-def test_freedom_and_programs_are_on_the_page_as_json_has_them(shown):
+def test_page_freedom_and_programs_equal_json(shown):
     found, _, page = shown
     a = found["records"][0]["details"]["dof_account"]
     assert a == ACCOUNT
@@ -163,7 +163,7 @@ def test_freedom_and_programs_are_on_the_page_as_json_has_them(shown):
         assert_row(page.rows("Program size")[0], [name, size["operations"], size["flops"]])
 
 
-def test_errors_are_on_the_terminal_as_json_has_them(shown):
+def test_terminal_errors_equal_json(shown):
     """Two digits of an error, one of its tolerance; those out of tolerance first, then lengths."""
     found, text, _ = shown
     rows = blocks(text, "  ")
@@ -201,7 +201,7 @@ def test_errors_are_on_the_terminal_as_json_has_them(shown):
         assert time == ("–" if us is None else f"{us:.0f}" if us > 999.5 else f"{us:.3g}")
 
 
-def test_what_is_off_is_red_on_a_terminal(shown, monkeypatch):
+def test_terminal_marks_deviations_red(shown, monkeypatch):
     found, _, _ = shown
     results = msgspec.convert(found, Results)
     monkeypatch.setenv("TERM", "xterm")

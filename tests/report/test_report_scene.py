@@ -55,7 +55,7 @@ def test_hardpoints_are_drawn_where_the_native_engine_has_them():
     assert drawn.steps[0] == "sample 0 · wheel travel −80 mm"
 
 
-def test_both_sides_of_a_joint_stay_together_and_rods_keep_their_length():
+def test_scene_keeps_joints_and_rods():
     drawn = drawing(scene(STRUT), AXIS)
     [rod] = drawn.rods
     lengths = [
@@ -77,7 +77,7 @@ def test_both_sides_of_a_joint_stay_together_and_rods_keep_their_length():
         assert math.dist(place(drawn, sides[0], frame), place(drawn, sides[1], frame)) < 5e-6
 
 
-def test_a_body_is_its_hardpoints_joined_and_fixed_bodies_are_not():
+def test_scene_links_hardpoints_of_bodies():
     drawn = drawing(scene(STRUT), AXIS)
     names = [body["name"] for body in drawn.bodies]
     linked = [names[drawn.nodes[a][0]] for a, _ in drawn.links]
@@ -124,7 +124,7 @@ def star(count: int) -> Scene:
     )
 
 
-def test_points_that_only_show_how_a_body_turns_are_no_hardpoints():
+def test_scene_omits_marker_points():
     shown = scene(cases.load("mcpherson_suspension"), poses=False)
     names = [point.name for point in shown.points]
     assert "wheel_center" in names
@@ -134,20 +134,18 @@ def test_points_that_only_show_how_a_body_turns_are_no_hardpoints():
 
 
 @pytest.mark.parametrize(("count", "nodes", "links"), [(1, 2, 1), (2, 2, 1), (4, 4, 6), (7, 8, 7)])
-def test_few_hardpoints_are_joined_each_with_each_and_many_with_a_hub(
-    count: int, nodes: int, links: int
-):
+def test_scene_links_many_hardpoints_by_hub(count: int, nodes: int, links: int):
     drawn = drawing(star(count), AXIS)
     assert (len(drawn.nodes), len(drawn.links)) == (nodes, links)
     assert place(drawn, 0, 0) == pytest.approx([6.0, 0.0, 0.0], abs=1e-12)
 
 
-def test_a_single_hardpoint_is_joined_with_no_origin_that_was_not_given():
+def test_scene_of_single_hardpoint():
     body = SceneBody(name="plate", fixed=False, origin=[0, 0, 0], euler_parameters=[1, 0, 0, 0])
     assert drawing(msgspec.structs.replace(star(1), bodies=[body]), AXIS).links == []
 
 
-def test_axes_are_drawn_amid_the_hardpoints_of_a_body_whose_origin_is_far():
+def test_scene_axes_of_far_origin():
     near, far = (
         drawing(star(4), AXIS),
         drawing(
@@ -186,7 +184,7 @@ def dead_centre() -> Case:
     )
 
 
-def test_samples_that_were_not_reached_have_no_frame_and_the_reason_is_said():
+def test_scene_skips_unreached_samples():
     shown = scene(dead_centre())
     assert 0 < len(shown.frames) < FRAMES
     assert "cannot be followed beyond" in shown.message
@@ -195,7 +193,7 @@ def test_samples_that_were_not_reached_have_no_frame_and_the_reason_is_said():
     assert drawing(shown, AXIS).caption.endswith(f"C{shown.message[1:]}.")
 
 
-def test_what_cannot_be_solved_is_drawn_at_the_design_and_says_why():
+def test_unsolved_scene_shows_design():
     case = dead_centre()
     undriven = replace(case.mechanism, joints=case.mechanism.joints[:2])
     shown = scene(replace(case, mechanism=undriven))
@@ -214,7 +212,7 @@ def test_what_cannot_be_solved_is_drawn_at_the_design_and_says_why():
         ("mujoco", Outcome.PASS, 161, False),
     ],
 )
-def test_poses_are_solved_for_only_where_the_native_engine_answered(
+def test_scene_poses_need_native_answer(
     engine: str, outcome: Outcome, solved: int | None, posed: bool
 ):
     made = record(

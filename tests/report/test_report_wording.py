@@ -1,14 +1,8 @@
 """Names and numbers of reports in words."""
 
-import io
-
-import msgspec
 import pytest
 from kincheck.core.errors import number_of, with_article
 from kincheck.core.harness.labels import number, output_label
-from kincheck.core.report.table import print_outputs
-
-from ..support.made_up import results
 
 
 def test_outputs_are_labelled_in_words() -> None:
@@ -32,25 +26,6 @@ def test_outputs_are_labelled_in_words() -> None:
 )
 def test_numbers_are_short_and_a_dash_is_no_zero(value: float | None, text: str) -> None:
     assert number(value) == text
-
-
-@pytest.mark.parametrize(
-    ("units", "head"), [(("m", "rad"), "position"), (("N", "m"), "value"), (("N", "N m"), "value")]
-)
-def test_a_force_has_a_value_and_no_position(units: tuple[str, str], head: str) -> None:
-    found = results()
-    record = found.records[0]
-    outputs = {
-        name: msgspec.structs.replace(series, unit=unit)
-        for unit, (name, series) in zip(units, record.outputs.items(), strict=True)
-    }
-    made = msgspec.structs.replace(
-        found, records=[msgspec.structs.replace(record, outputs=outputs)]
-    )
-    page = io.StringIO()
-    print_outputs(made, page)
-    heads = next(line for line in page.getvalue().splitlines() if line.startswith("case"))
-    assert heads.split() == ["case", "engine", "output", head, "velocity", "acceleration", "unit"]
 
 
 @pytest.mark.parametrize(

@@ -42,7 +42,7 @@ def test_the_mechanism_is_drawn_turned_and_moved(visit: Any) -> None:
     assert len(set(pictures)) == len(pictures), [what for what, *_ in told["looks"]]
 
 
-def test_without_poses_the_design_is_drawn_and_nothing_moves(visit: Any) -> None:
+def test_scene_without_poses_in_browser(visit: Any) -> None:
     shown = scene(cases.load("mcpherson_strut"), poses=False)
     told = visit(
         msgspec.structs.replace(results(), scenes={"strut": shown}),

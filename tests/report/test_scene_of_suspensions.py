@@ -33,9 +33,7 @@ from .test_report_scene import AXIS, STRUT, UP
         ({"name": "lift", "type": "joint_angle"}, 0, "lift"),
     ],
 )
-def test_travel_is_upwards_where_a_point_is_driven_along_z(
-    driver: dict[str, Any], up: int, name: str
-):
+def test_travel_axis_of_vertical_driver(driver: dict[str, Any], up: int, name: str):
     made = record(
         "strut", "closed_form", "one", 0.0, GRID, driver={"lift": GRID}, outputs={"x": series(GRID)}
     )
@@ -43,7 +41,7 @@ def test_travel_is_upwards_where_a_point_is_driven_along_z(
     assert (axis.up, axis.name) == (up, name)
 
 
-def test_large_mechanisms_have_fewer_frames_and_the_largest_no_scene():
+def test_large_scenes_have_fewer_frames():
     def case(loops: int) -> Case:
         made = chain(loops)
         return Case(
@@ -74,7 +72,7 @@ def test_a_suspension_has_its_wheel_about_the_axis_of_rotation():
     assert drawing(scene(STRUT, poses=False), AXIS).wheels == []
 
 
-def test_arrows_are_the_forces_of_outputs_at_the_samples_of_the_frames():
+def test_scene_arrows_are_output_forces():
     shown = msgspec.structs.replace(
         scene(cases.load("mcpherson_strut_loaded"), poses=False), frames=[0, 2]
     )

@@ -1,7 +1,8 @@
 """Small checks of joint types."""
 
 import pytest
-from kincheck.core.studies.joint_check import branches, check_joint
+from kincheck.core.studies.checks import check_joint
+from kincheck.core.studies.checks import manifold as branches
 
 
 @pytest.fixture

@@ -24,24 +24,13 @@ def one_thread(monkeypatch):
 
 @pytest.mark.usefixtures("one_thread")
 def test_command_and_report_of_a_run(tmp_path, capsys):
-    asked = [
-        "bench",
-        "engines",
-        "--rounds",
-        "1",
-        "--engine",
-        "native",
-        "--cases",
-        "rssr",
-        "--parts",
-        "work",
-    ]
+    asked = "bench engines --rounds 1 --engine native --cases rssr --parts work".split()
     assert main.main([*asked, "--json", "-", "--out", str(tmp_path)]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["schema"] == "kincheck-bench/1"
     assert {each["case"] for each in found["entries"]} == {"rssr"}
     assert json.loads((tmp_path / "bench.json").read_text("utf-8")) == found
-    run = ["run", "rssr", "--engine", "native", "--out", str(tmp_path)]
+    run = f"run rssr --engine native --out {tmp_path}".split()
     assert main.main(run) == 0
     assert "Work and precision" not in (tmp_path / "report.html").read_text("utf-8")
     assert main.main([*run, "--bench", str(tmp_path / "bench.json")]) == 0
@@ -49,7 +38,7 @@ def test_command_and_report_of_a_run(tmp_path, capsys):
 
 
 @pytest.mark.usefixtures("one_thread")
-def test_an_engine_that_is_named_and_missing_is_no_success(monkeypatch, capsys):
+def test_bench_named_engine_missing_has_status_2(monkeypatch, capsys):
     found = measured()  # of an engine "gone" too
     there = [each for each in found.entries if each.engine != "gone"]
     for name, status in (("gone", 2), ("native", 0)):
@@ -62,7 +51,7 @@ def test_an_engine_that_is_named_and_missing_is_no_success(monkeypatch, capsys):
         assert ("'gone' is requested, but missing" in capsys.readouterr().err) is (status == 2)
 
 
-def test_run_refuses_what_is_no_benchmark(tmp_path, capsys):
+def test_run_refuses_invalid_benchmark_file(tmp_path, capsys):
     (tmp_path / "bench.json").write_text("{}")
     bad = str(tmp_path / "bench.json")
     assert main.main(["run", "rssr", "--engine", "native", "--bench", bad]) == 2
@@ -103,7 +92,7 @@ def test_linear_algebra_has_one_thread(monkeypatch):
     )
     assert main.main(shlex.split("bench engines --rounds 2")) == 5
     ((arguments, env),) = started
-    assert arguments[-4:] == ["bench", "engines", "--rounds", "2"]
+    assert arguments[-4:] == "bench engines --rounds 2".split()
     assert {env[name] for name in THREADS} == {"1"}
 
 

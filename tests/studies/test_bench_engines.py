@@ -33,7 +33,7 @@ def test_contestants_take_turns(monkeypatch):
     assert [each.rounds for each in found.values()] == [3, 3]
 
 
-def test_quick_work_is_done_several_times_and_warmed(monkeypatch):
+def test_quick_work_is_warmed_and_repeated(monkeypatch):
     clock = iter(range(1000))
     # every work seems to take a millisecond
     monkeypatch.setattr(rounds, "perf_counter", lambda: 1.1e-3 * next(clock))
@@ -44,7 +44,7 @@ def test_quick_work_is_done_several_times_and_warmed(monkeypatch):
     assert found["a"].median == pytest.approx(0.55e-3)
 
 
-def test_work_that_is_slow_at_first_is_timed_by_what_it_takes_later(monkeypatch):
+def test_slow_first_calls_are_not_timed(monkeypatch):
     now, took = [0.0], iter([0.1, 0.2, *[0.001] * 200])
     monkeypatch.setattr(rounds, "perf_counter", lambda: now[0])
 
@@ -113,7 +113,7 @@ def test_an_entry_has_error_and_outcome():
         (Fake(answer=partial), Outcome.FAIL),
     ],
 )
-def test_what_cannot_be_timed_is_still_an_entry(engine, outcome):
+def test_unsolved_effort_is_an_untimed_entry(engine, outcome):
     found = precision.contestants(crank(), {"one": engine}, TOL)
     assert [(each.entry.outcome, each.work) for each in found] == [(outcome, None)]
     assert found[0].entry.message
@@ -213,7 +213,7 @@ def test_modes_share_neither_table_nor_diagram():
     assert "none" in tables["crank, projection: time at a required error"][-1]
 
 
-def test_every_row_has_loop_error_and_outcome_beside_the_time():
+def test_bench_rows_have_loop_and_error():
     for entry in measured().entries:
         assert entry.loop
         assert entry.message if entry.us_per_sample is None else entry.errors.position is not None
@@ -240,7 +240,7 @@ def test_an_effort_leaves_a_residual_on_purpose():
     assert (effort.entry.outcome, effort.entry.residual) == (Outcome.PASS, 1e-6)
 
 
-def test_loops_are_ratios_to_one_engine_over_the_cases_that_both_solve(monkeypatch):
+def test_loop_times_are_ratios_to_base(monkeypatch):
     """A made-up clock: every call of an engine takes its own time."""
     now = [0.0]
     monkeypatch.setattr(rounds, "perf_counter", lambda: now[0])

@@ -116,7 +116,7 @@ def test_table_3_is_printed_beside_every_condition(found):
     assert found.operations == count_operations()
 
 
-def test_what_the_simplification_gains_and_what_sharing_does(found):
+def test_operation_counts_fall_with_simplification(found):
     counts = by_way(found.operations)
     for name in ("d11", "d12", "d21"):
         for axes in ("paper", "native"):
@@ -135,7 +135,7 @@ def test_what_the_simplification_gains_and_what_sharing_does(found):
     assert "d10 jacobian 150" in said[2]
 
 
-def test_tracing_shares_over_rows_and_execution_does_not():
+def test_tracing_shares_operations_between_rows():
     f, g, h, *arms = (Vec3(*np.random.default_rng(k).normal(size=3).tolist()) for k in range(5))
     condition = conditions(f, g, h, *arms)[1]
     dots = condition.unsimplified("native")
@@ -196,7 +196,7 @@ def test_simplified_rows_gain_little(found):
         assert 0.0 < each.residual.rms <= each.residual.max  # no product cancels by luck
 
 
-def test_round_off_is_that_of_the_seed_and_fifty_digits_are_enough(monkeypatch):
+def test_round_off_depends_on_seed_only(monkeypatch):
     first = bench_roundoff.measure_roundoff(1, 1)
     monkeypatch.setattr(bench_roundoff, "DIGITS", 80)
     assert bench_roundoff.measure_roundoff(1, 1) == first
@@ -240,7 +240,7 @@ def test_programs_are_those_the_solver_runs(found, case):
     assert sizes["native"].motion < sizes["paper"].motion < sizes["conventional"].motion
 
 
-def test_sweeps_lose_what_the_rounded_points_lose_and_nothing_else(found):
+def test_far_sweeps_lose_rounded_digits_only(found):
     assert {each.style for each in found.sweeps} >= {"native", "paper", "conventional", "mixed"}
     for each in found.sweeps:
         if each.place == AT_DESIGN:  # numbers near one, times the condition of the rows (36)
@@ -258,7 +258,7 @@ def test_sweeps_lose_what_the_rounded_points_lose_and_nothing_else(found):
             assert each.position < 1.2e-10  # an ulp of a million: outputs are rounded there
 
 
-def test_a_mechanism_moved_away_and_back_is_rounded_once(case):
+def test_mechanism_moved_back_is_rounded_once(case):
     away = bench_whole._moved(case.mechanism, bench_whole.FAR)
     back = bench_whole._moved(away, tuple(-x for x in bench_whole.FAR))
     assert bench_whole._moved(back, bench_whole.FAR) == away

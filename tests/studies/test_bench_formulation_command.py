@@ -18,12 +18,7 @@ def few(monkeypatch):
 
 @pytest.mark.usefixtures("few")
 def test_command_writes_tables_json_and_page(tmp_path, capsys):
-    assert (
-        main.main(
-            ["bench", "formulation", "--seed", "7", "--json", "-", "--out", str(tmp_path / "new")]
-        )
-        == 0
-    )
+    assert main.main(f"bench formulation --seed 7 --json - --out {tmp_path / 'new'}".split()) == 0
     captured = capsys.readouterr()
     found = json.loads(captured.out)
     assert found["schema"] == "kincheck-bench-formulation/1"

@@ -48,7 +48,7 @@ def test_native_efforts_go_from_coarse_to_fine(monkeypatch):
     assert len({json.dumps(dict(each.settings)) for each in found}) == len(found)
 
 
-def test_levels_give_what_is_asked_and_no_more():
+def test_levels_compute_requested_orders_only():
     case = without_forces(cases.load("rssr"))
     found = {
         each.entry.setting: each.entry
@@ -162,6 +162,7 @@ def test_growth_is_that_of_the_largest():
     assert size.growth(sizes[:1]) is None
 
 
+@pytest.mark.nightly
 def test_processes(monkeypatch):
     name = "mcpherson_strut"
     found = processes.measure_processes(cases.load(name), name, [adapters.engine("native")], TOL, 1)

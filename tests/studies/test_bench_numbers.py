@@ -89,7 +89,7 @@ def assert_table(page, heading, expected):
         assert_row(row, values)
 
 
-def test_costs_are_on_the_page_as_json_has_them(shown):
+def test_page_costs_equal_json(shown):
     found, page = shown
     expected = [
         [each["engine"], each["loop"], each["cases"], each["us_per_sample"], each["ratio"]]
@@ -132,7 +132,7 @@ def test_costs_are_on_the_page_as_json_has_them(shown):
     assert_table(page, "First use", expected)
 
 
-def test_conclusions_and_diagrams_of_costs_follow_from_json(shown):
+def test_cost_diagrams_equal_json(shown):
     found, page = shown
     words = " ".join(page.text.split())
     power = np.log(30.0) / np.log(10.0)

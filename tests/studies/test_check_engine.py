@@ -16,10 +16,10 @@ from kincheck.core.cli import engine_loading, main
 from kincheck.core.harness.execution import here
 from kincheck.core.harness.run import run
 from kincheck.core.joints import Gear, Planar, Screw
-from kincheck.core.studies.engine_check import check_engine as checking
-from kincheck.core.studies.engine_check import force_cases
-from kincheck.core.studies.engine_check.rates import rates
-from kincheck.core.studies.findings import Verdict
+from kincheck.core.studies.checks import check_engine as checking
+from kincheck.core.studies.checks import engine_cases as force_cases
+from kincheck.core.studies.checks.check_engine import rates
+from kincheck.core.studies.checks.findings import Verdict
 
 from ..support.fakes import Fake, crank
 from ..support.faulty_engine import Odd, Shy, Sound
@@ -88,7 +88,7 @@ def test_each_fault_fails_its_row(few, capsys):
     assert lines[-1] == "faulty: 12 pass, 6 fail"
 
 
-def test_what_is_outside_the_protocol_ends_the_check(few):
+def test_check_engine_stops_on_protocol_error(few):
     report = kincheck.check_engine(Odd())
     assert failures(report) == {"protocol", "isolation: pickle"}
     assert "mode is 'magic', expected projection or simulate" in report["protocol"].message
@@ -108,19 +108,19 @@ def test_what_is_outside_the_protocol_ends_the_check(few):
         ("mujocco", "there is no engine 'mujocco'; did you mean 'mujoco'?"),
     ],
 )
-def test_what_is_no_engine_is_one_message(monkeypatch, capsys, where, message):
+def test_check_engine_refuses_class_without_protocol(monkeypatch, capsys, where, message):
     monkeypatch.syspath_prepend(str(ROOT))
     assert main.main(["check-engine", where]) == 2
     assert message in capsys.readouterr().err
 
 
-def test_run_takes_module_and_class_and_a_case_behind_them(monkeypatch, capsys):
+def test_run_takes_engine_by_module_and_class(monkeypatch, capsys):
     monkeypatch.syspath_prepend(str(ROOT))
     assert main.main(["run", "--jobs", "0", "--engine", f"{HERE}:Sound", "rssr"]) == 0
     assert "rssr  sound   pass" in capsys.readouterr().out
 
 
-def test_an_engine_named_by_module_and_class_must_be_there(monkeypatch, capsys):
+def test_named_engine_class_not_installed_fails(monkeypatch, capsys):
     monkeypatch.syspath_prepend(str(ROOT))
     for option in ("--engine", "--require"):
         argv = ["run", "rssr", "--jobs", "0", "--engine", "native", option, f"{HERE}:Shy"]
@@ -145,14 +145,14 @@ def offered(monkeypatch):
 def test_other_packages_offer_engines(offered, capsys):
     offered(sound=f"{HERE}:Sound", broken="tests.nothing:Engine")
     assert "sound" in main.registry().engines
-    assert main.main(["run", "rssr", "--jobs", "0", "--engine", "sound"]) == 0
-    assert main.main(["run", "rssr", "--jobs", "0", "--engine", "broken"]) == 2
+    assert main.main("run rssr --jobs 0 --engine sound".split()) == 0
+    assert main.main("run rssr --jobs 0 --engine broken".split()) == 2
     assert "No module named 'tests.nothing'" in capsys.readouterr().out
 
 
-def test_no_package_takes_the_name_of_our_own(offered, capsys):
+def test_entry_point_with_builtin_name_is_refused(offered, capsys):
     offered(mujoco=f"{HERE}:Sound")
-    assert main.main(["run", "rssr", "--engine", "native"]) == 2
+    assert main.main("run rssr --engine native".split()) == 2
     assert "offers an engine named 'mujoco', which is kincheck's own" in capsys.readouterr().err
 
 

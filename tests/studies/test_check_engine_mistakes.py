@@ -5,9 +5,9 @@ import pytest
 from kincheck.core.case.joint_probe import probe
 from kincheck.core.harness.execution import here
 from kincheck.core.joints import Screw, Universal
-from kincheck.core.studies.engine_check import check_engine as checking
-from kincheck.core.studies.engine_check import force_cases
-from kincheck.core.studies.findings import Verdict
+from kincheck.core.studies.checks import check_engine as checking
+from kincheck.core.studies.checks import engine_cases as force_cases
+from kincheck.core.studies.checks.findings import Verdict
 
 from ..support.engine_faults import HARMLESS, OF_FORCES, OF_MOTION, Wrapped
 
@@ -50,7 +50,7 @@ def test_a_fault_of_forces_is_found(fault, with_loads):
 
 
 @pytest.mark.parametrize("change", HARMLESS)
-def test_what_harms_nobody_passes(change):
+def test_harmless_engine_changes_pass(change):
     assert failing(change) == []
 
 

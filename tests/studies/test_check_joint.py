@@ -12,7 +12,7 @@ from kincheck.core import primitives as p
 from kincheck.core.cli.joint_loading import load_joint
 from kincheck.core.errors import KincheckError, MechanismError
 from kincheck.core.joints import AxialJoint
-from kincheck.core.studies.findings import Verdict
+from kincheck.core.studies.checks.findings import Verdict
 
 from ..support.fakes import Fake
 from .test_check_joint_mistakes import mistaken
@@ -60,7 +60,7 @@ def test_joints_of_users_pass(few, in_folder, module):
         )
 
 
-def test_an_engine_whose_residual_is_above_the_tolerance_has_not_solved_the_loop(loops_only):
+def test_loop_with_large_residual_fails(loops_only):
     native = adapters.engine("native")
 
     def answer(case):
@@ -74,7 +74,7 @@ def test_an_engine_whose_residual_is_above_the_tolerance_has_not_solved_the_loop
     )
 
 
-def test_an_engine_without_derivatives_passes_with_a_note(loops_only):
+def test_loop_without_derivatives_passes_with_note(loops_only):
     native = adapters.engine("native")
 
     def answer(case):
@@ -129,7 +129,7 @@ def test_no_specimen():
         check_joint(Revolute, specimens=[])
 
 
-def test_an_equivalent_that_fails_is_not_told_as_missing(loops_only):
+def test_failing_equivalent_is_reported_as_error(loops_only):
     def equivalent(self):
         raise ValueError("no such bodies")
 
@@ -143,7 +143,7 @@ def test_an_equivalent_that_fails_is_not_told_as_missing(loops_only):
     )
 
 
-def test_a_type_that_is_taken_is_refused_and_the_same_class_may_be_declared_anew():
+def test_joint_type_name_in_use_is_refused():
     with pytest.raises(
         MechanismError,
         match=r"Mine: type = 'revolute' is taken by kincheck.core.joints.revolute.Revolute; give",

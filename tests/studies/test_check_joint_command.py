@@ -53,15 +53,13 @@ steps = 5
 """
 
 
-def test_case_files_name_a_type_that_the_command_line_has_loaded(
-    in_folder, capsys, tmp_path, monkeypatch
-):
+def test_case_file_uses_joint_type_option(in_folder, capsys, tmp_path, monkeypatch):
     """A Scotch yoke: the block is where the pin's height is, 0.5 sin(turn)."""
     monkeypatch.delitem(Joint.registry, "pin_in_slot", raising=False)
     monkeypatch.delitem(sys.modules, "pin_in_slot", raising=False)
     file, out = tmp_path / "slot.toml", tmp_path / "slot.json"
     file.write_text(SLOT)
-    run = ["run", str(file), "--engine", "native", "pinocchio", "--json", str(out)]
+    run = f"run {file} --engine native pinocchio --json {out}".split()
     assert main(run) == 2
     assert "joints.slot.type: found 'pin_in_slot', expected a joint type" in capsys.readouterr().err
     given = ["--joint-type", "pin_in_slot:PinInSlot"]
@@ -78,7 +76,7 @@ def test_case_files_name_a_type_that_the_command_line_has_loaded(
         capsys.readouterr().out,
         re.MULTILINE,
     )
-    assert main(["explain", str(file), "--joint-type", "pin_in_slot:PinSlot"]) == 2
+    assert main(f"explain {file} --joint-type pin_in_slot:PinSlot".split()) == 2
     assert (
         capsys.readouterr().err
         == "kincheck: module 'pin_in_slot' has no class 'PinSlot'; did you mean 'PinInSlot'?\n"
@@ -108,13 +106,13 @@ def test_case_files_name_a_type_that_the_command_line_has_loaded(
         ),
     ],
 )
-def test_a_type_that_no_case_file_can_name_is_refused(monkeypatch, tmp_path, capsys, body, message):
+def test_check_joint_refuses_unusable_type_name(monkeypatch, tmp_path, capsys, body, message):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("sys.path", ["", *sys.path])
     monkeypatch.delitem(sys.modules, "own", raising=False)
     Path("own.py").write_text(f"from kincheck.core import Joint\nclass Mine(Joint):\n    {body}\n")
     importlib.invalidate_caches()
-    for argv in (["check-joint", "own:Mine"], ["list", "--joints", "--joint-type", "own:Mine"]):
+    for argv in (["check-joint", "own:Mine"], "list --joints --joint-type own:Mine".split()):
         assert main(argv) == 2
         said = capsys.readouterr().err
         assert message in said.replace(f"{tmp_path}{os.sep}", ""), said
@@ -124,7 +122,7 @@ def test_a_type_that_no_case_file_can_name_is_refused(monkeypatch, tmp_path, cap
 
 
 def test_command(few, in_folder, capsys):
-    assert main(["check-joint", "pin_in_slot:PinInSlot", "--seed", "1"]) == 0
+    assert main("check-joint pin_in_slot:PinInSlot --seed 1".split()) == 0
     said = capsys.readouterr().out
     assert "spurious branches" in said
     assert "(seed 1)" in said
@@ -161,7 +159,7 @@ def test_command_tells_of_a_failure(loops_only, monkeypatch, capsys, tmp_path):
         (".rzeppa:Rzeppa", "module '.rzeppa' cannot be imported: TypeError: "),
     ],
 )
-def test_command_that_cannot_do_its_work(in_folder, capsys, where, message):
+def test_check_joint_refuses_unknown_module_or_class(in_folder, capsys, where, message):
     assert main(["check-joint", where]) == 2
     assert message in capsys.readouterr().err
 
@@ -195,9 +193,7 @@ REFUSED = (
     ids=["syntax", "indent", "raises", "needs", "needs a name that begins its own", "imports",
          "recursion", "refused"],
 )  # fmt: skip
-def test_a_module_that_fails_is_one_message_with_its_place(
-    tmp_path, monkeypatch, capsys, text, said
-):
+def test_failing_joint_module_reports_its_line(tmp_path, monkeypatch, capsys, text, said):
     file, too = tmp_path / "broken_joint.py", tmp_path / "broken_too.py"
     file.write_text(text, encoding="utf-8")
     too.write_text("y = 1\nx = (\n", encoding="utf-8")
@@ -209,7 +205,7 @@ def test_a_module_that_fails_is_one_message_with_its_place(
     assert str(Path(kincheck.core.__file__).parent) not in line
 
 
-def test_a_script_that_ends_is_not_a_joint_that_passed(tmp_path, monkeypatch, capsys):
+def test_joint_module_that_exits_is_refused(tmp_path, monkeypatch, capsys):
     (tmp_path / "ends_at_once.py").write_text("import sys\nsys.exit(0)\n")
     monkeypatch.syspath_prepend(str(tmp_path))
     assert main(["check-joint", "ends_at_once:Joint"]) == 2

@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from kincheck import cases
-from kincheck.core.case.io.case_file import load_case
-from kincheck.core.case.io.case_writer import case_text
+from kincheck.core.case.io.case_file import case_text, load_case
 from kincheck.core.cli.main import main
 from kincheck.core.errors import KincheckError
 from kincheck.core.kinematics import LoadPoint, StaticModel

@@ -45,7 +45,7 @@ def test_without_redundant_rows_all_is_determined():
     assert str(made) == "all reactions and efforts are determined"
 
 
-def test_masses_change_nothing_and_outputs_choose_the_joints():
+def test_determinacy_covers_joints_of_outputs():
     whole, asked = found("four_bar"), found("four_bar", asked=True)
     (pin,) = asked.partly
     assert asked.joints == 1

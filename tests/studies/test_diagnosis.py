@@ -60,7 +60,7 @@ def with_joint(mechanism, name, **changes):
     )
 
 
-def test_redundant_rows_are_sums_of_the_rows_they_repeat():
+def test_redundant_rows_are_sums_of_others():
     ranks = Ranks(four_bar())
     assert len(ranks.dependencies) == ranks.account.rows - ranks.account.rank == 3
     rows = list(map(str, ranks.rows))
@@ -78,7 +78,7 @@ def test_redundant_rows_are_sums_of_the_rows_they_repeat():
     assert {parallel.row.owner, *(row.owner for _, row in parallel.repeats)} == {"A", "B", "C", "D"}
 
 
-def test_a_hinge_out_of_line_is_named_with_the_size_of_the_contradiction():
+def test_hinge_out_of_line_is_named():
     tilt = 1e-6
     found = diagnose(
         case(with_joint(four_bar(), "C", axis=(tilt, 1.0, 0.0)), [0.0, 0.1]), samples=3, tol=1e-12
@@ -95,7 +95,7 @@ def test_a_hinge_out_of_line_is_named_with_the_size_of_the_contradiction():
     assert diagnose(case(four_bar(), [0.0, 0.1]), samples=3, tol=1e-12).findings == []
 
 
-def test_rods_that_are_too_long_contradict_by_what_they_are_too_long():
+def test_long_rods_contradict_by_excess_length():
     """Two rods of 1.001 m push a slider from both sides, 1 m away: it stays where it is and each is
     off by 1 mm.
     """
@@ -116,7 +116,7 @@ def test_rods_that_are_too_long_contradict_by_what_they_are_too_long():
     assert Ranks(moved).contradictions == []
 
 
-def test_what_is_left_free_is_described_body_by_body():
+def test_free_motion_is_described_by_body():
     rod = Mechanism(
         "rod",
         [Body("a"), Body("rod"), Body("b")],
@@ -158,7 +158,7 @@ def test_a_nut_that_nothing_holds_screws_by_its_lead():
     assert screw.shift / screw.turn == pytest.approx(0.3 / (2.0 * np.pi))
 
 
-def test_a_dead_centre_at_the_design_is_told_from_a_missing_driver():
+def test_dead_centre_at_design_is_diagnosed():
     """Stretched out, the slider of a slider-crank cannot be driven: the crank turns without it."""
     stretched = replace(slider_crank(), drivers=[PointCoordinate("push", "end", X)])
     found = diagnose(case(stretched, [0.0]), samples=1, tol=1e-12)
@@ -209,7 +209,7 @@ def test_conditioning_finds_the_worst_sample_and_its_motion():
 
 
 @pytest.mark.parametrize("length", [1.0, 0.125, 0.3])
-def test_what_a_blocked_shift_asks_of_turns_is_by_the_metre(length):
+def test_blocked_shift_weights_turns_by_length(length):
     """A point on an arm, driven across the plane it moves in: the hinge would have to turn about
     the axes of that plane.
     """
@@ -229,7 +229,7 @@ def test_what_a_blocked_shift_asks_of_turns_is_by_the_metre(length):
     assert np.abs(about) == pytest.approx([turn])
 
 
-def test_directions_are_told_by_what_they_are_not_by_their_names():
+def test_direction_kind_ignores_joint_name():
     """A joint may be called as a field is."""
     joints = [Revolute("rear.axis", "ground", "arm", (3.0, 4.0, 0.0), (0.0, 0.0, 2.0))]
     points = [Point("tip", "arm", (4.0, 4.0, 0.0))]
@@ -247,7 +247,7 @@ def test_directions_are_told_by_what_they_are_not_by_their_names():
     assert found["joints.rear.axis.point x"] == ("m/m", pytest.approx(-np.sin(0.5)))
 
 
-def test_a_sprung_joint_of_a_motion_never_reached_is_no_traceback():
+def test_spring_torque_of_unreached_motion_is_missing():
     """A rocker far beyond its dead centres: how far the spring's joint turned is not known."""
     spring = TorsionSpringDamper("spring", "B", 2.0, 0.1)
     rocker = [JointAngle("rock", "D")]

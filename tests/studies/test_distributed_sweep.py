@@ -12,10 +12,9 @@ import pytest
 from kincheck.core.harness.workers import distributed as ours
 from kincheck.core.harness.workers.distributed import ClusterError
 from kincheck.core.harness.workers.messages import pack
-from kincheck.core.studies.tolerance import chunk_execution
-from kincheck.core.studies.tolerance.chunk_execution import on_cluster, solve_there
+from kincheck.core.studies.tolerance import sweep as chunk_execution
 from kincheck.core.studies.tolerance.study import Study
-from kincheck.core.studies.tolerance.sweep import sweep_designs
+from kincheck.core.studies.tolerance.sweep import on_cluster, solve_there, sweep_designs
 
 from ..support.fakes import crank
 from .test_vary import vary
@@ -34,7 +33,8 @@ def timeless(results):
     return msgspec.json.encode(msgspec.structs.replace(results, run={}, measured={}))
 
 
-def test_a_sweep_is_the_same_on_a_cluster_as_here_though_a_worker_is_lost(cluster, tmp_path):
+@pytest.mark.nightly
+def test_cluster_sweep_survives_lost_worker(cluster, tmp_path):
     """To the last bit, in whatever order the chunks were solved, and with those of the killed
     worker solved by the other.
     """
@@ -60,7 +60,7 @@ def test_a_sweep_is_the_same_on_a_cluster_as_here_though_a_worker_is_lost(cluste
     assert timeless(there) == timeless(sweep_designs(case, variation, **common))
 
 
-def test_chunks_of_a_frozen_worker_are_solved_by_another(cluster, tmp_path):
+def test_cluster_sweep_survives_frozen_worker(cluster, tmp_path):
     case = crank()
     variation = vary(tmp_path, case, tip={"at": "tip", "sigma": 1})
     frozen = next(iter(cluster.workers.values())).pid
@@ -78,7 +78,7 @@ def test_chunks_of_a_frozen_worker_are_solved_by_another(cluster, tmp_path):
     assert timeless(there) == timeless(sweep_designs(case, variation, **common))
 
 
-def test_a_cluster_that_goes_is_a_message(tmp_path, monkeypatch):
+def test_sweep_reports_lost_cluster(tmp_path, monkeypatch):
     """Its scheduler and worker are threads: processes that go are in the test above."""
     from distributed import LocalCluster  # takes most of a second, which reading the tests saves
 
@@ -119,7 +119,7 @@ def test_no_scheduler_is_a_message(tmp_path, monkeypatch):
         sweep_designs(case, variation, samples=5, source=on_cluster("tcp://127.0.0.1:1"))
 
 
-def test_a_worker_solves_chunks_and_keeps_the_model(tmp_path):
+def test_cluster_worker_reuses_its_model(tmp_path):
     case = crank()
     packed = pack(Study(case, vary(tmp_path, case, tip={"at": "tip", "sigma": 1}), 600, 0))
     version = importlib.metadata.version("kincheck")

@@ -61,9 +61,7 @@ def test_a_sound_installation_is_found_able(without_imports, tmp_path, capsys):
     assert found["machine"]["processor"]
 
 
-def test_a_missing_engine_is_no_obstacle_and_its_remedy_is_named(
-    without_imports, monkeypatch, capsys
-):
+def test_doctor_names_missing_engine_remedy(without_imports, monkeypatch, capsys):
     missing(monkeypatch, "pin")
     assert main(["doctor"]) == 0
     (line,) = (line for line in capsys.readouterr().out.splitlines() if line.startswith("pin:"))
@@ -77,7 +75,7 @@ OTHERS = (
 )
 
 
-def test_an_llvmlite_that_cannot_be_loaded_leaves_the_work_to_numpy(tmp_path):
+def test_doctor_with_broken_llvmlite_uses_numpy(tmp_path):
     """Its package is there, and its library is not; nothing that it made before is kept here."""
     for file, text in (("__init__.py", ""), ("binding.py", 'raise OSError("no libllvmlite.so")')):
         (tmp_path / "llvmlite").mkdir(exist_ok=True)
@@ -106,7 +104,7 @@ def test_an_llvmlite_that_cannot_be_loaded_leaves_the_work_to_numpy(tmp_path):
     assert (found["check"]["outcome"], found["machine"]["vector_width"]) == ("pass", None)
 
 
-def test_a_missing_essential_is_an_obstacle(without_imports, monkeypatch, capsys):
+def test_doctor_fails_without_essential_library(without_imports, monkeypatch, capsys):
     missing(monkeypatch, "scipy")
     assert main(["doctor"]) == 2
     out = capsys.readouterr().out
@@ -122,7 +120,7 @@ def test_a_missing_essential_is_an_obstacle(without_imports, monkeypatch, capsys
         ("time; time.sleep(60)", "takes more than"),
     ],
 )
-def test_what_is_installed_and_broken_is_told_from_what_works(imported, said, monkeypatch):
+def test_doctor_finds_broken_library(imported, said, monkeypatch):
     monkeypatch.setattr(installation, "PATIENCE", 5.0 if "sleep" not in imported else 0.5)
     part = installation.Part("numpy", "1.0", "kincheck", True, "", "")
     (found,) = installation._imported([part], {"numpy": imported})
@@ -144,12 +142,7 @@ def test_a_missing_system_library_is_named():
     assert found.remedy.startswith("install the system's package with libnothing.so.7 (of Debian: ")
 
 
-def test_a_sound_module_has_no_problem():
-    part = installation.Part("msgspec", "1.0", "kincheck", True, "", "")
-    assert installation._imported([part], {}) == [part]
-
-
-def test_a_cache_that_cannot_be_written_is_said(without_imports, monkeypatch, tmp_path, capsys):
+def test_doctor_names_unwritable_cache(without_imports, monkeypatch, tmp_path, capsys):
     (tmp_path / "file").touch()
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
     assert main(["doctor"]) == 0
@@ -167,7 +160,7 @@ def test_doctor_names_a_cache_others_can_write(without_imports, monkeypatch, tmp
     assert f"other users can write in {tmp_path / 'kincheck'}; every" in capsys.readouterr().out
 
 
-def test_a_user_without_a_home_solves_and_keeps_nothing(without_imports, monkeypatch, capsys):
+def test_user_without_home_has_no_cache(without_imports, monkeypatch, capsys):
     """As in a container that is run as a user whom it does not know."""
     monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
     monkeypatch.setattr(Path, "home", nobody)

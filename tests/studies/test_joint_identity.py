@@ -65,10 +65,10 @@ EDITS = {
 }
 
 
-SLOTTED = ["slot.toml", "--joint-type", "pin_in_slot:PinInSlot", "--engine", "native"]
+SLOTTED = "slot.toml --joint-type pin_in_slot:PinInSlot --engine native".split()
 
 
-def test_an_edit_of_the_joints_code_makes_another_run(folder, run):
+def test_edited_joint_code_makes_new_run(folder, run):
     # only native knows the joint, so nothing is compared
     assert "nothing was compared" in run(*SLOTTED)
     for edited, expected in EDITS.items():
@@ -87,7 +87,7 @@ class Mine:
 """
 
 
-def test_an_edit_of_an_engines_code_makes_another_run(tmp_path, run):
+def test_edited_engine_code_makes_new_run(tmp_path, run):
     """Whatever version it gives."""
     (tmp_path / "mine.py").write_text(ENGINE)
     command = ["four_bar", "--engine", "mine:Mine"]

@@ -10,21 +10,19 @@ import pytest
 from kincheck import cases
 from kincheck.core import CaseError
 from kincheck.core.case.case import HELD_BUT, ORDERS
-from kincheck.core.case.io.case_writer import case_text
+from kincheck.core.case.io.case_file import case_text
 from kincheck.core.case.io.reader_options import Supplied
 from kincheck.core.case.models.files import load
-from kincheck.core.case.models.hardpoints.sample_table import sample_table
-from kincheck.core.case.models.hardpoints.templates import TEMPLATES
+from kincheck.core.case.models.hardpoints.templates import TEMPLATES, sample_table
 from kincheck.core.cli.main import main
 from kincheck.core.kinematics import placed, solve_designs
 from kincheck.core.studies.diagnosis import diagnose
-from kincheck.core.studies.tolerance.gradients import gradients
-from kincheck.core.studies.tolerance.study import Ready, Study
-from kincheck.core.studies.variation.places import Geometry
+from kincheck.core.studies.tolerance.study import Ready, Study, gradients
 from kincheck.core.studies.variation.variation_file import read_variation
+from kincheck.core.studies.variation.varied_places import Geometry
 
 from ..support.rods_of_templates import solved
-from .test_vary import HEAD, moved, vary
+from .test_vary import moved, vary, vary_file
 
 CAR = {"cg_height": "0.5", "wheelbase": "2.6", "brake_share": "0.6", "position": "front"}
 CORNER = Supplied(travel="0.04:3", **CAR)
@@ -65,8 +63,7 @@ def study_of(folder, case):
     """A study in which all that varies by itself varies."""
     names = [each.name for each in Geometry(case).variables if each.moves]
     points = {name: {"at": name, "sigma": 1.0} for name in names}
-    path = folder / "vary.json"
-    path.write_text(json.dumps({**HEAD, "mode": "monte_carlo", "hardpoints": points}))
+    path = vary_file(folder, points)
     return Ready.of(Study(case, read_variation(path, case), 1, 0))
 
 
@@ -269,7 +266,7 @@ def test_sensitivities_of_a_table_name_its_rows(tmp_path, capsys):
     text = sample_table(TEMPLATES["mcpherson"])
     file, out = tmp_path / "car.csv", tmp_path / "found.json"
     file.write_text(text)
-    assert main(["explain", str(file), "--samples", "5", "--json", str(out)]) == 0
+    assert main(f"explain {file} --samples 5 --json {out}".split()) == 0
     found = json.loads(out.read_text())
     by_number = {
         (each["output"], each["number"]): each
@@ -287,8 +284,8 @@ def test_sensitivities_of_a_table_name_its_rows(tmp_path, capsys):
     assert "lca_outer x" in capsys.readouterr().out
 
 
-def test_explain_of_a_case_tells_what_moves_together(capsys):
-    assert main(["explain", "mcpherson_suspension", "--samples", "1"]) == 0
+def test_explain_names_coincident_places(capsys):
+    assert main("explain mcpherson_suspension --samples 1".split()) == 0
     told = capsys.readouterr().out
     assert "moved together: joints.ball.point = points.lower_ball.position, " in told
 

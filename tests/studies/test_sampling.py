@@ -1,19 +1,16 @@
 """Distributions, samplings and correlations of drawn variants, held against scipy's."""
 
-import json
 from importlib import import_module
 
 import numpy as np
 import pytest
-from kincheck.core import CaseError
 from kincheck.core.errors import KincheckError
-from kincheck.core.studies.variation.distributions import Law
-from kincheck.core.studies.variation.modes import Sampling
-from kincheck.core.studies.variation.sampling import DRAWN
+from kincheck.core.studies.variation.study_choices import Sampling
+from kincheck.core.studies.variation.variation import DRAWN, Law
 from kincheck.core.studies.variation.variation_file import read_variation
 
 from ..support.fakes import crank
-from .test_vary import HEAD
+from .test_vary import vary_file
 
 TIP = {
     "normal": {"at": "tip", "sigma": [0.0, 2.0, 0.0]},
@@ -46,17 +43,12 @@ def of_scipy(stats, law):
 
 
 def variation(tmp_path, tables=None, **hardpoints):
-    path = tmp_path / "vary.json"
-    whole = {**HEAD, "mode": "monte_carlo", "hardpoints": hardpoints, **(tables or {})}
-    path.write_text(json.dumps(whole))
-    return read_variation(path, crank())
+    return read_variation(vary_file(tmp_path, hardpoints, **(tables or {})), crank())
 
 
 @pytest.mark.parametrize("law", TIP)
 @pytest.mark.parametrize("sampling", [Sampling.LATIN, Sampling.SOBOL])
-def test_there_is_one_variant_in_every_interval_of_equal_probability(
-    tmp_path, law, sampling, of_scipy
-):
+def test_stratified_sampling_fills_every_interval(tmp_path, law, sampling, of_scipy):
     """A Latin hypercube has that for any number, a Sobol sequence for powers of two."""
     count = 1000 if sampling is Sampling.LATIN else 1024
     found = variation(tmp_path, tip=TIP[law]).sampled(sampling, count)
@@ -72,7 +64,7 @@ def test_random_draws_have_the_distribution(tmp_path, law, stats, of_scipy):
     assert np.abs(drawn).max() <= {"truncated_normal": 3.0, "triangular": 2.0}[law]
 
 
-def test_random_draws_of_earlier_versions_stay_the_same(tmp_path):
+def test_random_draws_equal_earlier_versions(tmp_path):
     """Equal seeds give equal numbers: normal and uniform coordinates are drawn as ever."""
     found = variation(
         tmp_path, tip=TIP["normal"], pivot={"at": "pivot", "half_width": [3.0, 0.0, 0.0]}
@@ -85,7 +77,7 @@ def test_random_draws_of_earlier_versions_stay_the_same(tmp_path):
 
 
 @pytest.mark.parametrize("sampling", Sampling)
-def test_a_variant_does_not_depend_on_those_drawn_with_it(tmp_path, sampling):
+def test_variant_depends_on_seed_and_index(tmp_path, sampling):
     found = variation(tmp_path, tip=TIP["triangular"], pivot={"at": "pivot", "sigma": 1.0}).sampled(
         sampling, 700
     )
@@ -123,86 +115,14 @@ def test_correlated_normal_coordinates_have_the_correlation(tmp_path, r):
         np.testing.assert_allclose(x, z, rtol=1e-12)
 
 
-def test_correlated_uniform_coordinates_have_the_correlation_of_the_copula(tmp_path):
+def test_correlated_uniform_coordinates_follow_copula(tmp_path):
     x, _, z = correlated(tmp_path, "uniform", 0.8)
     assert np.corrcoef(x, z)[0, 1] == pytest.approx(6.0 / np.pi * np.arcsin(0.4), abs=5e-3)
     assert np.abs([x, z]).max() <= 2e-3
     assert x.std() == pytest.approx(2e-3 / np.sqrt(3.0), rel=5e-3)
 
 
-MATRICES = [
-    ([[1, 0.5]], "found 1 rows of 2 numbers, expected 2 rows of 2"),
-    ([[1, 0.5], [0.4, 1]], "found 0.5 for tip.x and tip.y, but 0.4 for tip.y and tip.x, expected"),
-    ([[2, 0.5], [0.5, 1]], "found 2 for tip.x and tip.x, expected a number from -1 to 1"),
-    ([[0.9, 0.5], [0.5, 1]], "found 0.9 on the diagonal for tip.x, expected 1"),
-    (
-        [[1, 0.9, -0.9], [0.9, 1, 0.9], [-0.9, 0.9, 1]],
-        "found the eigenvalue -0.8, expected a positive semidefinite matrix",
-    ),
-]
-
-
-@pytest.mark.parametrize(("matrix", "message"), MATRICES)
-def test_a_matrix_that_is_none_of_correlations_is_refused(tmp_path, matrix, message):
-    names = ["tip.x", "tip.y", "tip.z"][: max(2, len(matrix))]
-    tables = {"correlations": {"a": {"coordinates": names, "matrix": matrix}}}
-    with pytest.raises(CaseError) as error:
-        variation(tmp_path, tables, tip={"at": "tip", "sigma": 1.0})
-    assert f"correlations.a.matrix: {message}" in str(error.value)
-
-
-def table(*names):
-    return {"coordinates": [*names], "matrix": [[1, 0.5], [0.5, 1]]}
-
-
-OTHER_FAULTS = [
-    (
-        {"correlations": {"a": table("tip.x", "tip.w")}},
-        "correlations.a.coordinates: there is no coordinate that varies 'tip.w'",
-    ),
-    (
-        {"correlations": {"a": table("tip.x", "tip.y"), "b": table("tip.y", "tip.z")}},
-        "correlations.b.coordinates: found 'tip.y' here and in correlations.a",
-    ),
-    (
-        {"mode": "grid", "correlations": {"a": table("tip.x", "tip.y")}},
-        "correlations: found some, expected none, for grid draws nothing",
-    ),
-    ({"limits": {"y": {}}}, "limits.y: found neither low nor high"),
-    ({"limits": {"y": {"low": 2, "high": 1}}}, "limits.y: found low = 2 and high = 1"),
-    ({"limits": {"yy": {"low": 2}}}, "limits.yy: there is no output 'yy' of the case"),
-]
-
-
-@pytest.mark.parametrize(("tables", "message"), OTHER_FAULTS)
-def test_what_is_wrong_with_correlations_and_limits_is_said(tmp_path, tables, message):
-    keys = {"values": [-1, 1]} if "mode" in tables else {"sigma": 1.0}
-    with pytest.raises(CaseError) as error:
-        variation(tmp_path, tables, tip={"at": "tip", **keys})
-    assert message in str(error.value)
-
-
-KEYS = [
-    (
-        {"sigma": 1.0, "distribution": "triangular"},
-        "found sigma, expected for distribution triangular: half_width",
-    ),
-    ({"half_width": 1.0, "distribution": "weibull"}, "found 'weibull', expected \"normal\""),
-    (
-        {"sigma": 1.0, "half_width": 1.0},
-        'or both with distribution = "truncated_normal"; correct the keys',
-    ),
-]
-
-
-@pytest.mark.parametrize(("keys", "message"), KEYS)
-def test_a_distribution_takes_its_own_keys(tmp_path, keys, message):
-    with pytest.raises(CaseError) as error:
-        variation(tmp_path, tip={"at": "tip", **keys})
-    assert message in str(error.value)
-
-
-def test_samplings_that_cannot_be_are_refused(tmp_path):
+def test_impossible_samplings_are_refused(tmp_path):
     found = variation(tmp_path, tip={"at": "tip", "sigma": 1.0})
     with pytest.raises(KincheckError, match="6 GB of memory, expected at most 1; take fewer"):
         found.sampled(Sampling.LATIN, 500_000_000)

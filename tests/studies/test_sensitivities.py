@@ -79,7 +79,7 @@ def hardpoint(mechanism, position):
 
 
 @pytest.mark.parametrize("name", ["mcpherson_strut", "rssr", "chrono_multi_link"])
-def test_the_budget_is_the_one_that_the_cases_were_given(name):
+def test_closure_budget_equals_case_tolerances(name):
     loaded = cases.load(name)
     found = diagnose(loaded, samples=41, tol=1e-12)
     stated = float(re.search(r"at most ([\d.e+-]+) m", loaded.outputs[0].why)[1])
@@ -97,7 +97,7 @@ def test_a_changed_axis_that_would_bind_is_flagged():
     assert "joints.C.point x" not in found.binding  # another link length
 
 
-def test_points_that_are_fixed_do_not_depend_on_anything_but_themselves():
+def test_fixed_point_depends_on_itself():
     mechanism = replace(
         mcpherson(), points=[*mcpherson().points, Point("bolt", "chassis", (0.0, 0.0, 0.0))]
     )

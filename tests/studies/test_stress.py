@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from kincheck.adapters import engine
 from kincheck.core.caches import clear_caches
-from kincheck.core.case.io.case_file import load_case
-from kincheck.core.case.io.case_writer import case_text
+from kincheck.core.case.io.case_file import case_text, load_case
 from kincheck.core.errors import KincheckError, SolveError
 from kincheck.core.harness.execution import Answer, Pair
 from kincheck.core.studies.stress.families import Family
@@ -21,7 +20,7 @@ NATIVE = engine("native")
 FAMILIES = Family.registry
 
 
-def test_a_small_loop_hides_no_corner_of_the_large_one():
+def test_corner_beside_small_loop_is_followed():
     """A corner that is turned round between two samples; stepped over where one sigma is asked for
     all blocks of the rows.
     """
@@ -35,7 +34,7 @@ def test_a_small_loop_hides_no_corner_of_the_large_one():
 
 
 @pytest.mark.parametrize("name", FAMILIES)
-def test_specimens_are_made_again_and_can_be_saved(name, tmp_path):
+def test_specimens_repeat_and_save_as_files(name, tmp_path):
     """The same numbers for the same seed, every kind of each family among them; a case file says
     all of them.
     """
@@ -116,7 +115,7 @@ def test_errors_do_not_grow_over_a_thousand_turns():
     assert 0.0 < last < 2.0 * first < 0.1
 
 
-def test_nothing_nearly_singular_is_silently_wrong_without_machine_code():
+def test_numpy_solver_in_singular_family():
     found, _ = stress([FAMILIES["singular"]], [interpreted(NATIVE)], samples=6, seed=0, prove=False)
     assert found.cells[0].samples[Verdict.SILENTLY_WRONG] == 0
 
@@ -131,13 +130,13 @@ def test_nothing_nearly_singular_is_silently_wrong_without_machine_code():
         "platform_nearly_singular",
     ],
 )
-def test_what_was_silently_wrong_is_so_no_longer(name):
+def test_former_silent_errors_stay_fixed(name):
     """The smallest mechanisms found so far, a sample each."""
     file = Path(__file__).parents[1] / "data" / "stress" / f"{name}.toml"
     assert judge_file(load_case(file), NATIVE, 1e-12).counts[Verdict.SILENTLY_WRONG] == 0
 
 
-def test_a_family_that_cannot_be_run_costs_no_other(monkeypatch):
+def test_failing_family_costs_no_other(monkeypatch):
     def defective(rng, samples):
         raise KincheckError("cannot be made")
 
@@ -149,7 +148,7 @@ def test_a_family_that_cannot_be_run_costs_no_other(monkeypatch):
     assert [cell.family for cell in found.cells] == ["offset"]
 
 
-def test_what_cannot_be_proved_is_counted(monkeypatch):
+def test_failed_proofs_are_counted(monkeypatch):
     def refused(truth, sample):
         raise SolveError("singular at the design")
 
@@ -160,14 +159,14 @@ def test_what_cannot_be_proved_is_counted(monkeypatch):
     assert "singular at the design" in proofs.reasons[0]
 
 
-def test_the_family_of_starts_finds_a_start_that_rounding_decides(monkeypatch):
+def test_starts_family_finds_rounded_starts(monkeypatch):
     """A tolerance of zero is the old rule: rounded and typed motions then start elsewhere."""
     made = specimens(FAMILIES["starts"], 1, 80)  # once, with their references
     monkeypatch.setattr("kincheck.core.studies.stress.run.specimens", lambda *_: made)
     found, _ = stress([FAMILIES["starts"]], [NATIVE], samples=80, seed=1, prove=False)
     assert found.cells[0].samples[Verdict.SILENTLY_WRONG] == 0
     assert found.cells[0].samples[Verdict.RIGHT] > 66
-    monkeypatch.setattr("kincheck.core.kinematics.compiled.motion_start.TYPED", 0.0)
+    monkeypatch.setattr("kincheck.core.kinematics.compiled.routes.TYPED", 0.0)
     clear_caches()
     found, _ = stress([FAMILIES["starts"]], [NATIVE], samples=80, seed=1, prove=False)
     assert found.cells[0].samples[Verdict.SILENTLY_WRONG] > 6

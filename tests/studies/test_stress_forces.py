@@ -16,10 +16,10 @@ from kincheck.core.studies.stress.reproducers import judge
 from kincheck.core.studies.stress.run import specimen
 from kincheck.core.studies.stress.shrink import rounded
 from kincheck.core.studies.stress.solving import interpreted, once
-from kincheck.core.studies.stress.truth.reference_forces import known_forces
 from kincheck.core.studies.stress.verdicts import Verdict, judged
+from kincheck.core.studies.truth.forces import known_forces
 
-demand = importlib.import_module("kincheck.core.kinematics.forces.demand")
+demand = importlib.import_module("kincheck.core.kinematics.forces.equations")
 FORCES = Family.registry["forces"]
 # Numbers of specimens: a hinge twice, a four-bar of four hinges, a fast arm, a driven slide.
 TWICE, FOUR_BAR, SPINNING, SLIDING = 21, 4, 5, 12
@@ -106,7 +106,7 @@ def test_mistakes_are_named(made, change, verdict):
     assert found.counts[verdict] == len(found.verdicts)
 
 
-def test_a_term_left_out_of_the_equations_is_found(monkeypatch):
+def test_missing_gyroscopic_moment_is_found(monkeypatch):
     """No gyroscopic moment."""
     monkeypatch.setattr(
         demand,

@@ -49,7 +49,7 @@ def test_a_bad_case_is_made_small():
     assert len(str(small.mechanism.joint("pivot").point[0])) < 8
 
 
-def test_a_case_that_cannot_be_judged_is_no_smaller_one(case):
+def test_unjudgeable_case_is_not_reduced(case):
     def bad(other):
         if other is not case:
             raise KincheckError("cannot be judged")

@@ -9,7 +9,7 @@ import pytest
 from kincheck import cases
 from kincheck.core import solve
 from kincheck.core.case.case import Output, without_forces
-from kincheck.core.case.io.coordinates import with_all_coordinates
+from kincheck.core.case.io.outputs import with_all_coordinates
 from kincheck.core.case.joint_probe import probes
 from kincheck.core.errors import KincheckError
 from kincheck.core.joints import Spherical
@@ -26,17 +26,16 @@ from kincheck.core.studies.stress.families.planar import (
     slider_crank,
     slider_crank_motion,
 )
-from kincheck.core.studies.stress.truth.conditions import NotStatedError, conditions
-from kincheck.core.studies.stress.truth.evaluation import Evaluator, Poses
-from kincheck.core.studies.stress.truth.long_double import extended
-from kincheck.core.studies.stress.truth.proofs import distance_from_proof
-from kincheck.core.studies.stress.truth.reference_motion import (
+from kincheck.core.studies.truth.motion import (
     ROUND_OFF,
     DefectError,
     Reach,
     closed,
     followed,
 )
+from kincheck.core.studies.truth.path import by_body
+from kincheck.core.studies.truth.proofs import distance_from_proof
+from kincheck.core.studies.truth.rows import NotStatedError, Poses, Rows, extended
 
 POLYNOMIAL = "polynomial"
 EVERY = {case.name: case for case in probes()}
@@ -54,31 +53,21 @@ def worst(truth, positions):
     return max(float(each.max()) for each in errors)
 
 
-@pytest.fixture
-def poses():
-    rng = np.random.default_rng(3)
-    still = Poses.design(2, 1)
-    return still.moved(extended(rng.normal(size=(2, 6, 1))))
-
-
 @pytest.mark.parametrize("name", PROBES)
-def test_the_jacobian_and_what_is_beyond_it_are_derivatives(name, poses):
+def test_jacobian_and_curvature_equal_differences(name):
     case = PROBES[name]
-    rows = Evaluator(conditions(case.mechanism))
-    bodies, rng, h = rows.bodies, np.random.default_rng(5), 1e-5
-    at = (
-        poses
-        if bodies == 2
-        else Poses.design(bodies, 1).moved(extended(rng.normal(size=(bodies, 6, 1))))
-    )
-    rates, near = extended(rng.normal(size=(bodies, 6, 1))), rows.angles(at)
+    rows = Rows(case.mechanism)
+    bodies, rng, h = len(rows.bodies), np.random.default_rng(5), 1e-5
+    step, rates = (by_body(rng.normal(size=(1, 6 * bodies))) for _ in range(2))
+    at = Poses.design(bodies, 1).moved(step)
+    near = rows.angles(at)
     before, here, after = (
         rows.residual(at.moved(s * h * rates), extended(np.zeros((1, 1))), near) for s in (-1, 0, 1)
     )
     first, second = (after - before) / (2 * h), (after - 2 * here + before) / h**2
     # an angle's derivatives are those on the joint's own conditions, which these bodies are not
-    others = np.setdiff1d(np.arange(len(second)), [term.row for term in rows.stated.turns])
-    assert np.abs(rows.jacobian(at)[0] @ rates.reshape(-1) - first[:, 0])[others].max() < 1e-8
+    others = np.setdiff1d(np.arange(len(second)), rows.turn_rows)
+    assert np.abs(rows.jacobian(at)[0] @ rates[1:].reshape(-1) - first[:, 0])[others].max() < 1e-8
     assert np.abs(rows.beyond(at, rates) - second)[others].max() < 1e-6
 
 
@@ -129,7 +118,7 @@ def test_the_motion_followed_is_the_closed_form(name):
             assert np.abs(along - getattr(case.reference[output.name], quantity)).max() < 1e-11
 
 
-def test_a_joint_type_that_it_does_not_know_is_named():
+def test_unknown_joint_type_is_named():
     @dataclass(frozen=True)
     class Odd(Spherical):
         type = "odd"
@@ -141,7 +130,7 @@ def test_a_joint_type_that_it_does_not_know_is_named():
             for j in case.mechanism.joints
         ]
         with pytest.raises(NotStatedError, match="odd"):
-            conditions(replace(case.mechanism, joints=joints))
+            Rows(replace(case.mechanism, joints=joints))
     finally:
         del Spherical.registry["odd"]
 
@@ -198,7 +187,7 @@ def test_a_gap_narrower_than_the_grid_is_not_jumped(off):
 
 
 @pytest.mark.parametrize("off", [-1e-9, -1e-3])
-def test_what_cannot_pass_is_beyond(off):
+def test_samples_past_a_gap_are_beyond(off):
     case, motion = parallelogram(off)
     truth, known = followed(case), closed(case, motion)
     assert list(truth.reach) == list(known.reach)
@@ -217,7 +206,7 @@ def test_the_end_of_a_stroke_is_found_to_the_last_digits():
 
 
 @pytest.mark.parametrize(("off", "told"), [(1e-8, True), (1e-3, False)])
-def test_an_engine_may_give_up_behind_what_is_singular_to_rounding_only(off, told):
+def test_sample_behind_rounding_singularity_may_fail(off, told):
     """A kite's crank passes the rocker's pivot by a little, between two samples."""
     plane, b, d = any_plane(np.random.default_rng(1)), (0.0, 0.4 * (1.0 - off)), (0.4, 0.0)
     c = (0.2 + 0.9 / 2**0.5, 0.2 + 0.9 / 2**0.5)
@@ -228,7 +217,7 @@ def test_an_engine_may_give_up_behind_what_is_singular_to_rounding_only(off, tol
     assert truth.singular.tolist() == [told, False, False, False]
 
 
-def test_what_is_round_off_grows_with_size_and_condition():
+def test_round_off_bound_grows_with_condition():
     near, far = (parallelogram(off, samples=2)[0] for off in (1e-1, 1e-3))
     bounds = [
         followed(replace(case, sweep=replace(case.sweep, values=np.array([-1.2])))).bounds["C"][
@@ -239,7 +228,7 @@ def test_what_is_round_off_grows_with_size_and_condition():
     assert ROUND_OFF < bounds[0] < 0.3 * bounds[1] < 1e-10
 
 
-def test_a_closed_form_that_is_wrong_is_a_defect_of_ours():
+def test_wrong_closed_form_is_a_defect():
     case, motion = parallelogram(1e-3)
     wrong = replace(
         case.mechanism,
@@ -260,11 +249,11 @@ def test_the_truth_is_proved(name):
     case = PROBES.get(name) or cases.load(name)
     truth = followed(case)
     assert distance_from_proof(truth, 3) < 1e-2
-    off = {name: (x + 1e-14, v, a) for name, (x, v, a) in truth.points.items()}
+    off = {name: moved + [[[1e-14]], [[0.0]], [[0.0]]] for name, moved in truth.points.items()}
     assert distance_from_proof(replace(truth, points=off), 3) > 1e-2
 
 
-def test_a_proof_is_about_rows_that_are_good_at_the_sample():
+def test_proof_chooses_rows_at_the_sample():
     """The Bennett loop after a quarter turn, where those chosen at the design depend on each
     other.
     """
@@ -293,7 +282,7 @@ def failures(make):
 
 
 @pytest.mark.parametrize(("make", "reasons"), WRONG, ids=[make.__name__ for make, _ in WRONG])
-def test_what_is_no_mechanism_is_refused_by_its_reason(make, reasons):
+def test_degenerate_mechanisms_name_their_failure(make, reasons):
     assert reasons.intersection(failures(make))
 
 

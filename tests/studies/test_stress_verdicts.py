@@ -14,8 +14,8 @@ from kincheck.core.studies.stress.families.base import as_case
 from kincheck.core.studies.stress.families.dimensions import crank_rocker
 from kincheck.core.studies.stress.families.planar import any_plane, four_bar
 from kincheck.core.studies.stress.solving import once
-from kincheck.core.studies.stress.truth.reference_motion import Reach, followed
 from kincheck.core.studies.stress.verdicts import Verdict, described_wrong, judged
+from kincheck.core.studies.truth.motion import Reach, followed
 
 from .test_stress import NATIVE
 
@@ -93,11 +93,11 @@ def test_an_error_beyond_round_off_is_silently_wrong(case, truth, quantity, by):
     assert found.first(Verdict.SILENTLY_WRONG) == 1
 
 
-def test_another_assembly_is_told_from_a_lack_of_digits(case, truth):
+def test_other_assembly_is_counted_apart(case, truth):
     assert judge(case, truth, Fake(moved(0.1))).elsewhere == 5
 
 
-def test_an_answer_where_there_is_none_is_silently_wrong(case, truth):
+def test_answer_beyond_reach_is_silently_wrong(case, truth):
     beyond = replace(truth, reach=np.array([Reach.BEYOND, *[Reach.REACHED] * 4]))
     found = judge(case, beyond, NATIVE)
     assert (found.counts[Verdict.SILENTLY_WRONG], found.elsewhere) == (1, 1)
@@ -107,7 +107,7 @@ def test_an_answer_where_there_is_none_is_silently_wrong(case, truth):
     )
 
 
-def test_what_the_truth_does_not_know_is_not_judged(case, truth):
+def test_unknown_truth_is_not_judged(case, truth):
     unknown = replace(truth, reach=np.array([*[Reach.REACHED] * 4, Reach.UNKNOWN]))
     assert judge(case, unknown, Fake(moved(0.1))).counts == {
         **dict.fromkeys(Verdict, 0),
@@ -129,7 +129,7 @@ def test_what_the_truth_does_not_know_is_not_judged(case, truth):
         (False, [FailureKind.FREE], {"reasons": ROUNDING, "excused": True}, 0),
     ],
 )
-def test_a_refusal_is_as_right_as_its_reason(case, truth, singular, failures, about, right):
+def test_refusal_is_judged_by_its_reason(case, truth, singular, failures, about, right):
     truth = replace(truth, singular=np.array([singular] * 2 + [False] * 3))
     found = judge(case, truth, Fake(moved(np.nan, samples=slice(0, 2)), failures), **about)
     assert found.counts[Verdict.REFUSED_RIGHTLY] == right
@@ -137,7 +137,7 @@ def test_a_refusal_is_as_right_as_its_reason(case, truth, singular, failures, ab
     assert found.counts[Verdict.RIGHT] == 3
 
 
-def test_errors_are_refusals_and_crashes_are_never_right(case):
+def test_errors_and_crashes_as_refusals(case):
     free = SolveError("a body can turn", FailureKind.FREE)
     reasons = frozenset({FailureKind.FREE})
     assert judge(case, None, Fake(fails=free), reasons=reasons).counts[Verdict.REFUSED_RIGHTLY] == 5

@@ -1,7 +1,5 @@
 """Studies of forces: against runs of single variants, by both ways; masses and loads vary."""
 
-import json
-
 import numpy as np
 import pytest
 from kincheck import adapters
@@ -11,11 +9,12 @@ from kincheck.core.cli.main import main
 from kincheck.core.harness.compare import output_series
 from kincheck.core.harness.execution import here
 from kincheck.core.kinematics import NativeSolver
+from kincheck.core.studies.tolerance.cross_check import Check
 from kincheck.core.studies.tolerance.study import Ready, Study
-from kincheck.core.studies.tolerance.sweep import Check, sweep_designs
+from kincheck.core.studies.tolerance.sweep import sweep_designs
 from kincheck.core.studies.variation.variation_file import read_variation
 
-from .test_vary import HEAD, vary
+from .test_vary import vary, vary_file
 
 COUNT = 4
 SLIDER_CRANK = {
@@ -90,7 +89,7 @@ def test_a_mass_that_may_become_negative_is_refused(tmp_path):
         vary(tmp_path, case, mass={"at": "bodies.slider.mass", "half_width": 2.0 * mass})
 
 
-def test_a_sweep_of_forces_is_reduced_checked_and_differentiated(tmp_path):
+def test_force_study_is_linear_in_mass(tmp_path):
     """A force is linear in a mass: mean, extremes and gradient follow from two runs."""
     case = load("planar_slider_crank")
     mass = {"mass": {"at": "bodies.slider.mass", "half_width": 0.1}}
@@ -115,17 +114,13 @@ def test_a_sweep_of_forces_is_reduced_checked_and_differentiated(tmp_path):
     np.testing.assert_allclose(torque.max, ends.max(axis=0), atol=1e-9 * size)
 
 
-def test_the_command_reduces_forces_in_the_units_of_the_file(tmp_path, capsys):
-    path = tmp_path / "vary.json"
+def test_force_study_prints_file_units(tmp_path, capsys):
     hardpoints = {"mass": {"at": "bodies.slider.mass", "half_width": 0.1}}
-    limits = {"crank_torque": {"high": 1e9}}
-    path.write_text(
-        json.dumps({**HEAD, "mode": "monte_carlo", "hardpoints": hardpoints, "limits": limits})
-    )
+    path = vary_file(tmp_path, hardpoints, limits={"crank_torque": {"high": 1e9}})
     case = load("planar_slider_crank")
     (limit,) = read_variation(path, case).limits
     assert limit.high == pytest.approx(1e6)  # N mm in the file
-    assert main(["sweep", "planar_slider_crank", "--vary", str(path), "--samples", "8"]) == 0
+    assert main(f"sweep planar_slider_crank --vary {path} --samples 8".split()) == 0
     output = capsys.readouterr()
     assert "crank_torque" in output.out
     assert "N mm" in output.out

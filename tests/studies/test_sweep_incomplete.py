@@ -6,27 +6,26 @@ import json
 import math
 import re
 from dataclasses import replace
-from html.parser import HTMLParser
 
 import msgspec
 import numpy as np
 import pytest
 from kincheck.core.case.case import Case, Output, Sweep, Truth
-from kincheck.core.case.io.case_writer import case_text
+from kincheck.core.case.io.case_file import case_text
 from kincheck.core.cli.main import main
 from kincheck.core.harness.record import to_json
 from kincheck.core.joints import Distance, Revolute
-from kincheck.core.mechanism.drivers import JointAngle
 from kincheck.core.mechanism.mechanism import Body, Mechanism, Point
-from kincheck.core.studies.tolerance.chunk import RowLimit, limit_counts
-from kincheck.core.studies.tolerance.csv_tables import limits_csv
+from kincheck.core.mechanism.motions import JointAngle
 from kincheck.core.studies.tolerance.page import page
+from kincheck.core.studies.tolerance.study import RowLimit, limit_counts
 from kincheck.core.studies.tolerance.sweep import sweep_designs
-from kincheck.core.studies.tolerance.tables import print_sweep
-from kincheck.core.studies.variation.limits import Limit
-from kincheck.core.studies.variation.modes import Incomplete
+from kincheck.core.studies.tolerance.tables import limits_csv, print_sweep
+from kincheck.core.studies.variation.study_choices import Incomplete
+from kincheck.core.studies.variation.variation import Limit
 from scipy.stats import beta
 
+from ..report.page import Page
 from .test_vary import HEAD, vary
 
 CRANK, PIVOT, END, LOW = 1.0, 4.0, (3.0, 2.0, 0.0), 0.7
@@ -136,35 +135,14 @@ def test_samples_without_a_nominal_value_are_not_judged():
     assert limit_counts(values, reached, unknown, [RowLimit(0, -1.0, 1.0)])[0, 1] == 2
 
 
-class _Cells(HTMLParser):
-    """The cells of the rows of a page's tables, by the first cell."""
-
-    def __init__(self):
-        super().__init__()
-        self.rows, self.row, self.inside = [], [], False
-
-    def handle_starttag(self, tag, attrs):
-        if tag == "tr":
-            self.row = []
-        self.inside = tag in ("td", "th") or (self.inside and tag == "span")
-        if tag in ("td", "th"):
-            self.row.append("")
-
-    def handle_endtag(self, tag):
-        if tag == "tr":
-            self.rows.append(self.row)
-        self.inside = self.inside and tag == "span"
-
-    def handle_data(self, data):
-        if self.inside:
-            self.row[-1] += data.strip()
-
-
 def on_page(results):
     """The cells of the table of limits, heads first."""
-    cells = _Cells()
-    cells.feed(page(results).split('id="limits"')[1].split("</section>")[0])
-    return [row[:-1] for row in cells.rows]  # without the place of the least Cpk
+    (rows,) = (
+        rows for above, rows in Page(page(results)).tables if above == "Specification limits"
+    )
+    return [
+        [cell.strip() for cell in row[:-1]] for row in rows
+    ]  # without the place of the least Cpk
 
 
 def on_terminal(results):
@@ -245,7 +223,7 @@ def test_command_states_how_incomplete_variants_count(tmp_path, capsys, option, 
     file.write_text(case_text(four_bar()))
     tables = {**HEAD, "mode": "monte_carlo", "hardpoints": {"end": JOINT}}
     points.write_text(json.dumps(tables | {"limits": {"height": {"low": 1000.0 * LOW}}}))
-    command = ["sweep", str(file), "--vary", str(points), "--samples", "40", "--json", str(out)]
+    command = f"sweep {file} --vary {points} --samples 40 --json {out}".split()
     assert main([*command, *option]) == 1
     found = json.loads(out.read_text())
     limit = found["limits"][0]

@@ -2,23 +2,23 @@
 forms.
 """
 
-import warnings
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-import pytest
 from kincheck.cases import load
 from kincheck.core import solve
-from kincheck.core.caches import clear_caches
 from kincheck.core.case.case import Output
 from kincheck.core.case.measures import Component, JointAngle, Orientation
 from kincheck.core.case.quantity import with_markers
-from kincheck.core.studies.tolerance import streaming_totals as room
-from kincheck.core.studies.tolerance.gradients import gradients
-from kincheck.core.studies.tolerance.reduce import QUANTILES, merged, nothing, quantiles
-from kincheck.core.studies.tolerance.streaming_totals import Totals
-from kincheck.core.studies.tolerance.study import Ready, Study
+from kincheck.core.studies.tolerance.statistics import (
+    QUANTILES,
+    merged,
+    nothing,
+    quantiles,
+    summary_of,
+)
+from kincheck.core.studies.tolerance.study import Ready, Study, gradients
 
 from ..support.fakes import crank
 from .test_vary import vary
@@ -39,9 +39,7 @@ def test_summaries_of_parts_are_the_summary_of_all():
     for cuts in ([0, 100], [0, 1, 40, 70, 71, 100], [0, 55, 100]):
         whole = nothing(2, 3)
         for a, b in pairwise(cuts):
-            totals = Totals(2, 3)
-            totals.take(values[:, :, a:b], a)
-            whole = merged(whole, totals.summary())
+            whole = merged(whole, summary_of(values[:, :, a:b], a))
         np.testing.assert_array_equal(whole.count, (~np.isnan(values)).sum(axis=2))
         some = whole.count > 0
         with np.errstate(all="ignore"):
@@ -61,43 +59,6 @@ def test_summaries_of_parts_are_the_summary_of_all():
             assert np.nanmin(values[q]) in values[q, :, low]
             assert np.nanmax(values[q]) in values[q, :, high]
     assert nothing(1, 2).extremes.tolist() == [[-1, -1]]
-
-
-@pytest.mark.parametrize("compiled", [True, False])
-def test_totals_leave_out_what_is_no_number(compiled, monkeypatch):
-    """Missing at first in a lane, everywhere, or infinite; a number of variants that no vector
-    holds; as numpy finds them.
-    """
-    monkeypatch.setattr(room, "available", lambda: compiled)
-    clear_caches()
-    random = np.random.default_rng(3)
-    values = -3e3 + random.normal(size=(2, 5, 3000))
-    values[0, 0, :700], values[0, 1], values[1, 2, ::3], values[1, 3, 5] = (
-        np.nan,
-        np.nan,
-        np.inf,
-        -np.inf,
-    )
-    totals = Totals(2, 5)
-    for a, b in pairwise([0, 1, 8, 71, 1500, 3000]):
-        totals.take(values[:, :, a:b], 1000 + a)
-    found, known = totals.summary(), np.where(np.isfinite(values), values, np.nan)
-    np.testing.assert_array_equal(found.count, (~np.isnan(known)).sum(axis=2))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of the sample without any
-        np.testing.assert_array_equal(found.least, np.nanmin(known, axis=2))
-        np.testing.assert_array_equal(found.most, np.nanmax(known, axis=2))
-        np.testing.assert_allclose(found.mean, np.nanmean(known, axis=2), rtol=1e-14)
-        np.testing.assert_allclose(found.deviation, np.nanstd(known, axis=2, ddof=1), rtol=1e-11)
-    for q in range(2):
-        assert (
-            found.extremes[q, 0]
-            == 1000 + np.unravel_index(np.nanargmin(known[q]), known[q].shape)[1]
-        )
-        assert (
-            found.extremes[q, 1]
-            == 1000 + np.unravel_index(np.nanargmax(known[q]), known[q].shape)[1]
-        )
 
 
 def test_quantiles_and_their_standard_errors():
@@ -152,7 +113,7 @@ def test_gradients_are_the_closed_form(tmp_path):
     assert (found.error < 1e-7).all()
 
 
-def test_variants_of_a_coarse_sweep_count_the_turns_of_the_nominal_one(tmp_path):
+def test_coarse_sweep_variants_count_nominal_turns(tmp_path):
     """At the samples and at design, where gradients are read too."""
     output = JointAngle("turned", 1e-9, 0.0, "test", "pivot")
     attitude = Orientation("e0", 1e-9, 0.0, "test", "arm", Component.E0)
@@ -174,7 +135,7 @@ def test_variants_of_a_coarse_sweep_count_the_turns_of_the_nominal_one(tmp_path)
 
 
 def test_gradients_that_are_rough_say_so(tmp_path, monkeypatch):
-    from kincheck.core.studies.tolerance import gradients as room
+    from kincheck.core.studies.tolerance import study as room
 
     monkeypatch.setattr(room, "STEP", 0.2)
     case = load("mcpherson_strut")

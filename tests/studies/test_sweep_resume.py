@@ -13,7 +13,7 @@ from kincheck.core.studies.tolerance.sweep import sweep_designs
 
 from ..support.fakes import crank
 from .test_sweep_study import TIP
-from .test_vary import HEAD, vary
+from .test_vary import vary, vary_file
 
 POINTS = {"ball": {"at": "ball", "sigma": 1.0}}
 VARIANTS, CHUNK = 256, 64
@@ -22,20 +22,8 @@ CHECK = ("--check", "native:0.01")
 
 @pytest.fixture(scope="module")
 def arguments(tmp_path_factory):
-    file = tmp_path_factory.mktemp("study") / "hardpoints.json"
-    file.write_text(json.dumps({**HEAD, "mode": "monte_carlo", "hardpoints": POINTS}))
-    return [
-        "sweep",
-        "mcpherson_strut",
-        "--vary",
-        str(file),
-        "--samples",
-        str(VARIANTS),
-        "--seed",
-        "3",
-        "--jobs",
-        "1",
-    ]
+    file = vary_file(tmp_path_factory.mktemp("study"), POINTS)
+    return f"sweep mcpherson_strut --vary {file} --samples {VARIANTS} --seed 3 --jobs 1".split()
 
 
 @pytest.fixture(scope="module")
@@ -90,9 +78,7 @@ def numbers(folder):
 
 
 @pytest.mark.parametrize("chunks", [1, 3])
-def test_a_sweep_that_is_taken_up_has_the_same_bits(
-    arguments, whole, tmp_path, capsys, stop, chunks
-):
+def test_resumed_sweep_has_the_same_bits(arguments, whole, tmp_path, capsys, stop, chunks):
     (_, whole), out = whole, tmp_path / "out"
     stop(chunks)
     assert main([*arguments, "--out", str(out), *CHECK]) == 130
@@ -118,7 +104,7 @@ def test_a_sweep_that_is_taken_up_has_the_same_bits(
     assert not (out / "sweep.part").exists()
 
 
-def test_the_part_is_that_of_the_first_variants(tmp_path, stop):
+def test_stopped_sweep_reduces_first_variants(tmp_path, stop):
     """What is known of a part is equal to what a sweep of as many variants in as many chunks has
     reduced.
     """
@@ -139,7 +125,7 @@ def test_the_part_is_that_of_the_first_variants(tmp_path, stop):
     assert found.gradients == whole.gradients
 
 
-def test_stored_values_of_a_part_say_so_and_are_whole_after(arguments, tmp_path, stop):
+def test_stored_values_are_marked_partial(arguments, tmp_path, stop):
     parquet = pytest.importorskip("pyarrow.parquet")
     out, stored, whole = (tmp_path / name for name in ("out", "part.parquet", "whole.parquet"))
     assert main([*arguments, "--store", str(whole)]) == 0
@@ -159,9 +145,7 @@ def test_stored_values_of_a_part_say_so_and_are_whole_after(arguments, tmp_path,
 @pytest.mark.parametrize(
     "change", [["--seed", "4"], ["--samples", "700"], ["--order", "1"], ["--tol", "1e-11"]]
 )
-def test_the_part_of_another_sweep_is_not_gone_on_with_and_stays(
-    arguments, stopped, tmp_path, capsys, change
-):
+def test_resume_refuses_part_of_another_sweep(arguments, stopped, tmp_path, capsys, change):
     out = tmp_path / "out"
     shutil.copytree(stopped, out)
     kept = (out / "sweep.part").read_bytes()
@@ -171,9 +155,7 @@ def test_the_part_of_another_sweep_is_not_gone_on_with_and_stays(
 
 
 @pytest.mark.parametrize("lost", [1, 40, 20_000])
-def test_a_part_that_was_cut_off_or_damaged_is_used_as_far_as_it_is_whole(
-    arguments, whole, stopped, tmp_path, lost
-):
+def test_resume_uses_undamaged_chunks(arguments, whole, stopped, tmp_path, lost):
     (whole, _), out = whole, tmp_path / "out"
     shutil.copytree(stopped, out)
     part = out / "sweep.part"
@@ -187,19 +169,19 @@ def test_a_part_that_was_cut_off_or_damaged_is_used_as_far_as_it_is_whole(
     assert numbers(out) == numbers(whole)
 
 
-def test_resume_begins_anew_where_there_is_no_part(arguments, tmp_path, capsys):
+def test_resume_without_part_starts_over(arguments, tmp_path, capsys):
     assert main([*arguments, "--out", str(tmp_path / "out"), "--resume"]) == 0
     assert main([*arguments, "--resume"]) == 2
     assert "--resume continues from a folder of results: give --out DIR" in capsys.readouterr().err
 
 
-def test_an_interrupt_before_the_first_chunk_is_one_line(arguments, tmp_path, capsys, stop):
+def test_interrupt_before_first_chunk(arguments, tmp_path, capsys, stop):
     stop(0)
     assert main([*arguments, "--out", str(tmp_path / "out")]) == 130
     assert capsys.readouterr().err == "kincheck: interrupted\n"
 
 
-def test_a_part_that_cannot_be_written_costs_no_result(arguments, tmp_path, capsys):
+def test_unwritable_part_costs_no_result(arguments, tmp_path, capsys):
     out = tmp_path / "out"
     (out / "sweep.part").mkdir(parents=True)
     assert main([*arguments, "--out", str(out)]) == 2

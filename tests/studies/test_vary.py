@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from kincheck.cases import load
 from kincheck.core import CaseError
-from kincheck.core.studies.variation.distributions import Law
-from kincheck.core.studies.variation.sampling import DRAWN
+from kincheck.core.studies.variation.variation import Law
 from kincheck.core.studies.variation.variation_file import read_variation
 
 from ..support.fakes import crank
@@ -17,13 +16,16 @@ from ..support.fakes import crank
 HEAD = {"schema": "kincheck-vary/1", "units": {"length": "mm", "angle": "deg"}}
 
 
+def vary_file(folder, hardpoints, mode="monte_carlo", **tables):
+    """A file of these hardpoints, in millimetres and degrees."""
+    path = folder / "vary.json"
+    path.write_text(json.dumps({**HEAD, "mode": mode, "hardpoints": hardpoints, **tables}))
+    return path
+
+
 def vary(tmp_path, case, mode="monte_carlo", lines=None, **hardpoints):
     """The variation that a file of these hardpoints gives."""
-    path = tmp_path / "vary.json"
-    path.write_text(
-        json.dumps({**HEAD, "mode": mode, "hardpoints": hardpoints, "lines": lines or {}})
-    )
-    return read_variation(path, case)
+    return read_variation(vary_file(tmp_path, hardpoints, mode, lines=lines or {}), case)
 
 
 def moved(variation, **offsets):
@@ -40,7 +42,7 @@ def moved(variation, **offsets):
     }
 
 
-def test_what_is_at_the_same_point_moves_together_unless_it_is_not_to(tmp_path):
+def test_coincident_places_move_together(tmp_path):
     case = load("mcpherson_suspension")
     together = moved(vary(tmp_path, case, ball={"at": "ball", "sigma": [1, 0, 2]}), ball__x=0.25)
     assert set(together) == {"joints.ball.point", "points.lower_ball.position"}
@@ -119,29 +121,6 @@ def test_a_line_follows_the_positions_it_goes_through(tmp_path):
             found["joints.strut_slide.axis"], [-0.01, 0.03, 0.02], atol=1e-12
         )
     assert "joints.strut_slide.axis" not in moved(vary(tmp_path, case, **ends), **offsets)
-
-
-def test_a_variant_is_known_by_seed_and_index(tmp_path):
-    found = vary(
-        tmp_path,
-        crank(),
-        tip={"at": "tip", "sigma": [1.0, 0, 0]},
-        pivot={"at": "pivot", "half_width": [0, 3.0, 0]},
-    )
-    whole = np.hstack([found.offsets(5, first, DRAWN) for first in range(0, 40 * DRAWN, DRAWN)])
-    for first, count in ((2 * DRAWN, 7), (250, 600), (513, 1)):
-        np.testing.assert_array_equal(
-            found.offsets(5, first, count), whole[:, first : first + count]
-        )
-    for index in (0, 255, 256, 9999):
-        np.testing.assert_array_equal(found.of_variant(5, index), whole[:, index])
-    assert not np.isin(whole, found.offsets(6, 0, DRAWN)).any()
-    assert len(np.unique(whole)) == whole.size
-    # standard errors of 10240 draws: 0.7 % of a standard deviation, 1 % of a mean; five of them
-    assert whole[0].std() == pytest.approx(1e-3, rel=0.035)
-    assert abs(whole[0].mean()) < 5e-5
-    assert np.abs(whole[1]).max() <= 3e-3
-    assert whole[1].std() == pytest.approx(3e-3 / np.sqrt(3), rel=0.035)
 
 
 def test_a_grid_has_every_combination_once(tmp_path):

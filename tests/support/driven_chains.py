@@ -16,9 +16,14 @@ from kincheck.core.joints import (
     Translational,
 )
 from kincheck.core.mechanism.body import Body
-from kincheck.core.mechanism.drivers import JointAngle, JointDisplacement, PointCoordinate
 from kincheck.core.mechanism.mechanism import GROUND, Mechanism, Point
-from kincheck.core.mechanism.motions import Motion, Path
+from kincheck.core.mechanism.motions import (
+    JointAngle,
+    JointDisplacement,
+    Motion,
+    Path,
+    PointCoordinate,
+)
 
 from ..oracles import free_bodies
 

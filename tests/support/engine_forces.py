@@ -5,13 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from kincheck import adapters
 from kincheck.core.case.case import Case, Sweep, Truth
-from kincheck.core.case.measures.force import (
-    Axis,
-    DriverEffort,
-    ElementForce,
-    JointForce,
-    JointMoment,
-)
+from kincheck.core.case.measures import Axis, DriverEffort, ElementForce, JointForce, JointMoment
 from kincheck.core.case.quantity import with_markers
 from kincheck.core.mechanism.loads import Force, SpringDamper, Torque, TorsionSpringDamper
 

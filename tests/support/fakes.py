@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from kincheck.core.case.case import Case, Output, Series, Sweep, Truth
 from kincheck.core.joints import Revolute
-from kincheck.core.mechanism.drivers import JointAngle
 from kincheck.core.mechanism.mechanism import Body, Mechanism, Point
+from kincheck.core.mechanism.motions import JointAngle
 from kincheck.core.trajectory import PointMotion, Trajectory
 
 RADIUS = 0.5

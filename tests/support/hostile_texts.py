@@ -7,7 +7,7 @@ from io import BytesIO
 
 from kincheck.core.case.io import case_file
 from kincheck.core.case.models.hardpoints.read import MOST_POINTS
-from kincheck.core.case.models.mjcf.tree import MOST_BODIES, MOST_MOVING
+from kincheck.core.case.models.trees.tree import MOST_LINKS, MOST_MOVING
 
 from ..fuzz.reference import PROVED
 from .case_texts import BASE, BY_FILE, edited
@@ -94,7 +94,7 @@ TEXTS: dict[str, tuple[str, str | bytes, str]] = {
     "fixed bodies of a model": (
         "a.xml",
         model(filled("<body/>")),
-        f"more than the {MOST_BODIES} that are read",
+        f"more than the {MOST_LINKS} that are read",
     ),
     "as many joints as are read": (
         "a.xml",

@@ -2,9 +2,9 @@
 
 from kincheck.core.joints import Distance, Revolute, Translational
 from kincheck.core.mechanism.body import Body
-from kincheck.core.mechanism.drivers import JointAngle, PointCoordinate
 from kincheck.core.mechanism.loads import Force, SpringDamper, Torque, TorsionSpringDamper
 from kincheck.core.mechanism.mechanism import Mechanism, Point
+from kincheck.core.mechanism.motions import JointAngle, PointCoordinate
 
 INERTIA = (0.5, 0.75, 1.0, 0.0625, -0.03125, 0.125)
 GRAVITY = (0.5, 0.0, -9.75)

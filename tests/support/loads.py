@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 from kincheck.core.kinematics import Method, NativeSolver, Style, with_forces
-from kincheck.core.mechanism.drivers import JointAngle, PointCoordinate
+from kincheck.core.mechanism.motions import JointAngle, PointCoordinate
 
 from ..oracles import naive, newton_euler
 

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 from kincheck.core.case.case import Case, Sweep, Truth
 from kincheck.core.joints import Cylindrical, Fixed, Revolute
-from kincheck.core.mechanism.drivers import JointAngle as AngleDriver
-from kincheck.core.mechanism.drivers import JointDisplacement as DisplacementDriver
 from kincheck.core.mechanism.mechanism import Body, Mechanism, Point
+from kincheck.core.mechanism.motions import JointAngle as AngleDriver
+from kincheck.core.mechanism.motions import JointDisplacement as DisplacementDriver
 from kincheck.core.mechanism.motions import Ramp
 
 AXIS = (1.0, 2.0, 2.0)

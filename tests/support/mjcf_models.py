@@ -3,10 +3,7 @@
 import numpy as np
 import pytest
 from kincheck.core.algebra import Quat, X, Y, Z, vec
-from kincheck.core.case.models.mjcf.classes import read_classes
-from kincheck.core.case.models.mjcf.elements import parse_xml
-from kincheck.core.case.models.mjcf.frames import read_compiler
-from kincheck.core.case.models.mjcf.tree import read_tree
+from kincheck.core.case.models.files import read_tree
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -34,8 +31,7 @@ def agree(file):
     """Compare what the tree holds at qpos0 with MuJoCo: places and turns of bodies, points and axes
     of joints, sites.
     """
-    root = parse_xml(file, file.read_text())
-    tree = read_tree(root, read_classes(root), read_compiler(root))
+    tree = read_tree(file)
     loaded = mujoco.MjModel.from_xml_path(str(file))
     data = mujoco.MjData(loaded)
     mujoco.mj_kinematics(loaded, data)
@@ -47,10 +43,10 @@ def agree(file):
     for name, joint in tree.joints.items():
         there = data.joint(name)
         assert np.allclose([*joint.point], there.xanchor, rtol=0, atol=EXACT), name
-        if joint.type != "ball":
+        if joint.kind != "ball":
             assert np.allclose([*joint.axis], there.xaxis, rtol=0, atol=EXACT), name
             assert np.isclose(
-                joint.ref, loaded.qpos0[loaded.joint(name).qposadr[0]], rtol=0, atol=EXACT
+                joint.reference, loaded.qpos0[loaded.joint(name).qposadr[0]], rtol=0, atol=EXACT
             ), name
     for name, (_, place) in tree.sites.items():
         assert np.allclose([*place.at], data.site(name).xpos, rtol=0, atol=EXACT), name

@@ -8,9 +8,9 @@ import random
 import msgspec
 from kincheck.core.harness.record import Seconds
 from kincheck.core.harness.run import run
-from kincheck.core.history.regression.run_selection import find, find_against
+from kincheck.core.history.comparison import regressions
+from kincheck.core.history.run_selection import find, find_against
 from kincheck.core.history.store import Store
-from kincheck.core.report.regression_report import regressions
 
 from .fakes import Fake, crank, off
 

@@ -3,7 +3,7 @@
 import numpy as np
 from kincheck.adapters.native import Native
 from kincheck.core.case.case import Case, Sweep, Truth
-from kincheck.core.case.io.suspension import with_slopes
+from kincheck.core.case.io.outputs import with_slopes
 from kincheck.core.case.quantity import with_markers
 from kincheck.core.case.suspension import (
     Convention,
@@ -13,8 +13,8 @@ from kincheck.core.case.suspension import (
 )
 from kincheck.core.harness.compare import output_series
 from kincheck.core.joints import Revolute
-from kincheck.core.mechanism.drivers import JointAngle
 from kincheck.core.mechanism.mechanism import Body, Mechanism, Point
+from kincheck.core.mechanism.motions import JointAngle
 
 TOL = 1e-12
 ROUND_OFF = 1e-14

@@ -4,8 +4,7 @@ from pathlib import Path
 
 import numpy as np
 from kincheck.core.case.case import Case
-from kincheck.core.case.io.case_file import load_case
-from kincheck.core.case.io.case_writer import case_text
+from kincheck.core.case.io.case_file import case_text, load_case
 
 # The grid is computed once in the model's coordinates, and once from the design.
 GRID = 4.0 * np.finfo(float).eps

@@ -1,38 +1,30 @@
-"""Case files, schema kincheck-case/1: TOML, or JSON with the same keys, to a `Case`."""
+"""Case files, schema kincheck-case/1: TOML, or JSON with the same keys, to a `Case`; and a `Case`
+to TOML, in SI units, with all digits of every number.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import fields, replace
 from pathlib import Path
 
 from ...errors import MechanismError, unknown
-from ...joints import Kind
-from ...mechanism.dimension import ACCELERATION
-from ...mechanism.mechanism import Body, Mechanism, Point
 from ..case import Case, Truth, size
 from ..quantity import with_markers
-from ..units import ANGLES, LENGTHS, Unit
+from ..units import ANGLES, LENGTHS, FileUnits
 from .compliance import read_resting, read_rig
-from .coordinates import with_all_coordinates
-from .document import explained, fault, join, shown
-from .driving import read_drivers, read_sweep
-from .in_si import geometry_in_si, load_in_si
-from .joints import read_joints
-from .loads import inertia_in_si, read_bushings, read_forces
-from .outputs import read_outputs
-from .reference import read_reference
-from .reference_columns import Convert
-from .reference_samples import ReferenceKeys
-from .schema import (
-    SCHEMA,
-    BodyKeys,
-    CaseKeys,
-    ClosureKeys,
-    PointKeys,
-    UnitsKeys,
+from .document import LONGEST_TEXT, Section, explained, read_tables, shown, toml_table
+from .mechanism_sections import (
+    mechanism_lines,
+    read_mechanism,
+    read_sweep,
+    sweep_lines,
+    values_in_file,
 )
-from .typed_tables import as_table, read_tables, typed
+from .outputs import output_lines, read_outputs, with_all_coordinates, with_slopes
+from .reference import read_reference, reason_against, reference_lines
+from .schema import SCHEMA, CaseKeys, ClosureKeys, ReferenceKeys, UnitsKeys
+from .suspension_section import read_suspension, suspension_lines
 
 LARGEST_FILE = 4_000_000
 # Twice the bodies of the largest measured mechanism; the same limit for joints and points.
@@ -54,65 +46,51 @@ def load_case(path: str | Path, closure: float | None = None) -> Case:
     """
     file = Path(path)
     advice = "a case holds hardpoints; samples belong into a reference file"
-    keys = typed(file, "", read_tables(file, LARGEST_FILE, advice, SCHEMA), CaseKeys)
+    root = Section(file, "", read_tables(file, LARGEST_FILE, advice, SCHEMA))
+    keys = root.typed(CaseKeys)
     for what in _PARTS:
         if (count := len(getattr(keys, what))) > MOST_PARTS:
-            raise fault(
-                file,
-                what,
+            raise root.at(what).fault(
                 f"found {count}, expected {MOST_PARTS} at most; divide the mechanism into several"
-                " cases",
+                " cases"
             )
-    units = typed(file, "units", keys.units, UnitsKeys)
-    length, angle = LENGTHS[units.length], ANGLES[units.angle]
-    mechanism = _mechanism(file, keys, length, angle)
+    written = Section(file, "units", keys.units).typed(UnitsKeys)
+    units = FileUnits(LENGTHS[written.length], ANGLES[written.angle])
+    mechanism = read_mechanism(root, keys, units)
     columns = None
     if keys.reference is not None:
-        columns = typed(file, "reference", keys.reference, ReferenceKeys)
-    sweep, driver_unit, own_grid = read_sweep(file, keys, mechanism, length, angle, columns)
-    by_unit: dict[str, Convert] = {"m": length, "rad": angle, "1": float, "N": float, "N m": length}
-    case = Case(keys.name, keys.source, Truth.CONSENSUS_ONLY, mechanism, sweep, ())
+        columns = root.at("reference").typed(ReferenceKeys)
+    sweep, driver, own_grid = read_sweep(root, mechanism, units, columns)
+    case = Case(
+        *(keys.name, keys.source, Truth.CONSENSUS_ONLY, mechanism, sweep, ()),
+        length_unit=units.length.name,
+        angle_unit=units.angle.name,
+    )
     if keys.equilibrium is not None:
         from .resting import at_rest  # it takes the solver, and few cases need it
 
-        resting = read_resting(file, keys.equilibrium, mechanism)
-        with explained(file, "equilibrium", length):
+        resting = read_resting(root.at("equilibrium"), mechanism)
+        with explained(file, "equilibrium", units.length):
             case = at_rest(case, resting)
-    case = _with_outputs(
-        file, keys, replace(case, length_unit=length.name, angle_unit=angle.name), length, by_unit
-    )
+    case = _with_outputs(root, case, units)
     if keys.compliance is not None:
-        case = replace(case, rig=read_rig(file, keys.compliance, case.mechanism, length))
-    with explained(file, "closure", length):
-        case = _within_digits(case, typed(file, "closure", keys.closure, ClosureKeys), closure)
+        rig = read_rig(root.at("compliance"), case.mechanism, units)
+        case = replace(case, rig=rig)
+    with explained(file, "closure", units.length):
+        closing = Section(file, "closure", keys.closure).typed(ClosureKeys)
+        case = _within_digits(case, closing, closure)
     if columns is None:
         return case
     if keys.truth in (None, Truth.CONSENSUS_ONLY):
         found = "nothing" if keys.truth is None else shown(str(keys.truth))
         kinds = ", ".join(kind for kind in Truth if kind is not Truth.CONSENSUS_ONLY)
-        raise fault(
-            file,
-            "truth",
+        raise root.at("truth").fault(
             f"found {found} beside a [reference], expected where that comes from; give one of"
-            f" {kinds}",
+            f" {kinds}"
         )
-    convention = (
-        ""
-        if keys.suspension is None
-        else str(as_table(file, "suspension", keys.suspension)["convention"])
-    )
-    series, origin = read_reference(
-        file,
-        columns,
-        driver_unit,
-        by_unit,
-        sweep.values,
-        case.outputs,
-        convention,
-        keys.truth,
-        own_grid=own_grid,
-    )
-    return replace(case, truth=keys.truth, reference=series, origin=origin)
+    convention = str(root.at("suspension").at("convention").value or "")
+    case = replace(case, truth=keys.truth)
+    return read_reference(file, columns, driver, units, case, convention, own_grid=own_grid)
 
 
 def _within_digits(case: Case, keys: ClosureKeys, closure: float | None) -> Case:
@@ -131,68 +109,69 @@ def _within_digits(case: Case, keys: ClosureKeys, closure: float | None) -> Case
     return within_digits(case, closure, why, keys.carrying)
 
 
-def _mechanism(file: Path, keys: CaseKeys, length: Unit, angle: Unit) -> Mechanism:
-    bodies: list[Body] = []
-    for name, value in keys.bodies.items():
-        body = typed(file, key := join("bodies", name), value, BodyKeys)
-        with explained(file, key):
-            bodies.append(
-                Body(
-                    name,
-                    geometry_in_si(Kind.POSITION, body.origin, length),
-                    body.euler_parameters,
-                    body.fixed,
-                    body.mass,
-                    geometry_in_si(Kind.POSITION, body.center_of_mass, length),
-                    inertia_in_si(name, body.inertia, length),
-                )
-            )
-    points: list[Point] = []
-    for name, value in keys.points.items():
-        point = typed(file, join("points", name), value, PointKeys)
-        points.append(
-            Point(name, point.body, geometry_in_si(Kind.POSITION, point.position, length))
-        )
-    joints, couplers = read_joints(file, keys, length, angle)
-    drivers = read_drivers(file, keys.drivers)
-    forces = read_forces(file, keys.forces, length, angle)
-    bushings = read_bushings(file, keys.joints, joints, length, angle)
-    gravity = load_in_si(ACCELERATION, keys.gravity, length, angle)
-    with explained(file, "", length):
-        return Mechanism(
-            *(keys.name, bodies, joints, points, drivers, couplers),
-            gravity=gravity,
-            forces=forces,
-            bushings=bushings,
-        )
-
-
-def _with_outputs(
-    file: Path, keys: CaseKeys, case: Case, length: Unit, units: Mapping[str, Convert]
-) -> Case:
+def _with_outputs(root: Section, case: Case, units: FileUnits) -> Case:
     """Return the case with its outputs and the additional points they need."""
-    mechanism = case.mechanism
-    if not (keys.points or keys.outputs):
-        raise fault(
-            file,
-            "points",
+    if not (root.at("points").value or root.at("outputs").value):
+        raise root.at("points").fault(
             "found no point, expected one whose motion is compared; add [points.NAME], or an output"
-            " of a joint or body, [outputs.NAME]",
+            " of a joint or body, [outputs.NAME]"
         )
-    if keys.suspension is None:
-        outputs = read_outputs(file, keys, None, case, units)
-        if not outputs:
-            return with_all_coordinates(case)
-        return replace(case, mechanism=with_markers(mechanism, outputs), outputs=outputs)
-    from . import suspension  # it has many classes, and few cases have a wheel
-    from .suspension_table import read_suspension
+    table = None
+    if root.at("suspension").value is not None:
+        table = read_suspension(root.at("suspension"), case, units)
+        wheels = tuple(each for each in (table.vehicle, table.other) if each)
+        case = replace(case, wheels=wheels)
+    outputs = read_outputs(root, table, case, units)
+    if not outputs:
+        outputs = with_all_coordinates(case).outputs
+    case = replace(case, mechanism=with_markers(case.mechanism, outputs), outputs=outputs)
+    slopes = table is not None and table.per_travel
+    return replace(case, outputs=with_slopes(outputs, size(case))) if slopes else case
 
-    table = read_suspension(file, keys.suspension, case, length, units["rad"])
-    case = replace(case, wheels=tuple(each for each in (table.vehicle, table.other) if each))
-    outputs = read_outputs(file, keys, table, case, units) or with_all_coordinates(case).outputs
-    case = replace(case, mechanism=with_markers(mechanism, outputs), outputs=outputs)
-    return (
-        replace(case, outputs=suspension.with_slopes(outputs, size(case)))
-        if table.per_travel
-        else case
-    )
+
+def case_text(case: Case, comments: Sequence[str] = ()) -> str:
+    """Return the text of a case file. It reads as the same case; samples agree to the last digit.
+
+    The text gives the values of a joint's driver relative to the design, also if the case does not.
+    If rows cannot hold the reference, the text omits it, and a comment gives the reason.
+
+    Args:
+        comments: comment lines at the top.
+
+    Raises:
+        CaseError: no case file can express the case: samples on no even grid, outputs of several
+            axles, or names and texts beyond their limits.
+    """
+    values = values_in_file(case)
+    reference = reference_lines(case, values)
+    lines = [f"# {line}" for line in comments]
+    if case.reference and not reference:
+        lines += [f"# The reference is left out, because {reason_against(case)}."]
+    source = case.source
+    if len(source) > LONGEST_TEXT:
+        source = f"{source[: LONGEST_TEXT - 6]} [...]"
+    top = {"schema": SCHEMA, "name": case.name, "source": source}
+    top |= {"truth": str(case.truth)} if reference else {}
+    lines += toml_table(top)
+    if any(case.mechanism.gravity):
+        lines += toml_table({"gravity": case.mechanism.gravity})
+    lines += mechanism_lines(case)
+    lines += sweep_lines(case, values, own_grid=bool(reference))
+    lines += _closure_lines(case)
+    if case.rig is not None:
+        given = {f.name: getattr(case.rig, f.name) for f in fields(case.rig)}
+        given = {key: value for key, value in given.items() if value is not None}
+        lines += toml_table(given, "compliance")
+    lines += suspension_lines(case)
+    lines += output_lines(case)
+    return "\n".join([*lines, *reference]) + "\n"
+
+
+def _closure_lines(case: Case) -> list[str]:
+    """Return the lines of [closure]. Joints are written as given, and reduced again on reading."""
+    closure, notes = case.closure, case.assembly
+    if closure is None:
+        return toml_table({"notes": notes}, "closure") if notes else []
+    notes = tuple(note for note in notes if note != closure.note)
+    keys = {"tolerance": closure.tolerance, "carrying": closure.carrying, "notes": notes}
+    return toml_table({key: value for key, value in keys.items() if value}, "closure")

@@ -1,23 +1,42 @@
-"""Catalogue of the types in case files: their keys, and the rows and freedoms of joints."""
+"""Catalogue of the types in case files: their keys, and the rows and freedoms of joints; and the
+JSON Schema of case files, made from the types of their readers.
+"""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, cast
+
+import msgspec
 
 from ...errors import MechanismError
 from ...joints import Coupler, Joint, Kind
-from ...mechanism.dimension import dimension_of
+from ...mechanism.body import dimension_of
 from ...mechanism.loads import ELEMENTS, Bushing, SpringDamper
 from ...mechanism.motions import Motion
-from .. import measures
-from ..measures import Measure
+from ..measures import Measure, key_of
 from ..quantity import own_keys
 from ..suspension import SuspensionOutput
-from .class_keys import Described, kind_of, own_fields
-from .driving import DRIVERS
+from .compliance import RestingKeys, RigKeys
+from .mechanism_sections import DRIVERS
+from .schema import (
+    COORDINATE,
+    SCHEMA,
+    BodyKeys,
+    CaseKeys,
+    ClosureKeys,
+    Described,
+    OutputKeys,
+    PointKeys,
+    ReferenceKeys,
+    SuspensionKeys,
+    SweepKeys,
+    UnitsKeys,
+    keys_of,
+    own_fields,
+)
 
 # Geometry for any joint. A universal joint needs two perpendicular directions; these are, up to the
 # rounding of a table. A constant-velocity joint needs shafts in the same sense.
@@ -96,17 +115,18 @@ def output_tables() -> dict[str, Rows]:
     """Return the output types by heading: name, keys and meaning; of a wheel: name, unit, keys,
     sign and needs.
     """
+
+    def keys(cls: type[Measure | SuspensionOutput]) -> str:
+        named = ((key_of(each), each.default) for each in own_keys(cls))
+        return ", ".join(key if default is MISSING else f"({key})" for key, default in named)
+
     rows: Rows = []
     for name, cls in sorted(SuspensionOutput.registry.items()):
-        keys = [
-            each.name if each.default is MISSING else f"({each.name})" for each in own_keys(cls)
-        ]
         needs = f"needs {', '.join(cls.needs)}" if cls.needs else ""
-        rows.append((name, f"[{cls.measure}]", ", ".join(keys), f"positive: {cls.positive}", needs))
+        rows.append((name, f"[{cls.measure}]", keys(cls), f"positive: {cls.positive}", needs))
     return {
         "outputs: (type) = coordinate, point, component or direction, (relative); or a type, and": [
-            (name, ", ".join(_measure_keys(cls)), _meaning(cls))
-            for name, cls in sorted(Measure.registry.items())
+            (name, keys(cls), _meaning(cls)) for name, cls in sorted(Measure.registry.items())
         ],
         "outputs of a wheel: type, and": rows,
     }
@@ -116,7 +136,7 @@ def rows_of(cls: type[Joint]) -> int | None:
     """Return the number of constraint equations of a joint type; None if the example geometry does
     not suit it.
     """
-    given = {each.name: _EXAMPLES[kind_of(each)] for each in own_fields(cls)}
+    given = {each.name: _EXAMPLES[each.metadata.get("kind")] for each in own_fields(cls)}
     try:
         return cls("example", "first", "second", **given).rows
     except MechanismError:
@@ -144,12 +164,6 @@ def _keys(cls: type[Described]) -> str:
     return ", ".join(names) or "nothing else"
 
 
-def _measure_keys(cls: type[Measure]) -> Iterator[str]:
-    for each in own_keys(cls):
-        key = measures.key_of(each)
-        yield key if each.default is MISSING else f"({key})"
-
-
 def _meaning(cls: type[Described] | type[Measure]) -> str:
     """Return the first sentence of a class's docstring. For a dataclass without a docstring,
     Python gives the signature.
@@ -161,13 +175,102 @@ def _meaning(cls: type[Described] | type[Measure]) -> str:
 def _printed(tables: Mapping[str, Rows]) -> Iterator[str]:
     for heading, rows in tables.items():
         yield heading
-        yield from _columns(rows)
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        for row in rows:
+            cells = (f"{cell:{width}}" for cell, width in zip(row, widths, strict=True))
+            yield f"  {'  '.join(cells).rstrip()}"
 
 
-def _columns(rows: Rows) -> Iterator[str]:
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    for row in rows:
-        yield (
-            "  "
-            + "  ".join(f"{cell:{width}}" for cell, width in zip(row, widths, strict=True)).rstrip()
-        )
+Keys: TypeAlias = type[msgspec.Struct]
+Tables: TypeAlias = Mapping[str, Keys | Mapping[str, Keys]]
+"""Keys of a table in a table of tables, by the name of the outer table; or keys by `type`."""
+
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+TEMPLATE = "#/$defs/{name}"
+
+
+def case_schema() -> dict[str, Any]:
+    """Return the schema of case files, with all joint types registered so far."""
+    joints: Mapping[str, type[Joint | Coupler]] = {**Joint.registry, **Coupler.registry}
+    measures = {name: keys_of(cls) for name, cls in Measure.registry.items()}
+    outputs = {name: keys_of(cls) for name, cls in SuspensionOutput.registry.items()}
+    tables: Tables = {
+        "bodies": BodyKeys,
+        "joints": {name: keys_of(cls) for name, cls in joints.items()},
+        "couplers": {name: keys_of(cls) for name, cls in Coupler.registry.items()},
+        "points": PointKeys,
+        "drivers": {name: keys_of(cls) for name, cls in DRIVERS.items()},
+        "forces": {name: keys_of(cls) for name, cls in ELEMENTS.items()},
+        "outputs": {COORDINATE: OutputKeys, **measures, **outputs},
+    }
+    single = {
+        "units": UnitsKeys,
+        "closure": ClosureKeys,
+        "sweep": SweepKeys,
+        "suspension": SuspensionKeys,
+        "reference": ReferenceKeys,
+        "compliance": RigKeys,
+        "equilibrium": RestingKeys,
+    }
+    motions = {name: keys_of(cls) for name, cls in Motion.registry.items()}
+    found = document_schema(SCHEMA, CaseKeys, tables, single, {"motion": motions})
+    for name in DRIVERS:
+        keys = found["$defs"][f"drivers.{name}"]["properties"]
+        keys["motion"] = any_of([f"motion.{name}" for name in motions])
+    return found
+
+
+def document_schema(
+    name: str,
+    keys: Keys,
+    tables: Tables,
+    single: Mapping[str, Keys],
+    further: Tables | None = None,
+) -> dict[str, Any]:
+    """Return the schema of a file of tables.
+
+    Args:
+        name: name of the schema, as in the key `schema` of the file.
+        keys: the keys at the top of the file.
+        tables: the keys of each table in a table of tables.
+        single: the keys of a table.
+        further: definitions used by other definitions.
+    """
+    structs = {"": keys, **single}
+    for table, each in {**tables, **(further or {})}.items():
+        kinds = each if isinstance(each, Mapping) else {"": each}
+        structs |= {f"{table}.{kind}".rstrip("."): struct for kind, struct in kinds.items()}
+    definitions = {label: struct_schema(struct) for label, struct in structs.items()}
+    for label, definition in definitions.items():
+        if kind := label.partition(".")[2]:
+            definition["properties"]["type"] = {"const": kind}
+    whole = definitions.pop("")
+    properties = whole["properties"] | {"schema": {"const": name}}
+    for table, each in tables.items():
+        labels = [f"{table}.{kind}" for kind in each] if isinstance(each, Mapping) else [table]
+        properties[table] = {"type": "object", "additionalProperties": any_of(labels)}
+    properties |= {table: any_of([table]) for table in single}
+    return whole | {"$schema": DIALECT, "properties": properties, "$defs": definitions}
+
+
+def any_of(labels: list[str]) -> dict[str, Any]:
+    """Return the schema of a value of any of the definitions."""
+    refs = [{"$ref": TEMPLATE.format(name=label)} for label in labels]
+    return refs[0] if len(refs) == 1 else {"anyOf": refs}
+
+
+def struct_schema(struct: Keys) -> dict[str, Any]:
+    """Return the schema of a struct, with all references replaced by their definitions."""
+    (ref,), parts = msgspec.json.schema_components([struct], ref_template=TEMPLATE)
+
+    def written_out(value: Any) -> Any:
+        if isinstance(value, dict):
+            table = cast("dict[str, Any]", value)
+            if "$ref" in table:
+                return written_out(parts[table["$ref"].rpartition("/")[2]])
+            return {key: written_out(each) for key, each in table.items()}
+        if isinstance(value, list):
+            return [written_out(each) for each in cast("list[Any]", value)]
+        return value
+
+    return written_out(ref)

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated, Any
 
 import msgspec
 from msgspec import Meta
 
-from ...mechanism.dimension import STIFFNESS
+from ...mechanism.body import STIFFNESS
 from ...mechanism.mechanism import Mechanism
 from ..compliance import Load, Resting, Rig
-from ..units import RADIAN, Unit
-from .document import unknown_name
-from .in_si import load_in_si
+from ..units import FileUnits
+from .document import Section
 from .schema import Text
-from .typed_tables import typed
 
 Names = Annotated[tuple[str, ...] | None, Meta(description="a list of names")]
 Loads = Annotated[tuple[Load, ...], Meta(description=f"a list of {', '.join(Load)}")]
@@ -40,26 +37,26 @@ class RestingKeys(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
     held: Annotated[tuple[str, ...], Meta(description="a list of names")] = ()
 
 
-def read_resting(file: Path, value: object, mechanism: Mechanism) -> Resting:
+def read_resting(section: Section, mechanism: Mechanism) -> Resting:
     """Return the table [equilibrium].
 
     Raises:
         CaseError: unknown keys or names.
     """
-    keys, known = typed(file, "equilibrium", value, RestingKeys), mechanism.drivers
+    keys, known = section.typed(RestingKeys), mechanism.drivers
     for name in keys.held:
         if name not in (names := [driver.name for driver in known]):
-            raise unknown_name(file, "equilibrium.held", name, names, "a driver")
+            raise section.at("held").unknown(name, names, "a driver")
     return Resting(keys.held)
 
 
-def read_rig(file: Path, value: object, mechanism: Mechanism, length: Unit) -> Rig:
+def read_rig(section: Section, mechanism: Mechanism, units: FileUnits) -> Rig:
     """Return the rig of a file, in SI.
 
     Raises:
         CaseError: unknown keys or names.
     """
-    keys = typed(file, "compliance", value, RigKeys)
+    keys = section.typed(RigKeys)
     known: dict[str, list[str]] = {
         "wheel": [body.name for body in mechanism.moving],
         "contact": [point.name for point in mechanism.points],
@@ -70,6 +67,6 @@ def read_rig(file: Path, value: object, mechanism: Mechanism, length: Unit) -> R
         given: Any = getattr(keys, key)
         for name in [given] if isinstance(given, str) else given or ():
             if name not in names:
-                raise unknown_name(file, f"compliance.{key}", name, names, what[key])
-    stiffness = load_in_si(STIFFNESS, keys.tire_stiffness, length, RADIAN)
+                raise section.at(key).unknown(name, names, what[key])
+    stiffness = keys.tire_stiffness and units.power(STIFFNESS, keys.tire_stiffness)
     return Rig(keys.wheel, keys.contact, keys.held, keys.loads, stiffness)

@@ -1,7 +1,8 @@
-"""Documents: TOML or JSON text to plain checked data, with one clear CaseError for each fault.
+"""Documents: TOML, JSON or YAML text to plain checked data, and its tables to typed structs, with
+one clear CaseError for each fault.
 
 Nothing is evaluated or imported from a file. Every message states file, key, found, expected and
-remedy.
+remedy. Every scalar of YAML is a text; its references and repeated keys are refused.
 """
 
 from __future__ import annotations
@@ -13,12 +14,16 @@ import re
 import reprlib
 import tomllib
 from collections import Counter
-from collections.abc import Generator, Iterable, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
-from typing import Any, TypeAlias, cast
+from typing import Annotated, Any, TypeVar, cast, get_args, get_origin
 
-from ...errors import LONGEST_NAME, CaseError, MechanismError, remedy
+import msgspec
+
+from ...errors import LONGEST_NAME, CaseError, MechanismError, brief, remedy, similar, with_article
 from ..units import METRE, Unit
 from .escape import visible
 from .foreign import binary, foreign
@@ -230,31 +235,14 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return table
 
 
-_Path: TypeAlias = "tuple[_Path, str | int] | None"
-"""Path to a value: the path of its container, and its name or index there. It becomes text only for
-an error.
-"""
-
-
-def _written(path: _Path) -> str:
-    steps: list[str | int] = []
-    while path is not None:
-        path, step = path
-        steps.append(step)
-    key = ""
-    for step in reversed(steps):
-        key = f"{key}[{step}]" if isinstance(step, int) else join(key, step)
-    return key
-
-
 def check_values(file: Path, tables: object) -> None:
     """Refuse unusable numbers, deep nesting, and text unprintable on terminals and in reports."""
     # a stack: nesting may be deeper than Python recurses
-    waiting: list[tuple[_Path, Any, int]] = [(None, tables, 0)]
+    waiting: list[tuple[tuple[str | int, ...], Any]] = [((), tables)]
     while waiting:
-        path, value, depth = waiting.pop()
+        path, value = waiting.pop()
         problem = ""
-        if depth > DEEPEST:
+        if len(path) > DEEPEST:
             problem = (
                 f"nested more than {DEEPEST} deep, expected tables and rows of numbers; correct the"
                 " table"
@@ -266,11 +254,9 @@ def check_values(file: Path, tables: object) -> None:
                     expected = f"expected 1 to {LONGEST_NAME} printable characters"
                     problem = f"found the name {shown(name)}, {expected}; rename it"
                     break
-            waiting += [((path, name), each, depth + 1) for name, each in table.items()]
+            waiting += [((*path, name), each) for name, each in table.items()]
         elif isinstance(value, list):
-            waiting += [
-                ((path, k), each, depth + 1) for k, each in enumerate(cast("list[Any]", value))
-            ]
+            waiting += [((*path, k), each) for k, each in enumerate(cast("list[Any]", value))]
         elif isinstance(value, str):
             if not all(letter.isprintable() or letter in "\n\t" for letter in value):
                 problem = (
@@ -289,7 +275,10 @@ def check_values(file: Path, tables: object) -> None:
                 " correct the number"
             )
         if problem:
-            raise fault(file, _written(path), problem)
+            key = ""
+            for step in path:
+                key = f"{key}[{step}]" if isinstance(step, int) else join(key, step)
+            raise fault(file, key, problem)
 
 
 def usable(number: float) -> bool:
@@ -297,3 +286,229 @@ def usable(number: float) -> bool:
     return number == 0 or (
         abs(number) <= LARGEST and abs(number) >= SMALLEST and math.isfinite(number)
     )
+
+
+_Struct = TypeVar("_Struct", bound=msgspec.Struct)
+_Class = TypeVar("_Class", bound=type)
+
+
+def read_tables(file: Path, limit: int, why_limit: str, schema: str) -> dict[str, Any]:
+    """Return the tables of a file of at most `limit` bytes and of this schema.
+
+    Raises:
+        CaseError: the file cannot be read, or has another schema or none.
+    """
+    tables = parse(file, read_text(file, limit, why_limit))
+    if tables.get("schema") != schema:
+        found = shown(tables["schema"]) if "schema" in tables else "none"
+        raise fault(
+            file, "schema", f'found {found}, expected "{schema}"; write schema = "{schema}"'
+        )
+    return tables
+
+
+@dataclass(frozen=True)
+class Section:
+    """A value of a document with its place for messages.
+
+    Attributes:
+        key: path of the keys to it; empty for the whole document.
+    """
+
+    file: Path
+    key: str
+    value: object
+
+    @property
+    def _entries(self) -> dict[str, Any]:
+        value = self.value
+        return cast("dict[str, Any]", value) if isinstance(value, dict) else {}
+
+    def at(self, name: str) -> Section:
+        """Return the value of a key in this table; None without it, or if this is no table."""
+        return Section(self.file, join(self.key, name), self._entries.get(name))
+
+    def each(self) -> Iterator[tuple[str, Section]]:
+        """Yield names and values of this table; nothing without it."""
+        return ((name, self.at(name)) for name in self._entries)
+
+    def fault(self, problem: str) -> CaseError:
+        """Return the error of this value; see `fault`."""
+        return fault(self.file, self.key, problem)
+
+    def unknown(self, name: object, known: Iterable[str], expected: str) -> CaseError:
+        """Return the error of a name here that is none of the known ones; see `unknown_name`."""
+        return unknown_name(self.file, self.key, name, known, expected)
+
+    @property
+    def table(self) -> dict[str, Any]:
+        """The value as a table.
+
+        Raises:
+            CaseError: the value is no table.
+        """
+        if not isinstance(self.value, dict):
+            raise self.fault(
+                f"found {shown(self.value)}, expected a table; write [{self.key}] and its keys"
+                " below"
+            )
+        return self._entries
+
+    def typed(self, struct: type[_Struct]) -> _Struct:
+        """Return the value as a struct; see `typed`."""
+        return typed(self.file, self.key, self.value, struct)
+
+    def class_of(self, what: str, known: Mapping[str, _Class]) -> _Class:
+        """Return the class named by the key `type` of this table.
+
+        Raises:
+            CaseError: not a table, or an unknown type.
+        """
+        expected = f"{with_article(what)} type"
+        if "type" not in self.table:
+            raise self.at("type").fault(
+                f"missing, expected {expected}; add it, one of {', '.join(known)}"
+            )
+        name = self.table["type"]
+        if not isinstance(name, str) or name not in known:
+            raise self.at("type").unknown(name, known, expected)
+        return known[name]
+
+
+def typed(file: Path, key: str, value: object, struct: type[_Struct]) -> _Struct:
+    """Return a table as a struct.
+
+    Args:
+        struct: declares the keys; messages quote the `msgspec.Meta` descriptions of its fields.
+
+    Raises:
+        CaseError: not a table, an unknown key, a missing key, or a value of another type or shape
+            than described.
+    """
+    table = Section(file, key, value).table
+    fields = _fields(struct)
+    for name in table:
+        if name not in fields:
+            close = similar(name, fields)
+            advice = f"did you mean {close!r}?" if close else "remove it"
+            problem = f"unknown key, expected one of {', '.join(fields)}; {advice}"
+            raise fault(file, join(key, name), problem)
+    for name, field in fields.items():
+        if field.required and name not in table:
+            raise fault(
+                file,
+                join(key, name),
+                f"missing, expected {description(field.type)}; add the key {name!r}",
+            )
+    for name, found in table.items():
+        try:
+            msgspec.convert(found, fields[name].type)
+        except msgspec.ValidationError:
+            expected = description(fields[name].type)
+            raise fault(
+                file,
+                join(key, name),
+                f"found {shown(found)}, expected {expected}; correct the value",
+            ) from None
+    return msgspec.convert(table, struct)
+
+
+@cache
+def _fields(struct: type[msgspec.Struct]) -> Mapping[str, msgspec.structs.FieldInfo]:
+    """Return the fields of a struct by key; cached, as a file may have ten thousand bodies."""
+    return {field.encode_name: field for field in msgspec.structs.fields(struct)}
+
+
+def description(annotation: Any) -> str:
+    """Return the description in `typing.Annotated[type, msgspec.Meta(description=...)]`."""
+    for part in get_args(annotation):
+        if isinstance(part, msgspec.Meta) and part.description:
+            return part.description
+        if get_origin(part) is Annotated:  # of Annotated[...] | None
+            return description(part)
+    raise TypeError(f"{annotation} has no description")
+
+
+INSTALL = "pip install 'kincheck[yaml]'"
+# The parser takes seconds for a megabyte; geometry and lists of joints are some kilobytes.
+LONGEST = 500_000
+
+
+def parse_yaml(file: Path, text: str) -> Any:
+    """Return the data of a YAML text.
+
+    Raises:
+        CaseError: PyYAML is missing, or the text is not valid or too long.
+    """
+    try:
+        import yaml
+    except ImportError:
+        raise fault(
+            file, "", f"needs PyYAML, which is not installed; {INSTALL}, or move the file away"
+        ) from None
+    if len(text) > LONGEST:
+        raise fault(
+            file,
+            "",
+            f"found {len(text)} characters, expected {LONGEST} at most; take out what is not"
+            " geometry",
+        )
+
+    class Plain(yaml.BaseLoader):
+        """Makes texts of all scalars, and refuses references, which can multiply without end."""
+
+        def compose_node(self, parent: Any, index: Any) -> Any:
+            if self.check_event(yaml.AliasEvent):  # pyright: ignore[reportUnknownMemberType]
+                raise yaml.YAMLError("found a reference (*NAME), expected none")
+            return super().compose_node(parent, index)
+
+        def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
+            keys = [key.value for key, _ in node.value if isinstance(key.value, str)]
+            if len(set(keys)) < len(keys):
+                twice = next(key for k, key in enumerate(keys) if key in keys[:k])
+                raise yaml.YAMLError(f"the key {shown(twice)} is given twice")
+            return super().construct_mapping(node, deep)
+
+    try:
+        data: Any = yaml.load(text, Plain)
+        check_values(file, {"content": data})
+        return data
+    except RecursionError:
+        what = "nested too deeply"
+    except (yaml.YAMLError, ValueError) as error:
+        what = " ".join(str(error).split())
+    raise fault(file, "", f"not valid YAML: {what}; correct the syntax") from None
+
+
+def toml_table(values: Mapping[str, Any], *path: str) -> list[str]:
+    """Return the lines of a table of a TOML file, with a heading if it has a path.
+
+    Raises:
+        CaseError: a name of the path is not one that a file can hold.
+    """
+    heading = ["", f"[{'.'.join(map(_toml_key, path))}]"] if path else []
+    return [*heading, *(f"{key} = {_toml_value(value)}" for key, value in values.items())]
+
+
+def _toml_key(name: str) -> str:
+    """Return a name as a key, without quotes if TOML allows it."""
+    if not (name and name.isprintable() and len(name) <= LONGEST_NAME):
+        raise CaseError(
+            f"name {brief(name)!r}: found {len(name)} characters, expected 1 to {LONGEST_NAME}"
+            " printable ones, which a case file can hold; rename it"
+        )
+    bare = name.replace("_", "a").replace("-", "a").isalnum() and name.isascii()
+    return name if bare else json.dumps(name)
+
+
+def _toml_value(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False)  # a JSON string is a basic string of TOML
+    if isinstance(value, tuple | list):
+        return f"[{', '.join(map(_toml_value, cast('Sequence[Any]', value)))}]"
+    if isinstance(value, int):
+        return repr(value)
+    # the reader refuses smaller numbers; they are the round-off of zeros
+    return repr(float(value) if abs(value) >= SMALLEST else 0.0)

@@ -8,7 +8,7 @@ import codecs
 import io
 import re
 import zipfile
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 
 EXCEL, ARCHIVE = "an Excel workbook", "a zip archive"
@@ -44,33 +44,14 @@ _SIGNATURES: Sequence[tuple[bytes, str, str]] = (
 )
 # Start of a web page; models in XML have other first elements.
 _HTML = re.compile(rb"\s*(?:<!doctype\s+html|<html|<table|<meta)\b", re.IGNORECASE)
-_MEMBERS: Sequence[tuple[Callable[[str], bool], str, str]] = (
-    (
-        lambda name: name == "xl/workbook.bin",
-        "a binary Excel workbook (.xlsb)",
-        "save it as .xlsx or as CSV",
-    ),
-    (
-        lambda name: name.startswith("xl/"),
-        EXCEL,
-        "name it .xlsx, or save the sheet as CSV",
-    ),
-    (
-        lambda name: name.startswith("word/"),
-        "a Word document",
-        "copy the table into a spreadsheet and save it as CSV",
-    ),
-    (
-        lambda name: name.startswith("ppt/"),
-        "a PowerPoint presentation",
-        "copy the table into a spreadsheet and save it as CSV",
-    ),
-    (
-        lambda name: name == "content.xml",
-        "an OpenDocument file (.ods, .odt)",
-        "save it as .xlsx or as CSV",
-    ),
+_MEMBERS: Sequence[tuple[str, str, str]] = (
+    ("xl/workbook.bin", "a binary Excel workbook (.xlsb)", "save it as .xlsx or as CSV"),
+    ("xl/", EXCEL, "name it .xlsx, or save the sheet as CSV"),
+    ("word/", "a Word document", "copy the table into a spreadsheet and save it as CSV"),
+    ("ppt/", "a PowerPoint presentation", "copy the table into a spreadsheet and save it as CSV"),
+    ("content.xml", "an OpenDocument file (.ods, .odt)", "save it as .xlsx or as CSV"),
 )
+"""Start of a name in an archive, its kind and the remedy."""
 # Tab, line feed, form feed and carriage return are the only control characters of texts.
 _CONTROL = re.compile(rb"[\x00-\x08\x0b\x0e-\x1a\x1c-\x1f]")
 
@@ -112,7 +93,7 @@ def _archive(data: bytes) -> tuple[str, str]:
     with suppress(zipfile.BadZipFile, ValueError, NotImplementedError, OSError):
         few = members(data) <= MOST_MEMBERS
         names = zipfile.ZipFile(io.BytesIO(data)).namelist() if few else []
-        for known, what, advice in _MEMBERS:
-            if any(map(known, names)):
+        for start, what, advice in _MEMBERS:
+            if any(name.startswith(start) for name in names):
                 return what, advice
     return ARCHIVE, "unpack it and give the file inside"

@@ -12,8 +12,7 @@ import numpy as np
 from ... import joints
 from ...errors import SolveError
 from ...kinematics import NativeSolver, start_of
-from ...mechanism.equivalents import with_equivalents
-from ...mechanism.mechanism import Mechanism
+from ...mechanism.mechanism import Mechanism, with_equivalents
 from ...trajectory import Array, BodyMotion
 from ..case import Case
 

@@ -1,95 +1,350 @@
-"""[outputs.NAME] of a case file: coordinates of points, measures and suspension outputs."""
+"""[outputs.NAME] of a case file, read and written: coordinates of points, measures and suspension
+outputs; their tolerances; and the outputs of a case whose file names none.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from pathlib import Path
-from typing import TYPE_CHECKING
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
 
-from ..case import PER_TRAVEL, Case, Output, Quantity, size
-from ..measures import Measure
-from .coordinates import AXES
-from .document import fault, join, unknown_name
-from .in_si import direction
-from .measures import read_measure
-from .reference_columns import DERIVATIVES, Convert
-from .schema import COORDINATE, CaseKeys, OutputKeys
-from .tolerance import tolerance
-from .typed_tables import as_table, class_of, typed
+import numpy as np
 
-if TYPE_CHECKING:
-    from .suspension_table import SuspensionTable
+from ...errors import CaseError
+from ...mechanism.loads import Bushing, ForceElement, Torque, TorsionSpringDamper
+from ...mechanism.mechanism import Mechanism, Vector
+from ..case import PER_TRAVEL, Case, Output, Quantity, pace, size
+from ..measures import (
+    Component,
+    ForceMeasure,
+    JointAngle,
+    JointDisplacement,
+    Measure,
+    Orientation,
+    key_of,
+)
+from ..quantity import own_keys, with_markers
+from ..suspension import AxleOutput, PerTravel, Rate, Side, SuspensionOutput, Vehicle
+from ..suspension.base import WheelOutput
+from ..units import Convert, FileUnits
+from .document import Section, explained, shown, toml_table
+from .reference_samples import DERIVATIVES
+from .schema import COORDINATE, OutputKeys, ToleranceKeys, keys_of
+from .suspension_section import SuspensionTable, check_point, direction, wheels_of
+
+AXES: Mapping[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+
+# Hardpoints are measured to about a micrometre; double precision rounds coordinates of metre-sized
+# mechanisms at 1e-16 m.
+DEFAULT_ATOL = 1e-9
+# The driver's pace scales `atol`. Near a dead centre, outputs and their errors change thousands of
+# times as fast as the driver. Example: a loop of a revolute, a cylindrical joint and a pin in a
+# slot has 1,855 m/s^2 at a pace of 0.5 /s. Engines are proved to be within 3e-10 m/s^2; 1e-9 m at
+# this pace allows less.
+DEFAULT_RTOL = 1e-9
+_OF_RANGE = "; and of values whose range is larger, as much of the range"
+# For mechanisms below a millimetre: some are as small as a nanometre.
+PART_OF_SIZE = 1e-6
+DEFAULT_WHY = (
+    "the default of 1e-9 m, or a millionth of the size of mechanisms below a millimetre: a"
+    " thousandth of the micrometre that hardpoints are measured to, and millions of times the"
+    f" round-off of metre-sized coordinates in double precision{_OF_RANGE}"
+)
+FORCES = ("N", "N m")
+_OF_LOADS = (
+    "the default of 1e-9 of the loads (weights, inertia at the drivers' pace, springs, applied"
+    " forces): a thousandth of what load cells resolve, and a thousand times the round-off of the"
+    f" least exact engine, which differentiates its rows numerically{_OF_RANGE}"
+)
+_DEFAULTS: Mapping[str, str] = {
+    "m": DEFAULT_WHY,
+    "rad": (
+        "the default of 1e-9 rad: a nanometre, the default of lengths, at a metre; a"
+        " hundred-thousandth of the hundredth of a degree that wheel alignment is measured to, and"
+        f" millions of times the round-off of an angle in double precision{_OF_RANGE}"
+    ),
+    "1": (
+        "the default of 1e-9 of a ratio: a nanometre, the default of lengths, in a metre, and"
+        f" millions of times the round-off of a ratio near one in double precision{_OF_RANGE}"
+    ),
+    **dict.fromkeys(FORCES, _OF_LOADS),
+}
+"""Reason for the default, by the unit of the output."""
+
+
+def default(size: float, unit: str = "m") -> tuple[float, float, str]:
+    """Return the default atol [unit], rtol [-] and their reason.
+
+    Args:
+        size: size of the mechanism [m]; for a force or torque, the loads [unit].
+    """
+    least = {"m": min(DEFAULT_ATOL, PART_OF_SIZE * size)}
+    return (
+        least.get(unit, DEFAULT_ATOL * (size if unit in FORCES else 1.0)),
+        DEFAULT_RTOL,
+        _DEFAULTS[unit],
+    )
+
+
+def _tolerance(
+    section: Section, keys: ToleranceKeys, convert: Convert, size: float, unit: str = "m"
+) -> tuple[float, float, str]:
+    """Return atol [unit], rtol [-] and their reason.
+
+    Args:
+        convert: conversion from the file's unit of the output to SI.
+        size: see `default`.
+    """
+    given = keys.atol is not None or keys.rtol is not None
+    if given and keys.why is None:
+        raise section.at("why").fault(
+            "missing, expected the reason for the tolerance; add the key 'why'"
+        )
+    if keys.why is None:
+        return default(size, unit)
+    if not given:
+        raise section.at("why").fault(
+            "found a reason without a tolerance, expected both; add atol or rtol"
+        )
+    return convert(keys.atol or 0.0), keys.rtol or 0.0, keys.why
+
+
+def with_all_coordinates(case: Case, points: Iterable[str] | None = None) -> Case:
+    """Return the case with outputs POINT.x, .y and .z and default tolerances.
+
+    Args:
+        points: names of points; None for all.
+    """
+    given, names = (
+        default(size(case)),
+        [point.name for point in case.mechanism.points] if points is None else points,
+    )
+    outputs = [
+        Output(f"{name}.{axis}", name, along, False, *given)
+        for name in names
+        for axis, along in AXES.items()
+    ]
+    return replace(case, outputs=tuple(outputs))
+
+
+def with_all_motions(case: Case) -> Case:
+    """Return the case with the motion of every part as outputs, with default tolerances.
+
+    The outputs are the coordinates of all points, the angle or displacement of every joint with
+    such a freedom, and the Euler parameters of every moving body.
+    """
+    mechanism, extent = case.mechanism, size(case)
+    outputs: list[Quantity] = [*with_all_coordinates(case).outputs]
+    for joint in mechanism.joints:
+        for what, cls in (("angle", JointAngle), ("displacement", JointDisplacement)):
+            if cls.freedom in joint.freedoms:
+                given = default(extent, cls.measure)
+                outputs.append(cls(f"{joint.name}.{what}", *given, joint=joint.name))
+    outputs += [
+        Orientation(f"{body.name}.{each}", *default(extent, "1"), body=body.name, component=each)
+        for body in mechanism.moving
+        for each in Component
+        if each.startswith("e")
+    ]
+    return replace(case, mechanism=with_markers(mechanism, outputs), outputs=tuple(outputs))
 
 
 def read_outputs(
-    file: Path,
-    keys: CaseKeys,
-    table: SuspensionTable | None,
-    case: Case,
-    units: Mapping[str, Convert],
+    root: Section, table: SuspensionTable | None, case: Case, units: FileUnits
 ) -> tuple[Quantity, ...]:
-    """Return the outputs named in the file."""
+    """Return the outputs that the file names.
+
+    Args:
+        table: the table [suspension], if there is one.
+        case: the case read so far.
+
+    Raises:
+        CaseError: an unknown type, key or name, a missing input of the type, or an output that this
+            joint or wheel does not have.
+    """
     return tuple(
-        _output(file, name, value, keys, table, case, units) for name, value in keys.outputs.items()
+        _output(name, section, table, case, units) for name, section in root.at("outputs").each()
     )
 
 
 def _output(
-    file: Path,
-    name: str,
-    value: object,
-    keys: CaseKeys,
-    table: SuspensionTable | None,
-    case: Case,
-    units: Mapping[str, Convert],
+    name: str, section: Section, table: SuspensionTable | None, case: Case, units: FileUnits
 ) -> Quantity:
-    key = join("outputs", name)
     if name.endswith((*DERIVATIVES, PER_TRAVEL)):
-        raise fault(
-            file,
-            key,
+        raise section.fault(
             "a name with this ending is a derivative in reference tables; give the output another"
-            " name",
+            " name"
         )
-    if as_table(file, key, value).get("type", COORDINATE) != COORDINATE:
-        from .suspension import SuspensionOutput, read_output
-
+    if section.table.get("type", COORDINATE) != COORDINATE:
         known = {COORDINATE: Output, **Measure.registry, **SuspensionOutput.registry}
-        cls = class_of(file, key, "output", value, known)
+        cls = section.class_of("output", known)
         if issubclass(cls, Measure):
-            return read_measure(file, key, cls, name, value, case, units)
+            return _measure(name, section, cls, case, units)
         if issubclass(cls, SuspensionOutput):
-            return read_output(file, key, cls, name, value, table, case, units)
-    return _coordinate(file, key, name, value, keys, case, units["m"])
-
-
-def _coordinate(
-    file: Path, key: str, name: str, value: object, keys: CaseKeys, case: Case, length: Convert
-) -> Output:
-    output = typed(file, key, value, OutputKeys)
-    if output.point not in keys.points:
-        raise unknown_name(file, join(key, "point"), output.point, keys.points, "a point")
-    match output.component, output.direction:
+            return _of_wheel(name, section, cls, table, case, units)
+    keys = section.typed(OutputKeys)
+    check_point(section.at("point"), keys.point, case.mechanism)
+    match keys.component, keys.direction:
         case str(axis), None:
             along = AXES[axis]
         case None, (_, _, _) as found:
-            along = direction(file, join(key, "direction"), found)
+            along = direction(section.at("direction"), found)
         case component, _:
-            what = (
-                "neither component nor direction"
-                if component is None
-                else "both component and direction"
+            what = "both component and" if component else "neither component nor"
+            raise section.fault(
+                f'found {what} direction, expected one of them; give component = "x" or direction ='
+                " [x, y, z]"
             )
-            raise fault(
-                file,
-                key,
-                f'found {what}, expected one of them; give component = "x" or direction = [x,'
-                " y, z]",
-            )
-    return Output(
-        name,
-        output.point,
-        along,
-        output.relative,
-        *tolerance(file, key, output, length, size(case)),
+    given = _tolerance(section, keys, units.length, size(case))
+    return Output(name, keys.point, along, keys.relative, *given)
+
+
+def _measure(
+    name: str, section: Section, cls: type[Measure], case: Case, units: FileUnits
+) -> Measure:
+    keys: Any = section.typed(keys_of(cls))
+    given = {each.name: getattr(keys, key_of(each)) for each in own_keys(cls)}
+    with explained(section.file, section.key):
+        output = cls(name, 0.0, 0.0, "", **given)
+        output.check(case.mechanism)
+        output = output.bound(case.mechanism)
+    scale = size(case)
+    if isinstance(output, ForceMeasure):
+        loads = largest_load(case.mechanism, scale, pace(case))
+        scale = loads * scale if output.turns else loads
+    _, convert = units.of(output.unit)
+    atol, rtol, why = _tolerance(section, keys, convert, scale, output.unit)
+    return replace(output, atol=atol, rtol=rtol, why=why)
+
+
+def _largest(each: ForceElement, name: str) -> float:
+    """Return the largest of an element's numbers of a name; zero without it."""
+    return float(np.max(getattr(each, name, 0.0)))
+
+
+def _steepest(each: ForceElement) -> float:
+    """Return the steepest slope between rows of an element's curves."""
+    given: Any = getattr(each, "curve", None) or ()
+    tables = given if isinstance(each, Bushing) else (given,)
+    slopes = [np.abs(np.divide(*np.diff(table, axis=0).T[::-1])).max() for table in tables if table]
+    return float(max(slopes, default=0.0))
+
+
+def largest_load(mechanism: Mechanism, size: float, pace: float) -> float:
+    """Return an estimate of the largest force of a mechanism [N], the scale of errors.
+
+    It counts the weights, the inertia forces at a pace [1/s], springs stretched by their own
+    length, and applied forces.
+    """
+    masses = sum(body.mass for body in mechanism.moving)
+    total = masses * (math.hypot(*mechanism.gravity) + size * pace**2)
+    for each in mechanism.forces:
+        arm = 1.0 / size if isinstance(each, TorsionSpringDamper) else size
+        total += (_largest(each, "stiffness") + _largest(each, "damping") * pace) * arm
+        turning = _largest(each, "turning_stiffness") + _largest(each, "turning_damping") * pace
+        total += turning / size + _largest(each, "preload") + _steepest(each) * arm
+        vector = getattr(each, "vector", (0.0,))
+        total += float(np.linalg.norm(vector)) / (size if isinstance(each, Torque) else 1.0)
+    return total
+
+
+def _of_wheel(
+    name: str,
+    section: Section,
+    cls: type[SuspensionOutput],
+    table: SuspensionTable | None,
+    case: Case,
+    units: FileUnits,
+) -> SuspensionOutput:
+    suspension = Section(section.file, "suspension", None)
+    what = f"for {section.key} of type {cls.type!r}"
+    if table is None:
+        raise suspension.fault(f"missing, expected a table {what}; add [suspension]")
+    keys: Any = section.typed(keys_of(cls))
+    if issubclass(cls, AxleOutput) and table.other is None:
+        raise suspension.at("other").fault(
+            f"missing, expected the other wheel {what}; add [suspension.other]"
+        )
+    vehicle = _wheel(section, table, getattr(keys, "side", None))
+    for need in cls.needs:
+        if getattr(vehicle, need) is None:
+            raise suspension.at(need).fault(f"missing, expected it {what}; add it")
+    given: dict[str, Any] = {each.name: getattr(keys, each.name) for each in own_keys(cls)}
+    if issubclass(cls, AxleOutput):
+        given["other"] = table.other
+    _, convert = units.of(cls.measure)
+    tolerance = _tolerance(section, keys, convert, size(case), cls.measure)
+    output = cls(name, vehicle, *tolerance, **given)
+    if problem := output.problem:
+        raise section.fault(problem)
+    for each in own_keys(cls):
+        if isinstance(given[each.name], tuple):  # names of points
+            for point in given[each.name]:
+                check_point(section.at(each.name), point, case.mechanism)
+    moving = [*case.sweep.path.motions]
+    if isinstance(output, Rate) and len(moving) > 1 and not output.vehicle.travel:
+        raise section.at("type").fault(
+            f"found {output.type!r} while {', '.join(moving)} move, expected one of them to be the"
+            " wheel's travel, for it is a derivative by that; name it by suspension.travel"
+        )
+    return output
+
+
+def _wheel(section: Section, table: SuspensionTable, side: Side | None) -> Vehicle:
+    """Return the vehicle with the wheel of an output."""
+    for wheel in filter(None, (table.vehicle, table.other)):
+        if side in (None, wheel.side):
+            return wheel
+    raise section.at("side").fault(
+        f"found {shown(str(side))}, expected {table.vehicle.side}, the side in [suspension];"
+        " correct it, or add [suspension.other]"
     )
+
+
+def with_slopes(outputs: Sequence[Quantity], size: float) -> tuple[Quantity, ...]:
+    """Return the outputs, each output of a wheel followed by its derivative by travel.
+
+    Args:
+        size: size of the mechanism [m]. If a pose error changes an output by d, it changes the
+            slope by about d / size.
+    """
+    both: list[Quantity] = []
+    for output in outputs:
+        both.append(output)
+        if isinstance(output, SuspensionOutput) and not isinstance(output, AxleOutput):
+            both.append(PerTravel(output, output.atol / size))
+    return tuple(both)
+
+
+def output_lines(case: Case) -> Iterator[str]:
+    """Yield the lines of the outputs of a case, in SI units.
+
+    Raises:
+        CaseError: an output is one that a case file cannot name.
+    """
+    for output in case.outputs:
+        if not isinstance(output, PerTravel):  # the reader derives it from the output before it
+            keys = dict(_keys(case, output))
+            given = {"atol": output.atol, "rtol": output.rtol, "why": output.why}
+            yield from toml_table({**keys, **given}, "outputs", output.name)
+
+
+def _keys(case: Case, output: Any) -> Iterator[tuple[str, Any]]:
+    if isinstance(output, Measure | SuspensionOutput):
+        yield "type", output.type
+        if isinstance(output, WheelOutput) and len(wheels_of(case)) > 1:
+            yield "side", output.vehicle.side
+        for each in own_keys(type(output)):
+            if (value := getattr(output, each.name)) is not None:
+                yield key_of(each), value
+    elif isinstance(output, Output):
+        component = next((name for name, axis in AXES.items() if axis == output.direction), None)
+        yield "point", output.point
+        yield ("direction", output.direction) if component is None else ("component", component)
+        yield "relative", output.relative
+    else:
+        raise CaseError(
+            f"case {case.name!r}: output {output.name!r} is a derivative, which the file cannot"
+            " name; leave it out"
+        )

@@ -37,30 +37,33 @@ class Supplied:
     units: str | None = None
     axes: str | None = None
     travel: str | None = None
-    drive: tuple[str, ...] = ()
-    hold: tuple[str, ...] = ()
+    rack: str | None = None
     names: Path | None = None
     wheel_radius: str | None = None
     wheelbase: str | None = None
     axle: str | None = None
-    closure: float | None = None
-    hold_rest: bool = False
-    start: tuple[str, ...] = ()
-    rack: str | None = None
-    sheet: str | None = None
     position: str | None = None
     cg_height: str | None = None
     brake_share: str | None = None
     drive_share: str | None = None
+    sheet: str | None = None
+    drive: tuple[str, ...] = ()
+    hold: tuple[str, ...] = ()
+    hold_rest: bool = False
+    start: tuple[str, ...] = ()
+    closure: float | None = None
 
     @property
-    def given(self) -> tuple[str, ...]:
+    def given(self) -> list[str]:
         """Names of the given options, as on the command line."""
-        return tuple(
-            each.name.replace("_", "-") for each in fields(self) if getattr(self, each.name)
-        )
+        values = (getattr(self, each.name) for each in fields(self))
+        return [name for name, value in zip(_NAMES, values, strict=True) if value]
 
 
+_NAMES = tuple(each.name.replace("_", "-") for each in fields(Supplied))
+_SHEET = _NAMES.index("sheet")
+OF_HARDPOINTS, OF_MODELS = _NAMES[:_SHEET], _NAMES[_SHEET + 1 :]
+"""Options of each kind of file; those of hardpoints may have a sheet, too."""
 NOTHING = Supplied()
 
 LEFT_OUT = "; left out: "

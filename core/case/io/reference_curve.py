@@ -1,44 +1,64 @@
 """A measured curve as the reference of a case: a table of a rig or of another program, with its own
-columns, units and grid.
+names of columns, units and grid.
 
 A column without a unit is in metres or radians.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...errors import MOST_NAMED, brief, shortened
+from ...errors import MOST_NAMED, brief, remedy, shortened
 from ...trajectory import Array
 from ..case import TIME, Case, Origin, Quantity, Truth
-from ..suspension import Convention
-from ..units import METRE, RADIAN, SECOND, Unit
-from .column_units import required_unit, unit_of_head
-from .curve_columns import MAP, Target, match, read_stated
+from ..suspension import Convention, PerTravel
+from ..units import METRE, RADIAN, SECOND, Convert, FileUnits, Unit
 from .document import decimal, fault, shown, unknown_name
 from .reference import compared
-from .reference_columns import (
+from .reference_file import sha256
+from .reference_samples import (
     Column,
     Columns,
-    Convert,
+    Samples,
     column_of,
     driver_unit,
+    head_of,
     known_columns,
+    read_table,
     require_positions,
+    samples_of,
 )
-from .reference_samples import Samples, sha256
-from .reference_table import from_table
 from .schema import MOST_SAMPLES
+from .table import required_unit, split_head, unit_of_head
 
+MAP = "--map"
+# Names for an output or a driver, in normal form. Names of sums and changes (track, total toe) are
+# no names of outputs.
+_ALSO: Mapping[str, Sequence[str]] = {
+    "toe": ("toe_angle", "toe_in"),
+    "camber": ("camber_angle",),
+    "caster": ("caster_angle", "castor", "castor_angle"),
+    "kingpin_inclination": ("kpi", "kpi_angle", "kingpin_angle", "kingpin_inclination_angle"),
+    "roll_center_height": ("rc_height", "roll_center", "roll_center_z", "rch"),
+    "scrub_radius": ("scrub",),
+    "mechanical_trail": ("trail", "caster_trail", "castor_trail"),
+    "stroke": (
+        *("travel", "wheel_travel", "bump", "bump_travel", "jounce", "wheel_stroke", "wheel_lift"),
+        *("vertical_travel", "wheel_displacement", "vertical_displacement", "wheel_center_travel"),
+    ),
+    "rack_travel": ("rack", "rack_displacement", "rack_stroke", "rack_disp", "steering_rack"),
+}
+_OUTPUTS = {other: name for name, others in _ALSO.items() for other in others}
+_LEFT = re.compile(r"^(?:left|l|fl|rl|lf|lr)_(?=..)|_(?:left|l|fl|rl|lf|lr)$")
 # A rig may go farther than the sweep. Millimetres taken for metres are 1000 times as far, degrees
 # for radians 57 times.
 FARTHER = 20.0
-_SI: dict[str, Convert] = {"m": METRE, "rad": RADIAN, "1": float, "N": float, "N m": METRE}
 
 
 @dataclass(frozen=True)
@@ -71,57 +91,52 @@ def with_curve(case: Case, file: Path, options: CurveOptions) -> tuple[Case, lis
     """
     driver, known = case.sweep.driver, known_columns(case.outputs)
     stated = read_stated(file, options.columns, driver, known)
-    targets: list[Target] = []
-    left_out: list[str] = []
-
-    def choose(file: Path, where: str, heads: Sequence[str]) -> Sequence[int]:
-        found = match(file, where, heads, driver, known, stated)
-        targets[:] = found.values()
-        left_out[:] = [head for k, head in enumerate(heads) if head and k not in found]
-        return [*found]
-
-    samples = _stated_units(
-        from_table(file, options.sheet, "--reference-sheet NAME", choose), targets
+    table = read_table(file, options.sheet, "--reference-sheet NAME")
+    where, heads = head_of(table)
+    found = match(file, where, heads, driver, known, stated)
+    left_out = [head for k, head in enumerate(heads) if head and k not in found]
+    targets = [*found.values()]
+    samples = samples_of(table, [*found])
+    columns = zip(samples.columns, targets, strict=True)
+    samples = replace(
+        samples, columns=[f"{text} [{each.unit}]" if each.unit else text for text, each in columns]
     )
     unit, of = _columns(case, samples, targets)
     outputs = _with_accuracy(file, case.outputs, [*of], options.accuracy)
-    convention, signs = _convention(outputs, [*of]), _signs(file, samples.signs, options.signs)
+    compared_outputs: list[Any] = [each for each in outputs if each.name in of and each.signs]
+    convention = str(compared_outputs[0].vehicle.convention) if compared_outputs else ""
+    signs = _signs(file, samples.signs, options.signs)
     if signs and convention not in ("", signs):
-        problem = f"found {shown(signs)}, expected {convention!r} as in the case; turn columns with"
-        advice = f' the opposite sign by {MAP} "COLUMN=-OUTPUT", and say --signs {convention}'
-        raise fault(file, "signs", problem + advice)
+        raise fault(
+            file,
+            "signs",
+            f"found {shown(signs)}, expected {convention!r} as in the case; turn columns with the"
+            f' opposite sign by {MAP} "COLUMN=-OUTPUT", and say --signs {convention}',
+        )
     bare = [text for text in samples.columns if not unit_of_head(file, "", text, known)[1]]
-    driven = np.array([unit(row[0]) for _, row in samples.rows])
+    driven = np.array([unit(x) for x in samples.numbers[:, 0].tolist()])
     if samples.columns[0] in bare:
         _require_size(samples, unit, driven, case)
     values = driven if options.own_samples else case.sweep.values
     if len(values) > MOST_SAMPLES:
         problem = f"found {len(values)} rows, expected {MOST_SAMPLES} at most"
         raise fault(file, "--at-reference", f"{problem}; thin them out")
-    origin = Origin((options.citation or "").strip(), file.name, sha256(file))
-    series, origin = compared(
-        samples, Columns(unit, driver, of), outputs, values, origin, options.own_samples
-    )
     assumed = bool(convention) and not signs
-    words = convention + " (assumed: the file names none)" * assumed
     case = replace(
         case,
         truth=Truth.THIRD_PARTY_DATA,
         sweep=replace(case.sweep, values=values),
         outputs=outputs,
-        reference=series,
-        origin=replace(origin, signs=words),
+        origin=Origin(
+            (options.citation or "").strip(),
+            file.name,
+            sha256(file),
+            signs=convention + " (assumed: the file names none)" * assumed,
+        ),
     )
-    return case, _notes(file, origin, left_out, bare, convention if assumed else "")
-
-
-def _stated_units(samples: Samples, targets: Sequence[Target]) -> Samples:
-    """Return samples whose heads have the units that the user states."""
-    heads = zip(samples.columns, targets, strict=True)
-    return replace(
-        samples,
-        columns=[f"{text} [{target.unit}]" if target.unit else text for text, target in heads],
-    )
+    case = compared(samples, Columns(unit, driver, of), case, own=options.own_samples)
+    assert case.origin is not None
+    return case, _notes(file, case.origin, left_out, bare, convention if assumed else "")
 
 
 def _columns(
@@ -138,7 +153,7 @@ def _columns(
         if k == 0:
             continue
         name, written = unit_of_head(samples.file, samples.header, text, known)
-        found = column_of(samples, k, written, known[target.name], _SI)
+        found = column_of(samples, k, written, known[target.name], FileUnits())
         words = found.unit
         if name != target.name:
             words += f", column {shown(text)}"
@@ -167,10 +182,10 @@ def _with_accuracy(
             raise unknown_name(file, "--accuracy", name, units, "an output with a column")
         number, _, unit = right.partition(" ")
         try:
-            found = decimal(number)
+            size = decimal(number)
         except ValueError:
-            found = float("nan")
-        if not 0.0 < found < float("inf") or not (unit.strip() or units[name] == "1"):
+            size = float("nan")
+        if not 0.0 < size < float("inf") or not (unit.strip() or units[name] == "1"):
             raise fault(
                 file,
                 "--accuracy",
@@ -178,27 +193,14 @@ def _with_accuracy(
                 f' "{name}=0.02 {"deg" if units[name] == "rad" else units[name]}"',
             )
         measured = required_unit(file, "--accuracy", name, unit.strip() or "-", units[name])
-        stated[name] = measured.convert(found)
+        stated[name] = measured.convert(size)
     why = f"the accuracy of {file.name}, as its user states it"
-    return tuple(
-        _replaced(output, stated[output.name], why) if output.name in stated else output
-        for output in outputs
-    )
-
-
-def _replaced(output: Any, atol: float, why: str) -> Quantity:
-    """Return an output with another tolerance; a slope has that of its own alone."""
-    if hasattr(output, "of_output"):
-        return replace(output, atol=atol)
-    return replace(output, atol=atol, rtol=0.0, why=why)
-
-
-def _convention(outputs: Sequence[Any], compared: Sequence[str]) -> str:
-    """Return the convention of signs of the compared suspension outputs; empty without any."""
-    return next(
-        (str(each.vehicle.convention) for each in outputs if each.name in compared and each.signs),
-        "",
-    )
+    found: list[Any] = [*outputs]
+    for k, output in enumerate(found):
+        if output.name in stated:  # a slope has the other tolerances of its output
+            rest = {} if isinstance(output, PerTravel) else {"rtol": 0.0, "why": why}
+            found[k] = replace(output, atol=stated[output.name], **rest)
+    return tuple(found)
 
 
 def _signs(file: Path, written: str, stated: str | None) -> str:
@@ -248,3 +250,150 @@ def _notes(
             f"{file}: names no convention of signs, {assumed} is assumed; state it: --signs"
         )
     return notes
+
+
+@dataclass(frozen=True)
+class Target:
+    """What a column holds.
+
+    Attributes:
+        name: the driver, or OUTPUT, OUTPUT.velocity or OUTPUT.acceleration.
+        unit: unit stated by the user; empty for that of the head.
+        opposite: whether the numbers have the opposite sign.
+    """
+
+    name: str
+    unit: str = ""
+    opposite: bool = False
+
+
+def read_stated(
+    file: Path, texts: Sequence[str], driver: str, known: Mapping[str, str]
+) -> dict[str, Target]:
+    """Return what columns hold, by their heads, as the user states it: "COLUMN=[-]NAME [UNIT]".
+
+    Args:
+        known: names of the columns of outputs.
+
+    Raises:
+        CaseError: a text has another form, or names no output.
+    """
+    stated: dict[str, Target] = {}
+    for text in texts:
+        head, equals, right = (part.strip() for part in text.rpartition("="))
+        opposite = right.startswith("-")
+        name, unit = split_head(right.removeprefix("-").strip(), known)
+        if not equals or not head or not name:
+            raise fault(
+                file,
+                MAP,
+                f"found {shown(text)}, expected COLUMN=OUTPUT, COLUMN=-OUTPUT or"
+                f' COLUMN="OUTPUT [UNIT]"; say {MAP} "Toe Angle=toe [deg]"',
+            )
+        if name != driver and name not in known:
+            raise unknown_name(
+                file, MAP, name, [driver, *known], f"the driver {driver} or an output"
+            )
+        if head in stated or name in [target.name for target in stated.values()]:
+            raise fault(
+                file,
+                MAP,
+                f"found {shown(head)} or {shown(name)} twice, expected once; leave out one",
+            )
+        stated[head] = Target(name, unit, opposite)
+    return stated
+
+
+def match(
+    file: Path,
+    where: str,
+    heads: Sequence[str],
+    driver: str,
+    known: Mapping[str, str],
+    stated: Mapping[str, Target],
+) -> dict[int, Target]:
+    """Return what columns hold, by their indices, the driver first. Other columns are left out.
+
+    Raises:
+        CaseError: two columns hold the same, a stated column is missing, or none holds an output.
+    """
+    names = [_bare(head, known) for head in heads]
+    found: dict[int, Target] = {}
+    for head, target in stated.items():
+        places = [k for k, each in enumerate(heads) if head in (each, names[k])]
+        if len(places) != 1:
+            problem = "no column" if not places else "several columns"
+            raise fault(
+                file,
+                MAP,
+                f"found {problem} {shown(head)}, expected one of the file;"
+                f" {remedy(head, filter(None, heads))}",
+            )
+        if places[0] in found:
+            raise fault(
+                file,
+                MAP,
+                f"found the column {shown(heads[places[0]])} twice, expected it once; leave one"
+                " out",
+            )
+        found[places[0]] = target
+    taken = {target.name for target in found.values()}
+    by_name = {_normal(name): name for name in (*known, driver)}
+    matches: dict[str, list[int]] = {}
+    for k, name in enumerate(names):
+        wanted = _named(name, by_name)
+        if k not in found and wanted and wanted not in taken:
+            matches.setdefault(wanted, []).append(k)
+    for name, places in matches.items():
+        exact = [k for k in places if names[k] == name] or places
+        if len(exact) > 1:
+            both = " and ".join(shown(heads[k]) for k in exact)
+            raise fault(
+                file,
+                where,
+                f"found the columns {both}, expected one for {name}; say which by {MAP}"
+                f' "COLUMN={name}"',
+            )
+        found[exact[0]] = Target(name)
+    if driver not in [target.name for target in found.values()]:
+        found.setdefault(0, Target(driver))
+    drives = [k for k, target in found.items() if target.name == driver]
+    outputs = sorted(k for k in found if k not in drives)
+    if not drives or not outputs:
+        missing = (
+            f"an output of the case, such as {shortened([*map(brief, known)][:6], MOST_NAMED)}"
+            if drives
+            else f"the driver {driver}"
+        )
+        listed = shortened([brief(shown(head)) for head in heads if head], MOST_NAMED)
+        raise fault(
+            file,
+            where,
+            f"found the columns {listed}, expected one of {missing}; name it so, or say {MAP}"
+            f' "COLUMN={next(iter(known), "OUTPUT") if drives else driver}"',
+        )
+    return {k: found[k] for k in (*drives, *outputs)}
+
+
+def _bare(head: str, known: Mapping[str, str]) -> str:
+    """Return a head without its units."""
+    name, unit = split_head(head, known)
+    return _bare(name, known) if unit else name
+
+
+def _named(name: str, by_name: Mapping[str, str]) -> str:
+    """Return the driver or column of an output of a name, of a rig's name for it, or of one of
+    these of the left side; empty if there is none.
+    """
+    plain = _normal(name)
+    for each in (plain, _LEFT.sub("", plain)):
+        also = _normal(_OUTPUTS.get(each, ""))
+        for other in (each, also, f"left_{each}", f"left_{also}"):
+            if other in by_name:
+                return by_name[other]
+    return ""
+
+
+def _normal(name: str) -> str:
+    """Return a name without differences in case, separators and the spelling of centre."""
+    return re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_").replace("centre", "center")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 import re
 from collections.abc import Sequence
@@ -15,11 +16,10 @@ import numpy as np
 from ...trajectory import QUANTITIES, Array
 from ..case import Case, Origin, Quantity, Series, Truth
 from .document import fault, read_text, shown
-from .reference_samples import sha256
 
 LARGEST_FILE = 256_000_000
-# Twelve digits of a driver value, as for reference tables: a smaller error moves no output by as
-# much as a tolerance.
+# Twelve digits of a driver value: a smaller error moves no output by as much as a tolerance; a
+# rounded table has a larger error.
 SAME_GRID = 1e-12
 # Fewer forms than Python's numbers: no 1_0, no nan.
 _DECIMAL = re.compile(r"[-+]?\d++(?:\.\d*+)?(?:[eE][-+]?\d++)?", re.ASCII)
@@ -118,6 +118,11 @@ def read(file: Path) -> Reference:
             "",
             f"found {error}, expected a proved reference; make one with kincheck reference CASE",
         ) from None
+
+
+def sha256(file: Path) -> str:
+    """Return the digest of a file, as `sha256sum` prints it."""
+    return hashlib.sha256(file.read_bytes()).hexdigest()
 
 
 def series(

@@ -1,176 +1,410 @@
-"""Samples of a reference table, the keys of its place, and the reader of rows in a case file."""
+"""Samples of a reference: from a table beside the case file, or from rows in it; and its columns,
+with units and the outputs that they hold.
+
+A table may have titles above its head and comments, such as `# signs: iso8855`. A head is the name
+of an output, or `OUTPUT.velocity` or `OUTPUT.acceleration`, with or without a unit: `toe [deg]`;
+units may also stand in a row below.
+"""
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Sequence
+import math
+import re
+from array import array
+from collections import Counter
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
-from typing import Annotated
 
-import msgspec
-from msgspec import Meta
+import numpy as np
 
+from ...errors import remedy
+from ...trajectory import Array
 from ..case import PER_TRAVEL, Quantity
-from ..printed import Printed
-from .document import decimal, fault, shown
+from ..curves import Printed
+from ..units import Convert, FileUnits, Unit, si_of
+from .document import LARGEST, SMALLEST, decimal, fault, read_text, shown
+from .schema import ReferenceKeys
+from .table import (
+    DELIMITERS,
+    LARGEST_FILE,
+    WORKBOOKS,
+    Row,
+    Table,
+    find_decimal_sign,
+    is_number,
+    is_unit_row,
+    numeral,
+    one_sheet,
+    read_sheets,
+    required_unit,
+    text_table,
+    trimmed,
+    unit_of_head,
+)
 
-CITATION = "a text that says where the true values come from: author, title, page or address"
-DIGEST = "sha256:"
-
-
-class ReferenceKeys(msgspec.Struct, forbid_unknown_fields=True):
-    """Keys of [reference]: `file`, or `rows` with `columns` (default: the driver, then all outputs
-    in order), and their source.
-
-    Attributes:
-        citation: source of the true values; without it, agreement with them validates nothing.
-        digest: digest of the file; a file with another digest is refused.
-        sheet: sheet of a workbook with several tables.
-    """
-
-    file: (
-        Annotated[
-            str,
-            Meta(min_length=1, description="the name of a CSV or .xlsx file beside the case file"),
-        ]
-        | None
-    ) = None
-    sheet: (
-        Annotated[str, Meta(min_length=1, description="the name of a sheet of an .xlsx file")]
-        | None
-    ) = None
-    columns: (
-        Annotated[
-            list[str], Meta(min_length=2, description="a list of column names, the driver first")
-        ]
-        | None
-    ) = None
-    rows: (
-        Annotated[
-            list[list[int | float]], Meta(min_length=1, description="a list of rows of numbers")
-        ]
-        | None
-    ) = None
-    citation: Annotated[str, Meta(pattern=r"\S", description=CITATION)] | None = None
-    digest: (
-        Annotated[
-            str,
-            Meta(
-                pattern=f"^{DIGEST}[0-9a-f]{{64}}$",
-                description=f'"{DIGEST}" and 64 hexadecimal digits',
-            ),
-        ]
-        | None
-    ) = None
-
-
-ROWS = "expected rows of numbers, one for each sample; add them"
+# A line for each sample of the largest sweep, and as many other lines.
+MOST_LINES = 2_000_000
+COLUMNS, ROWS = "reference.columns", "reference.rows"
+"""Places of a table in a case file."""
+DERIVATIVES = (".velocity", ".acceleration")
+_SIGNS = re.compile(r"\"?\s*#\s*signs:\s*(\w+)")
 
 
 @dataclass(frozen=True)
 class Samples:
-    """Columns by name, and rows with their place for messages.
+    """Columns by name, and their numbers.
 
     Attributes:
-        key: key of all rows.
-        signs: sign convention named in a comment.
-        lines: lines of a separate file, for messages.
+        header: place of the names.
+        places: of the rows, for messages.
+        numbers: shape (rows, columns), NaN for gaps.
         printed: digits of the numbers, by column.
+        table: the table that they are from, with the driver values in its column `first`.
+        signs: sign convention named in a comment.
     """
 
     file: Path
     header: str
     columns: Sequence[str]
-    rows: Sequence[tuple[str, Sequence[float]]]
-    key: str = ""
-    signs: str = ""
-    lines: Sequence[str] = ()
-    printed: Sequence[Printed] = ()
+    places: Sequence[str]
+    numbers: Array
+    printed: Sequence[Printed]
+    table: Table
+    first: int
+    signs: str
+
+    @property
+    def key(self) -> str:
+        """Key of the rows in a case file; empty in a file of their own."""
+        return ROWS if self.header == COLUMNS else ""
 
     def driver_value(self, k: int) -> str:
         """Return the driver value of a row as written."""
-        where, row = self.rows[k]
-        line = self.lines[int(where.removeprefix("line ")) - 1] if self.lines else ""
-        cell = line.partition(",")[0].strip().strip('"').strip()
-        with suppress(ValueError):  # rows in the case file, or a row of several lines
-            if decimal(cell) == row[0]:
-                return cell
-        return repr(row[0])
+        rows = self.table.rows()
+        return next(str(cells[self.first]) for place, cells in rows if place == self.places[k])
 
 
-def inline(file: Path, keys: ReferenceKeys, outputs: Sequence[Quantity]) -> Samples:
-    """Return the samples of the rows in a case file."""
+def read_table(file: Path, sheet: str | None, option: str, above: str = "") -> Table:
+    """Read the table of a reference or a recording.
+
+    Args:
+        sheet: name of the sheet of a workbook; None for the only sheet with cells.
+        option: the option to choose a sheet, for messages.
+        above: the last line of a text that is above the table, if it has one, in small letters.
+
+    Raises:
+        CaseError: the file is unreadable, too large, or has no such sheet.
+    """
+    if file.suffix.lower() in WORKBOOKS:
+        return one_sheet(file, read_sheets(file, sheet, MOST_LINES), option)
+    if sheet is not None:
+        problem = f"found the sheet {shown(sheet)} of a file that is no workbook (.xlsx)"
+        raise fault(file, "sheet", f"{problem}, expected none; leave it out")
+    text = read_text(file, LARGEST_FILE, "thin out the samples", of_spreadsheet=True)
+    lines = text.splitlines()
+    if len(lines) > MOST_LINES:
+        raise fault(
+            file,
+            "",
+            f"found {len(lines)} lines, expected a row for each sample of the sweep; thin out the"
+            " samples",
+        )
+    if above:
+        last = next((k for k, line in enumerate(lines, 1) if line.strip().lower() == above), 0)
+        lines[:last] = [""] * last
+    return text_table(file, lines, ("#",), _delimiter)
+
+
+def _delimiter(table: Table) -> str:
+    """Return the most frequent sign of the first line that has one, or a blank if numbers stand
+    above it; titles may stand above the head.
+    """
+    for line in table.lines:
+        most = max(DELIMITERS, key=line.count)
+        if most in line:
+            return most
+        if len(words := line.split()) > 1 and all(map(is_number, words)):
+            return " "
+    return ","
+
+
+def head_of(table: Table) -> tuple[str, list[str]]:
+    """Return the place of the head of a table, and the texts in it.
+
+    Raises:
+        CaseError: the table is empty.
+    """
+    for where, cells in _below_titles(table):
+        return where, [str(cell).strip() for cell in cells]
+    raise fault(
+        table.file,
+        "",
+        "found no samples, expected a line of column names and rows of numbers; add them",
+    )
+
+
+def samples_of(table: Table, wanted: Sequence[int] | None = None, *, gaps: bool = False) -> Samples:
+    """Return the samples of a table: a head and rows of numbers; a row of units may stand between.
+
+    Args:
+        wanted: indices of the columns to read, the driver first; None for all.
+        gaps: whether empty cells and "nan" are gaps, and no faults.
+
+    Raises:
+        CaseError: a row lacks a number, or has a text in place of one.
+    """
+    file, (where, names) = table.file, head_of(table)
+    wanted = range(len(names)) if wanted is None else wanted
+    every = [*wanted] == [*range(len(names))]
+    sign = "." if table.delimiter == "," else _decimal_sign(table, wanted)
+    places, numbers = list[str](), array("d")
+    printed = [Printed() for _ in wanted]
+    for k, (place, cells) in enumerate(_body(table)):
+        if k == 0 and is_unit_row(cells):
+            units = [str(cell).strip("[]() ") for cell in cells] + [""] * len(names)
+            names = [
+                f"{name} [{unit}]" if unit else name
+                for name, unit in zip(names, units, strict=False)
+            ]
+            continue
+        if not every and not any(cells[n] != "" for n in wanted if n < len(cells)):
+            continue  # a note
+        if gaps:
+            cells = [*cells, *[""] * (len(names) - len(cells))]
+        width = len(cells)
+        if not (width == len(names) if every else max(wanted) < width <= len(names)):
+            expected = f"{len(names)} ({', '.join(names)})"
+            raise fault(
+                file, place, f"found {width} numbers, expected {expected}; complete the row"
+            )
+        # convert at once: the cells of a large file as texts would take many times its size
+        for column, n in zip(printed, wanted, strict=True):
+            if gaps and str(cells[n]).lower().lstrip("+-") in ("", "nan"):
+                numbers.append(math.nan)
+                continue
+            text = numeral(cells[n], sign)
+            column.add(text)
+            numbers.append(_number(file, f"{place}, column {names[n]}", cells[n], text))
+        places.append(place)
+    if not places:
+        raise fault(
+            file,
+            "",
+            "found column names only, expected rows of numbers, one for each sample; add them",
+        )
+    comments = [*table.comments, *(str(cells[0]) for _, cells in table.sheet)]
+    signs = next((said[1] for text in comments if (said := _SIGNS.match(text))), "")
+    return Samples(
+        *(file, where, [names[n] for n in wanted], places),
+        np.array(numbers).reshape(len(places), len(wanted)),
+        *(printed, table, wanted[0], signs),
+    )
+
+
+def _below_titles(table: Table) -> Iterator[Row]:
+    """Yield the rows from the head on, the first row with several cells; all rows without a head.
+    Comments of a sheet are left out.
+    """
+    above: list[Row] = []
+    head = False
+    for where, cells in table.rows():
+        filled = sum(cell != "" for cell in cells)
+        if not table.delimiter and filled < 2 and str(cells[0]).startswith("#"):
+            continue
+        if head:
+            yield where, trimmed(cells)
+        elif filled > 1:
+            head = True
+            yield where, trimmed(cells)
+        else:
+            above.append((where, trimmed(cells)))
+    if not head:
+        yield from above
+
+
+def _body(table: Table) -> Iterator[Row]:
+    return islice(_below_titles(table), 1, None)
+
+
+def _decimal_sign(table: Table, wanted: Sequence[int]) -> str:
+    texts = [
+        (place, cell)
+        for k, (place, cells) in enumerate(_body(table))
+        if k or not is_unit_row(cells)
+        for cell in (cells[n] for n in wanted if n < len(cells))
+        if isinstance(cell, str) and cell
+    ]
+    return find_decimal_sign(table.file, texts)
+
+
+def _number(file: Path, where: str, cell: object, text: str) -> float:
+    number = math.nan
+    with suppress(ValueError):
+        number = decimal(text)
+    if not abs(number) <= LARGEST:
+        raise fault(
+            file,
+            where,
+            f"found {shown(cell)}, expected a finite number, at most {LARGEST:g}; correct it or"
+            " leave the column out",
+        )
+    return number if abs(number) >= SMALLEST else 0.0  # far below any tolerance
+
+
+def inline(file: Path, keys: ReferenceKeys, outputs: Sequence[Quantity]) -> Table:
+    """Return the table of the rows in a case file.
+
+    Raises:
+        CaseError: there are no rows.
+    """
     if keys.rows is None:
         raise fault(
             file,
             "reference",
             "found neither file nor rows, expected one of them; name a CSV file or give the rows",
         )
-    columns = keys.columns or [
-        "driver",
-        *(output.name for output in outputs if not output.name.endswith(PER_TRAVEL)),
+    own = (output.name for output in outputs if not output.name.endswith(PER_TRAVEL))
+    rows = [(f"{ROWS}[{k}]", [*map(repr, row)]) for k, row in enumerate(keys.rows)]
+    head = (COLUMNS, keys.columns or ["driver", *own])
+    return Table(file, delimiter=",", sheet=[head, *rows])
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a reference.
+
+    Attributes:
+        place: its index.
+        unit: its unit in the file, in words.
+        convert: conversion of its numbers to SI.
+    """
+
+    place: int
+    unit: str
+    convert: Convert
+
+
+@dataclass(frozen=True)
+class Columns:
+    """The columns of a reference.
+
+    Attributes:
+        driver: the unit of the driver values, in the first column.
+        name: name of the first column.
+        of: columns by OUTPUT, OUTPUT.velocity and OUTPUT.acceleration.
+    """
+
+    driver: Unit
+    name: str
+    of: Mapping[str, Column]
+
+
+def known_columns(outputs: Iterable[Quantity]) -> dict[str, str]:
+    """Return the SI unit of each possible column of outputs, by name."""
+    return {
+        output.name + ending: output.unit + time
+        for output in outputs
+        for ending, time in zip(("", *DERIVATIVES), ("", "/s", "/s^2"), strict=True)
+    }
+
+
+def driver_unit(samples: Samples, default: Unit) -> tuple[str, Unit]:
+    """Return the name of the first column, and the unit of the driver values in it.
+
+    Args:
+        default: unit without one in the head.
+
+    Raises:
+        CaseError: the unit is unknown, or of something else.
+    """
+    text = samples.columns[0]
+    name, unit = unit_of_head(samples.file, samples.header, text)
+    if not unit:
+        return text, default
+    return name, required_unit(samples.file, samples.header, text, unit, si_of(default))
+
+
+def read_columns(
+    samples: Samples, driver: Unit, units: FileUnits, outputs: Sequence[Quantity]
+) -> Columns:
+    """Return the columns of a reference of a case file.
+
+    Args:
+        driver: unit of the driver values, unless the head gives another one.
+        units: of the case file.
+
+    Raises:
+        CaseError: a column is unknown or given twice, or a unit is not the output's.
+    """
+    file, where, known = samples.file, samples.header, known_columns(outputs)
+    first, driver = driver_unit(samples, driver)
+    heads = [
+        (name, unit) if name in known else (text, unit)
+        for text in samples.columns[1:]
+        for name, unit in [unit_of_head(file, where, text, known)]
     ]
-    key = "reference.rows"
-    rows = [(f"{key}[{k}]", row) for k, row in enumerate(keys.rows)]
-    printed = [Printed() for _ in columns]
-    if not rows:
-        raise fault(file, key, f"found none, {ROWS}")
-    samples = Samples(file, "reference.columns", columns, rows, key, printed=printed)
-    for where, row in rows:
-        check_width(file, where, len(row), columns)
-        for column, number in zip(printed, row, strict=True):
-            column.add(repr(number))
-    return samples
-
-
-def only_beside(case_file: Path, keys: ReferenceKeys) -> Path:
-    """Return the path of the file; it must be the only source."""
-    if keys.rows is not None or keys.columns is not None:
+    counts = Counter(name for name, _ in heads)
+    if not heads:
+        names = ", ".join(output.name for output in outputs)
+        raise fault(file, where, f"found no column of an output, expected some of {names}; add one")
+    if first in known:
         raise fault(
-            case_file,
-            "reference",
-            "found file and rows or columns, expected one source; remove one of them",
+            file,
+            where,
+            f"found {first!r} first, the name of an output, expected the driver values; put their"
+            " column first, or name it otherwise",
         )
-    return beside(case_file, keys.file or "")
-
-
-def beside(case_file: Path, name: str) -> Path:
-    """Return the path of a file in or below the case file's folder; any other path is refused."""
-    folder = case_file.parent.resolve()
-    try:
-        file = (folder / name).resolve()
-        inside = not Path(name).is_absolute() and file.is_relative_to(folder)
-    except (OSError, ValueError, RuntimeError):  # a null byte, a loop of links
-        inside = False
-        file = folder
-    with suppress(OSError):  # the reader reports an inaccessible file
-        inside = inside and not file.is_symlink()  # a loop of links: Python 3.13 resolves it
-    if not inside:
-        raise fault(
-            case_file,
-            "reference.file",
-            f"found {shown(name)}, expected a file in the folder of the case file or below; put it"
-            " there and give its name",
-        )
-    with suppress(OSError):  # the reader reports an inaccessible file
-        if not file.exists():
+    for name in counts:
+        if counts[name] > 1:
             raise fault(
-                case_file,
-                "reference.file",
-                f"found {shown(name)}, but there is no such file; check the name",
+                file, where, f"found the column {name!r} twice, expected it once; remove one"
             )
-    return file
+        if name not in known:
+            raise fault(
+                file,
+                where,
+                f"found the column {shown(name)}, expected outputs of the case;"
+                f" {remedy(name, known)}",
+            )
+        require_positions(samples, name, counts)
+    of = {
+        name: column_of(samples, k, unit, known[name], units)
+        for k, (name, unit) in enumerate(heads, 1)
+    }
+    return Columns(driver, first, of)
 
 
-def sha256(file: Path) -> str:
-    """Return the digest of a file, as `sha256sum` prints it."""
-    return hashlib.sha256(file.read_bytes()).hexdigest()
+def column_of(samples: Samples, k: int, unit: str, si: str, units: FileUnits) -> Column:
+    """Return a column.
+
+    Args:
+        k: its index.
+        unit: its unit, from the head; empty for the default.
+        si: the SI unit of its values.
+        units: the default units.
+
+    Raises:
+        CaseError: the unit is unknown, or of something else.
+    """
+    if not unit:
+        return Column(k, *units.of(si.removesuffix("^2").removesuffix("/s")))
+    found = required_unit(samples.file, samples.header, samples.columns[k], unit, si)
+    return Column(k, found.name, found.convert)
 
 
-def check_width(file: Path, where: str, found: int, columns: Sequence[str]) -> None:
-    """Refuse a row without a number for each column."""
-    if found != len(columns):
-        expected = f"{len(columns)} ({', '.join(columns)})"
-        raise fault(file, where, f"found {found} numbers, expected {expected}; complete the row")
+def require_positions(samples: Samples, name: str, names: Collection[str]) -> None:
+    """Refuse a derivative without the column of its positions.
+
+    Raises:
+        CaseError: it has none.
+    """
+    stem = name.removesuffix(".velocity").removesuffix(".acceleration")
+    if stem not in names:
+        raise fault(
+            samples.file,
+            samples.header,
+            f"found {name!r} alone, expected its positions too; add the column {stem!r}",
+        )

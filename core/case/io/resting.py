@@ -12,9 +12,8 @@ from ...errors import CaseError, MechanismError
 from ...jet import Jet
 from ...joints.base import unit
 from ...kinematics import Equilibria, StaticModel
-from ...mechanism.drivers import JointDriver, PointCoordinate
 from ...mechanism.mechanism import Mechanism
-from ...mechanism.motions import Motion, Ramp, Table
+from ...mechanism.motions import JointDriver, Motion, PointCoordinate, Ramp, Table
 from ...trajectory import Array
 from ..case import TIME, Case, Sweep
 from ..compliance import Resting

@@ -114,7 +114,7 @@ left out. `kincheck list --joints` prints all types with their keys.
                          "lateral", "braking", "aligning"]; (tire_stiffness) [N/length], vertical,
                          for the ride rate
     [reference]          true values: file, the name of a CSV file beside the case file, or rows,
-                         with (columns)
+                         with (columns); (sheet), the name of one of several in an .xlsx file
                          beside: in its folder or below, also after following links; a foreign case
                          file opens no other file
                          first column: swept values; others: OUTPUT, OUTPUT.velocity,
@@ -126,20 +126,59 @@ left out. `kincheck list --joints` prints all types with their keys.
                          without it, agreement is never called validated
                          (digest) = "sha256:...", of the file, as sha256sum prints it: a file with
                          another digest is refused
+
+Masses and loads of a case file: their keys, and their numbers in SI.
+
+All keys may be left out. A case without masses and loads has no forces. The motion does
+not depend on masses and loads. Mass is in kg, time in s and force in N, for any [units]. All other
+numbers follow the file's units of length and angle. With length = "mm" and angle = "deg", as in
+Adams: lengths in mm, torque in N mm, stiffness in N/mm, damping in N s/mm, torsional stiffness in
+N mm/deg, torsional damping in N mm s/deg, inertia in kg mm^2, gravity in mm/s^2 (-9806.65 on
+Earth). Points and vectors are global, at the design position. Results are always in SI.
+
+    (gravity) = [0, 0, 0]   acceleration of free fall, global axes [length/s^2]
+    [bodies.NAME]        (mass) = 0 [kg]
+                         (center_of_mass), global: the body's origin unless given
+                         (inertia) = [Ixx, Iyy, Izz, Ixy, Iyz, Ixz], entries of the matrix about the
+                         centre of mass, global axes at design [kg length^2]; the products have the
+                         sign of the matrix entry, Ixy = -sum of m x y; default: zero, a point mass
+    [forces.NAME]        type = "spring_damper": bodies = [first, second], points = [on first, on
+                         second], stiffness [N/length], (damping) = 0 [N s/length],
+                         (free_length), default: the length at design; tension is positive
+                         type = "torsion_spring_damper": joint with a rotation, stiffness
+                         [N length/angle], (damping) = 0 [N length s/angle], (free_angle) = 0: the
+                         joint's angle is zero at design
+                         type = "force": body, point, vector [N], (frame) = "global": its direction
+                         is constant; "body": it turns with the body
+                         type = "torque": body, vector [N length], (frame) = "global"
+                         `kincheck list --joints` prints these types too
 """
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from collections.abc import Iterable, Mapping
+from dataclasses import MISSING, Field, fields
+from enum import StrEnum
+from functools import cache
+from typing import Annotated, Any, Literal, TypeAlias, get_args, get_type_hints
 
 import msgspec
 from msgspec import Meta
 
-from ...mechanism.body import SIX_NUMBERS, Inertia
+from ...joints import Coupler, Joint, Kind
+from ...mechanism.body import ANGLE, SIX_NUMBERS, Inertia, dimension_of
+from ...mechanism.curves import dimensions_of
+from ...mechanism.loads import Axes, Bushing, ForceElement, SpringDamper
 from ...mechanism.mechanism import Vector
+from ...mechanism.motions import Driver, Motion
 from ..case import TIME, Truth
+from ..measures import NAMES, Measure, key_of
+from ..quantity import own_keys
+from ..suspension import Axle, AxleOutput, Convention, Reaction, Side, SuspensionOutput
 
 SCHEMA = "kincheck-case/1"
+CITATION = "a text that says where the true values come from: author, title, page or address"
+DIGEST = "sha256:"
 MOST_SAMPLES = 1_000_000
 COORDINATE = "coordinate"
 """The default type of an output."""
@@ -157,7 +196,21 @@ Numbers6 = Annotated[Inertia, Meta(description=SIX_NUMBERS)]
 Table = Annotated[dict[str, Any], Meta(description="a table")]
 Bodies = Annotated[tuple[str, str], Meta(description='two names ["first body", "second body"]')]
 Joints = Annotated[tuple[str, str], Meta(description='two names ["first joint", "second joint"]')]
-Truths = Annotated[Truth, Meta(description=f"one of {', '.join(Truth)}")]
+Points = Annotated[tuple[str, str], Meta(description='two names ["first point", "second point"]')]
+Rods = Annotated[
+    tuple[tuple[str, str], tuple[str, str], tuple[str, str], tuple[str, str]],
+    Meta(description='the ends of four rods [["on the body", "on the wheel carrier"], ...]'),
+]
+Length = Annotated[float, Meta(gt=0.0, description="a positive length")]
+Share = Annotated[float, Meta(ge=0.0, le=1.0, description="a part of the whole, 0 to 1")]
+
+
+def _one_of(words: Iterable[str]) -> Meta:
+    return Meta(description=f"one of {', '.join(words)}")
+
+
+Sides = Annotated[Side, _one_of(Side)]
+Reactions = Annotated[Reaction, _one_of(Reaction)]
 
 
 class UnitsKeys(msgspec.Struct, forbid_unknown_fields=True):
@@ -178,7 +231,7 @@ class CaseKeys(msgspec.Struct, forbid_unknown_fields=True):
     bodies: Table
     drivers: Table
     sweep: Table | None = None
-    truth: Truths | None = None
+    truth: Annotated[Truth, _one_of(Truth)] | None = None
     units: Table = {}
     joints: Table = {}
     couplers: Table = {}
@@ -256,3 +309,211 @@ class OutputKeys(ToleranceKeys, forbid_unknown_fields=True, kw_only=True):
     component: Annotated[Literal["x", "y", "z"], Meta(description='"x", "y" or "z"')] | None = None
     direction: Numbers3 | None = None
     relative: Flag = False
+
+
+class SuspensionKeys(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
+    """[suspension]; global at design."""
+
+    convention: Annotated[Convention, _one_of(Convention)]
+    side: Sides
+    forward: Numbers3
+    up: Numbers3
+    wheel_center: Text = "wheel_center"
+    center_plane: Numbers3 = (0.0, 0.0, 0.0)
+    static_toe: Number = 0.0
+    static_camber: Number = 0.0
+    wheel_axis: Text | None = None
+    wheel_radius: Length | None = None
+    wheel_contact: Text | None = None
+    kingpin: Points | None = None
+    kingpin_links: Rods | None = None
+    axle: Annotated[Axle, _one_of(Axle)] | None = None
+    wheelbase: Length | None = None
+    cg_height: Length | None = None
+    brakes: Reactions = Reaction.OUTBOARD
+    brake_share: Share | None = None
+    drive: Reactions = Reaction.INBOARD
+    drive_share: Share | None = None
+    travel: Text | None = None
+    per_travel: Flag = True
+    other: dict[str, Any] | None = None
+
+
+class OtherWheelKeys(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
+    """[suspension.other]: the axle's other wheel; omitted keys are equal to the first wheel's."""
+
+    wheel_center: Text
+    static_toe: Number | None = None
+    static_camber: Number | None = None
+    wheel_axis: Text | None = None
+    wheel_contact: Text | None = None
+    kingpin: Points | None = None
+    kingpin_links: Rods | None = None
+    travel: Text | None = None
+
+
+class ReferenceKeys(msgspec.Struct, forbid_unknown_fields=True):
+    """Keys of [reference]: `file`, or `rows` with `columns` (default: the driver, then all outputs
+    in order), and their source.
+
+    Attributes:
+        citation: source of the true values; without it, agreement with them validates nothing.
+        digest: digest of the file; a file with another digest is refused.
+        sheet: sheet of a workbook with several tables.
+    """
+
+    file: (
+        Annotated[
+            str,
+            Meta(min_length=1, description="the name of a CSV or .xlsx file beside the case file"),
+        ]
+        | None
+    ) = None
+    sheet: (
+        Annotated[str, Meta(min_length=1, description="the name of a sheet of an .xlsx file")]
+        | None
+    ) = None
+    columns: (
+        Annotated[
+            list[str], Meta(min_length=2, description="a list of column names, the driver first")
+        ]
+        | None
+    ) = None
+    rows: (
+        Annotated[
+            list[list[int | float]], Meta(min_length=1, description="a list of rows of numbers")
+        ]
+        | None
+    ) = None
+    citation: Annotated[str, Meta(pattern=r"\S", description=CITATION)] | None = None
+    digest: (
+        Annotated[
+            str,
+            Meta(
+                pattern=f"^{DIGEST}[0-9a-f]{{64}}$",
+                description=f'"{DIGEST}" and 64 hexadecimal digits',
+            ),
+        ]
+        | None
+    ) = None
+
+
+Described: TypeAlias = Joint | Coupler | Driver | Motion | ForceElement
+_INHERITED = {each.name for base in (Joint, Coupler, Driver, Motion) for each in fields(base)}
+_SHAPES: Mapping[Any, Any] = {
+    Kind.POSITION: Vector,
+    Kind.DIRECTION: Vector,
+    Kind.POSITIONS: tuple[Vector, Vector],
+    Kind.DIRECTIONS: tuple[Vector, Vector],
+    Kind.LENGTH: float,
+}
+_OF_JOINTS: Mapping[Any, Any] = {
+    "tuple[float, ...]": Numbers,
+    "tuple[str, str]": Annotated[
+        tuple[Literal["rotation", "translation"], Literal["rotation", "translation"]],
+        Meta(description='two of "rotation", "translation", of the first and second joint'),
+    ],
+}
+"""Shape of a coupler's field with several values, by its annotation."""
+_OF_FIELDS: Mapping[Any, Any] = {
+    str: Text,
+    bool: Flag,
+    float: Number,
+    Vector: Numbers3,
+    tuple[float, ...]: Numbers,
+    str | None: Annotated[str | None, Meta(description="a name")],
+    Vector | None: Annotated[Vector | None, Meta(description="a direction [x, y, z]")],
+    tuple[Vector, Vector]: Annotated[
+        tuple[Vector, Vector], Meta(description="two directions [[x, y, z], [x, y, z]]")
+    ],
+}
+_PAIRS_OF_SPRING = tuple[tuple[float, float], ...] | None
+_PAIRS = Annotated[
+    tuple[tuple[float, float], ...] | None, Meta(description="a table of pairs of numbers")
+]
+_CURVES = Annotated[
+    tuple[tuple[float | tuple[float, float], ...], ...] | None,
+    Meta(description="a table [[displacement, force], ...], or one for each axis"),
+]
+_ONE_OR_THREE = Annotated[float | Vector, Meta(description="a number, or three along the axes")]
+_FRAME = Annotated[Literal["global", "body"], Meta(description='"global" or "body"')]
+
+
+def own_fields(cls: type[Described]) -> list[Field[Any]]:
+    """Return the fields of a class itself, without the fields of its kind; case files give them."""
+    return [
+        each
+        for each in fields(cls)
+        if each.name not in _INHERITED and not each.metadata.get("hidden")
+    ]
+
+
+@cache
+def keys_of(cls: type[Described | Measure | SuspensionOutput]) -> type[msgspec.Struct]:
+    """Return the keys of a type: `type`, what it joins, its own fields, and for an output its
+    tolerance and the reason.
+    """
+    keys: list[Any] = [("type", Text)]
+    quantity = issubclass(cls, Measure | SuspensionOutput)
+    if issubclass(cls, Coupler):
+        keys.append(("joints", Joints))
+    elif issubclass(cls, Joint | SpringDamper | Bushing):
+        keys.append(("bodies", Bodies))
+    elif issubclass(cls, SuspensionOutput) and not issubclass(cls, AxleOutput):
+        keys.append(("side", Sides | None, None))
+    # classes of users may have annotations that only their own modules can resolve
+    hints = {} if issubclass(cls, Joint | Coupler) else get_type_hints(cls)
+    for each in own_keys(cls) if quantity else own_fields(cls):
+        key = (key_of(each), _shape(each, hints.get(each.name)))
+        keys.append(key if each.default is MISSING else (*key, each.default))
+    if issubclass(cls, Driver):
+        keys.append(("motion", Table | None, None))
+    bases = (ToleranceKeys,) if quantity else None
+    return msgspec.defstruct(
+        cls.__name__, keys, bases=bases, kw_only=True, forbid_unknown_fields=True
+    )
+
+
+@cache
+def bushing_keys() -> type[msgspec.Struct]:
+    """Return the keys of a joint's bushing: bodies and point are by default the joint's."""
+    hints = get_type_hints(Bushing)
+    place = Annotated[Vector | None, Meta(description="a point [x, y, z]")]
+    keys: list[Any] = [
+        ("bodies", Annotated[Bodies | None, Meta(description="two names of bodies")], None),
+        ("point", place, None),
+    ]
+    keys += [
+        (each.name, _shape(each, hints[each.name]), each.default)
+        for each in own_fields(Bushing)
+        if each.name != "point"
+    ]
+    return msgspec.defstruct("BushingKeys", keys, kw_only=True, forbid_unknown_fields=True)
+
+
+def _shape(each: Field[Any], hint: Any) -> Any:
+    """Return the annotation of a field, by its kind, dimension, name or type.
+
+    Args:
+        hint: type of the field; None for that of a joint or coupler.
+    """
+    if (kind := each.metadata.get("kind")) is not None:
+        return Annotated[_SHAPES[kind], Meta(description=kind.value)]
+    if dimensions_of(each) is not None:
+        return _PAIRS if hint == _PAIRS_OF_SPRING else _CURVES
+    dimension = dimension_of(each)
+    if dimension and hint == Vector and each.default is not MISSING:
+        return _ONE_OR_THREE
+    if dimension and hint != Vector:
+        return Number if dimension is ANGLE else Size
+    if hint is None:
+        return _OF_JOINTS.get(each.type, Number)
+    if hint is Axes:
+        return _FRAME
+    for words in (hint, *get_args(hint)):
+        if isinstance(words, type) and issubclass(words, StrEnum):
+            return Annotated[hint, _one_of(words)]
+    if hint == tuple[str, str]:
+        what = NAMES.get(key_of(each), "point")
+        return Annotated[hint, Meta(description=f'two names ["first {what}", "second {what}"]')]
+    return _OF_FIELDS[hint]

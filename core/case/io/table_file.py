@@ -1,10 +1,12 @@
-"""Writer of tables for other programs, chunk by chunk: CSV, or Parquet if pyarrow is installed."""
+"""Writer of tables for other programs, chunk by chunk: CSV, Parquet if pyarrow is installed, or a
+workbook if openpyxl is.
+"""
 
 from __future__ import annotations
 
 import csv
 import importlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import Enum
 from pathlib import Path
 from typing import Any, TextIO
@@ -14,6 +16,9 @@ from ...extras import library
 from .escape import cell
 
 Rows = Sequence[Sequence[Any]]
+
+SHEET_ROWS = 1_048_576
+"""Most rows of a sheet of a workbook, its head included."""
 
 
 class Kind(Enum):
@@ -68,11 +73,47 @@ def write_parquet(path: Path, columns: Mapping[str, Kind], chunks: Iterable[Rows
     return count
 
 
-def no_parquet(named: str, remedy: str) -> str:
-    """Return a message if pyarrow is not installed, as Parquet needs it; else an empty text."""
+def write_workbook(path: Path, columns: Mapping[str, Kind], chunks: Iterable[Rows]) -> int:
+    """Write a workbook (.xlsx) of one sheet and return the number of rows.
+
+    Raises:
+        ImportError: openpyxl is not installed; see `lack`.
+        OSError: the rows are more than a sheet has room for.
+    """
+    openpyxl: Any = importlib.import_module("openpyxl")
+    book = openpyxl.Workbook(write_only=True)
+    sheet = book.create_sheet("curves")
+    sheet.append([cell(name) for name in columns])
+    count = 0
+    for rows in chunks:
+        count += len(rows)
+        if count >= SHEET_ROWS:
+            raise OSError(f"a sheet has room for {SHEET_ROWS:,} rows; write CSV or Parquet")
+        for row in rows:
+            sheet.append([cell(each) for each in row])
+    book.save(path)
+    return count
+
+
+WRITERS: Mapping[str, Callable[[Path, Mapping[str, Kind], Iterable[Rows]], int]] = {
+    "csv": write_csv,
+    "parquet": write_parquet,
+    "xlsx": write_workbook,
+}
+"""Writers by kind of file."""
+
+_NEEDS = {
+    "parquet": ("Parquet", ("pyarrow", "pyarrow.parquet")),
+    "xlsx": ("a workbook", ("openpyxl",)),
+}
+
+
+def lack(kind: str, named: str, remedy: str) -> str:
+    """Return a message if the library that a kind of file needs is missing, else an empty text."""
+    what, modules = _NEEDS.get(kind, ("", ()))
     try:
-        for name in ("pyarrow", "pyarrow.parquet"):
-            library("Parquet", name, "parquet")
+        for name in modules:
+            library(what, name, kind)
     except KincheckError as error:
         return f"{named}: {error}; {remedy}"
     return ""

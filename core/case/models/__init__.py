@@ -1,1 +1,1 @@
-"""Models in other formats: MJCF files and hardpoint tables, read into cases."""
+"""Models in other formats: MJCF, URDF, SDF and hardpoint tables, read into cases."""

@@ -9,11 +9,12 @@ from ...errors import with_article
 from ..case import Case
 from ..io.case_file import LARGEST_FILE, load_case
 from ..io.document import fault, parse, read_text
-from ..io.reader_options import NOTHING, Supplied
-from ..io.workbook import WORKBOOKS
+from ..io.reader_options import NOTHING, OF_HARDPOINTS, OF_MODELS, Supplied
+from ..io.table import WORKBOOKS
 
 if TYPE_CHECKING:
     from .hardpoints.table import HardpointTable
+    from .trees.tree import Tree
 
 CASE_FILES = (".toml", ".json")
 TABLES = (".csv", ".tsv", ".tab", ".dat", ".prn", ".m", ".hpts")
@@ -32,7 +33,6 @@ CASE, CHRONO, ADAMS, TABLE, TREE, WORKBOOK, MODEL = (
     "workbook of hardpoints",
     "model",
 )
-HARDPOINTS = (CHRONO, ADAMS, TABLE)
 UNREAD = {
     ".constraints.json": "holds the loops of a URDF beside it; give that file, NAME.urdf",
     ".xacro": "holds macros; expand them: xacro FILE > robot.urdf",
@@ -59,26 +59,11 @@ UNREAD = {
     ),
 }
 """Files that people have beside their models, and what to do, by suffix."""
-_OF_HARDPOINTS = (
-    "template",
-    "units",
-    "axes",
-    "travel",
-    "rack",
-    "names",
-    "wheel-radius",
-    "wheelbase",
-    "axle",
-    "position",
-    "cg-height",
-    "brake-share",
-    "drive-share",
-)
 _OPTIONS = {
     CASE: ("closure",),
-    MODEL: ("drive", "hold", "hold-rest", "start", "closure"),
-    **dict.fromkeys(HARDPOINTS, _OF_HARDPOINTS),
-    **dict.fromkeys((WORKBOOK, TREE, TABLE), (*_OF_HARDPOINTS, "sheet")),
+    MODEL: OF_MODELS,
+    **dict.fromkeys((CHRONO, ADAMS), OF_HARDPOINTS),
+    **dict.fromkeys((WORKBOOK, TREE, TABLE), (*OF_HARDPOINTS, "sheet")),
 }
 
 
@@ -111,45 +96,37 @@ def load(file: Path, supplied: Supplied = NOTHING) -> Case:
             "found a file name with control characters, expected printable ones; rename the file",
         )
     if kind == MODEL:
-        return _model(file, _text(file), supplied)
+        from .trees.case import case_of
+
+        return case_of(read_tree(file), supplied)
     from .hardpoints.read import case_of_hardpoints
 
     return case_of_hardpoints(_hardpoints(file, kind, supplied), supplied)
 
 
-def _model(file: Path, text: str, supplied: Supplied) -> Case:
-    """Return the case of a model in XML: MJCF, URDF or SDF, whatever the file is called."""
-    from .mjcf.elements import parse_xml
-    from .mjcf.read import Document, case_of, read_mjcf
+def read_tree(file: Path) -> Tree:
+    """Return the links of a model in XML: MJCF, URDF or SDF, whatever the file is called.
 
-    root = parse_xml(file, text)
+    Raises:
+        CaseError: it is no such model, or something in it makes no sense.
+    """
+    from .trees.element import parse_xml
+
+    root = parse_xml(file, _text(file))
     match root.tag:
         case "robot":
-            from .robots.urdf import read_urdf
-
-            robot = read_urdf(file, root)
+            from .trees.urdf import read_urdf as read
         case "sdf":
-            from .robots.sdf import read_sdf
-
-            robot = read_sdf(root)
+            from .trees.sdf import read_sdf as read
         case _:
-            return read_mjcf(file, root, supplied)
-    from .robots.as_mjcf import as_mjcf
-
-    name = root.attributes.get("name", file.stem)
-    beside = f" with {', '.join(robot.beside)}" if robot.beside else ""
-    described = f"{robot.format} {name!r} of {file.name}{beside}"
-    zero, closed = "its zero pose", not robot.paired
-    document = Document(described, as_mjcf(robot), root, robot.left_out, zero, closed)
-    return case_of(file, document, supplied)
+            from .trees.mjcf import read_mjcf as read
+    return read(file, root)
 
 
 def _hardpoints(file: Path, kind: str, supplied: Supplied) -> HardpointTable:
     """Return the table of hardpoints of a file."""
-    from .hardpoints.adams import read_adams
-    from .hardpoints.chrono import read_chrono
-    from .hardpoints.plain import read_plain
-    from .hardpoints.rows import read_spreadsheet
+    from .hardpoints.programs import read_adams, read_chrono
+    from .hardpoints.rows import read_plain, read_spreadsheet
     from .hardpoints.tree import read_tree
 
     if kind == WORKBOOK:
@@ -189,7 +166,7 @@ def kind_of(file: Path, supplied: Supplied = NOTHING) -> str:
 
 
 def _kind_of_json(file: Path, supplied: Supplied) -> str:
-    from .hardpoints.chrono import is_chrono, without_comments
+    from .hardpoints.programs import is_chrono, without_comments
     from .hardpoints.tree import has_points, json_tree
 
     text = without_comments(_text(file))

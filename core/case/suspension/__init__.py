@@ -2,14 +2,9 @@
 and the meaning of its sign.
 """
 
-from . import axle as axle
-from . import instant_axis as instant_axis
-from . import steering_axis as steering_axis
-from . import wheel as wheel
 from .axle import AxleOutput
-from .base import Rate, SuspensionOutput
-from .per_travel import PerTravel
-from .vehicle import Axle, Convention, Reaction, Side, Vehicle
+from .base import PerTravel, Rate, SuspensionOutput
+from .corner import Axle, Convention, Reaction, Side, Vehicle
 from .wheel import Camber, Toe, camber_of_front_view
 
 __all__ = [

@@ -18,8 +18,7 @@ from ...algebra import Vec3
 from ...jet import Jet, arctan2, sqrt, where
 from ..quantity import HIDDEN
 from .base import SuspensionOutput, held
-from .corner import PARALLEL, Corner
-from .vehicle import Side, Vehicle
+from .corner import PARALLEL, Corner, Side, Vehicle
 
 # Wheels steered by less than this have no Ackermann of use [rad]: a quotient of two differences.
 STRAIGHT = 1e-2

@@ -1,4 +1,5 @@
-"""Base classes of suspension outputs: a formula over the vectors of a corner, with unit and sign.
+"""Base classes of suspension outputs: a formula over the vectors of a corner, with unit and sign;
+and derivatives by wheel travel.
 
 A new output type is a frozen dataclass with `type`, `measure`, `positive`, `needs`, `reads` and a
 formula, derived from one of the three kinds here, or from `AxleOutput`. The class declaration
@@ -9,7 +10,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
@@ -17,10 +18,9 @@ import numpy as np
 from ...algebra import Vec3
 from ...jet import Jet, where
 from ...mechanism.mechanism import Mechanism, Point
-from ..case import HELD_BUT
-from ..quantity import HIDDEN, TypedQuantity
-from .corner import Corner
-from .vehicle import Vehicle
+from ..case import HELD_BUT, PER_TRAVEL
+from ..quantity import HIDDEN, PoseQuantity, TypedQuantity
+from .corner import Corner, Vehicle
 
 # Samples with a wheel speed below this fraction of the fastest point's speed are left out: a
 # quotient by the travel speed has lost three digits of its rates there, and more at lower speeds.
@@ -86,14 +86,6 @@ class SuspensionOutput(TypedQuantity):
     def signs(self) -> str:
         """Convention of signs and axes, in words."""
         return self.vehicle.signs
-
-    @property
-    def facts(self) -> Mapping[str, Any]:
-        """Properties for readers of results."""
-        own = {
-            each: value for each, value in asdict(self).items() if each not in ("vehicle", "other")
-        }
-        return {"type": self.type, "unit": self.unit, "sense": self.sense, **own}
 
 
 @dataclass(frozen=True)
@@ -174,3 +166,84 @@ def where_moving(quotient: Jet, corner: Corner, at: Mapping[str, Vec3]) -> Jet:
     # which must not be judged by one another.
     fastest = np.max(np.nan_to_num(np.array(speeds)), axis=(0, 1), initial=0.0)
     return where(travel > STILL * fastest, quotient)
+
+
+@dataclass(frozen=True)
+class PerTravel(PoseQuantity):
+    """The derivative of an output by wheel travel (jounce): the upward displacement of the wheel
+    centre relative to the vehicle's body.
+
+    Other drivers are held, see `Vehicle.travel`. If the vehicle has no driver of its travel, it is
+    the slope along the sweep, q' / s', and includes the share of other moving drivers.
+
+    Attributes:
+        atol: tolerance of the output over the size of the mechanism [unit / m].
+    """
+
+    of_output: SuspensionOutput
+    atol: float
+
+    @property
+    def name(self) -> str:
+        """Name of the output with the suffix `PER_TRAVEL`."""
+        return f"{self.of_output.name}{PER_TRAVEL}"
+
+    @property
+    def points(self) -> tuple[str, ...]:
+        """Names of the points it reads."""
+        return tuple(dict.fromkeys((*self.of_output.points, self.vehicle.wheel_center)))
+
+    @property
+    def orders(self) -> int:
+        """One less than those of the output; the value alone where other drivers are held."""
+        return 1 if self.vehicle.travel else self.of_output.orders - 1
+
+    def markers(self, mechanism: Mechanism) -> Sequence[Point]:
+        """Return the markers of the output."""
+        return self.of_output.markers(mechanism)
+
+    @property
+    def unit(self) -> str:
+        """Unit of the output per metre."""
+        return f"{self.of_output.unit}/m"
+
+    @property
+    def rtol(self) -> float:
+        """Relative tolerance of the output."""
+        return self.of_output.rtol
+
+    @property
+    def why(self) -> str:
+        """Reason for the tolerance."""
+        return f"that of {self.of_output.name} over the size of the mechanism; {self.of_output.why}"
+
+    @property
+    def sense(self) -> str:
+        """Meaning of a positive value, in words."""
+        return f"{self.of_output.sense}, per metre of jounce travel"
+
+    @property
+    def vehicle(self) -> Vehicle:
+        """Vehicle of the output."""
+        return self.of_output.vehicle
+
+    @property
+    def signs(self) -> str:
+        """Convention of signs and axes, in words."""
+        return self.of_output.signs
+
+    @property
+    def facts(self) -> Mapping[str, Any]:
+        """Properties for readers of results."""
+        known: Sequence[str] = ("name", "unit", "sense", "atol", "rtol", "why")
+        return {
+            "type": "per_travel",
+            "of": self.of_output.name,
+            **{each: getattr(self, each) for each in known},
+            **held(self.vehicle),
+        }
+
+    def of(self, at: Mapping[str, Vec3], design: Mapping[str, Vec3]) -> Jet:
+        """Return the slope, NaN while the wheel is at rest."""
+        corner = Corner(self.vehicle, at)
+        return where_moving(self.of_output.of(at, design).dot / corner.center.z.dot, corner, at)

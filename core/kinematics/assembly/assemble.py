@@ -26,14 +26,13 @@ from ...errors import SolveError, number_of
 from ...input_checks import no_such, real, require_kind, require_positive
 from ...mechanism.mechanism import Mechanism
 from ...primitives.base import Pose
-from ...program import NumpyExecutor, Plan, Program, program
 from ...tabular import Tabular
 from ...trajectory import Array, BodyMotion
+from ..compiled.dense_equations import System
 from ..compiled.programs import Tracer
 from ..compiled.request import CONSISTENT, Request
 from ..formulation.constraints import Style
-from ..formulation.driver_inputs import standing_drives
-from ..formulation.state_vectors import displaced, state_of
+from ..formulation.state_vectors import displaced, standing_drives, state_of
 
 MAX_ITERATIONS = 100
 # mu over |phi|^2: 0.01 to 1 serve alike on the strut; less lets singular Jacobians throw bodies
@@ -163,86 +162,58 @@ def require_shapes(
 
 
 class Closing:
-    """The programs to close a mechanism at values of its drivers."""
+    """The equations to close a mechanism at values of its drivers."""
 
     def __init__(
         self, mechanism: Mechanism, values: Mapping[str, float], style: str = "mixed"
     ) -> None:
         self.values, self.moving = values, tuple(body.name for body in mechanism.moving)
-        self.tracer = tracer = Tracer(
+        self.tracer = Tracer(
             mechanism, Request(tuple(values), (), self.moving, order=0, style=Style(style))
         )
-        self.kept = list(tracer.selection.chosen)
-        phi, rows = tracer.formulation.phi(tracer.at), tracer.formulation.rows(tracer.at)
-        slot, vector = tracer.layout.scalar, tracer.layout.vector
-        self._phi, self._step = vector("phi", len(phi)), vector("step", tracer.unknowns)
-        self._entries = np.array([(k, column) for k, row in enumerate(rows) for column in row])
-        self._rows = [slot(f"entry {k} {column}") for k, column in self._entries.tolist()]
-        entries = [x for row in rows for x in row.values()]
-        step = [tracer.tape.input(each) for each in self._step]
-        after = tracer.formulation.retract(tracer.at, step)
-        state = {
-            slot: x
-            for name, value in after.items()
-            for slot, x in zip(vector(name, len(value)), value, strict=True)
-        }
-        self._programs: list[Program] = [
-            program(
-                "rows",
-                tracer.tape,
-                dict(zip([*self._phi, *self._rows], [*phi, *entries], strict=True)),
-            ),
-            program("retract", tracer.tape, state),
-            tracer.outputs(),
-        ]
+        self.system = System(self.tracer)
+        self.kept = [*self.tracer.selection.chosen]
 
     def run(self, poses: Mapping[str, Pose], n: int, tol: float) -> Assembled:
         """Close from n poses of each body, scalars of shape (n,); bodies left out start at
         design.
         """
-        slots, vectors, frame = (
-            self.tracer.layout.slots,
-            self.tracer.layout.vectors,
-            self.tracer.frame,
+        system, tracer = self.system, self.tracer
+        start = state_of(tracer.formulation, tracer.mechanism, tracer.frame, poses, self.values)
+        drives = standing_drives(tracer.mechanism, tracer.frame.unit, self.values).values()
+        state: Array = np.array(
+            [np.broadcast_to(x, (n,)) for value in start.values() for x in value]
         )
-        executor = NumpyExecutor(Plan({each.name: each for each in self._programs}, slots), n)
-        mechanism = self.tracer.mechanism
-        for name, value in state_of(
-            self.tracer.formulation, mechanism, frame, poses, self.values
-        ).items():
-            executor.put(vectors[name], np.array([np.broadcast_to(x, (n,)) for x in value]))
-        for name, drive in standing_drives(mechanism, frame.unit, self.values).items():
-            executor.put(vectors[f"drive {name}"], np.array([astuple(drive)]).T)
+        sample = np.array([[0.0, *(x for drive in drives for x in astuple(drive))]] * n).T
         iterations, done = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.bool_)
         for _ in range(MAX_ITERATIONS):
-            executor.run("rows")
-            phi = executor.get(self._phi).T
-            active = np.flatnonzero(~done & np.isfinite(phi).all(axis=1))
+            phi, _, entries = system.evaluate(state, sample)
+            active = np.flatnonzero(~done & np.isfinite(phi).all(axis=0))
             if not len(active):
                 break
             iterations[active] += 1
             # and this step, still taken, makes it round-off
-            done |= np.abs(phi[:, self.kept]).max(axis=1) < tol
-            matrix = np.zeros((len(active), phi.shape[1], self.tracer.unknowns))
-            matrix[:, self._entries[:, 0], self._entries[:, 1]] = executor.get(self._rows).T[active]
-            step = np.zeros((n, self.tracer.unknowns))
-            step[active] = self._steps(phi[active], matrix)
-            executor.put(self._step, step.T)
-            executor.run("retract")
-        executor.run("outputs")
-        block = executor.get(range(len(slots)))
-        closes = done & (block[slots["closure"]] <= tol)
-        sound = (block[slots["branch"]] > 0.0) & (block[slots["leftover"]] <= max(CONSISTENT, tol))
-        found = np.where(closes & sound, block, np.nan)
-        bodies = {
-            name: BodyMotion(
-                found[vectors[f"r {name}"]].T, found[vectors[f"p {name}"]].T, None, None
-            )
-            for name in self.moving
-        }
-        return Assembled(
-            bodies, closes & sound, closes & ~sound, block[slots["closure"]].copy(), iterations
+            done |= np.abs(phi[self.kept]).max(axis=0) < tol
+            matrix = np.zeros((len(active), len(phi), system.unknowns))
+            matrix[:, system.rows, system.columns] = entries.T[active]
+            step = np.zeros((n, system.unknowns))
+            step[active] = self._steps(phi.T[active], matrix)
+            state = system.stepped(state, step.T)
+        found = system.equations(state, sample)
+        none = np.zeros((system.unknowns, n))
+        outputs = system.outputs(state, sample, none, none)
+        residual: Array = np.abs(found.phi).max(axis=1)
+        closes = done & (residual <= tol)
+        sound = (outputs["branch"][0] > 0.0) & (found.leftover <= max(CONSISTENT, tol))
+        r, p = (
+            {
+                name: np.where(closes & sound, outputs[f"{label} {name}"], np.nan).T
+                for name in self.moving
+            }
+            for label in ("r", "p")
         )
+        bodies = {name: BodyMotion(r[name], p[name], None, None) for name in self.moving}
+        return Assembled(bodies, closes & sound, closes & ~sound, residual, iterations)
 
     def _steps(self, phi: Array, matrix: Array) -> Array:
         """Steps of lanes, shape (n, unknowns), from their residuals, shape (n, rows), and

@@ -1,19 +1,29 @@
-"""Components of a cascade bound to lanes, one sample a lane."""
+"""A large mechanism solved component by component: one program for all components built alike.
+
+Every component reads the motion of prescribed bodies from a table of all solved quantities (the
+world) and adds its own. `ComponentLanes` binds them to lanes, one sample a lane.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import groupby
+from typing import Any
 
 import numpy as np
 
+from ...errors import SolveError
 from ...failures import FailureKind, PoseFailure
+from ...mechanism.mechanism import Mechanism, Vector
 from ...mechanism.motions import Path
 from ...program import Parts, Plan
-from ...program.memory import aligned
+from ...program.plan import aligned
 from ...trajectory import QUANTITIES, Array
+from ..compiled.compiled_model import CLOSED, Model, compile_model
 from ..compiled.request import (
+    ACCEPT,
     EARLIER,
     FROM,
     LARGEST_SIGMA,
@@ -21,15 +31,170 @@ from ..compiled.request import (
     RATE_T,
     SIGMA,
     TIME,
+    Request,
     slots_of,
 )
 from ..compiled.solution import Columns
-from ..continuation.singular_crossing import SOUND, Numbers
+from ..continuation.singular_poses import SOUND, Numbers
 from ..formulation.acceptance_criteria import AMPLIFIED, doubtful
-from ..sparse.poses import ChosenPivots, error_bounds
-from ..sparse.sparse_equations import SparseEquations
-from .cascade import Cascade
-from .lanes import CLOSURES, MARGINS, SIGMAS, WORST, Anchor, Indices, Lanes
+from ..formulation.constraints import frames
+from ..formulation.parameters import places
+from ..structure.components import Component, Section, components, section
+from ..structure.degrees_of_freedom import counted
+from .sparse_lanes import SparseLanes
+from .sweep import CLOSURES, MARGINS, SIGMAS, WORST, Anchor, Indices, Lanes
+
+
+@dataclass(frozen=True, eq=False)
+class ComponentType:
+    """Components of one structure: one model, and numbers for each.
+
+    Attributes:
+        members: numbers of the components.
+        fixed: values of the slots `Plan.fixed`, the same in all lanes, at the design position,
+            shape (members, fixed).
+        base: first row of the first member in the world; each has `model.kept` rows.
+    """
+
+    model: Model
+    members: tuple[int, ...]
+    fixed: Array
+    base: int
+
+    @cached_property
+    def column(self) -> Mapping[str, int]:
+        """Return the columns of `fixed` with the tolerances, and with times and singular values at
+        the poses before.
+        """
+        names = (*ACCEPT, EARLIER + TIME, *(FROM + name for name in (TIME, SIGMA, LARGEST_SIGMA)))
+        return {name: list(self.model.plan.fixed).index(self.model.slots[name]) for name in names}
+
+    def rows(self, name: str, member: int) -> range:
+        """Return the rows of the world with a kept quantity of a member."""
+        rows = self.model.rows[name]
+        start = self.base + member * self.model.kept
+        return range(start + rows.start, start + rows.stop)
+
+
+class Cascade:
+    """The components of a mechanism with their programs, ready to be solved along paths.
+
+    Args:
+        request: as for `compile_model`; accelerations are computed whatever its order, to predict
+            from.
+        parts: its components, if known already.
+
+    Raises:
+        SolveError: the mechanism has couplers, is not driven enough, or does not close at the
+            design position.
+    """
+
+    def __init__(
+        self, mechanism: Mechanism, request: Request, parts: Sequence[Component] | None = None
+    ) -> None:
+        self.mechanism, self.request = mechanism, request
+        frame = frames(mechanism)
+        self.parts = components(mechanism, frame) if parts is None else parts
+        self.unit = max(part.extent for part in self.parts) or frame.unit
+        metres = {name: frame.unit * origin for name, origin in frame.origins.items()}
+        origins: dict[str, Vector] = {
+            name: (origin.x, origin.y, origin.z) for name, origin in metres.items()
+        }
+        driven = {getattr(driver, "point", "") for driver in mechanism.drivers}
+        self.points: list[list[str]] = [[] for _ in self.parts]
+        self.part_of = {name: k for k, part in enumerate(self.parts) for name in part.bodies}
+        for point in mechanism.points:
+            if (
+                point.name in request.points or point.name in driven
+            ) and point.body in self.part_of:
+                self.points[self.part_of[point.body]].append(point.name)
+        sections = [self._section(k, part, origins) for k, part in enumerate(self.parts)]
+        alike: dict[object, list[int]] = {}
+        for k, each in enumerate(sections):
+            alike.setdefault(each.signature, []).append(k)
+        self.kinds: list[ComponentType] = []
+        self.rows = 0
+        for members in alike.values():
+            kind = self._kind([sections[k] for k in members], members)
+            self.kinds.append(kind)
+            self.rows += len(members) * kind.model.kept
+        self.place = {part: (kind, k) for kind in self.kinds for k, part in enumerate(kind.members)}
+
+    @property
+    def largest(self) -> int:
+        """Unknowns of the largest component."""
+        return max(kind.model.selection.account.moving_coordinates for kind in self.kinds)
+
+    @cached_property
+    def details(self) -> dict[str, Any]:
+        """The cascade as the record of every solution shows it."""
+        unknowns, rows, redundant, sizes = 0, 0, list[str](), dict[str, dict[str, int]]()
+        for kind in self.kinds:
+            account, like = kind.model.selection.account, self.parts[kind.members[0]].bodies[0]
+            unknowns += account.moving_coordinates * len(kind.members)
+            rows += account.rows * len(kind.members)
+            for part in (self.parts[k] for k in kind.members):
+                # as they are called in a section
+                joints = {f"j{k}": joint.name for k, joint in enumerate(part.joints)}
+                named = (name.partition(":") for name in account.redundant_rows)
+                redundant += [f"{joints[owner]}{colon}{row}" for owner, colon, row in named]
+            which = f"components like that of {like} ({len(kind.members)})"
+            sizes |= {f"{name}, {which}": size for name, size in kind.model.sizes.items()}
+        return {
+            **counted(self.mechanism, unknowns, rows, redundant).details,
+            "components": len(self.parts),
+            "largest_component": self.largest,
+            "program": sizes,
+        }
+
+    def _section(self, k: int, part: Component, origins: dict[str, Vector]) -> Section:
+        points = [self.mechanism.point(name) for name in self.points[k]]
+        wanted = [self.mechanism.body(name) for name in part.bodies if name in self.request.bodies]
+        return section(part, self.unit, origins, points, wanted)
+
+    def _kind(self, sections: Sequence[Section], members: Sequence[int]) -> ComponentType:
+        first, values = sections[0], [places(each.mechanism) for each in sections]
+        varied = tuple(
+            place
+            for place, value in values[0].items()
+            if any(each[place] != value for each in values)
+        )
+        m, part = first.mechanism, self.parts[members[0]]
+        request = Request(
+            tuple(driver.name for driver in m.drivers),
+            tuple(f"p{k}" for k in range(len(self.points[members[0]]))),
+            tuple(f"b{k}" for k, name in enumerate(part.bodies) if name in self.request.bodies),
+            compiled=self.request.compiled,
+            last_iteration=self.request.last_iteration,
+            state=True,
+            varied=varied,
+        )
+        model = compile_model(m, request, first)
+        numbers = np.array(
+            [[x for place in varied for x in each[place]] for each in values]
+        ).reshape(len(members), -1)
+        lanes = model.standing(numbers.T)
+        if np.isnan(lanes).any():
+            worst = self.parts[members[int(np.isnan(lanes).any(axis=0).argmax())]]
+            raise SolveError(
+                f"mechanism {self.mechanism.name!r}: the component of {', '.join(worst.bodies)}"
+                f" does not close at the design position to {CLOSED:g} of its size; check points,"
+                " axes and lengths",
+                FailureKind.NOT_CLOSED,
+            )
+        source, target = np.array(model.plan.carried).T
+        lanes[target] = lanes[source]
+        return ComponentType(
+            model, tuple(members), np.ascontiguousarray(lanes[list(model.plan.fixed)].T), self.rows
+        )
+
+    def body_rows(self, name: str) -> list[int]:
+        """Return the rows of the world with the motion of a body, in the order of `PRESCRIBED`."""
+        kind, member = self.place[self.part_of[name]]
+        k = self.parts[kind.members[member]].bodies.index(name)
+        u, q, v, a = (kind.rows(label, member) for label in (f"u b{k}", f"q b{k}", RATE, RATE_T))
+        return [*u, *q, *v[6 * k : 6 * k + 6], *a[6 * k : 6 * k + 6]]
+
 
 # Samples at once: all are predicted from one pose, and the farther they are from it the more
 # iterations they take, and the more are tried in vain; and what a large chain takes its time for is
@@ -164,12 +329,8 @@ class ComponentLanes(Lanes):
 
     def sampled(self, times: Array, path: Path) -> list[Array]:
         """See `Lanes`: by component type; types without drivers share one table."""
-        models, alone = [kind.model for kind in self.cascade.kinds], times[None]
-        driven = [(model, model.request.drivers) for model in models]
-        return [
-            model.samples(times, path.drive(names, times)) if names else alone
-            for model, names in driven
-        ]
+        models, alone = (kind.model for kind in self.cascade.kinds), times[None]
+        return [each.samples(path, times) if each.request.drivers else alone for each in models]
 
     def attempt_at(self, tables: Sequence[Array], *, neighbours: bool = False) -> Array:
         """See `Lanes`."""
@@ -197,41 +358,33 @@ class ComponentLanes(Lanes):
         closure, sigma = (self.worst[row, :count] for row in (CLOSURES, SIGMAS))
         if not doubtful(float(sigma.min()), float(closure.max()), self._tol):
             return {}
-        at, model = np.flatnonzero(doubtful(sigma, closure, self._tol)), self._whole
+        at = np.flatnonzero(doubtful(sigma, closure, self._tol))
         state = np.stack([self._state(k) for k in at.tolist()], axis=1)
-        errors = error_bounds(
-            ChosenPivots(model, model.rows),
-            state,
-            model.drives(path, self._times[at]),
-            model.scale,
-            self.request.order,
-        )
+        sample = self._whole.sampled(self._times[at], path)[0]
+        errors = self._whole.error_bounds(state, sample)
         limit, found = AMPLIFIED * self._tol, zip(at.tolist(), errors.tolist(), strict=True)
         return {k: error for k, error in found if not error <= limit}  # or it is no number
 
     @cached_property
-    def _whole(self) -> SparseEquations:
-        return SparseEquations(self.mechanism, compiled=self.request.compiled)
+    def _whole(self) -> SparseLanes:
+        return SparseLanes(self.mechanism, replace(self.request, points=(), bodies=()))
 
     def _state(self, lane: int) -> Array:
         """Return the state of a lane as the equations of the whole mechanism have it."""
-        model, cascade = self._whole, self.cascade
-        places, scale = model.elements.numbering, cascade.unit / model.unit
-        found = np.zeros(places.state)
+        names, cascade = self._whole.system.names, self.cascade
+        found = np.zeros(len(self._whole.system.design))
         for k, part in enumerate(cascade.parts):
             kind, member = cascade.place[k]
             for name in kind.model.state:
                 what, own = name.split(" ", 1)
-                values = self.world[kind.rows(name, member), lane]
                 if what == "x":
                     joint, _, coordinate = own.rpartition(".")
-                    of_joint = f"{part.joints[int(joint[1:])].name}.{coordinate}"
-                    at = places.places(7, (), (of_joint,))
+                    whole = f"x {part.joints[int(joint[1:])].name}.{coordinate}"
                 else:
-                    of_body = places.places(7, (part.bodies[int(own[1:])],), ())
-                    at = of_body[:3] if what == "u" else of_body[3:]
+                    whole = f"{what} {part.bodies[int(own[1:])]}"
                 length = what == "u" or name.endswith(".translation")
-                found[at] = values * (scale if length else 1.0)
+                values = self.world[kind.rows(name, member), lane]
+                found[names[whole]] = values * (cascade.unit / self._whole.unit if length else 1.0)
         return found
 
     def each(self, name: str) -> Array:

@@ -1,88 +1,171 @@
-"""A sparse system bound to lanes, one sample a lane: a list of one block.
+"""A large mechanism as one sparse system bound to lanes, one sample a lane: a list of one block.
 
-Lanes are predicted by the polynomial through the last eight samples, at first by a Taylor step of
-second order with the error of the last such step.
+All equations are one program without an elimination; each pose has factors of its own (SuperLU).
+Lengths are measured near the size of the bodies, not of the whole mechanism: the entries of the
+matrix and the round-off of the rows depend on that size.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from contextlib import suppress
+from dataclasses import dataclass, fields, replace
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ...errors import SolveError
 from ...failures import FailureKind, PoseFailure
+from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path
 from ...program import before, maximum
 from ...trajectory import Array
-from ..compiled.interpolation import lagrange
-from ..compiled.predictor import ABOUT
-from ..compiled.request import ACCEPT, Request
-from ..continuation.failure_reasons import failure_kind
-from ..continuation.singular_crossing import SOUND, Numbers
+from ..compiled.compiled_model import ASSEMBLING, CLOSED, STILL
+from ..compiled.dense_equations import System
+from ..compiled.programs import Tracer
+from ..compiled.request import ACCEPT, MAX_ITERATIONS, Request
+from ..compiled.solution import Columns
+from ..compiled.step_programs import ABOUT
+from ..continuation.segments import BETTER, SEEN
+from ..continuation.singular_poses import SOUND, Numbers
+from ..continuation.walk import failure_kind
 from ..formulation.acceptance_criteria import (
     AMPLIFIED,
     EPSILON,
     LOW,
-    TURNED_BY_PIVOTS,
-    WORSE_BY_PIVOTS,
-)
-from ..formulation.margins import (
     Block,
     Candidate,
     Limits,
+    doubtful,
     known_slope,
     least_slope,
     margins,
     slope_between,
 )
-from ..sparse.output_motions import OutputMotions
-from ..sparse.poses import ChosenPivots, FixedOrder, Poses, Solved, error_bounds
-from ..sparse.sparse_equations import (
-    POSES,
-    Rows,
-    SparseEquations,
-    Stand,
-    distance,
-)
-from ..structure.sparse_lu import SingularError
-from .lanes import MARGINS, WORST, Anchor, Lanes
+from ..formulation.constraints import measured
+from ..formulation.formulation import row_names
+from ..formulation.state_vectors import turns
+from ..structure.degrees_of_freedom import NullSpaces, counted, locked_drivers, require_driven
+from ..structure.sparse_lu import Blocks, Factors, Pattern, SingularError
+from .sweep import CLOSURES, MARGINS, SIGMAS, WORST, Anchor, Indices, Lanes
 
-REMEMBERED = 8
-"""Samples that the next ones are predicted from: extrapolated by as many again, their rounding
-errors grow to 1e-12.
-"""
-WORTH = 4
-"""Samples at once that are worth making tables for: that takes what 12 (43 bodies) to 36 (1,999)
-save, once for all sweeps.
-"""
-# Rows are chosen anew where that makes the determinant, and so the least of what it is a product
-# of, as many times larger.
-BETTER = 3.0
-TOO_LONG = ("continued", "near", "not turned round", "as regular", "regular between")
-"""Criteria that shorter steps meet; the order of elimination has no effect on them."""
+POSES = 8
+"""Poses evaluated together: samples that are so far from the last one are still predicted well."""
+# Residuals below this, some round-offs in rows of size one, are as small as they get; elsewhere an
+# iteration that gains less than a digit shows that they are.
+SETTLED, STALLS = 1e-15, 0.1
 FEW = 5
 """Names listed in a message, at most."""
+# Steps of inverse iteration: each divides what is left of other directions by the square of how
+# much better they are determined.
+STEPS = 3
 
 
 @dataclass(frozen=True, eq=False)
-class _Reached:
-    """What an attempt found: poses, and beside them numbers of shape (numbers, lanes)."""
+class Rows:
+    """A choice of the rows to solve.
 
-    poses: Solved
-    times: Array
+    Attributes:
+        kept, dropped: solved rows, and redundant rows.
+        pattern, blocks: of the solved ones.
+    """
+
+    kept: Indices
+    dropped: Indices
+    pattern: Pattern
+    blocks: Blocks
+    _solved: Indices
+
+    @staticmethod
+    def of(kept: Indices, system: System, count: int) -> Rows:
+        """Return the choice of these rows, of as many."""
+        place = np.full(count, -1, np.intp)
+        place[kept] = np.arange(len(kept))
+        solved = np.flatnonzero(place[system.rows] >= 0)
+        pattern = place[system.rows[solved]], system.columns[solved], len(kept)
+        dropped = np.setdiff1d(np.arange(count), kept)
+        return Rows(kept, dropped, Pattern(*pattern), Blocks(*pattern), solved)
+
+    def factor(self, entries: Array) -> Factors:
+        """Return the factors for entries of all rows. Raises SingularError."""
+        return self.pattern.factor(entries[self._solved])
+
+    def tests(self, entries: Array) -> tuple[Array, float]:
+        """Return the sigmas of the blocks and the sign of the determinant for entries of all rows.
+
+        Raises:
+            SingularError: a block is singular.
+        """
+        return self.blocks.sigmas(entries[self._solved])
+
+
+@dataclass(frozen=True, eq=False)
+class Poses:
+    """Solved poses, one a lane along the last axis, or a single one without that axis.
+
+    Attributes:
+        sample: inputs of the equations, the time first.
+        earlier: time of the pose before; the same without one.
+        state, taylor: the pose, and the Taylor step to it.
+        rates, accelerations: of the unknowns.
+        sigmas, slopes: of the blocks, and their change by the pose, zero if unknown.
+        largest, high: largest sigmas so far, and since other rows were looked for.
+        sign: of the determinant.
+    """
+
+    sample: Array
     earlier: Array
-    drives: Array
+    state: Array
     taylor: Array
-    largest_pivot: Array
+    rates: Array
+    accelerations: Array
+    sigmas: Array
     slopes: Array
+    largest: Array
     high: Array
-    margins: Mapping[str, Array]
-    neighbours: bool
+    sign: Array
+
+    def lane(self, k: int) -> Poses:
+        """Return one of the poses."""
+        return Poses(*(getattr(self, each.name)[..., k] for each in fields(self)))
+
+    @property
+    def time(self) -> float:
+        """The time of a single pose [s]."""
+        return float(self.sample[0])
 
 
-def _numbers(here: Stand) -> Numbers:
+class Solved(NamedTuple):
+    """Poses after Newton's iteration, shape (numbers, lanes) or (lanes,)."""
+
+    state: Array
+    iterations: Array
+    done: NDArray[np.bool_]
+
+
+class Motion(NamedTuple):
+    """Residuals, entries of the Jacobian, rates, accelerations and factors at poses; NaN and None
+    where rows are singular.
+    """
+
+    phi: Array
+    entries: Array
+    rates: Array
+    accelerations: Array
+    factors: Sequence[Factors | None]
+
+
+def solutions(factors: Sequence[Factors | None], b: Array, *, transposed: bool = False) -> Array:
+    """Return solutions by the factors of each lane, NaN without any, shape (unknowns, lanes)."""
+    found = np.full_like(b, np.nan)
+    for k, each in enumerate(factors):
+        if each is not None:
+            found[:, k] = (each.solve_transposed if transposed else each.solve)(b[:, k])
+    return found
+
+
+def _numbers(here: Poses) -> Numbers:
     return Numbers(here.state, np.concatenate([here.rates, here.accelerations]))
 
 
@@ -90,57 +173,161 @@ class SparseLanes(Lanes):
     """A sparse system bound to lanes.
 
     Attributes:
+        system: the equations.
         here: the pose before the lanes.
+        rows: the solved ones.
+
+    Raises:
+        SolveError: the mechanism cannot move, has more degrees of freedom than drivers, or does not
+            close at the design position.
     """
 
-    many, worse = POSES, WORSE_BY_PIVOTS
+    many = POSES
+    here: Poses
+    rows: Rows
 
-    def __init__(self, model: SparseEquations, request: Request) -> None:
-        self.model, self.mechanism, self.request = model, model.mechanism, request
-        self.unit, self.details = model.unit, model.details
-        self._outputs = OutputMotions(model, request)
-        self.here, self._known = model.design, [model.rows]
-        self._ordered: dict[Rows, FixedOrder] = {}
+    def __init__(self, mechanism: Mechanism, request: Request) -> None:
+        if not mechanism.moving:
+            require_driven(mechanism)
+        self.mechanism, self.request = mechanism, request
+        extent, frame = measured(mechanism)
+        self.unit = frame.unit
+        self.system = System(Tracer(mechanism, request, frame=frame), compiled=request.compiled)
+        # what a change of the state is measured by: lengths by the mechanism's size
+        self._scale = np.ones((len(self.system.design), 1))
+        for name, at in self.system.names.items():
+            if name.startswith("u ") or name.endswith(".translation"):
+                self._scale[at] = frame.unit / extent
+        names = ["time", *(f"drive {name}.{k}" for name in request.drivers for k in range(5))]
+        self._angles = [names.index(name) for name in turns(mechanism, request.drivers)]
+        self._columns = Columns.of(request)
         self.worst = np.zeros((len(WORST), POSES))
+        self.here = self._closed()
         self.design = self.anchor(0.0)
         self.begin()
 
+    def _closed(self) -> Poses:
+        """Choose the rows, and return the design position; a rod given longer or shorter than its
+        design distance is taken up here.
+        """
+        mechanism, system = self.mechanism, self.system
+        sample = system.samples(STILL, STILL.times)
+        phi, _, entries = system.evaluate(system.design, sample)
+        drivers = len(mechanism.drivers)
+        kept = self._independent(entries[:, 0], len(phi)) if len(phi) >= system.unknowns else None
+        if kept is None:
+            require_driven(mechanism)
+            raise SolveError(
+                f"mechanism {mechanism.name!r}: driven by {locked_drivers(mechanism)} it"
+                " does not move at the design position (lock-up or dead centre); give the design"
+                " in another pose, some degrees on, and sweep from there, or drive another"
+                " coordinate",
+                FailureKind.LOCKED,
+            )
+        self.rows = Rows.of(kept, system, len(phi))
+        redundant, count = self._redundant, len(phi) - drivers
+        self.details = {
+            **counted(mechanism, system.unknowns, count, redundant).details,
+            "unknowns": system.unknowns,
+            "program": system.sizes,
+            "factor_entries": self.rows.factor(entries[:, 0]).entries,
+        }
+        found = self._iterated(system.design, sample, CLOSED, ASSEMBLING)
+        closure = np.abs(system.evaluate(found.state, sample)[0][kept]).max()
+        zero = np.zeros((system.unknowns, 1))
+        (branch,) = system.outputs(found.state, sample, zero, zero)["branch"]
+        if not (closure <= CLOSED and branch[0] > 0.0):
+            raise SolveError(
+                f"mechanism {mechanism.name!r} does not close at the design position: residual"
+                f" {closure * self.unit:.3g} m after Newton's iteration, expected 0; check"
+                " points, axes and lengths",
+                FailureKind.NOT_CLOSED,
+            )
+        none = np.zeros((self.rows.blocks.count, 1))
+        return Poses(
+            sample,
+            sample[0],
+            found.state,
+            found.state,
+            zero,
+            zero,
+            none,
+            none,
+            none,
+            none,
+            sample[0],
+        ).lane(0)
+
+    def _independent(self, entries: Array, count: int) -> Indices | None:
+        system = self.system
+        null = NullSpaces(system.rows, system.columns, entries, (count, system.unknowns))
+        return null.independent_rows(len(self.mechanism.drivers))
+
+    @property
+    def _redundant(self) -> list[str]:
+        """The rows left out, as "joint: primitive"."""
+        names = row_names(self.system.tracer.formulation)
+        return [names[row] for row in self.rows.dropped]
+
     def begin(self) -> None:
         """See `Lanes`."""
-        self._renewed, self._smallest_pivot = 0, np.inf
+        self._renewed = 0
 
     @property
     def findings(self) -> Mapping[str, Any]:
         """See `Lanes`."""
-        renewed = {"rows_chosen_anew": self._renewed} if self._renewed else {}
-        return {"smallest_pivot": self._smallest_pivot, **renewed}
+        return {"rows_chosen_anew": self._renewed} if self._renewed else {}
 
     def accept_by(self, limits: Mapping[str, float]) -> None:
         """See `Lanes`."""
-        tol, consistent, crossing = (limits[name] for name in ACCEPT)
-        self._crossing = crossing > 0.0
-        self._limits = Limits(tol, consistent, crossing, WORSE_BY_PIVOTS, TURNED_BY_PIVOTS)
+        self._limits = Limits(*(limits[name] for name in ACCEPT))
 
     def depart(self, time: float, path: Path) -> PoseFailure | None:
         """See `Lanes`."""
         try:
-            drives = self.model.drives(path, np.array([time]))
-            self.here = self.model.moving(self.here, time, drives)
+            self._stand(self.sampled(np.array([time]), path)[0])
         except SingularError:
             return PoseFailure(FailureKind.SINGULAR_ROWS)
         return None
 
+    def _stand(self, sample: Array) -> None:
+        """Stand at the pose before the lanes, with rates by a sample and no step behind.
+
+        Raises:
+            SingularError: the rows are singular there.
+        """
+        here, state = self.here, self.here.state[:, None]
+        found = self._motion(state, sample)
+        sigmas, sign = self.rows.tests(found.entries[:, 0])
+        known = len(here.sigmas) == len(sigmas)
+        largest = np.maximum(here.largest, sigmas) if known else sigmas
+        self.here = Poses(
+            sample[:, 0],
+            sample[0, 0],
+            here.state,
+            here.state,
+            found.rates[:, 0],
+            found.accelerations[:, 0],
+            sigmas,
+            here.slopes if known else np.zeros_like(sigmas),
+            largest,
+            largest,
+            np.array(sign),
+        )
+        if found.factors[0] is None:
+            raise SingularError("exactly singular")
+
     def anchor(self, time: float) -> Anchor:
-        """See `Lanes`: the pose."""
-        return Anchor(time, self.here, _numbers)
+        """See `Lanes`: the pose and its rows."""
+        return Anchor(time, (self.here, self.rows), lambda pose: _numbers(pose[0]))
 
     def restore(self, anchor: Anchor) -> None:
         """See `Lanes`."""
-        self.here = anchor.pose
+        self.here, self.rows = anchor.pose
 
     def sampled(self, times: Array, path: Path) -> list[Array]:
-        """See `Lanes`: the times, and the numbers of all drivers."""
-        return [np.concatenate([times[None], self.model.drives(path, times)])]
+        """See `Lanes`."""
+        return [self.system.samples(path, times)]
 
     @property
     def sound(self) -> bool:
@@ -148,248 +335,237 @@ class SparseLanes(Lanes):
         return bool((self.here.sigmas >= SOUND * self.here.largest).all())
 
     def attempt_at(self, tables: Sequence[Array], *, neighbours: bool = False) -> Array:
-        """See `Lanes`: in a fixed order if that is worth it, and else, or if it may be the order
-        that is refused, by chosen pivots.
-        """
+        """See `Lanes`."""
         (table,) = tables
-        count, rows = table.shape[1], self.here.rows
-        worth = (neighbours and count >= WORTH) or rows in self._ordered
-        together = self._together(rows) if worth else None
-        if together is not None:
-            some = self._margins(together, table[:, : together.width], neighbours=neighbours)
-            if not (some > 0.0).any() and not self._too_long():
-                outgrown = not self._found.poses.believed[0]
-                wanted = 1 if neighbours else count
-                poses = ChosenPivots(self.model, rows)
-                some = self._margins(poses, table[:, :wanted], neighbours=neighbours)
-                if outgrown and some[0] > 0.0:
-                    together.order(self.model)
-            return np.concatenate([some, np.full(count - len(some), -np.inf)])
-        return self._margins(ChosenPivots(self.model, rows), table, neighbours=neighbours)
-
-    def _too_long(self) -> bool:
-        """Return whether all lanes of the last attempt are only too far from the one before."""
-        found, count = self._found, len(self._found.times)
-        margins = {
-            name: margin.reshape(-1, count).min(axis=0) for name, margin in found.margins.items()
-        }
-        others = [margin > 0.0 for name, margin in margins.items() if name not in TOO_LONG]
-        return bool((np.logical_and.reduce(others) & found.poses.believed).all())
-
-    def _together(self, rows: Rows) -> FixedOrder | None:
-        """Return the rows in a fixed order, kept with them; None without machine code."""
-        if not self.model.elements.compiled:
-            return None
-        if rows not in self._ordered:
-            self.model.evaluate(self.here.state[:, None], self.here.drives[:, None])
-            self._ordered[rows] = FixedOrder(self.model, rows)
-        return self._ordered[rows]
-
-    def _margins(self, poses: Poses, table: Array, *, neighbours: bool) -> Array:
-        """Attempt lanes, and return their margins."""
         count, here = table.shape[1], self.here
         self.last = count - 1
+        sample = table[:, np.minimum(np.arange(POSES), count - 1)]
         with np.errstate(all="ignore"):  # lanes that diverge are found by their residuals
-            found = self._found = self._attempt(poses, table, count, neighbours=neighbours)
-            each = [margin.reshape(-1, count).min(axis=0) for margin in found.margins.values()]
-            margin: Array = np.minimum.reduce(each)
-        solved = found.poses
-        margin = np.where(solved.believed & ~np.isnan(margin), margin, -np.inf)
-        if neighbours and len(here.rows.dropped):
-            low = (solved.sigmas < LOW * found.high).any(axis=1)
-            # with other rows, what is found beyond may be better
-            margin[1:][np.logical_or.accumulate(low)[:-1]] = -np.inf
-        sigma = np.minimum(solved.pivot, solved.sigmas.min(axis=1, initial=np.inf))
-        tests = solved.closure, solved.leftover, solved.iterations, sigma, margin
-        self.worst[:, :count] = tests
-        return margin
+            h, last = sample[0] - here.time, here.time - float(here.earlier)
+            state, rates, accelerations = (
+                each[:, None] for each in (here.state, here.rates, here.accelerations)
+            )
+            whole = np.broadcast_to(state, (len(state), POSES))
+            taylor = self.system.stepped(whole, h * (rates + (0.5 * h) * accelerations))
+            lack = np.where(ABOUT * abs(last) > np.abs(h), (h / (last or 1.0)) ** 3, 0.0)
+            predicted = taylor + lack * (here.state - here.taylor)[:, None]
+            solved = self._iterated(predicted, sample, self._limits.tol, MAX_ITERATIONS, count)
+            self._judge(solved, sample, taylor, count, neighbours=neighbours)
+        return self.worst[MARGINS, :count].copy()
 
-    def _attempt(self, poses: Poses, table: Array, count: int, *, neighbours: bool) -> _Reached:
-        here, model = self.here, self.model
-        lanes = np.minimum(np.arange(poses.width), count - 1)
-        times, drives = table[0, lanes], table[1:, lanes]
+    def _iterated(
+        self, state: Array, sample: Array, tol: float, most: int, count: int = 1
+    ) -> Solved:
+        """Iterate the first lanes until their residuals get no smaller."""
+        kept, iterations = self.rows.kept, np.zeros(state.shape[1])
+        last = np.full(state.shape[1], np.inf)
+        while True:
+            phi, _, entries = self.system.evaluate(state, sample)
+            closure: Array = np.abs(phi[kept]).max(axis=0)
+            done = (closure <= SETTLED) | ((closure <= tol) & (closure > STALLS * last))
+            active = np.flatnonzero((~done & (closure < np.inf))[:count])
+            if not len(active) or iterations.max() >= most:
+                return Solved(state, iterations, done)
+            factors, step = self._factors(entries, active), np.zeros((len(kept), state.shape[1]))
+            step[:, active] = -solutions(factors, phi[kept])[:, active]
+            state, last = self.system.stepped(state, step), closure
+            iterations[active] += 1.0
+
+    def _factors(self, entries: Array, lanes: Indices) -> list[Factors | None]:
+        """Return the factors of some lanes, None for the others and where rows are singular."""
+        found: list[Factors | None] = [None] * entries.shape[1]
+        for k in lanes.tolist():
+            with suppress(SingularError):
+                found[k] = self.rows.factor(entries[:, k])
+        return found
+
+    def _motion(self, state: Array, sample: Array, count: int | None = None) -> Motion:
+        """Return the motion of the first lanes."""
+        kept = self.rows.kept
+        phi, nu, entries = self.system.evaluate(state, sample)
+        factors = self._factors(
+            entries, np.flatnonzero(np.abs(phi[:, :count]).max(axis=0) < np.inf)
+        )
+        rates = solutions(factors, nu[kept])
+        accelerations = solutions(factors, self.system.gamma(state, sample, rates)[kept])
+        return Motion(phi, entries, rates, accelerations, factors)
+
+    def _judge(
+        self, solved: Solved, sample: Array, taylor: Array, count: int, *, neighbours: bool
+    ) -> None:
+        """Test lanes, and keep what is found of them."""
+        here, system, rows = self.here, self.system, self.rows
 
         def previous(values: Array, first: Array) -> Array:
             """Return the values of the pose before each lane, those of the first one given."""
-            alone = np.broadcast_to(first[..., None], values.shape)
-            return before(values, first) if neighbours else alone
-
-        def taylor_from(state: Array, rates: Array, accelerations: Array, h: Array) -> Array:
-            whole = np.broadcast_to(state, (len(state), poses.width))
-            return poses.moved(whole, h * (rates + (0.5 * h) * accelerations))
-
-        state, rates, accelerations = (
-            each[:, None] for each in (here.state, here.rates, here.accelerations)
-        )
-        taylor = taylor_from(state, rates, accelerations, times - here.time)
-        zero = np.zeros((len(here.rates), poses.width))
-        predicted = poses.moved(self._predicted(taylor, times, neighbours=neighbours), zero)
-        solved = poses.solve(predicted, drives, self._limits.tol, count)
-        times, drives, taylor = times[:count], drives[:, :count], taylor[:, :count]
-        past, earlier = previous(solved.state, here.state), previous(times, np.array(here.time))
-        if neighbours:
-            rates, accelerations = (
-                previous(solved.rates, here.rates),
-                previous(solved.accelerations, here.accelerations),
+            return (
+                before(values, first)
+                if neighbours
+                else np.broadcast_to(first[..., None], values.shape)
             )
-            state, rates, accelerations = (each[:, lanes] for each in (past, rates, accelerations))
-            taylor = taylor_from(state, rates, accelerations, (times - earlier)[lanes])[:, :count]
-        gap, step = (distance(solved.state - each, model.scale) for each in (taylor, past))
-        angles = drives[model.angles]
-        sigmas, sigmas_before = solved.sigmas.T, previous(solved.sigmas.T, here.sigmas)
+
+        state = solved.state
+        motion = self._motion(state, sample, count)
+        sigmas, sign = np.full((rows.blocks.count, POSES), np.nan), np.full(POSES, np.nan)
+        for k, factors in enumerate(motion.factors):
+            if factors is not None:
+                sigmas[:, k], sign[k] = rows.tests(motion.entries[:, k])
+        self.outputs = system.outputs(state, sample, motion.rates, motion.accelerations)
+        (branch,) = self.outputs["branch"]
+        closure = np.abs(motion.phi[rows.kept]).max(axis=0)
+        leftover = np.abs(motion.phi[rows.dropped]).max(axis=0, initial=0.0)
+        off = previous(state - taylor, np.zeros(len(state)))
+        moved = self._distance(state - previous(state, here.state))
         slope = known_slope(here.slopes)
-        slopes = slope_between(sigmas, sigmas_before, step)
+        slopes = slope_between(sigmas, previous(sigmas, here.sigmas), moved)
         least = least_slope(slope)[:, None]
         known = maximum(previous(slopes, slope), least)
-        slopes = maximum(slopes, least)
-        largest = np.maximum(solved.pivot, here.largest_pivot)
-        falls = min(here.pivot, here.sigmas.min(initial=np.inf))
+        largest = np.maximum.accumulate(np.column_stack([here.largest, sigmas]), axis=1)[:, 1:]
+        high = np.maximum.accumulate(np.column_stack([here.high, sigmas]), axis=1)[:, 1:]
+        sigma = sigmas.min(axis=0)
         candidate = Candidate(
             done=solved.done.astype(float),
-            closure=solved.closure,
-            leftover=solved.leftover,
-            branch=solved.branch,
-            gap=gap,
-            moved=step,
-            reach=step,
-            turns=[
-                np.abs(angles - previous(angles, here.drives[model.angles])).max(
-                    axis=0, initial=0.0
-                )
-            ],
-            sigma=np.minimum(solved.pivot, sigmas.min(axis=0, initial=np.inf)),
-            # exchanges of rows make SuperLU's pivots jump tenfold: their increase is no sign of a
-            # motion away from a singular pose
-            before=falls if isinstance(poses, ChosenPivots) else -np.inf,
-            largest=largest,
-            # signs of determinants change with the choice of rows too, so they do not replace the
-            # test of sigma
-            reversal=np.array([float(each != here.orientation) for each in solved.orientation]),
-            blocks=[Block(sigmas, sigmas_before, np.maximum(slopes, known))],
+            closure=closure,
+            leftover=leftover,
+            branch=branch,
+            gap=self._distance(state - taylor - off),
+            moved=moved,
+            reach=self._distance(state - here.state[:, None]),
+            turns=[sample[k] - previous(sample[k], here.sample[k]) for k in self._angles],
+            sigma=sigma,
+            before=previous(sigma, here.sigmas.min()),
+            largest=largest.min(axis=0),
+            reversal=sign - previous(sign, here.sign),
+            blocks=[Block(sigmas, previous(sigmas, here.sigmas), maximum(slopes, known))],
         )
-        high = np.maximum.accumulate(np.vstack([here.high, solved.sigmas]))[1:]
-        return _Reached(
-            solved,
-            times,
-            earlier,
-            drives,
+        self._margins = {
+            name: margin.reshape(-1, POSES).min(axis=0)
+            for name, margin in margins(candidate, self._limits).items()
+        }
+        margin: Array = np.minimum.reduce([*self._margins.values()])
+        margin[np.isnan(margin)] = -np.inf
+        if neighbours and len(rows.dropped):
+            low = (sigmas < LOW * high).any(axis=0)
+            # with other rows, what is found beyond may be better
+            margin[1:][np.logical_or.accumulate(low)[:-1]] = -np.inf
+        self.worst[:] = closure, leftover, solved.iterations, sigma, margin
+        self._found = Poses(
+            sample,
+            np.full(POSES, here.time),
+            state,
             taylor,
+            motion.rates,
+            motion.accelerations,
+            sigmas,
+            maximum(slopes, least),
             largest,
-            slopes.T,
             high,
-            margins(candidate, self._limits),
-            neighbours,
+            sign,
         )
+        self._branch = branch
 
-    def _predicted(self, taylor: Array, times: Array, *, neighbours: bool) -> Array:
-        """Return predicted states, their Euler parameters of any length."""
-        here = self.here
-        if neighbours and len(here.past) == REMEMBERED:
-            nodes = np.array([time for time, _ in here.past])
-            weights = lagrange(times, np.repeat(nodes[:, None], len(times), axis=1))
-            return np.column_stack([state for _, state in here.past]) @ weights
-        h, last = times - here.time, here.time - here.earlier
-        part = np.where(ABOUT * abs(last) > np.abs(h), (h / (last or 1.0)) ** 3, 0.0)
-        return taylor + part * (here.state - here.predicted)[:, None]
+    def _distance(self, change: Array) -> Array:
+        """Return the largest of changes of the state, each number by its scale, shape (lanes,)."""
+        return np.abs(change * self._scale).max(axis=0)
 
     def carry(self, lane: int) -> None:
         """See `Lanes`; change to better rows there, if the present ones have become much more
         singular.
         """
-        self.here = self._stand(lane)
-        self._smallest_pivot = min(self._smallest_pivot, self.here.pivot)
-        if not self._crossing and (self.here.sigmas < LOW * self.here.high).any():
+        self.here = self._found.lane(lane)
+        crossing = self._limits.crossing > 0.0
+        if (
+            not crossing
+            and len(self.rows.dropped)
+            and (self.here.sigmas < LOW * self.here.high).any()
+        ):
             self._choose_rows()
-
-    def _stand(self, lane: int) -> Stand:
-        found, solved, here = self._found, self._found.poses, self.here
-        passed = zip(found.times[: lane + 1].tolist(), solved.state.T, strict=False)
-        past = {**dict(here.past), **dict(passed)} if found.neighbours else {}
-        return Stand(
-            here.rows,
-            float(found.times[lane]),
-            float(found.earlier[lane]),
-            solved.state[:, lane],
-            found.taylor[:, lane],
-            solved.rates[:, lane],
-            solved.accelerations[:, lane],
-            found.drives[:, lane],
-            float(solved.pivot[lane]),
-            float(found.largest_pivot[lane]),
-            solved.orientation[lane],
-            solved.sigmas[lane],
-            found.slopes[lane],
-            np.maximum(here.largest, found.high[lane]),
-            found.high[lane],
-            tuple(past.items())[-REMEMBERED:],
-        )
 
     def _choose_rows(self) -> None:
         """Change to better rows at the pose before the lanes; if none are better, remember how
         singular it is.
         """
-        here, model = self.here, self.model
-        drives = here.drives[:, None]
-        model.evaluate(here.state[:, None], drives)
-        jacobian = model.jacobian()
-        if len(here.rows.dropped) and jacobian.well_chosen:
-            kept = jacobian.independent(len(model.mechanism.drivers))
-            known = (each for each in self._known if np.array_equal(each.kept, kept))
-            try:
-                rows: Rows = next(known, None) or Rows.of(kept, jacobian)
-                of_rows, of_here = (
-                    each.order.factor(jacobian.values[each.solved]) for each in (rows, here.rows)
-                )
-                if of_rows.log_determinant > of_here.log_determinant + np.log(BETTER):
-                    still = Stand(
-                        rows, here.time, here.time, here.state, here.state, here.rates, here.rates
-                    )
-                    self.here = replace(model.moving(still, here.time, drives), past=here.past)
-                    self._renewed += 1
-                    self._known += [rows] if rows not in self._known else []
-                    return
-            except SingularError:
-                pass
-        self.here = replace(here, high=here.sigmas)
+        here, before = self.here, self.rows
+        sample = here.sample[:, None]
+        phi, _, entries = self.system.evaluate(here.state[:, None], sample)
+        kept = self._independent(entries[:, 0], len(phi))
+        least = max(BETTER * here.sigmas.min(), SEEN * here.largest.min())
+        if kept is not None:
+            self.rows = Rows.of(kept, self.system, len(phi))
+            self._stand(sample)
+            if self.here.sigmas.min() > least:
+                self._renewed += 1
+                return
+        self.rows, self.here = before, replace(here, high=here.sigmas)
 
     def motions(self, count: int) -> Array:
         """See `Lanes`."""
-        found = self._found.poses
-        return self._outputs.motions(
-            *(each[:, :count] for each in (found.state, found.rates, found.accelerations))
-        )
+        found = np.empty((self._columns.count, count))
+        for name, at in self._columns.by_vector.items():
+            found[at] = self.outputs[name][:, :count]
+        return found
 
     def uncertain(self, count: int, path: Path) -> Mapping[int, float]:
-        """See `Lanes`. Small pivots alone are no reason to refuse a sample: large mechanisms have
-        many.
+        """See `Lanes`."""
+        found, tol = self._found, self._limits.tol
+        closure, sigma = self.worst[CLOSURES, :count], self.worst[SIGMAS, :count]
+        at = np.flatnonzero(doubtful(sigma, closure, tol))
+        errors = self.error_bounds(found.state[:, at], found.sample[:, at])
+        return {
+            k: error
+            for k, error in zip(at.tolist(), errors.tolist(), strict=True)
+            if not error <= AMPLIFIED * tol  # or it is no number
+        }
+
+    def error_bounds(self, state: Array, sample: Array) -> Array:
+        """Return bounds of the errors of poses [of the mechanism's size] and of their rates and
+        accelerations [of their own], as far as they are wanted; NaN at singular poses.
+
+        Each pose is displaced as far as its residuals allow, in the direction least determined by
+        the rows. The smallest singular value alone would put all samples of a large ring in doubt,
+        although they are known well.
+
+        Args:
+            state, sample: shape (numbers, n), for any number of poses.
         """
-        found, limit, off = self._found.poses, AMPLIFIED * self._limits.tol, dict[int, float]()
-        least = np.minimum(found.pivot, found.sigmas.min(axis=1, initial=np.inf))[:count]
-        doubtful = WORSE_BY_PIVOTS * np.maximum(found.closure[:count], EPSILON) > limit * least**2
-        rows, at = self.here.rows, np.flatnonzero(doubtful)
-        # what a fixed order leaves uncertain may be the order
-        for poses in (self._ordered.get(rows), ChosenPivots(self.model, rows)):
-            if poses is not None and at.size:
-                drives, order = self._found.drives[:, at], self.request.order
-                errors = error_bounds(poses, found.state[:, at], drives, self.model.scale, order)
-                beyond = ~(errors <= limit)  # or it is no number
-                at, off = at[beyond], dict(zip(at[beyond].tolist(), errors[beyond], strict=True))
-        return off
+        n, found = state.shape[1], [np.empty(0)]
+        for first in range(0, n, POSES):
+            some = np.minimum(np.arange(first, first + POSES), n - 1)
+            found.append(self._error_bounds(state[:, some], sample[:, some]))
+        return np.concatenate(found)[:n]
+
+    def _error_bounds(self, state: Array, sample: Array) -> Array:
+        with np.errstate(all="ignore"):  # what overflows is no number
+            here = self._motion(state, sample)
+            left = np.ones(here.rates.shape)
+            for _ in range(STEPS):
+                right = solutions(here.factors, left / np.abs(left).max(axis=0))
+                left = solutions(here.factors, right, transposed=True)
+            closure = np.abs(here.phi[self.rows.kept]).max(axis=0)
+            step = solutions(here.factors, np.maximum(closure, EPSILON) * np.sign(left))
+            moved = self.system.stepped(state, step)
+            there = self._motion(moved, sample)
+            speed, acceleration = (
+                np.abs(each).max(axis=0) for each in (here.rates, here.accelerations)
+            )
+            off = [
+                np.abs(a - b).max(axis=0) / np.where(size == 0.0, 1.0, size)
+                for a, b, size in (
+                    (there.rates, here.rates, speed),
+                    (there.accelerations, here.accelerations, np.maximum(acceleration, speed**2)),
+                )
+            ]
+            every = [self._distance(moved - state), *off]
+            return np.max(every[: self.request.order + 1], axis=0)
 
     def failure(self, tol: float) -> PoseFailure:
         """See `Lanes`."""
-        found, solved, count = self._found, self._found.poses, len(self._found.times)
-        refused = np.flatnonzero(~(self.worst[MARGINS, :count] > 0.0))
+        refused = np.flatnonzero(~(self.worst[MARGINS, : self.last + 1] > 0.0))
         lane = int(refused[-1]) if len(refused) else self.last
-        failed = [
-            name
-            for name, margin in found.margins.items()
-            if not (margin.reshape(-1, count)[:, lane] > 0.0).all()
-        ]
-        closure, leftover, branch = (
-            float(each[lane]) for each in (solved.closure, solved.leftover, solved.branch)
-        )
-        names = self.model.redundant(self.here.rows)
+        failed = [name for name, margin in self._margins.items() if not margin[lane] > 0.0]
+        closure, leftover = (float(each) for each in self.worst[:2, lane])
+        names = self._redundant
         few = [*names[:FEW], "..."] if len(names) > FEW else names
-        kind = failure_kind(failed, closure)
-        return PoseFailure(kind, closure, tol, leftover, branch, few, pivot=self.here.pivot)
+        kind, sigma = failure_kind(failed, closure), float(self.here.sigmas.min())
+        branch = float(self._branch[lane])
+        return PoseFailure(kind, closure, tol, leftover, branch, few, sigma=sigma)

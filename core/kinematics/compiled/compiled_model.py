@@ -1,13 +1,22 @@
-"""A mechanism made ready to be swept: its rows selected, its programs traced, its lanes laid
-out.
+"""A mechanism made ready to be swept: its rows selected, its programs traced, its lanes laid out.
+
+Programs with their layout are kept on disk beside their machine code. The key of an entry is the
+mechanism, the request and all source files of tracing: a change of any of them traces anew. Joint
+types of the user are traced every time, because their source may be anywhere.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from functools import cached_property
+import hashlib
+import os
+import pathlib
+import pickle
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,19 +24,196 @@ from ...caches import ThreadCache, keep_last
 from ...errors import SolveError
 from ...failures import FailureKind
 from ...mechanism.mechanism import Mechanism
-from ...program import Executor, NumpyExecutor
+from ...mechanism.motions import Path
+from ...program import ITERATIONS, NODES, Plan, groups_behind
+from ...program.disk_cache import kept
+from ...program.llvm import compiler
 from ...program.llvm.compiler import available
-from ...program.llvm.executor import LlvmExecutor
+from ...program.llvm.executor import Executor, bind
 from ...program.llvm.jit import LlvmCode, make_loops_ready
 from ...trajectory import Array
-from ..formulation.driver_inputs import drive_numbers
+from ..formulation.constraints import Frames
+from ..formulation.state_vectors import samples
 from ..structure.components import Section
-from .program_cache import Tracing, is_builtin, traced
-from .request import EARLIER, FROM, TIME, Request, slots_of
-from .sample_rows import rows_of_bodies, rows_of_points
+from ..structure.degrees_of_freedom import Selection
+from . import step_programs as acceptance
+from . import step_programs as predictor
+from .request import (
+    EARLIER,
+    FROM,
+    LARGEST,
+    LARGEST_OF_PARTS,
+    MAX_ITERATIONS,
+    SMALLEST,
+    SMALLEST_OF_PARTS,
+    TIME,
+    Request,
+    kept_forces,
+    kept_motions,
+    kept_tests,
+    row_ranges,
+    rows_of_bodies,
+    rows_of_points,
+    slots_of,
+)
 
 if TYPE_CHECKING:
-    from .force_table import ForceTable
+    from .solution import ForceTable
+
+CORE = pathlib.Path(__file__).parents[2]
+PACKAGE = __name__.split(".kinematics.")[0]
+
+
+@dataclass(frozen=True, eq=False)
+class Tracing:
+    """The programs of a mechanism for a request, and the layout of their lanes.
+
+    Attributes:
+        plan: the programs, the slots of a lane, and the loops over the programs.
+        vectors: name of a vector -> its slots.
+        state: name of a vector of the state -> its value at design.
+        varied: name of a varied place -> its values at design.
+        prescribed: name of a vector of a prescribed body's motion -> its value at rest at design.
+        sampled: slots with a given value at every sample: the time, and five numbers of each moving
+            driver.
+        rows: name of a motion or test -> its rows among those kept of a sample.
+        blocks: of the rows (`Elimination.sigmas`).
+    """
+
+    plan: Plan
+    vectors: Mapping[str, Sequence[int]]
+    state: Mapping[str, Sequence[float]]
+    varied: Mapping[str, Sequence[float]]
+    prescribed: Mapping[str, Sequence[float]]
+    sampled: Sequence[int]
+    rows: Mapping[str, slice]
+    blocks: int
+    selection: Selection
+    frame: Frames
+
+
+def traced(mechanism: Mechanism, request: Request, section: Section | None = None) -> Tracing:
+    """Select the rows and trace the programs of a request, or load them from the disk cache.
+
+    Raises:
+        SolveError: drivers and degrees of freedom do not match.
+    """
+    compiled = request.compiled and compiler.available()
+    lanes = compiler.vector_width() if compiled else NODES  # numpy's are as many or more
+    if section or request.varied or not (is_builtin(mechanism) and compiled):
+        return _trace(mechanism, request, section, lanes)
+    content = _source() + pickle.dumps((mechanism, request, lanes))
+    return kept(content, lambda: _packed(_trace(mechanism, request, None, lanes)), _unpacked)
+
+
+def _packed(tracing: Tracing) -> bytes:
+    return msgspec.msgpack.encode(tracing, enc_hook=_plain)
+
+
+def _unpacked(whole: bytes) -> Tracing:
+    return msgspec.msgpack.decode(whole, type=Tracing, dec_hook=lambda kind, ends: kind(*ends))
+
+
+def _plain(value: slice | np.generic) -> Any:
+    """Return a range of rows as its ends, and a number of numpy as a number."""
+    return (value.start, value.stop) if isinstance(value, slice) else value.item()
+
+
+def is_builtin(mechanism: Mechanism) -> bool:
+    """Return whether all parts are of this package: equal parts then mean the same."""
+    parts = (*mechanism.joints, *mechanism.couplers, *mechanism.drivers, *mechanism.forces)
+    return all(type(each).__module__.startswith(f"{PACKAGE}.") for each in parts)
+
+
+@cache
+def _source() -> bytes:
+    """Return a digest of the source files of tracing."""
+    digest = hashlib.sha256()
+    for name in source_files():
+        with open(name, "rb", buffering=0) as file:
+            digest.update(file.read())
+    return digest.digest()
+
+
+def source_files() -> list[str]:
+    """Return the files of every folder imported by tracing; a test compares them."""
+    # a new process reads them all: pathlib would take twice as long
+    folders = ("primitives", "joints", "mechanism", "program", "kinematics")
+    nested = [name for folder in folders for name in _modules(os.path.join(CORE, folder))]
+    return sorted([*(each.path for each in os.scandir(CORE) if _is_module(each)), *nested])
+
+
+def _modules(folder: str) -> Iterator[str]:
+    for each in os.scandir(folder):
+        if _is_module(each):
+            yield each.path
+        elif each.is_dir():
+            yield from _modules(each.path)
+
+
+def _is_module(entry: os.DirEntry[str]) -> bool:
+    return entry.name.endswith(".py")
+
+
+def _trace(mechanism: Mechanism, request: Request, section: Section | None, lanes: int) -> Tracing:
+    from .programs import Tracer  # with all that tracing takes: who finds it done does without
+
+    tracer = Tracer(mechanism, request, section)
+    programs = [tracer.newton(), predictor.predict(tracer)]
+    # a lane needs v and a where the march goes on from it, whatever is asked for
+    if request.order < 2:
+        programs.append(tracer.tangent())
+    if not request.state:
+        programs.append(predictor.extrapolate(tracer, lanes))
+    programs.append(tracer.outputs())
+    programs += acceptance.tests(tracer, neighbours=False)
+    if not request.state:  # parts of a mechanism are attempted lane by lane
+        programs += acceptance.tests(tracer, neighbours=True)
+    if request.varied:
+        programs.append(tracer.prepared.program())
+        if not request.state:
+            programs.append(predictor.extend(tracer))
+    carried, continued = predictor.carried(tracer), predictor.continued(tracer)
+    tracer.layout.scalar(ITERATIONS)
+    slots, vectors, state = tracer.layout.slots, tracer.layout.vectors, tracer.formulation.design
+    sampled = [slots[TIME], *slots_of(vectors, (f"drive {name}" for name in request.drivers))]
+    motions = [*kept_motions(request, state), *(kept_forces(vectors) if request.forces else ())]
+    tests = kept_tests(request, tracer.blocks)
+    fixed = [*(target for _, target in carried), *slots_of(vectors, tracer.geometry)]
+    plan = Plan(
+        {program.name: program for program in programs},
+        slots,
+        after=("outputs",),
+        alone=acceptance.ALONE,
+        joined=() if request.state else acceptance.JOINED,
+        onward=("outputs" if request.order == 2 else "tangent",),
+        sampled=[*sampled, *vectors.get(predictor.WEIGHT, ())],
+        behind=groups_behind(lanes),
+        remembered=slots_of(vectors, state) if predictor.PAST in vectors else (),
+        past=vectors.get(predictor.PAST, (0,))[0],
+        carried=carried,
+        continued=continued,
+        kept=[*slots_of(vectors, motions), *(slots[name] for name in tests)],
+        largest=[slots[name] for name in (LARGEST_OF_PARTS if request.state else LARGEST)],
+        smallest=[slots[name] for name in (SMALLEST_OF_PARTS if request.state else SMALLEST)],
+        fixed=[*fixed, *tracer.prepared.slots],
+        taken=slots_of(vectors, tracer.at_rest),
+        tolerance=request.last_iteration,
+        most=MAX_ITERATIONS,
+    )
+    return Tracing(
+        plan,
+        vectors,
+        state,
+        tracer.geometry,
+        tracer.at_rest,
+        sampled,
+        row_ranges({name: len(vectors[name]) for name in motions}, tests),
+        tracer.blocks,
+        tracer.selection,
+        tracer.frame,
+    )
+
 
 # Models that are kept for whoever solves one mechanism again and again: to fetch one from disk
 # takes longer than many sweeps.
@@ -39,6 +225,7 @@ CLOSED = 1e-12
 # distance is taken up by them.
 ASSEMBLING = 50
 NONE_VARIED = np.empty((0, 1))
+STILL = Path({}, np.zeros(1))
 
 
 def compile_model(mechanism: Mechanism, request: Request, section: Section | None = None) -> Model:
@@ -105,7 +292,7 @@ class Model(Tracing):
         wanted = self.request.forces
         if wanted is None:
             return None
-        from .force_table import ForceTable  # most motions are without forces
+        from .solution import ForceTable  # most motions are without forces
 
         return ForceTable(wanted, self.rows, self.frame.unit)
 
@@ -131,22 +318,11 @@ class Model(Tracing):
         Every caller with the same number of lanes gets the same memory, and sets every slot it
         reads.
         """
-        return self.bound(
-            lanes,
-            lambda: (
-                LlvmExecutor(self._code, lanes) if self._code else NumpyExecutor(self.plan, lanes)
-            ),
-        )
+        return self.bound(lanes, lambda: bind(self.plan, lanes, self._code))
 
-    def samples(self, times: Array, drive: Array) -> Array:
-        """Return the values of the slots `sampled` at the times, shape (sampled, n).
-
-        Args:
-            drive: value from the design, velocity and acceleration of every moving driver [SI],
-                shape (3, drivers, n).
-        """
-        drivers = [self.mechanism.driver(name) for name in self.request.drivers]
-        return np.concatenate([times[None], drive_numbers(drivers, drive, self.frame.unit)])
+    def samples(self, path: Path, times: Array) -> Array:
+        """Return the values of the slots `sampled` at times of a path, shape (sampled, n)."""
+        return samples(self.mechanism, self.request.drivers, self.frame.unit, path, times)
 
     def departing(self, lane: Array, sample: Array) -> Array:
         """Return a lane ready for predictions from a solved lane, with rates by a sample of the
@@ -191,7 +367,7 @@ class Model(Tracing):
         return self.stand_at(
             executor,
             self.state,
-            self.samples(np.zeros(1), np.zeros((3, len(self.request.drivers), 1))),
+            self.samples(STILL, STILL.times),
             geometry,
         )
 

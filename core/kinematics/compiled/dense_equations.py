@@ -1,25 +1,32 @@
-"""Equations of a model at arbitrary poses: residuals, Jacobian and right-hand sides as matrices.
+"""Equations of a mechanism at arbitrary poses: residuals, Jacobian and right-hand sides.
 
-For rare tasks outside the walk: poses near singular ones, curves beyond limits of travel. Many
-poses at once are lanes, run by numpy.
+For all that is outside one program with an elimination of its own: poses near singular ones, curves
+beyond limits of travel, mechanisms too large for such a program. Many poses at once are lanes.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import accumulate, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...algebra import Scalar
+from ...mechanism.motions import Path
 from ...primitives.base import Twist
-from ...program import NumpyExecutor, Plan, program
+from ...program import Plan, program
+from ...program.llvm.compiler import available
+from ...program.llvm.executor import Executor, bind
+from ...program.llvm.jit import LlvmCode
 from ...trajectory import Array
 from ..formulation.formulation import Configuration
+from ..formulation.state_vectors import samples
 from .compiled_model import Model
 from .programs import Tracer
-from .request import FROM, RATE, RATE_T, TIME
+from .request import FROM, RATE, RATE_T, TIME, kept_forces, kept_motions
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,12 +39,14 @@ class Equations:
         nu: right-hand sides of the velocity equations: minus the rate of the residuals at rest,
             shape (m, n).
         redundant: Jacobian of the rows left out, shape (m, dropped, n).
+        left_out: their residuals, shape (m, dropped).
     """
 
     phi: Array
     jacobian: Array
     nu: Array
     redundant: Array
+    left_out: Array
 
     @property
     def closure(self) -> Array:
@@ -45,117 +54,174 @@ class Equations:
         largest = np.abs(self.phi).max(axis=1)
         return np.where(np.isnan(largest), np.inf, largest)
 
+    @property
+    def leftover(self) -> Array:
+        """Return the largest residual of the rows left out of each pose, shape (m,)."""
+        return np.abs(self.left_out).max(axis=1, initial=0.0)
+
 
 def system_of(model: Model) -> System:
     """Return the equations of a model; kept with it, because tracing takes longer than the use."""
-    return model.bound("system", lambda: System(model))
+    return model.bound(
+        "system",
+        lambda: System(
+            Tracer(
+                model.mechanism, replace(model.request, compiled=False), selection=model.selection
+            )
+        ),
+    )
 
 
 class System:
-    """The equations of a model with constant geometry.
+    """The equations of a mechanism with constant geometry.
 
     A state is one column of numbers [units, rad, -]. Values of the drivers come from a sample, see
     `Model.samples`.
 
+    Args:
+        compiled: run by machine code if llvmlite is installed: interpreted, because it takes longer
+            to compile so many operations than they ever run.
+
     Attributes:
-        owners: joint or driver of every kept row.
         conditions: see `Formulation`.
-        driven: which kept rows are drivers', shape (n,).
         unknowns: n.
+        names: by vector of the state, its numbers in a state.
+        rows, columns: of the entries of the Jacobian.
     """
 
-    def __init__(self, model: Model) -> None:
-        self.model, self._tracer = (
-            model,
-            Tracer(model.mechanism, replace(model.request, compiled=False)),
-        )
-        tracer, kept = self._tracer, self._tracer.selection.chosen
+    def __init__(self, tracer: Tracer, *, compiled: bool = False) -> None:
+        self.tracer = tracer
         formulation, at, vector = tracer.formulation, tracer.at, tracer.layout.vector
-        self.unknowns = tracer.unknowns
-        self.conditions = formulation.conditions
-        self.owners = [formulation.owners[k][0] for k in kept]
-        joint_rows = len(formulation.owners) - len(model.mechanism.drivers)
-        self.driven: NDArray[np.bool_] = np.array(kept) >= joint_rows
-        self._names = {name: vector(name, len(value)) for name, value in formulation.design.items()}
-        self._state = [slot for slots in self._names.values() for slot in slots]
-        self._phi, self._nu, self._gamma, self._step = (
-            vector(name, self.unknowns) for name in ("phi", "nu", "gamma", "step")
-        )
+        self.unknowns, self.conditions = tracer.unknowns, formulation.conditions
+        names = {name: vector(name, len(value)) for name, value in formulation.design.items()}
+        ends = [*accumulate(map(len, names.values()), initial=0)]
+        self.names = {name: slice(*ends) for name, ends in zip(names, pairwise(ends), strict=True)}
         every, phi, nu = formulation.rows(at), formulation.phi(at), formulation.nu(at)
-        rows = [every[k] for k in (*kept, *tracer.selection.dropped)]
-        self._rows = len(rows)
-        self._entries = np.array([(i, j) for i, row in enumerate(rows) for j in row])
-        self._values = [tracer.layout.scalar(f"entry {i} {j}") for i, j in self._entries.tolist()]
+        self.rows, self.columns = (
+            np.array([(i, j) for i, row in enumerate(every) for j in row], np.intp).reshape(-1, 2).T
+        )
         gamma = formulation.gamma(at, [tracer.tape.input(k) for k in vector(RATE, self.unknowns)])
-        after = formulation.retract(at, [tracer.tape.input(k) for k in self._step])
-        wanted: dict[str, tuple[Sequence[int], list[Scalar]]] = {
-            "rows": (
-                [*self._phi, *self._nu, *self._values],
-                [
-                    *(phi[k] for k in kept),
-                    *(nu[k] for k in kept),
-                    *(x for row in rows for x in row.values()),
-                ],
-            ),
-            "gamma": (self._gamma, [gamma[k] for k in kept]),
-            "retract": (self._state, [x for name in self._names for x in after[name]]),
+        after = formulation.retract(
+            at, [tracer.tape.input(k) for k in vector("step", self.unknowns)]
+        )
+        wanted: dict[str, dict[str, list[Scalar]]] = {
+            "rows": {"phi": phi, "nu": nu, "entries": [x for row in every for x in row.values()]},
+            "gamma": {"gamma": gamma},
+            "retract": {name: [*after[name]] for name in names},
         }
         programs = [
-            program(name, tracer.tape, dict(zip(*each, strict=True)))
+            program(
+                name,
+                tracer.tape,
+                {
+                    slot: x
+                    for label, values in each.items()
+                    for slot, x in zip(vector(label, len(values)), values, strict=True)
+                },
+            )
             for name, each in wanted.items()
         ]
-        self._vectors, slots = tracer.layout.vectors, tracer.layout.slots
-        self._plan = Plan(
-            {each.name: each for each in [*programs, tracer.outputs_of_rates()]}, slots
-        )
+        programs.append(tracer.outputs_of_rates())
+        self._vectors = tracer.layout.vectors
+        self._state = [slot for slots in names.values() for slot in slots]
         self._sampled = [
             tracer.layout.scalar(TIME),
-            *(k for name in model.request.drivers for k in self._vectors[f"drive {name}"]),
+            *(k for name in tracer.request.drivers for k in vector(f"drive {name}", 5)),
         ]
-        self._executors: dict[int, NumpyExecutor] = {}
+        self._plan = Plan({each.name: each for each in programs}, tracer.layout.slots)
+        self._code = LlvmCode(self._plan, often=math.inf) if compiled and available() else None
+        self._executors: dict[int, Executor] = {}
+
+    @property
+    def model_rows(self) -> tuple[Sequence[int], Sequence[int]]:
+        """The rows solved and those left out, as they are selected at the design position."""
+        return self.tracer.selection.chosen, self.tracer.selection.dropped
+
+    @property
+    def sizes(self) -> dict[str, dict[str, int]]:
+        """Operations and flops of each program."""
+        return {name: each.size for name, each in self._plan.programs.items()}
+
+    @property
+    def owners(self) -> list[str]:
+        """Joint or driver of every kept row."""
+        return [self.tracer.formulation.owners[k][0] for k in self.tracer.selection.chosen]
+
+    @property
+    def driven(self) -> NDArray[np.bool_]:
+        """Which kept rows are drivers', shape (n,)."""
+        joints = len(self.tracer.formulation.owners) - len(self.tracer.mechanism.drivers)
+        return np.array(self.tracer.selection.chosen) >= joints
+
+    @property
+    def design(self) -> Array:
+        """The state at the design position, shape (numbers, 1)."""
+        return np.concatenate([*self.tracer.formulation.design.values()])[:, None]
+
+    def samples(self, path: Path, times: Array) -> Array:
+        """Return samples at times of a path, shape (sampled, n); see `Model.samples`."""
+        tracer = self.tracer
+        return samples(tracer.mechanism, tracer.request.drivers, tracer.frame.unit, path, times)
 
     def state(self, lanes: Array, ahead: str = FROM) -> Array:
         """Return the states of lanes of the model, by default those they are predicted from, shape
         (numbers, lanes).
         """
-        return np.concatenate([lanes[self.model.vectors[f"{ahead}{name}"]] for name in self._names])
+        return np.concatenate([lanes[self._vectors[f"{ahead}{name}"]] for name in self.names])
 
-    def equations(self, state: Array, sample: Array) -> Equations:
-        """The kept rows at states, shape (numbers, m), and samples, shape (sampled, m)."""
+    def evaluate(self, state: Array, sample: Array) -> tuple[Array, Array, Array]:
+        """Return phi, nu and the entries of the Jacobian of all rows, shape (numbers, m) each.
+
+        Args:
+            state, sample: shape (numbers, m) and (sampled, m).
+        """
         executor = self._at(state, sample)
         executor.run("rows")
-        m = state.shape[1]
-        rows = np.zeros((m, self._rows, self.unknowns))
-        rows[:, self._entries[:, 0], self._entries[:, 1]] = executor.get(self._values).T
-        jacobian, redundant = rows[:, : self.unknowns], rows[:, self.unknowns :]
-        return Equations(executor.get(self._phi).T, jacobian, executor.get(self._nu).T, redundant)
+        phi, nu, entries = (executor.get(self._vectors[k]) for k in ("phi", "nu", "entries"))
+        return phi, nu, entries
+
+    def equations(self, state: Array, sample: Array) -> Equations:
+        """Return the kept rows at states and samples, see `evaluate`."""
+        phi, nu, entries = self.evaluate(state, sample)
+        chosen, dropped = ([*each] for each in self.model_rows)
+        matrix = np.zeros((state.shape[1], len(phi), self.unknowns))
+        matrix[:, self.rows, self.columns] = entries.T
+        return Equations(
+            phi[chosen].T, matrix[:, chosen], nu[chosen].T, matrix[:, dropped], phi[dropped].T
+        )
 
     def gamma(self, state: Array, sample: Array, rate: Array) -> Array:
-        """Right-hand sides of the acceleration equations at rates of the unknowns, shape (m, n)."""
+        """Return the right-hand sides of the acceleration equations of all rows at rates of the
+        unknowns, shape (unknowns, m); shape (rows, m).
+        """
         executor = self._at(state, sample)
-        executor.put(self._vectors[RATE], rate.T)
+        executor.put(self._vectors[RATE], rate)
         executor.run("gamma")
-        return executor.get(self._gamma).T
+        return executor.get(self._vectors["gamma"])
 
     def stepped(self, state: Array, step: Array) -> Array:
-        """States after steps of the unknowns, shape (m, n)."""
+        """Return states after steps of the unknowns, shape (unknowns, m)."""
         executor = self._executor(state.shape[1])
         executor.put(self._state, state)
-        executor.put(self._step, step.T)
+        executor.put(self._vectors["step"], step)
         executor.run("retract")
         return executor.get(self._state)
 
     def outputs(self, state: Array, sample: Array, rate: Array, rate_t: Array) -> dict[str, Array]:
-        """The wanted motions by name, shape (components, m) each, and the tests "closure",
-        "leftover" and "branch".
+        """Return the wanted motions by name, shape (components, m) each, and the test "branch", by
+        rates and accelerations of the unknowns, shape (unknowns, m).
         """
         executor = self._at(state, sample)
-        executor.put(self._vectors[RATE], rate.T)
-        executor.put(self._vectors[RATE_T], rate_t.T)
+        executor.put(self._vectors[RATE], rate)
+        executor.put(self._vectors[RATE_T], rate_t)
         executor.run("outputs")
-        slots = {name: self._vectors[name] for name in self.model.rows if name in self._vectors}
-        slots |= {name: [self._plan.slots[name]] for name in ("closure", "leftover", "branch")}
-        return {name: executor.get(each) for name, each in slots.items()}
+        request = self.tracer.request
+        names = [
+            *kept_motions(request, ()),
+            *(kept_forces(self._vectors) if request.forces else ()),
+        ]
+        found = {name: executor.get(self._vectors[name]) for name in names}
+        return found | {"branch": executor.get([self._plan.slots["branch"]])}
 
     def poses(self, state: Array) -> Array:
         """Return the poses of all bodies in one state, shape (numbers, 1): displacements [units]
@@ -170,19 +236,18 @@ class System:
         """How the bodies move in one state, shape (numbers,), at rates of the unknowns, shape
         (n,).
         """
-        return self._tracer.formulation.twists(self._configuration(state), rate.tolist())
+        return self.tracer.formulation.twists(self._configuration(state), rate.tolist())
 
     def _configuration(self, state: Array) -> Configuration:
-        numbers = iter(state.tolist())
-        named = {name: [next(numbers) for _ in slots] for name, slots in self._names.items()}
-        return self._tracer.formulation.configuration(named)
+        named = {name: state[at].tolist() for name, at in self.names.items()}
+        return self.tracer.formulation.configuration(named)
 
-    def _executor(self, lanes: int) -> NumpyExecutor:
+    def _executor(self, lanes: int) -> Executor:
         if lanes not in self._executors:  # kept: binding costs more than running
-            self._executors[lanes] = NumpyExecutor(self._plan, lanes)
+            self._executors[lanes] = bind(self._plan, lanes, self._code)
         return self._executors[lanes]
 
-    def _at(self, state: Array, sample: Array) -> NumpyExecutor:
+    def _at(self, state: Array, sample: Array) -> Executor:
         executor = self._executor(state.shape[1])
         executor.put(self._state, state)
         executor.put(self._sampled, sample)

@@ -15,7 +15,7 @@ iteration.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from functools import cached_property, reduce
+from functools import cached_property, partial, reduce
 from typing import Any
 
 from ...algebra import Scalar, Vec3, quat, vec
@@ -23,17 +23,23 @@ from ...mechanism.mechanism import Mechanism, Vector
 from ...primitives.base import GROUND_POSE, GROUND_TWIST, Drive, Pose, Twist
 from ...program import Elimination, Prepared, Program, Tape, absolute, maximum, minimum, program
 from ...trajectory import QUANTITIES
-from ..forces.demand import BodyStates
+from ..forces.equations import BodyStates
 from ..formulation.acceptance_criteria import EPSILON
-from ..formulation.body_kinematics import motion_of_frame, motion_of_point
 from ..formulation.cartesian import Cartesian, PrescribedBody
-from ..formulation.constraints import Style, constraints, frames
-from ..formulation.driver_inputs import turns
-from ..formulation.formulation import GROUND_ACCELERATION, Acceleration, Formulation, State
+from ..formulation.constraints import Frames, Style, constraints, frames
+from ..formulation.formulation import (
+    GROUND_ACCELERATION,
+    Acceleration,
+    Formulation,
+    State,
+    motion_of_frame,
+    motion_of_point,
+)
 from ..formulation.parameters import every_place, placed
 from ..formulation.relative import Relative
+from ..formulation.state_vectors import turns
 from ..structure.components import Section, select_section
-from ..structure.degrees_of_freedom import select_rows
+from ..structure.degrees_of_freedom import Selection, select_rows
 from .request import (
     BLOCKS,
     FIRM,
@@ -52,26 +58,34 @@ from .traced_forces import Rows, TracedForces, angles, native_rows
 class Tracer:
     """One tape for all programs: shared operations are recorded once.
 
-    Raises:
-        SolveError: the mechanism cannot be solved as described (see `select_rows`).
+    Args:
+        frame: of the lengths, if it is not that of the section or of the mechanism's size.
+        selection: of the rows, if it is known.
+
+    Attributes:
+        selection: the rows solved, by default those independent at the design position.
     """
 
     def __init__(
-        self, mechanism: Mechanism, request: Request, section: Section | None = None
+        self,
+        mechanism: Mechanism,
+        request: Request,
+        section: Section | None = None,
+        *,
+        frame: Frames | None = None,
+        selection: Selection | None = None,
     ) -> None:
         self.request, self.tape, self.layout = request, Tape(), Layout()
         self.mechanism, self._section = mechanism, section
-        self.frame = section.frame(mechanism) if section else frames(mechanism)
+        self.frame = frame or (section.frame(mechanism) if section else frames(mechanism))
         self.prescribed: Mapping[str, PrescribedBody] = (
             {name: PrescribedBody() for name in section.given} if section else {}
         )
         # the angle of a torsional spring is a coordinate, followed through any number of turns
         self.named = angles(mechanism) if request.forces else []
-        formulation = self._formulate({})
-        if section:
-            self.selection = select_section(mechanism, self.frame, formulation)
-        else:
-            self.selection = select_rows(mechanism, self.frame, formulation, request.rows)
+        self._numbers = mechanism, self.frame, self._formulate({})
+        if selection is not None:
+            self.selection = selection
         known = every_place(mechanism)
         self.geometry = {place: known[place] for place in request.varied}
         given = {place: self.vector(place, len(value)) for place, value in self.geometry.items()}
@@ -128,6 +142,12 @@ class Tracer:
         """Add a state to the outputs."""
         for name, value in state.items():
             self.store(out, name, value)
+
+    @cached_property
+    def selection(self) -> Selection:
+        """Raises SolveError: the mechanism cannot be solved as described, see `select_rows`."""
+        select = select_section if self._section else partial(select_rows, wanted=self.request.rows)
+        return select(*self._numbers)
 
     def _kept(self, values: Sequence[Any]) -> list[Any]:
         return [values[k] for k in self.selection.chosen]
@@ -206,25 +226,23 @@ class Tracer:
         One program for all: operations on the pose are shared, and fill the waits between the
         pivots of the elimination.
         """
-        v, a, rates = self._solve_rates(self.request.order)
-        return self._outputs(v, a, rates)
+        v, a, out = self._solve_rates(self.request.order)
+        phi = self.formulation.phi(self.at)
+        out[self.layout.scalar("closure")] = largest(self._kept(phi))
+        out[self.layout.scalar("leftover")] = largest([phi[k] for k in self.selection.dropped])
+        return self._outputs(v, a, out)
 
     def outputs_of_rates(self) -> Program:
-        """Return the program of `outputs` for given rates, instead of the solution of the
-        mechanism's equations.
-        """
+        """Return the program of the wanted motions and of the branch for given rates."""
         return self._outputs(
             self.vector(RATE, self.unknowns), self.vector(RATE_T, self.unknowns), {}
         )
 
     def _outputs(
-        self, v: Sequence[Scalar], a: Sequence[Scalar], rates: Mapping[int, Scalar]
+        self, v: Sequence[Scalar], a: Sequence[Scalar], found: Mapping[int, Scalar]
     ) -> Program:
-        phi = self.formulation.phi(self.at)
-        out: dict[int, Scalar] = {
-            **rates,
-            self.layout.scalar("closure"): largest(self._kept(phi)),
-            self.layout.scalar("leftover"): largest([phi[k] for k in self.selection.dropped]),
+        out = {
+            **found,
             self.layout.scalar("branch"): reduce(minimum, self.formulation.branch(self.at), 1.0),
         }
         twists = self.formulation.twists(self.at, v)

@@ -1,19 +1,34 @@
-"""Solutions: the table of solved samples as a trajectory, for every way of solving."""
+"""Solutions: the table of solved samples as a trajectory, for every way of solving, with its forces
+as views, each computed when it is read.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...failures import FailureKind
-from ...forces import Forces
+from ...forces import Forces, Reaction
 from ...trajectory import Array, BodyMotion, Motions, PointMotion, Trajectory
-from .request import Request
-from .sample_rows import kept_motions, row_ranges, rows_of_bodies, rows_of_points
+from ..forces.wanted import WantedForces
+from .request import (
+    EFFORT,
+    ELEMENT,
+    FORCE_SIGMA,
+    POWER,
+    REACTION,
+    REDUNDANT,
+    Request,
+    kept_motions,
+    row_ranges,
+    rows_of_bodies,
+    rows_of_points,
+)
 
 _Columns = Mapping[str, Sequence[slice | None]]
 
@@ -85,3 +100,145 @@ def solution(
         forces=forces,
         failures=failures,
     )
+
+
+# Where the estimate of the smallest singular value is above this, the pose is far from singular in
+# the sense of forces, which is a billionth of the largest singular value, and no digits are
+# multiplied by `AMPLIFIED`: rows are of size one.
+REGULAR = 1e-4
+# Rows that are chosen of more may be nearly singular where all of them are not: those that are not
+# lose no more than three digits.
+WELL_CHOSEN = 1e-3
+
+_Value = TypeVar("_Value")
+
+
+class _Read(Mapping[str, _Value]):
+    """Values by name, each computed on access: a sweep pays only for those in use."""
+
+    def __init__(self, names: tuple[str, ...], read: Callable[[str], _Value]) -> None:
+        self._names, self._read = names, read
+
+    def __getitem__(self, name: str) -> _Value:
+        if name not in self._names:
+            raise KeyError(name)
+        return self._read(name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+
+class ForceTable:
+    """The forces of a model in its table of solved samples.
+
+    Args:
+        rows: columns of the table by the name of a vector.
+        unit: of length, in which undetermined directions are given [m].
+
+    Attributes:
+        least: where the estimate of the smallest singular value is above it, the pose is far from
+            singular.
+    """
+
+    def __init__(
+        self,
+        wanted: WantedForces,
+        rows: Mapping[str, slice],
+        unit: float,
+    ) -> None:
+        self.wanted, self.rows, self.unit = wanted, rows, unit
+        self._power = rows[POWER].start
+        products = rows[REDUNDANT] if REDUNDANT in rows else slice(0, 0)
+        # with r redundant rows there are r + r (r + 1) / 2 products
+        self.redundant = round((2.0 * (products.stop - products.start) + 2.25) ** 0.5 - 1.5)
+        self.least = WELL_CHOSEN if self.redundant else REGULAR
+
+    def read(self, table: Array, sigma: float) -> Forces | None:
+        """Return the forces of a table, shape (n, columns), with its NaN; None near a singular
+        pose, to be decided by singular values.
+
+        Args:
+            sigma: smallest estimate, over the sweep, of the smallest singular value of the solved
+                rows.
+        """
+        if FORCE_SIGMA in self.rows:
+            own = table[:, self.rows[FORCE_SIGMA]]
+            sigma = min(sigma, float(np.fmin.reduce(own, axis=None, initial=np.inf)))
+        if not sigma > self.least:
+            return None
+        return self.of(table)
+
+    def of(self, table: Array) -> Forces:
+        """Return the forces of samples that are all far from singular poses; see `read`."""
+        samples, wanted = _Samples(self, table), self.wanted
+        power, largest = table[:, self._power], table[:, self._power + 1]
+        return Forces(
+            _Read(wanted.joints, samples.reaction),
+            _Read(wanted.drivers, samples.effort),
+            _Read(wanted.elements, samples.element),
+            power,
+            largest,
+        )
+
+
+class _Samples:
+    """The forces of the samples in one table.
+
+    Redundant rows allow many multipliers. The shortest are taken, as by singular values: they do
+    not depend on the choice of rows.
+    """
+
+    def __init__(self, of: ForceTable, table: Array) -> None:
+        self._of, self._table = of, table
+
+    def element(self, name: str) -> Array:
+        """Return the amount of a force element, shape (n,)."""
+        return self._vector(ELEMENT, name)[:, 0]
+
+    def reaction(self, name: str) -> Reaction:
+        """Return the reaction of a joint."""
+        values = self._vector(REACTION, name).reshape(-1, 1 + self._of.redundant, 6)
+        si = np.repeat([1.0 / self._of.unit, 1.0], 3)
+        found, free = self._shortest(values.swapaxes(1, 2), si)
+        return Reaction(found[:, :3], found[:, 3:], free)
+
+    def effort(self, name: str) -> Array:
+        """Return the effort of a driver, shape (n,)."""
+        return self._vector(EFFORT, name)[:, 0]
+
+    def _vector(self, kind: str, name: str) -> Array:
+        return self._table[:, self._of.rows[kind + name]]
+
+    @cached_property
+    def _basis(self) -> tuple[Array, Array]:
+        """Matrices to orthonormalise the undetermined directions, shape (n, r, r), and the part of
+        each direction in the multipliers, shape (n, r); NaN at samples that were not reached.
+        """
+        r, values = self._of.redundant, self._vector(REDUNDANT, "")
+        known = np.isfinite(values).all(axis=1)
+        gram = np.tile(np.eye(r), (len(values), 1, 1))
+        pairs = [(i, j) for i in range(r) for j in range(i, r)]
+        for k, (i, j) in enumerate(pairs):
+            gram[known, i, j] = gram[known, j, i] = values[known, r + k]
+        to_orthonormal: Array = np.asarray(np.linalg.inv(np.linalg.cholesky(gram)), np.float64)
+        to_orthonormal = to_orthonormal.swapaxes(1, 2)
+        to_orthonormal[~known] = np.nan
+        return to_orthonormal, np.einsum("nkj,nk->nj", to_orthonormal, values[:, :r])
+
+    def _shortest(self, values: Array, si: Array) -> tuple[Array, Array]:
+        """Return the components of the shortest multipliers [SI], shape (n, components), and the
+        undetermined directions, shape (n, components, r).
+
+        Args:
+            values: of all multipliers [SI], then of each undetermined direction, shape (n,
+                components, 1 + r).
+            si: size in SI of the components of a direction, shape (components,).
+        """
+        if not self._of.redundant:
+            return values[..., 0], values[..., 1:]
+        to_orthonormal, part = self._basis
+        free = values[..., 1:] @ to_orthonormal
+        return values[..., 0] - si * np.einsum("nck,nk->nc", free, part), free

@@ -2,7 +2,7 @@
 
 The rows are factored already: the multipliers of a sample are one transposed solve. Redundant rows
 may carry any multipliers, balanced by the others. Each gives an undetermined direction of the
-multipliers, by one more transposed solve; `force_table` orthonormalises these directions.
+multipliers, by one more transposed solve; `ForceTable` orthonormalises these directions.
 """
 
 from __future__ import annotations
@@ -17,16 +17,13 @@ from ...mechanism.loads import TorsionSpringDamper
 from ...mechanism.mechanism import Mechanism
 from ...primitives.base import Drive
 from ...program import Elimination, absolute, maximum
-from ..forces.demand import BodyStates
-from ..forces.elements import at_work
-from ..forces.equations import ForceEquations
-from ..forces.power import powers
+from ..forces.equations import BodyStates, ForceEquations, at_work, powers
 from ..forces.wanted import WantedForces
 from ..formulation.cartesian import Cartesian
 from ..formulation.constraints import Frames, constraints
 from ..formulation.formulation import Configuration
 from ..structure.degrees_of_freedom import Selection, select_rows
-from .sample_rows import EFFORT, ELEMENT, FORCE_SIGMA, POWER, REACTION, REDUNDANT
+from .request import EFFORT, ELEMENT, FORCE_SIGMA, POWER, REACTION, REDUNDANT
 
 
 def can_trace(mechanism: Mechanism) -> bool:

@@ -91,9 +91,7 @@ class ArclengthWalk:
 
     def sample(self, time: float) -> Array:
         """Return a sample of the drivers, shape (sampled, 1)."""
-        times = np.array([time])
-        model = self.system.model
-        return model.samples(times, self.path.drive(model.request.drivers, times))
+        return self.system.samples(self.path, np.array([time]))
 
     def begin(self, state: Array, time: float, direction: float) -> Spot:
         """A pose as the first of a walk, with time growing or falling from there.
@@ -111,7 +109,7 @@ class ArclengthWalk:
 
         Corrections are across the tangent of the spot: h is measured along it.
         """
-        state = self.system.stepped(spot.state, h * spot.dq[None])
+        state = self.system.stepped(spot.state, h * spot.dq[:, None])
         time, moved, closure = spot.time + h * spot.dt, 0.0, np.inf
         found = self.system.equations(state, self.sample(time))
         for _ in range(CORRECTIONS):
@@ -126,7 +124,7 @@ class ArclengthWalk:
             moved += float(np.abs(step[:-1]).max())
             if moved > LARGEST_DEVIATION * abs(h) + self.tol:
                 return None
-            state, time = self.system.stepped(state, step[None, :-1]), time + float(step[-1])
+            state, time = self.system.stepped(state, step[:-1, None]), time + float(step[-1])
             found = self.system.equations(state, self.sample(time))
         try:
             after = _spot(found, state, time, spot.dq, spot.arc + h)
@@ -135,12 +133,13 @@ class ArclengthWalk:
         return after if self._solved(after) else None
 
     def _solved(self, spot: Spot) -> bool:
-        zero = np.zeros((1, self.system.unknowns))
-        tests = self.system.outputs(spot.state, self.sample(spot.time), zero, zero)
-        closure, leftover, branch = (
-            float(tests[name][0, 0]) for name in ("closure", "leftover", "branch")
+        zero, sample = np.zeros((self.system.unknowns, 1)), self.sample(spot.time)
+        tests = self.system.equations(spot.state, sample)
+        (branch,) = self.system.outputs(spot.state, sample, zero, zero)["branch"]
+        closure, leftover = tests.closure[0], tests.leftover[0]
+        return bool(
+            closure <= self.tol and leftover <= max(CONSISTENT, self.tol) and branch[0] > 0.0
         )
-        return closure <= self.tol and leftover <= max(CONSISTENT, self.tol) and branch > 0.0
 
     def along(
         self, spot: Spot, length: float, longest: float, attempts: int | None = None

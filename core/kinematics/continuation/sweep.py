@@ -11,14 +11,12 @@ from typing import Any
 import numpy as np
 
 from ...failures import FailureKind
-from ...forces import Forces
 from ...mechanism.motions import Path
 from ...program import ITERATIONS
 from ...trajectory import Array, Trajectory
 from ..compiled.compiled_model import Model
-from ..compiled.motion_start import solve_from_start
 from ..compiled.request import SIGMA
-from ..compiled.samples import Route
+from ..compiled.routes import Route, solve_from_start
 from ..compiled.solution import solution
 from ..formulation.acceptance_criteria import LOW, in_question
 from .walk import march
@@ -63,6 +61,10 @@ def _follow(route: Route, tol: float) -> Trajectory:
     if not (found.solved.any() if message else found.solved.size):
         closure = leftover = sigma = math.nan
     table = found.kept.T
+    # at a singular pose rigid bodies determine no finite force: samples there are interpolated, or
+    # not reached, which leaves notes or messages
+    finite = not message and "notes" not in findings
+    forces = model.forces.read(table, sigma) if finite and model.forces else None
     return solution(
         table,
         model.of_points,
@@ -76,17 +78,8 @@ def _follow(route: Route, tol: float) -> Trajectory:
         failures=failures,
         account=route.details,
         findings={"smallest_singular_value": min(sigma, 1.0), **findings},
-        forces=_forces(model, table, sigma) if not message and "notes" not in findings else None,
+        forces=forces,
     )
-
-
-def _forces(model: Model, table: Array, sigma: float) -> Forces | None:
-    """Return the forces computed by a model; None if none are wanted, or some may not be finite.
-
-    At a singular pose rigid bodies determine no finite force. Samples there are interpolated, or
-    not reached because forces cannot be interpolated: both leave notes or messages.
-    """
-    return model.forces.read(table, sigma) if model.forces else None
 
 
 def _worst(tests: Array) -> tuple[float, float, float]:

@@ -1,27 +1,175 @@
-"""Trace a motion along its own length, through limit points; the driver's value is a result."""
+"""Trace a motion along its own length, through limit points; the driver's value is a result.
+
+A curve is closed if it passes its beginning again, in the same direction.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
 
-from ...errors import SolveError
+from ...dataset import Dataset, Variable
+from ...errors import SolveError, number_of
 from ...input_checks import names_of, no_such, require_kind, require_positive
 from ...mechanism.mechanism import Mechanism
 from ...mechanism.motions import Path, Ramp
+from ...tabular import Tabular
 from ...trajectory import Array
 from ..compiled.compiled_model import recent_model
 from ..compiled.dense_equations import System, system_of
 from ..compiled.request import Request
 from ..formulation.constraints import Style
-from ..structure.driver_count import require_driven
-from .curve import Curve, Event
-from .curve_start import Beginning
+from ..structure.degrees_of_freedom import require_driven
 from .pseudo_arclength import NODE, ArclengthWalk, Beside, Spot
-from .singularity import examine
+from .singular_poses import Singularity, examine
+
+
+@dataclass(frozen=True, eq=False)
+class Event:
+    """A singular pose on a curve.
+
+    Attributes:
+        arc: length from the beginning of the curve.
+        value: of the driver, from the design position [m or rad].
+        singularity: dependent rows, and motions possible with the driver held.
+        points: position of the wanted points [m], shape (3,) each.
+    """
+
+    arc: float
+    value: float
+    singularity: Singularity
+    points: Mapping[str, Array]
+
+    @property
+    def kind(self) -> str:
+        """ "limit point" if the driver locks up and turns back; "branch point" if the motion may
+        branch.
+        """
+        return "limit point" if self.singularity.lock_up else "branch point"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Curve(Tabular):
+    """The motion of a mechanism along its own length, n poses.
+
+    Attributes:
+        driver: its name.
+        arc: length from the design position, shape (n,); it falls from zero if the curve was traced
+            backwards. The length of a step is the change of all unknowns: displacements in units of
+            the mechanism's size, turns in radians.
+        values: of the driver, from its design value [m or rad], shape (n,).
+        sigma: smallest singular value of the rows, drivers included: distance from a singular pose
+            [-], shape (n,).
+        points: position by name [m], shape (n, 3).
+        events: limit points and branch points, in order.
+        closed: whether the curve came back to the design position, which is then the last pose too.
+        message: empty, or the reason of an early end.
+        unit: of the driver, m or rad.
+    """
+
+    driver: str
+    arc: Array
+    values: Array
+    sigma: Array
+    points: Mapping[str, Array]
+    events: tuple[Event, ...]
+    closed: bool
+    message: str = ""
+    unit: str = ""
+
+    def summary(self) -> str:
+        """Return the driver's range, the number of poses, and the singular ones."""
+        low, high = self.values.min(initial=np.inf), self.values.max(initial=-np.inf)
+        kinds = [each.kind for each in self.events]
+        events = [number_of(kinds.count(kind), kind) for kind in dict.fromkeys(kinds)]
+        span = f"{self.driver} from {low:.6g} to {high:.6g} {self.unit}".rstrip()
+        shape = "closed" if self.closed else "open"
+        return ", ".join(filter(None, [span, number_of(len(self.arc), "pose"), shape, *events]))
+
+    def dataset(self) -> Dataset:
+        """Return driver, points and distance from singularity over the length of the curve."""
+        coords = {
+            "arc": Variable("pose", self.arc),
+            "point": Variable("point", [*self.points]),
+            "axis": Variable("axis", ["x", "y", "z"]),
+        }
+        variables = {
+            self.driver: Variable("pose", self.values, self.unit),
+            "smallest_singular_value": Variable("pose", self.sigma),
+        }
+        if self.points:
+            positions = np.stack([*self.points.values()], axis=1)
+            variables["position"] = Variable(("pose", "point", "axis"), positions, "m")
+        return Dataset(("pose",), coords, variables, "arc")
+
+
+# The cosine of two directions above which they are the same way: below it the curve crosses itself.
+SAME_WAY = 0.9
+# Two poses are one if no number differs by more than this part of the longest step: far above
+# rounding.
+SAME_POSE = 0.02
+# Length over which the direction of the beginning is measured, and rounds of the secant rule that
+# look for it.
+SMALL, ROUNDS = 1e-6, 8
+
+
+class Beginning:
+    """The first spot of a walk, and the plane across the curve there."""
+
+    def __init__(self, walk: ArclengthWalk, first: Spot, longest: float) -> None:
+        self.walk, self.first, self.longest = walk, first, longest
+        self._poses = walk.system.poses(first.state)
+        after = walk.system.poses(walk.system.stepped(first.state, SMALL * first.dq[:, None]))
+        self._way = (after - self._poses) / SMALL
+
+    def passed(self, before: Spot, after: Spot) -> Spot | None:
+        """Return the beginning as a spot at its length on the curve if the step between two spots
+        passes it, else None.
+        """
+        if float(self.first.dq @ after.dq) < SAME_WAY:
+            return None
+        change, change_after = self._change(before), self._change(after)
+        ahead, beyond = self._along(change), -self._along(change_after)
+        if not (ahead > 0.0 <= beyond and np.abs(change_after).max() <= 2.0 * self.longest):
+            return None
+        share = ahead / (ahead + beyond)
+        spot: Spot | None = None
+        h, apart = (
+            share * (after.arc - before.arc),
+            np.abs((1.0 - share) * change + share * change_after).max(),
+        )
+        for _ in range(ROUNDS):
+            spot = self.walk.advance(before, h)
+            # beside a branch point: where it is between the two spots is known well enough
+            if spot is None:
+                break
+            change = self._change(spot)
+            gap, apart = self._along(change), np.abs(change).max()
+            h += gap
+            if abs(gap) <= SMALL * SMALL:
+                break
+        if apart > SAME_POSE * self.longest:
+            return None
+        turned = before.time + share * (after.time - before.time) if spot is None else spot.time
+        return replace(self.first, arc=before.arc + h, time=turned)
+
+    def _change(self, spot: Spot) -> Array:
+        """Return the change from the pose of a spot to the beginning; Euler parameters p and -p are
+        the same.
+        """
+        there = self.walk.system.poses(spot.state)
+        there[:, 3:] *= np.where(
+            (there[:, 3:] * self._poses[:, 3:]).sum(axis=1, keepdims=True) < 0.0, -1.0, 1.0
+        )
+        return self._poses - there
+
+    def _along(self, change: Array) -> float:
+        """Return the length of a change along the curve, to first order."""
+        return float((change * self._way).sum() / (self._way * self._way).sum())
+
 
 # A step is at most this long [units of the mechanism's size, rad]: poses far enough apart to be
 # cheap, near enough to be drawn.
@@ -253,6 +401,6 @@ def _stacked(walk: ArclengthWalk, spots: Sequence[Spot]) -> tuple[Array, Array]:
 
 
 def _points(walk: ArclengthWalk, spots: Sequence[Spot]) -> dict[str, Array]:
-    zero = np.zeros((len(spots), walk.system.unknowns))
+    zero = np.zeros((walk.system.unknowns, len(spots)))
     found = walk.system.outputs(*_stacked(walk, spots), zero, zero)
-    return {name: found[f"position {name}"].T for name in walk.system.model.request.points}
+    return {name: found[f"position {name}"].T for name in walk.system.tracer.request.points}

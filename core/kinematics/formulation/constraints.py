@@ -19,11 +19,10 @@ from ...algebra import ZERO, Vec3, vec
 from ...errors import SolveError
 from ...joints import Attachment, AxialJoint, Joint
 from ...joints.base import unit
-from ...mechanism.drivers import Driver, JointDriver, PointCoordinate
-from ...mechanism.mechanism import GROUND, Mechanism
-from ...mechanism.topology import spanning_tree
+from ...mechanism.mechanism import GROUND, Mechanism, spanning_tree
+from ...mechanism.motions import Driver, JointDriver, PointCoordinate
 from ...primitives.base import Drive
-from .relation import Relation as Relation
+from .formulation import Relation as Relation
 
 
 @dataclass(frozen=True)

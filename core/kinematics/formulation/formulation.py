@@ -1,4 +1,5 @@
-"""The interface of a formulation: unknowns, the poses they stand for, and the equations.
+"""The interface of a formulation: unknowns, the poses they stand for, and the equations; motions of
+points and frames carried by a body; rows of joint coordinates.
 
 Newton's iteration, velocities, accelerations, prediction and row selection are written once over
 this interface, for all formulations.
@@ -7,11 +8,11 @@ this interface, for all formulations.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol, TypeAlias
 
-from ...algebra import ZERO, Scalar, Vec3, cross
-from ...primitives.base import Pose, Twist
+from ...algebra import ZERO, Quat, Scalar, Vec3, cross, rotation_less_identity, vec
+from ...primitives.base import Drive, Pose, Twist
 
 State: TypeAlias = Mapping[str, Sequence[Scalar]]
 """Named vectors that define the configuration (for Cartesian coordinates: displacement and Euler
@@ -123,3 +124,90 @@ class Formulation(Protocol):
 def row_names(formulation: Formulation) -> list[str]:
     """Return a readable name of every row: its joint or driver, and its primitive."""
     return [f"{owner}: {primitive}" for owner, primitive in formulation.owners]
+
+
+def position_of(position: Sequence[Scalar], arm: Vec3, metres: Scalar, pose: Pose) -> Vec3:
+    """Return the position of a point [m]; its displacement is formed first and added once.
+
+    Args:
+        position: at design [m].
+        arm: from the body's internal origin at design, in the unit of the frames.
+        metres: length of that unit [m].
+    """
+    return vec(position) + metres * (pose.u + pose.swing(arm))
+
+
+def motion_of_point(
+    position: Sequence[Scalar],
+    arm: Vec3,
+    metres: Scalar,
+    pose: Pose,
+    twist: Twist,
+    acceleration: Acceleration,
+) -> tuple[Vec3, Vec3, Vec3]:
+    """Return position [m], velocity and acceleration of a point; see `position_of`."""
+    turned = pose.turn(arm)
+    return (
+        position_of(position, arm, metres, pose),
+        metres * twist.of(turned),
+        metres * acceleration.of(turned, twist),
+    )
+
+
+def motion_of_frame(
+    design: Quat, pose: Pose, twist: Twist, acceleration: Acceleration
+) -> tuple[Quat, Vec3, Vec3]:
+    """Return the paper's variables p, omega' and omega'dot of a body's own frame.
+
+    Args:
+        design: Euler parameters of the frame at design.
+    """
+    p = pose.q * design
+    to_body = rotation_less_identity(p).T
+    return p, twist.w + to_body @ twist.w, acceleration.w_t + to_body @ acceleration.w_t
+
+
+@dataclass(frozen=True)
+class Relation:
+    """A row of coordinates: their weighted sum is the drive's value (zero unless driven).
+
+    Attributes:
+        curve: coefficients of a polynomial in the last coordinate, the constant first, that is
+            added to the sum; empty for a linear row.
+    """
+
+    owner: str
+    weights: Mapping[str, Scalar]
+    drive: Drive = field(default_factory=Drive)
+    curve: Sequence[Scalar] = ()
+
+    def value(self, x: Sequence[Scalar]) -> Scalar:
+        """Return the residual at values of the coordinates."""
+        linear = sum((k * each for k, each in zip(self.weights.values(), x, strict=True)), 0.0)
+        return linear + _polynomial(self.curve, x[-1]) - self.drive.c
+
+    def slopes(self, x: Sequence[Scalar]) -> dict[str, Scalar]:
+        """Return the derivatives by the coordinates."""
+        found = dict(self.weights)
+        if self.curve:
+            last = [*found][-1]
+            found[last] = found[last] + _polynomial(_derived(self.curve), x[-1])
+        return found
+
+    def gamma(self, x: Sequence[Scalar], rates: Sequence[Scalar]) -> Scalar:
+        """Return the right-hand side of the accelerations at values and rates."""
+        bend = _polynomial(_derived(_derived(self.curve)), x[-1])
+        return self.drive.c_tt - bend * (rates[-1] * rates[-1])
+
+
+def _polynomial(coefficients: Sequence[Scalar], x: Scalar) -> Scalar:
+    """Return the value of a polynomial, the constant first."""
+    found: Scalar = 0.0
+    for c in reversed(coefficients):
+        found = c + x * found
+    return found
+
+
+def _derived(coefficients: Sequence[Scalar]) -> Sequence[Scalar]:
+    """Return the coefficients of the derivative of a polynomial."""
+    return [float(k) * c for k, c in enumerate(coefficients)][1:]

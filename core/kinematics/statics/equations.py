@@ -29,7 +29,6 @@ from ...mechanism.mechanism import Mechanism, Vector
 from ...primitives.base import Drive, Twist
 from ...program import (
     Elimination,
-    Executor,
     NumpyExecutor,
     Plan,
     Program,
@@ -38,13 +37,12 @@ from ...program import (
     maximum,
     program,
 )
-from ...program.derivative import folded, jacobian
+from ...program.llvm.executor import Executor
+from ...program.tape import folded, jacobian
 from ...trajectory import Array
 from ..compiled.request import Layout
 from ..compiled.traced_forces import angles
-from ..forces.demand import BodyStates, Wrench
-from ..forces.elements import at_work
-from ..forces.equations import ForceEquations
+from ..forces.equations import BodyStates, ForceEquations, Wrench, at_work
 from ..formulation.cartesian import COLUMNS, Cartesian
 from ..formulation.constraints import Frames, constraints, frames
 from ..formulation.formulation import GROUND_ACCELERATION

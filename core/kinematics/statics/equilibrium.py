@@ -26,9 +26,8 @@ from ...algebra import quat, vec
 from ...errors import SolveError
 from ...mechanism.mechanism import Mechanism
 from ...primitives.base import Pose
-from ...program import Executor, NumpyExecutor
 from ...program.llvm.compiler import available
-from ...program.llvm.executor import LlvmExecutor
+from ...program.llvm.executor import Executor, bind
 from ...program.llvm.jit import LlvmCode, make_loops_ready
 from ...trajectory import Array, BodyMotion
 from ..formulation.cartesian import COLUMNS
@@ -168,10 +167,7 @@ class StaticModel:
 
     def executor(self, lanes: int) -> Executor:
         """Return the programs bound to lanes at design."""
-        plan = self.equations.plan
-        made: Executor = (
-            LlvmExecutor(self._code, lanes) if self._code else NumpyExecutor(plan, lanes)
-        )
+        made = bind(self.equations.plan, lanes, self._code)
         put_design(made, self.equations.vectors, self.equations.design, self.drivers)
         made.put(self.equations.vectors[MULTIPLIERS], self.equations.multipliers[:, None])
         return made

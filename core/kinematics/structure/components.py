@@ -19,8 +19,8 @@ from ...algebra import ZERO, vec
 from ...errors import SolveError
 from ...failures import FailureKind
 from ...joints import Joint, Kind
-from ...mechanism.drivers import Driver, JointDriver, PointCoordinate
 from ...mechanism.mechanism import GROUND, Body, Mechanism, Point, Vector
+from ...mechanism.motions import Driver, JointDriver, PointCoordinate
 from ..formulation.cartesian import COLUMNS, Cartesian
 from ..formulation.constraints import Frames, extent, unit_near
 from ..formulation.formulation import Formulation, row_names

@@ -1,14 +1,43 @@
-"""Selection of independent rows among redundant ones, chosen to stay independent along a sweep."""
+"""Redundant rows: independent ones among them, chosen to stay independent along a sweep, and joints
+that hold less where rows are redundant but for the digits of a file.
+
+Four hinges that a file makes parallel to 1e-6 leave a planar loop no freedom, because three of its
+rows agree to these digits only. A joint that closes the loop then gets fewer rows: two bodies with
+a common point and axis share a line, or a plane. The result is a mechanism like any other, the same
+for every engine. It knows the rows left out: they leave reactions undetermined, as redundant rows.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
-from ...trajectory import Array
+from ... import primitives as p
+from ...algebra import ZERO, Vec3, X, Y, Z, cross, vec
+from ...joints import (
+    Attachment,
+    AxialJoint,
+    Inline,
+    InPlane,
+    Joint,
+    OrientationLock,
+    ParallelAxes,
+    PerpendicularAxes,
+    Spherical,
+)
+from ...joints.base import triad
+from ...mechanism.loads import TorsionSpringDamper
+from ...mechanism.mechanism import Mechanism, Reduced, Vector, spanning_tree
+from ...mechanism.motions import JointDriver
+from ...primitives.base import GROUND_POSE
+from ...trajectory import Array, BodyMotion
+from ..formulation.cartesian import COLUMNS, Cartesian
+from ..formulation.constraints import Frames, frames
 from ..formulation.formulation import Condition, Formulation
+from ..formulation.state_vectors import displaced, jacobian
 
 # Rows are of size one. At a feasible pose a redundant row leaves round-off (1e-15); the smallest
 # independent remainder in sound linkages is near 1e-2. Values between belong to nearly singular
@@ -135,3 +164,217 @@ def _without(left: Array, basis: Array) -> Array:
     for _ in range(2):
         left = left - (left @ basis.T) @ basis
     return left
+
+
+# Gaps of several joints add up, and arms lengthen them.
+ADDED_UP = 10.0
+# A vanishing sum of rows with a smaller part of orientations is ended by a direction of the point.
+TURNS = 0.1
+
+
+@dataclass(frozen=True)
+class Reduction:
+    """A mechanism without redundant rows.
+
+    Attributes:
+        mechanism: its `reduced` joints are those with rows left out.
+        unit: the mechanism's size [m].
+        limit: largest residual that the joints as given may keep along a motion [m].
+    """
+
+    mechanism: Mechanism
+    unit: float
+    limit: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Held:
+    """Directions of a joint's conditions: held along (places) and held about (turns).
+
+    Both are orthonormal, of shape (directions, 3), global at design.
+
+    Attributes:
+        axes: on the first and the second body, at right angles, if their condition is the only one
+            of turns: its direction moves with both bodies.
+    """
+
+    places: Array
+    turns: Array
+    axes: tuple[Vector, Vector] | None
+
+    def rows(self, joint: Joint, frame: Frames, formulation: Cartesian) -> Array:
+        """Return the rows of both, shape (directions, unknowns)."""
+        found = np.zeros((len(self.places) + len(self.turns), formulation.unknowns))
+        for body, sign in zip(joint.bodies, (-1.0, 1.0), strict=True):
+            if body in formulation.columns:
+                k, n = formulation.columns[body], len(self.places)
+                if n:
+                    arm = np.array([*frame.arm(body, joint.points_on()[0])])
+                    found[:n, k : k + 3] = sign * self.places
+                    found[:n, k + 3 : k + COLUMNS] = sign * np.cross(arm, self.places)
+                found[n:, k + 3 : k + COLUMNS] = sign * self.turns
+        return found
+
+    def parted(self, sums: Array) -> tuple[_Held, _Held]:
+        """Return the rest after ending vanishing sums of rows, and the part left out.
+
+        Args:
+            sums: weights of the rows in each sum, shape (sums, directions).
+        """
+        n = len(self.places)
+        left, sizes, right = np.linalg.svd(sums[:, n:])
+        turning = int((sizes > TURNS).sum())
+        straight = np.linalg.qr((left[:, turning:].T @ sums[:, :n]).T)[0].T
+        return (
+            _Held(_complement(straight) @ self.places, right[turning:] @ self.turns, self.axes),
+            _Held(straight @ self.places, right[:turning] @ self.turns, self.axes),
+        )
+
+    def joints(self, joint: Joint) -> list[Joint]:
+        """Return joints with these conditions between the bodies of a joint, under its name."""
+        name, turns, found = joint.name, self.turns, list[Joint]()
+        ends = joint.bodies
+        match len(self.places):
+            case 1:
+                found.append(InPlane(name, *ends, joint.points_on()[0], _vector(self.places[0])))
+            case 2:
+                line = _normal(self.places)
+                found.append(Inline(name, *ends, joint.points_on()[0], line))
+            case 3:
+                found.append(Spherical(name, *ends, joint.points_on()[0]))
+            case _:
+                pass
+        name = f"{name}: axes" if found else name
+        match len(turns):
+            case 1:
+                f, g, _ = triad(_vector(turns[0]))
+                found.append(PerpendicularAxes(name, *ends, self.axes or ((*f,), (*g,))))
+            case 2:
+                found.append(ParallelAxes(name, *ends, _normal(turns)))
+            case 3:
+                found.append(OrientationLock(name, *ends))
+            case _:
+                pass
+        return found
+
+
+def reduce_rows(
+    mechanism: Mechanism, tolerance: float, carrying: Collection[str] = ()
+) -> Reduction:
+    """Return the mechanism without redundant rows, to a tolerance [m].
+
+    Joints of closed loops lose rows; driven and coupled ones, those with torsional springs, and
+    joints of other primitives than points, lines, planes and orientations, keep theirs.
+
+    Args:
+        carrying: joints with all their rows, as long as others can close the loops.
+    """
+    bare = replace(mechanism, drivers=())
+    frame = frames(bare)
+    formulation = Cartesian.of(bare, frame)
+    matrix, named = jacobian(formulation), dict[str, list[int]]()
+    for k, (owner, _) in enumerate(formulation.owners):
+        named.setdefault(owner, []).append(k)
+    keeping = {each.joint for each in mechanism.drivers if isinstance(each, JointDriver)}
+    keeping |= {joint for coupler in mechanism.couplers for joint in coupler.joints}
+    keeping |= {each.joint for each in mechanism.forces if isinstance(each, TorsionSpringDamper)}
+    tree = spanning_tree(mechanism, {*carrying, *keeping})
+    held = {joint.name: _held(joint) for joint in tree.cut if joint.name not in keeping}
+    whole = [name for name in named if held.get(name) is None]
+    span = _spanned(
+        np.empty((0, formulation.unknowns)), matrix[[k for n in whole for k in named[n]]]
+    )
+    enough, changed = ADDED_UP * tolerance / frame.unit, dict[str, list[Joint]]()
+    reduced = list[Reduced]()
+    for joint in tree.cut:
+        if (holds := held.get(joint.name)) is None:
+            continue
+        rows = holds.rows(joint, frame, formulation)
+        left, sizes, _ = np.linalg.svd(_without(rows, span), full_matrices=True)
+        weak = np.concatenate([sizes <= enough, np.ones(len(rows) - len(sizes), dtype=np.bool_)])
+        if weak.any():
+            holds, less = holds.parted(left[:, weak].T)
+            kept = changed[joint.name] = holds.joints(joint)
+            names = tuple(each.name for each in kept)
+            left_out = tuple(each.changed(name=joint.name) for each in less.joints(joint))
+            reduced.append(Reduced(joint, names, left_out))
+            rows = holds.rows(joint, frame, formulation)
+        span = _spanned(span, rows)
+    joints = [each for joint in mechanism.joints for each in changed.get(joint.name, [joint])]
+    return Reduction(
+        replace(mechanism, joints=joints, reduced=reduced) if changed else mechanism,
+        frame.unit,
+        ADDED_UP * tolerance,
+    )
+
+
+def largest_residual(
+    mechanism: Mechanism, joints: Sequence[Joint], bodies: Mapping[str, BodyMotion]
+) -> float:
+    """Return the largest residual of joints over poses of the moving bodies [m].
+
+    Angles count at an arm of the mechanism's size.
+    """
+    frame = frames(mechanism)
+    poses = displaced(mechanism, frame, {name: (each.r, each.p) for name, each in bodies.items()})
+    found = 0.0
+    for joint in joints:
+        i, j = (Attachment(frame.origins[body]) for body in joint.bodies)
+        pair = [poses.get(body, GROUND_POSE) for body in joint.bodies]
+        for each in joint.scaled(1.0 / frame.unit).primitives(i, j):
+            found = max(found, *(float(np.max(np.abs(x), initial=0.0)) for x in each.phi(*pair)))
+    return frame.unit * found
+
+
+def _held(joint: Joint) -> _Held | None:
+    """Return the conditions of a joint; None if it has others than points and orientations."""
+    if isinstance(joint, AxialJoint) and joint.relations:
+        return None
+    places, turns, here = list[Vec3](), list[Vec3](), Attachment(ZERO)
+    crossed: list[tuple[Vector, Vector]] = []
+    for each in joint.primitives(here, here):
+        match each:
+            case p.Spherical():
+                places += (X, Y, Z)
+            case p.Dot12():
+                turns += (X, Y, Z)
+            case p.Dot11(f=f, g=g) | p.Dot21(f=f, g=g):
+                (turns if isinstance(each, p.Dot11) else places).extend((f, g))
+            case p.Dot20(a=a):
+                places.append(a)
+            case p.Dot10(a=a, b=b):
+                turns.append(cross(a, b))
+                crossed.append(((*a,), (*b,)))
+            case _:
+                return None
+    if places and len(joint.points_on()) != 1:
+        return None
+    axes = crossed[0] if len(turns) == 1 and crossed else None
+    return _Held(_orthonormal(places), _orthonormal(turns), axes)
+
+
+def _orthonormal(vectors: Sequence[Vec3]) -> Array:
+    found = np.array([[*each] for each in vectors], dtype=np.float64).reshape(-1, 3)
+    return np.linalg.qr(found.T)[0].T
+
+
+def _complement(vectors: Array) -> Array:
+    """Return an orthonormal basis of the vectors normal to independent ones, by rows."""
+    return np.linalg.svd(vectors, full_matrices=True)[2][len(vectors) :]
+
+
+def _vector(a: Array) -> Vector:
+    x, y, z = a.tolist()
+    return x, y, z
+
+
+def _normal(pair: Array) -> Vector:
+    """Return the normal of two vectors, shape (2, 3)."""
+    x, y, z = cross(*map(vec, pair.tolist()))
+    return x, y, z
+
+
+def _spanned(span: Array, rows: Array) -> Array:
+    """Return an orthonormal basis of a span and further rows."""
+    _, sizes, basis = np.linalg.svd(_without(rows, span), full_matrices=False)
+    return np.concatenate([span, basis[sizes > RANK_TOLERANCE]])

@@ -1,129 +1,59 @@
-"""A large sparse matrix of fixed pattern, factored by SuperLU in an order found once.
+"""Large sparse matrices: factors by SuperLU, and their blocks.
 
-The order is COLAMD's, with the row pivots of the first factorisation. Times in a given order for a
-ring of N spatial loops, without any decomposition, and a chain (least of 15, one Zen 4 core, N =
-1,000, ring and chain): COLAMD 2.4 and 1.7 ms, minimum degree of A^T A 3.0 and 1.6, reverse
-Cuthill-McKee of the bodies 2.9 and 1.5. COLAMD wins on the ring, the critical case; a new order at
-every factorisation costs a quarter more. Minimum degree of A + A^T is unsuitable for these
-matrices, whose diagonals have no meaning: it took 1.6 s.
+The columns are in COLAMD's order. Times for a ring of N spatial loops, without any decomposition,
+and a chain (least of 15, one Zen 4 core, N = 1,000, ring and chain): COLAMD 2.4 and 1.7 ms, minimum
+degree of A^T A 3.0 and 1.6, reverse Cuthill-McKee of the bodies 2.9 and 1.5. Minimum degree of
+A + A^T is unsuitable for these matrices, whose diagonals have no meaning: it took 1.6 s.
 """
 
 from __future__ import annotations
 
 import importlib
-from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...caches import keep_last
 from ...trajectory import Array
-
-Indices = NDArray[np.intp]
-# Supernodes of these matrices are a few columns wide; SuperLU's own settings (10 and 20) double the
-# time.
-NARROW = {"relax": 4, "panel_size": 4}
-# Smallest pivot relative to the largest entry of its column: rows keep the order found first.
-PIVOT_THRESHOLD = 0.1
+from .degrees_of_freedom import NARROW, Indices
 
 
 class SingularError(ArithmeticError):
     """The matrix cannot be factored."""
 
 
-class Ordered(NamedTuple):
-    """A pattern in an order of elimination.
+class Pattern:
+    """A square pattern of entries."""
 
-    Attributes:
-        rows, columns: of the entries.
-        row, column: position of every original row and column.
-    """
-
-    rows: Indices
-    columns: Indices
-    row: Indices
-    column: Indices
-
-
-class Order:
-    """A square pattern in an order of elimination, found at some values.
-
-    Raises:
-        SingularError: the matrix is singular at the values given.
-    """
-
-    def __init__(self, rows: Indices, columns: Indices, values: Array, n: int) -> None:
+    def __init__(self, rows: Indices, columns: Indices, n: int) -> None:
         sparse: Any = importlib.import_module("scipy.sparse")
         self._splu: Any = importlib.import_module("scipy.sparse.linalg").splu
-        first = self._factored(
-            sparse.csc_matrix((values, (rows, columns)), shape=(n, n)), permc_spec="COLAMD"
+        self._matrix = sparse.csc_matrix(
+            (np.arange(len(rows)) + 0.0, (rows, columns)), shape=(n, n)
         )
-        self.row: Indices = first.perm_r
-        self.column: Indices = first.perm_c
-        numbered = sparse.csc_matrix(
-            (np.arange(len(values)) + 1.0, (self.row[rows], self.column[columns])), shape=(n, n)
-        )
-        numbered.sort_indices()
-        self._entries: Indices = numbered.data.astype(np.intp) - 1
-        self._matrix, self._rows, self._columns = numbered, rows, columns
+        self._entries = self._matrix.data.astype(np.intp)
 
-    def _factored(self, matrix: Any, **options: Any) -> Any:
+    def factor(self, values: Array) -> Factors:
+        """Return the factors of a matrix of these entries.
+
+        Raises:
+            SingularError: the matrix is singular, or digits are lost in the elimination.
+        """
+        self._matrix.data[:] = values[self._entries]
         try:
-            return self._splu(matrix, diag_pivot_thresh=PIVOT_THRESHOLD, **NARROW, **options)
+            return Factors(self._splu(self._matrix, permc_spec="COLAMD", **NARROW))
         except RuntimeError as error:
             # the second message means a loss of digits in the elimination
             if any(said in str(error) for said in ("singular", "failed to factorize")):
                 raise SingularError("exactly singular") from error
             raise
 
-    def places(self, factors: Factors) -> Ordered:
-        """Return the pattern in the order of factors, with the rows that they exchanged."""
-        row, column = factors.row[self.row], factors.column[self.column]
-        return Ordered(row[self._rows], column[self._columns], row, column)
-
-    def factor(self, values: Array) -> Factors:
-        """Return the factors of a matrix, its entries in the original order.
-
-        Raises:
-            SingularError: the matrix is singular.
-        """
-        self._matrix.data[:] = values[self._entries]
-        return Factors(self._factored(self._matrix, permc_spec="NATURAL"), self.row, self.column)
-
 
 class Factors:
-    """The factors of a square matrix.
+    """The factors of a square matrix, as SuperLU has them."""
 
-    Args:
-        factors: as SuperLU has them.
-        row, column: place of every original row and column in the order of elimination.
-    """
-
-    def __init__(self, factors: Any, row: Indices, column: Indices) -> None:
-        self._factors, self._row, self._column = factors, row, column
-
-    @property
-    def row(self) -> Indices:
-        """Places of the rows after exchanges."""
-        return self._factors.perm_r
-
-    @property
-    def column(self) -> Indices:
-        """Places of the columns."""
-        return self._factors.perm_c
-
-    @cached_property
-    def signed_pivot(self) -> float:
-        """The smallest pivot, with the sign of the determinant or always its opposite."""
-        diagonal = self._factors.U.diagonal()
-        odd = np.count_nonzero(diagonal < 0.0) + len(diagonal) - _cycles(self._factors.perm_r)
-        smallest = float(np.abs(diagonal).min())
-        return -smallest if odd % 2 else smallest
-
-    @property
-    def log_determinant(self) -> float:
-        """The logarithm of the determinant's absolute value."""
-        return float(np.log(np.abs(self._factors.U.diagonal())).sum())
+    def __init__(self, factors: Any) -> None:
+        self._factors = factors
 
     @property
     def entries(self) -> int:
@@ -132,24 +62,74 @@ class Factors:
 
     def solve(self, b: Array) -> Array:
         """Solve for a right-hand side."""
-        placed = np.empty_like(b)
-        placed[self._row] = b
-        return self._factors.solve(placed)[self._column]
+        return self._factors.solve(b)
 
     def solve_transposed(self, b: Array) -> Array:
         """Solve with the transposed matrix."""
-        placed = np.empty_like(b)
-        placed[self._column] = b
-        return self._factors.solve(placed, "T")[self._row]
+        return self._factors.solve(b, "T")
+
+    @property
+    def sign(self) -> float:
+        """The sign of the determinant, or for all values of a pattern the opposite: its columns are
+        always in the same order.
+        """
+        odd = np.count_nonzero(self._factors.U.diagonal() < 0.0)
+        odd += _exchanges(self._factors.perm_r.tobytes())
+        return -1.0 if odd % 2 else 1.0
 
 
-def _cycles(permutation: Indices) -> int:
-    """Return the number of cycles of a permutation; n less this is its number of exchanges."""
+class Blocks:
+    """The blocks of a pattern to be solved one after the other.
+
+    Attributes:
+        count: number of blocks.
+    """
+
+    def __init__(self, rows: Indices, columns: Indices, n: int) -> None:
+        sparse, graphs = (
+            importlib.import_module(name) for name in ("scipy.sparse", "scipy.sparse.csgraph")
+        )
+        pattern = sparse.csr_array((np.ones(len(rows)), (rows, columns)), shape=(n, n))
+        row_of: Indices = graphs.maximum_bipartite_matching(pattern, perm_type="row")
+        needs = sparse.csr_array((np.ones(len(rows)), (rows, row_of[columns])), shape=(n, n))
+        self.count, self._of_rows = graphs.connected_components(
+            needs, directed=True, connection="strong"
+        )
+        self._of_columns = self._of_rows[row_of]
+        self._inside = np.flatnonzero(self._of_rows[rows] == self._of_columns[columns])
+        self._pattern = Pattern(rows[self._inside], columns[self._inside], n)
+        self._start = np.random.default_rng(0).normal(size=n)
+
+    def sigmas(self, values: Array) -> tuple[Array, float]:
+        """Return an estimate of the smallest singular value of each block, and the sign of the
+        determinant, for entries of the pattern.
+
+        The estimate is by a step of inverse iteration: of one row exact, else never smaller, and
+        closer the more singular a block is.
+
+        Raises:
+            SingularError: a block is singular.
+        """
+        factors = self._pattern.factor(values[self._inside])
+        left = factors.solve_transposed(self._start)
+        right = factors.solve(left)
+        sizes = (
+            np.sqrt(np.bincount(of, x**2))
+            for of, x in ((self._of_rows, left), (self._of_columns, right))
+        )
+        return np.divide(*sizes), factors.sign
+
+
+@keep_last(64)
+def _exchanges(content: bytes) -> int:
+    """Return the number of exchanges that a permutation takes: its length less its cycles.
+
+    Neighbouring poses mostly have the same.
+    """
+    permutation = np.frombuffer(content, np.intc)
     n = len(permutation)
-    if (permutation == np.arange(n)).all():
-        return n
     sparse, graphs = (
         importlib.import_module(name) for name in ("scipy.sparse", "scipy.sparse.csgraph")
     )
     graph = sparse.csr_matrix((np.ones(n), permutation, np.arange(n + 1)), shape=(n, n))
-    return int(graphs.connected_components(graph, directed=False, return_labels=False))
+    return n - int(graphs.connected_components(graph, directed=False, return_labels=False))

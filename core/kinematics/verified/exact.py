@@ -1,25 +1,42 @@
-"""A mechanism with exact numbers.
+"""A mechanism with exact numbers, and its equations as programs for ball arithmetic.
 
 Coordinates, axes and lengths are fractions: their doubles, or the decimals that print them.
 Quantities that joints derive from them (differences, directions, lengths) stay fractions up to the
 first root and are balls from there on, so no rounding is ignored. A joint type that calls `math`
 itself rounds to a double; the joint types of kincheck do not. Pi of a screw's lead is its double.
+
+The residuals are the only equations of the primitives in use: the Jacobian is the derivative of the
+traced residuals, and the unit length of the Euler parameters is an equation of its own. Proofs
+therefore check rows, nu and gamma and do not rely on them.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import fields, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass, replace
 from fractions import Fraction
 from typing import Any
 
-from ...algebra import Vec3
+from ...algebra import Scalar, Vec3, quat
 from ...errors import SolveError
 from ...mechanism.loads import Law
 from ...mechanism.mechanism import Mechanism
+from ...primitives.base import GROUND_POSE, Drive
+from ...program import Program, Tape, Traced, program
 from ...program.ball_executor import Ball, flint
-from .exact_forces import converted
+from ...program.tape import jacobian
+from ..forces.wanted import WantedForces
+from ..formulation.cartesian import Cartesian
+from ..formulation.constraints import Frames, constraints, frames
+from .exact_forces import (
+    ForceInputs,
+    ForcePrograms,
+    TracedRows,
+    converted,
+    force_programs,
+    numbered,
+)
 
 Reading = Callable[[float], Fraction]
 """Interpretation of a float of a description as a fraction."""
@@ -170,4 +187,167 @@ def exact_mechanism(mechanism: Mechanism, reading: Reading) -> Mechanism:
         bodies=[converted(body, read) for body in mechanism.bodies],
         gravity=read(mechanism.gravity),
         forces=[converted(force, read) for force in mechanism.forces],
+    )
+
+
+class _Inputs:
+    """The slots of the programs: state, drivers, then geometry in the order of use."""
+
+    def __init__(self) -> None:
+        self.tape = Tape()
+        self.count = 0
+        self.geometry: list[Ball] = []
+
+    def vector(self, count: int) -> list[Traced]:
+        first, self.count = self.count, self.count + count
+        return [self.tape.input(slot) for slot in range(first, self.count)]
+
+    def lift(self, value: Any) -> Any:
+        """Return a value with its exact numbers as program inputs, or literals if trivial."""
+        if isinstance(value, Exact):
+            return self._number(value)
+        if isinstance(value, Mapping):
+            return {key: self.lift(each) for key, each in value.items()}  # pyright: ignore[reportUnknownVariableType]
+        if isinstance(value, tuple):
+            return tuple(map(self.lift, value))  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
+        if is_dataclass(value) and not isinstance(value, type):
+            return replace(
+                value, **{f.name: self.lift(getattr(value, f.name)) for f in fields(value)}
+            )
+        if isinstance(value, float) and value not in (0.0, 1.0, -1.0):
+            return self._number(Exact.of(Fraction(value)))
+        return value
+
+    def members(self, items: Sequence[Any]) -> list[Any]:
+        """Return bodies, joints or force elements with exact numbers as program inputs."""
+        return [converted(item, self.lift) for item in items]
+
+    def _number(self, value: Exact) -> Scalar:
+        if value.trivial is not None:
+            return value.trivial
+        self.geometry.append(value.ball)
+        return self.vector(1)[0]
+
+
+@dataclass(frozen=True, eq=False)
+class ExactEquations:
+    """The equations of a mechanism for a proof; inputs are state, drivers, those of forces, then
+    `geometry`.
+
+    Attributes:
+        state: names and sizes of the vectors of the state: displacement "u BODY" [units], Euler
+            parameters "q BODY", coordinates "x JOINT.FREEDOM" [units or rad].
+        drivers: three inputs for each moving driver: value [units or rad], cosine and sine of its
+            half. With forces the drivers that stand still are among them.
+        geometry: values of the further inputs.
+        residuals: as many as scalars of the state: the kept rows, then the lengths of the Euler
+            parameters.
+        derivative: their Jacobian; the slot of an entry is row * size + column, zeros are left out.
+        points: displacement of each point from the design [m], three slots each.
+        tests: the rows left out, then the branch tests.
+        kept, left_out: numbers of the rows solved, and of the others.
+        forces: programs of forces; None unless wanted.
+    """
+
+    frame: Frames
+    state: Mapping[str, int]
+    drivers: tuple[str, ...]
+    geometry: Sequence[Ball]
+    residuals: Program
+    derivative: Program
+    points: Program
+    tests: Program
+    kept: Sequence[int]
+    left_out: Sequence[int]
+    forces: ForcePrograms | None
+
+    @property
+    def size(self) -> int:
+        """Number of scalars of the state."""
+        return sum(self.state.values())
+
+
+def equations(
+    mechanism: Mechanism,
+    drivers: Sequence[str],
+    points: Sequence[str],
+    kept: Sequence[int],
+    wanted: WantedForces | None = None,
+) -> ExactEquations:
+    """Return the programs of an exact mechanism.
+
+    Args:
+        mechanism: from `exact_mechanism`; the call sets the precision of the geometry.
+        drivers: names of the moving drivers; of all if forces are wanted.
+        points: names of the output points.
+        kept: the rows to solve; the others are tests.
+        wanted: forces to enclose.
+    """
+    frame, inputs = frames(mechanism), _Inputs()
+    design = Cartesian.of(mechanism, frame).design
+    parts = {name: inputs.vector(len(value)) for name, value in design.items()}
+    state = [x for part in parts.values() for x in part]
+    driven = {name: inputs.vector(3) for name in drivers}
+    drives = {name: Drive(c, 0.0, 0.0, *half) for name, (c, *half) in driven.items()}
+    rows = len(Cartesian.of(mechanism, frame).owners)
+    given = wanted and ForceInputs.of(mechanism, len(state), rows, drivers, inputs.vector)
+    formulation = Cartesian(
+        [inputs.lift(c) for c in constraints(mechanism, frame, drives)], frame.moving
+    )
+    at = formulation.configuration(parts)
+    phi = formulation.phi(at)
+    lengths = [
+        0.5 * (q.e0 * q.e0 + q.e @ q.e - 1.0)
+        for q in (quat(p) for n, p in parts.items() if n[0] == "q")
+    ]
+    taken = set(kept)
+    left_out = [k for k in range(len(phi)) if k not in taken]
+    moved: list[Scalar] = []
+    for name in points:
+        point = mechanism.point(name)
+        pose, arm = (
+            at.poses.get(point.body, GROUND_POSE),
+            inputs.lift(frame.arm(point.body, point.position)),
+        )
+        moved += inputs.lift(Exact.of(Fraction(frame.unit))) * (pose.u + pose.swing(arm))
+    inputs_of_rows = [*state, *(x for each in driven.values() for x in each)]
+    gradients = jacobian(inputs.tape, [*phi, *lengths], inputs_of_rows)
+    solved = [*(gradients[k] for k in kept), *gradients[len(phi) :]]
+    entries = {
+        row * len(state) + column: value
+        for row, gradient in enumerate(solved)
+        for column, value in gradient.items()
+        if column < len(state)
+    }
+    forces: ForcePrograms | None = None
+    if wanted is not None and given is not None:
+        traced = TracedRows(formulation, at, parts, gradients[: len(phi)], drives, left_out)
+        forces = force_programs(
+            inputs.tape, _lifted(mechanism, inputs), inputs.lift(frame), traced, given, wanted
+        )
+    return ExactEquations(
+        frame,
+        {name: len(value) for name, value in design.items()},
+        tuple(drivers),
+        inputs.geometry,
+        numbered("residuals", inputs.tape, [*(phi[k] for k in kept), *lengths]),
+        program("derivative", inputs.tape, entries),
+        numbered("points", inputs.tape, moved),
+        numbered("tests", inputs.tape, [*(phi[k] for k in left_out), *formulation.branch(at)]),
+        kept,
+        left_out,
+        forces,
+    )
+
+
+def _lifted(mechanism: Mechanism, inputs: _Inputs) -> Mechanism:
+    """Return the mechanism with inputs in place of the numbers that forces depend on."""
+    return mechanism.with_joints(
+        lambda joint: converted(joint, inputs.lift),
+        grounded=(),
+        points=inputs.members(mechanism.points),
+        drivers=inputs.members(mechanism.drivers),
+        bodies=inputs.members(mechanism.bodies),
+        gravity=inputs.lift(mechanism.gravity),
+        forces=inputs.members(mechanism.forces),
     )

@@ -27,8 +27,8 @@ import numpy as np
 from ...program import Program
 from ...program.ball_executor import ORDER, Ball, evaluate, flint
 from ...trajectory import Array
-from .exact_equations import ExactEquations
-from .force_enclosure import EnclosedForces, UnprovedError, enclose_forces
+from .exact import ExactEquations
+from .exact_forces import EnclosedForces, UnprovedError, enclose_forces
 
 # Radii of B to try, in units of the mechanism's size: the largest that succeeds bounds the region
 # with a single solution.

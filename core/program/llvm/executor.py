@@ -5,16 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from ...trajectory import Array
-from ..executor_protocol import Parts, Side, Table
-from ..memory import BYTES, address, aligned
-from ..plan import LINE
+from ..numpy_executor import NumpyExecutor
+from ..plan import BYTES, LINE, Parts, Plan, Side, Table, address, aligned
 from .jit import LlvmCode
-from .one_motion import MOTION, SIDE
+from .loops import MOTION, SIDE
 
 OUT, FORGET = (MOTION.index(each) for each in ("ptr out", "i64 forget"))
 REACHED = SIDE.index("i64 reached")
@@ -36,26 +35,26 @@ class LlvmExecutor:
         self._address = address(self._memory)
 
     def clear(self) -> None:
-        """See `Executor`."""
+        """See `NumpyExecutor`."""
         self._memory[:] = 0.0
 
     def put(self, slots: Sequence[int], values: Array) -> None:
-        """See `Executor`."""
+        """See `NumpyExecutor`."""
         # equal values of all lanes need no arrangement
         self._memory[:, _places(slots)] = values if values.shape[1] == 1 else self.arranged(values)
 
     def get(self, slots: Sequence[int]) -> Array:
-        """See `Executor`."""
+        """See `NumpyExecutor`."""
         found = np.empty((len(slots), self._groups, self.group))
         found[:] = self._memory[:, _places(slots)].transpose(1, 0, 2)
         return found.reshape(len(slots), -1)[:, : self.lanes]
 
     def window(self, slots: range) -> Array:
-        """See `Executor`."""
+        """See `NumpyExecutor`."""
         return self._memory[:, _places(slots)]
 
     def arranged(self, table: Table) -> Table:
-        """See `Executor`."""
+        """See `NumpyExecutor`."""
         padded = np.empty((len(table), self.room), table.dtype)
         padded[:, : self.lanes] = table
         padded[:, self.lanes :] = padded[:, self.lanes - 1 : self.lanes]
@@ -63,36 +62,36 @@ class LlvmExecutor:
         return found
 
     def run(self, name: str) -> None:
-        """See `Executor`."""
+        """See `NumpyExecutor`."""
         code = self._code
         code.call("follow", "run_program")(self._address, self._groups, code.memory.entry(name))
         self._code.count(self._groups)
 
     def attempt(self) -> None:
-        """See `Executor`."""
+        """See `NumpyExecutor`."""
         self._code.call("follow", "attempt")(self._address, self._groups)
         self._code.count(self._groups)
 
     def carry(self) -> None:
-        """See `Executor`."""
+        """See `NumpyExecutor`."""
         self._code.call("follow", "carry")(self._address, self._groups)
 
     def track(self, sides: Sequence[Side], start: Array, n: int) -> LlvmTrack:
-        """See `Executor`."""
+        """See `NumpyExecutor`."""
         return LlvmTrack(self._code, self._memory, sides, start, n)
 
     @property
     def room(self) -> int:
-        """See `Executor`."""
+        """See `NumpyExecutor`."""
         return self._groups * self.group
 
     def table(self, columns: int) -> Array:
-        """See `Executor`."""
+        """See `NumpyExecutor`."""
         shape = len(self._code.plan.kept), columns, self.room
         return aligned(math.prod(shape)).reshape(shape)
 
     def fan(self, samples: Array, out: Array, worst: Array, first: int, step: int) -> None:
-        """See `Executor`."""
+        """See `NumpyExecutor`."""
         stride, wanted = samples.strides[0] // samples.itemsize, samples.shape[1]
         given = self._address, self._groups, samples.ctypes.data, stride, wanted
         self._code.call("fan", "fan")(
@@ -101,7 +100,7 @@ class LlvmExecutor:
         self._code.count(self._groups * wanted)
 
     def fold(self, table: Array, totals: Array) -> None:
-        """See `Executor`."""
+        """See `NumpyExecutor`."""
         columns, room = table.shape
         self._code.call("fold", "fold")(
             self._address, address(table), columns, room, address(totals)
@@ -109,11 +108,11 @@ class LlvmExecutor:
         self._code.count(columns * self.groups(room))
 
     def groups(self, lanes: int) -> int:
-        """See `Executor`."""
+        """See `NumpyExecutor`."""
         return -(-lanes // self._code.width)
 
     def parts(self, parts: Parts) -> Callable[[int], object]:
-        """See `Executor`."""
+        """See `NumpyExecutor`."""
         samples, addresses = (
             parts.samples,
             [each.ctypes.data for each in (parts.taken, parts.world)],
@@ -132,7 +131,7 @@ class LlvmExecutor:
 
 
 class LlvmTrack:
-    """See `Track`. Vectors of samples are aligned to cache lines on both sides of the start: a
+    """See `NumpyTrack`. Vectors of samples are aligned to cache lines on both sides of the start: a
     vector across two lines takes longer.
     """
 
@@ -178,7 +177,7 @@ class LlvmTrack:
         self._alive = memory, tables  # keeps their addresses valid
 
     def begin(self) -> Array:
-        """See `Track`."""
+        """See `NumpyTrack`."""
         room = np.empty(self._room)
         start = address(room)
         skip = -start % (LINE * BYTES)
@@ -187,14 +186,22 @@ class LlvmTrack:
         return np.ndarray(self._shape, np.float64, room, skip + self._margin, self._strides)
 
     def run(self) -> Sequence[int]:
-        """See `Track`."""
+        """See `NumpyTrack`."""
         early = self._run()
         self._code.count(self._groups)
         return self._sides[: len(self._counts), REACHED].tolist() if early else self._counts
 
     def follow(self, side: int, at: int, stop: int, *, anew: bool) -> int:
-        """See `Track`."""
+        """See `NumpyTrack`."""
         return self._follow[side][anew](at, stop)
+
+
+Executor: TypeAlias = NumpyExecutor | LlvmExecutor
+
+
+def bind(plan: Plan, lanes: int, code: LlvmCode | None) -> Executor:
+    """Return a plan bound to lanes, by its machine code or else by numpy."""
+    return LlvmExecutor(code, lanes) if code else NumpyExecutor(plan, lanes)
 
 
 def _places(slots: Sequence[int]) -> Sequence[int] | slice:

@@ -1,29 +1,95 @@
 """A plan ready to run on this processor: loops common to all plans, and programs interpreted or
-compiled.
+compiled; machine code is cached by content, processor and version.
 """
 
 from __future__ import annotations
 
+import ctypes
 import hashlib
+import inspect
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import cache, partial
 from pathlib import Path
 from threading import Lock, Thread
+from typing import Any
+
+import msgspec
 
 from ...caches import keep_last
-from .. import bytecode, disk_cache, lowering, plan, tape
+from .. import disk_cache, plan, straight_line, tape
 from ..plan import Plan
-from . import code_cache, compiler
-from .interpreter import interpret
-from .ir_writer import declarations
-from .loops import parts, run, settle
-from .many_motions import fan
-from .one_motion import follow
+from ..straight_line import Bytecode, bytecode, packed, unpacked
+from . import compiler
+from .ir_writer import declarations, interpret
+from .loops import fan, fold, follow, parts, run, settle
 from .plan import PlanInMemory, rows
 from .programs import function
-from .reduce import fold
+
+
+class Code:
+    """Machine code of functions; calls release the GIL.
+
+    Args:
+        signatures: number of arguments by function: addresses and integers. All return an integer,
+            which is meaningless for functions without a result. Other functions are reached by
+            address only.
+
+    Attributes:
+        address: return the address of a function by name.
+        calls: functions with a signature; each keeps the code alive.
+    """
+
+    def __init__(self, code: bytes, signatures: Mapping[str, int]) -> None:
+        self.address = (
+            compiler.placed(msgspec.msgpack.decode(code, type=compiler.Image))
+            if compiler.possible()
+            else compiler.loaded(code)
+        )
+        # integers are passed as addresses: ctypes takes a third of the time for those
+        types = {
+            name: ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_void_p] * count)
+            for name, count in signatures.items()
+        }
+        self.calls: dict[str, Callable[..., int]] = {}
+        for name, kind in types.items():
+            call: Any = kind(self.address(name))
+            call.alive = self.address
+            self.calls[name] = call
+
+
+def load(
+    content: str, text: Callable[[], str], signatures: Mapping[str, int] | None = None
+) -> Code:
+    """Return the cached code of a content; compile the text if there is none."""
+    return disk_cache.kept(
+        cache_key(content), lambda: _emitted(text()), lambda code: Code(code, signatures or {})
+    )
+
+
+def find(content: str) -> Code | None:
+    """Return the cached code of a content, or None."""
+    return disk_cache.find(cache_key(content), lambda code: Code(code, {}))
+
+
+def cache_key(content: str) -> bytes:
+    """Return the cache key: content, processor, compiler, and sources that process its output."""
+    return "\n".join(
+        (*compiler.processor(), str(compiler.possible()), _compiling(), content)
+    ).encode()
+
+
+@cache
+def _compiling() -> str:
+    """Return the source of the module that compiles and links."""
+    return inspect.getsource(compiler)
+
+
+def _emitted(text: str) -> bytes:
+    file = compiler.emitted(text)
+    return msgspec.msgpack.encode(compiler.joined(file)) if compiler.possible() else file
+
 
 _NEEDED = rows, settle
 LOOPS: Mapping[str, tuple[Sequence[Callable[[int], str]], Mapping[str, int]]] = {
@@ -63,17 +129,20 @@ class LlvmCode:
 
     Raises ImportError if llvmlite is missing.
 
+    Args:
+        often: limit of interpretation, see `OFTEN`; infinite for programs that are never compiled.
+
     Attributes:
         stride: slots of a lane, with the cells of intermediate values after `Plan.slots`.
         memory: the plan, as loops read it.
         interpreted: whether programs are not compiled yet.
     """
 
-    def __init__(self, plan: Plan) -> None:
+    def __init__(self, plan: Plan, often: float = OFTEN) -> None:
         self.width, self.plan, self._lock = compiler.vector_width(), plan, Lock()
         # content of the code as a key: writing the text takes longer than loading the code
         self._content = repr([plan.programs, self.width, _sources()])
-        code = code_cache.find(self._content)
+        code = find(self._content)
         again = code is None and disk_cache.known(self._of_tables)
         self.interpreted, tables = code is None, {} if code else self._tables()
         self.stride = len(plan.slots) + max((each.cells for each in tables.values()), default=0)
@@ -83,7 +152,8 @@ class LlvmCode:
         else:
             self._interpret(tables)
         operations = sum(len(each.nodes) for each in plan.programs.values())
-        often = 0 if _AT_ONCE.get() else AGAIN if again else OFTEN
+        if often == OFTEN:
+            often = 0 if _AT_ONCE.get() else AGAIN if again else OFTEN
         self._left = often * max(OPERATIONS, operations) // OPERATIONS
 
     def call(self, loop: str, name: str) -> Callable[..., int]:
@@ -98,10 +168,10 @@ class LlvmCode:
         if self._left <= 0:
             with self._lock:  # do not replace compiled code that other threads run
                 if self.interpreted:
-                    self._take(code_cache.load(self._content, self._text))
+                    self._take(load(self._content, self._text))
                     self.interpreted = False
 
-    def _interpret(self, tables: Mapping[str, bytecode.Bytecode]) -> None:
+    def _interpret(self, tables: Mapping[str, Bytecode]) -> None:
         loop = _loop("interpret", self.width)
         for name, table in tables.items():
             self.memory.entries[self.memory.calls[name]] = (
@@ -110,23 +180,22 @@ class LlvmCode:
             )
         self._alive = tables, loop  # keeps their addresses valid
 
-    def _take(self, code: code_cache.Code) -> None:
+    def _take(self, code: Code) -> None:
         self._code = code
         for name, at in self.memory.calls.items():
             # a compiled function needs no table
             self.memory.entries[at, 0] = code.address(name)
 
-    def _tables(self) -> dict[str, bytecode.Bytecode]:
+    def _tables(self) -> dict[str, Bytecode]:
         slots = len(self.plan.slots)
 
         def made() -> bytes:
             tables = {
-                name: bytecode.bytecode(each, slots, self.width)
-                for name, each in self.plan.programs.items()
+                name: bytecode(each, slots, self.width) for name, each in self.plan.programs.items()
             }
-            return bytecode.packed(tables)
+            return packed(tables)
 
-        return disk_cache.kept(self._of_tables, made, bytecode.unpacked)
+        return disk_cache.kept(self._of_tables, made, unpacked)
 
     @property
     def _of_tables(self) -> bytes:
@@ -149,7 +218,7 @@ def make_loops_ready() -> None:
     missing = [
         name
         for name in ("interpret", "follow")
-        if not disk_cache.known(code_cache.cache_key(_content(name, width)))
+        if not disk_cache.known(cache_key(_content(name, width)))
     ]
     if missing:
         compiler.llvm()
@@ -161,7 +230,7 @@ def interpreter(width: int) -> Callable[..., int]:
     return _loop("interpret", width).calls["interpret"]
 
 
-def _loop(name: str, width: int) -> code_cache.Code:
+def _loop(name: str, width: int) -> Code:
     with _LOCK:
         return _made(name, width)
 
@@ -170,11 +239,11 @@ _LOCK = Lock()
 
 
 @keep_last(2 * len(LOOPS))
-def _made(name: str, width: int) -> code_cache.Code:
+def _made(name: str, width: int) -> Code:
     """Return functions that run any plan."""
     writers, signatures = LOOPS[name]
     text = partial("\n".join, [*(write(width) for write in writers), declarations(width)])
-    return code_cache.load(_content(name, width), text, signatures)
+    return load(_content(name, width), text, signatures)
 
 
 def _content(name: str, width: int) -> str:
@@ -186,6 +255,6 @@ def _sources() -> str:
     """Return a digest of all writers of text or tables: this folder, and the modules it uses."""
     files = (
         *sorted(Path(__file__).parent.glob("*.py")),
-        *(Path(str(each.__file__)) for each in (plan, lowering, tape, bytecode)),
+        *(Path(str(each.__file__)) for each in (plan, straight_line, tape)),
     )
     return hashlib.sha256(b"".join(each.read_bytes() for each in files)).hexdigest()

@@ -1,5 +1,5 @@
-"""Loops of plans as LLVM code: Newton's iteration, and parts of a mechanism; for motions, see
-`follow` and `fan`.
+"""Loops of plans as LLVM code: Newton's iteration, parts of a mechanism, one motion (lanes are
+samples), many motions (lanes are motions), and totals of many lanes.
 
 They are the same for all plans and read the plan from memory: see `plan`.
 """
@@ -7,9 +7,12 @@ They are the same for all plans and read the plan from memory: see `plan`.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
+from ..plan import LINE
+from ..tape import NODES
 from .ir_writer import Lines
-from .plan import Rows, call, function, over
+from .plan import TOGETHER, Rows, call, function, over
 
 
 def settle(width: int) -> str:
@@ -83,7 +86,7 @@ end:
 
 
 def parts(width: int) -> str:
-    """Return the LLVM functions of `Executor.parts`."""
+    """Return the LLVM functions of `parts` of an executor."""
     source = Rows(width)
     row = source.let(f"load i64, ptr {source.number('%rows', '%row')}, align 8")
     place = source.number("%world", source.product("%room", row))
@@ -148,3 +151,400 @@ end:
         leave.function("leave", "ptr %ahead"),
     ]
     return "".join([*rows, function(head, body)])
+
+
+MOTION = ("ptr lane", "ptr start", "ptr worst", "ptr out", "i64 row", "i64 forget", "i64 sides")
+SIDE = (
+    "ptr samples",
+    "i64 stride",
+    "i64 first",
+    "i64 step",
+    "i64 count",
+    "ptr anchor",
+    "i64 reached",
+)
+"""Fields of a motion and of each side, eight bytes each: few arguments make a call fast. If
+`forget` is set, a call restarts `worst` and clears the field, so later calls continue. `run` writes
+the number of samples it reached.
+"""
+
+
+def follow(width: int) -> str:
+    """Return the LLVM functions of `follow` of a track: W samples at a time, on from the last
+    accepted one. An anchor remains at the end only if the motion stays there.
+
+    Extrapolated groups begin at a multiple of W: the group after a fully accepted one ends there.
+    With few lanes, several such groups must precede.
+    """
+    vector, test = f"<{width} x double>", Lines(width, "test")
+    accepted = test.let(f"fcmp ogt {vector} {test.read('%plan_margin')}, zeroinitializer")
+    body = f"""{_read_fields("motion", MOTION)}
+  {_read_fields("side", SIDE)}
+  %descending = icmp slt i64 %step, 0
+  %extrapolates = icmp ne i64 %plan_behind, 0
+  %quick = icmp ne i64 %plan_quick, 0
+  %forget_at = getelementptr i64, ptr %motion, i64 {_index(MOTION, "forget")}
+  store i64 0, ptr %forget_at, align 8
+  %worst_here = alloca {vector}, i64 %plan_worst_count, align 64
+  {over("begin_worst", "worst", "ptr %worst_here", "ptr %worst", "i64 %forget")}
+  {over("give", "targets", "ptr %place", "i64 1")}
+  br label %head
+head:
+  %at = phi i64 [%from, %entry], [%next, %pass], [%next, %take]
+  %smooth = phi i1 [false, %entry], [%extrapolates, %pass], [false, %take]
+  %whole_before = phi i1 [false, %entry], [false, %pass], [%onto, %take]
+  %behind = phi i64 [0, %entry], [%behind_now, %pass], [%behind_now, %take]
+  %more = icmp slt i64 %at, %stop
+  br i1 %more, label %attempt, label %end
+attempt:
+  %samples_here = getelementptr double, ptr %samples, i64 %at
+  {over("take", "sampled", "ptr %samples_here", "i64 %stride")}
+  %first_call = select i1 %smooth, ptr %plan_extrapolate, ptr %plan_predict
+  {call("first", "%first_call")}
+  call void @settle(ptr %plan, ptr %lane)
+  {over("calls", "joined")}
+  {test.text}
+  %bits = bitcast <{width} x i1> {accepted} to i{width}
+  %wide = zext i{width} %bits to i64
+  %rejected = xor i64 %wide, {2 ** (width + 1) - 1}
+  %leading = call i64 @llvm.cttz.i64(i64 %rejected, i1 true)
+  %offset = and i64 %at, {width - 1}
+  %short = sub i64 {width}, %offset
+  %room = select i1 %whole_before, i64 %short, i64 {width}
+  %wanted = sub i64 %stop, %at
+  %left = call i64 @llvm.smin.i64(i64 %room, i64 %wanted)
+  %accepted = call i64 @llvm.smin.i64(i64 %leading, i64 %left)
+  %next = add i64 %at, %accepted
+  %every = icmp eq i64 %accepted, {width}
+  %full = and i1 %every, %quick
+  %further = icmp slt i64 %next, %stop
+  %onto = and i1 %full, %extrapolates
+  %aligned = icmp eq i64 %offset, 0
+  %counts = and i1 %every, %aligned
+  %one_more = add i64 %behind, 1
+  %behind_now = select i1 %counts, i64 %one_more, i64 0
+  %enough = icmp uge i64 %behind_now, %plan_behind
+  %going = and i1 %full, %further
+  %whole = and i1 %going, %enough
+  %none = icmp eq i64 %accepted, 0
+  br i1 %none, label %missed, label %keep
+missed:
+  br i1 %smooth, label %return, label %end
+return:
+  %before_here = getelementptr double, ptr %samples_here, i64 -1
+  {over("copy", "returned")}
+  {over("give", "sampled", "ptr %before_here", "i64 %stride")}
+  {over("calls", "onward")}
+  br label %take
+keep:
+  {over("update_worst", "worst", "ptr %worst_here", "i64 %accepted")}
+  %up_column = add i64 %first, %at
+  %down_first = sub i64 %first, %at
+  %down_column = sub i64 %down_first, {width - 1}
+  %column = select i1 %descending, i64 %down_column, i64 %up_column
+  %out_here = getelementptr double, ptr %out, i64 %column
+  br i1 %descending, label %backward, label %forward
+forward:
+  {over("keep", "kept", "ptr %out_here", "i64 %row")}
+  br label %kept
+backward:
+  {over("keep_turned", "kept", "ptr %out_here", "i64 %row")}
+  br label %kept
+kept:
+  br i1 %whole, label %pass, label %other
+other:
+  %there = xor i1 %further, true
+  %leaves = xor i1 %stays, true
+  %over = and i1 %there, %leaves
+  br i1 %over, label %leave, label %onward
+leave:
+  {over("end_worst", "worst", "ptr %worst_here", "ptr %worst")}
+  ret i64 %next
+pass:
+  {over("spread", "moves", f"i64 {width - 1}")}
+  br label %head
+onward:
+  {over("copy", "shifted")}
+  {over("calls", "remaining")}
+  br label %take
+take:
+  %before = sub i64 %accepted, 1
+  %last = call i64 @llvm.smax.i64(i64 %before, i64 0)
+  {over("spread", "carried", "i64 %last")}
+  br label %head
+end:
+  {over("put", "targets", "ptr %anchor", "i64 1")}
+  {over("end_worst", "worst", "ptr %worst_here", "ptr %worst")}
+  ret i64 %at"""
+    turned = Rows(width)
+    place = turned.number("%numbers", turned.product("%stride", "%row"))
+    turned.lines.append(
+        f"store {vector} {turned.turned(turned.read(turned.entry()))}, ptr {place}, align 8"
+    )
+    places = "ptr %plan, ptr %motion, ptr %side, ptr %place, i64 %from, i64 %stop"
+    stay = f"""  %at = call i64 @go({places}, i1 true)
+  ret i64 %at"""
+    return f"""declare i64 @llvm.cttz.i64(i64, i1)
+declare i64 @llvm.smin.i64(i64, i64)
+declare i64 @llvm.smax.i64(i64, i64)
+{turned.function("keep_turned", "ptr %numbers", "i64 %stride")}{_worst(width)}{_run()}""" + "".join(
+        [
+            function(f"internal i64 @go({places}, i1 %stays)", body),
+            function(f"i64 @follow({places})", stay),
+        ]
+    )
+
+
+def _run() -> str:
+    """Return the function that follows every side and counts the sides that end early."""
+    return f"""define i64 @run(ptr %plan, ptr %motion, ptr %table) {{
+entry:
+  {_read_fields("motion", MOTION)}
+  br label %head
+head:
+  %k = phi i64 [0, %entry], [%next, %one]
+  %early = phi i64 [0, %entry], [%early_now, %one]
+  %more = icmp ult i64 %k, %sides
+  br i1 %more, label %one, label %end
+one:
+  %offset = mul i64 %k, {len(SIDE)}
+  %side = getelementptr i64, ptr %table, i64 %offset
+  {_read_fields("side", SIDE)}
+  %at = call i64 @go(ptr %plan, ptr %motion, ptr %side, ptr %start, i64 0, i64 %count, i1 false)
+  %reached_at = getelementptr i64, ptr %side, i64 {_index(SIDE, "reached")}
+  store i64 %at, ptr %reached_at, align 8
+  %ended = icmp ne i64 %at, %count
+  %counted = zext i1 %ended to i64
+  %early_now = add i64 %early, %counted
+  %next = add i64 %k, 1
+  br label %head
+end:
+  ret i64 %early
+}}
+"""
+
+
+def _read_fields(name: str, fields: Sequence[str]) -> str:
+    """Return lines that read the fields of a struct, each under its own name."""
+    lines = Lines(0, f"{name}_")
+    for k, (kind, field) in enumerate(each.split() for each in fields):
+        lines.lines.append(f"%{field} = load {kind}, ptr {lines.number(f'%{name}', k)}, align 8")
+    return lines.text
+
+
+def _index(fields: Sequence[str], name: str) -> int:
+    return [each.split()[1] for each in fields].index(name)
+
+
+def _worst(width: int) -> str:
+    """Return functions for the largest of slots, times a sign, over accepted lanes; vectors until
+    the end.
+
+    They begin, update by a group, and write the largest to its place.
+    """
+    begin, update, end = (Rows(width) for _ in range(3))
+    vector, words = begin.vector, f"<{width} x i64>"
+    here, *_ = [
+        rows.let(f"getelementptr {vector}, ptr %here, i64 %row") for rows in (begin, update, end)
+    ]
+    new, sign = begin.let("icmp ne i64 %forget, 0"), begin.entry(1, 3, "double")
+    so_far = begin.let(f"load double, ptr {begin.number('%found', '%row')}, align 8")
+    so_far = begin.let(f"fmul double {so_far}, {sign}")
+    start = begin.spread(
+        begin.let(f"select i1 {new}, double {begin.entry(2, 3, 'double')}, double {so_far}")
+    )
+    begin.lines.append(f"store {vector} {start}, ptr {here}, align 64")
+    numbers = ", ".join(f"i64 {k}" for k in range(width))
+    one = update.let(f"insertelement {words} poison, i64 %accepted, i64 0")
+    wanted = update.let(
+        f"shufflevector {words} {one}, {words} poison, <{width} x i32> zeroinitializer"
+    )
+    kept = update.let(f"icmp ult {words} <{numbers}>, {wanted}")
+    before = update.let(f"load {vector}, ptr {here}, align 64")
+    signed = update.arithmetic(
+        "*", update.read(update.entry(0, 3)), update.spread(update.entry(1, 3, "double"))
+    )
+    value = update.choose(kept, signed, before)
+    worse = update.let(f"fcmp ogt {vector} {value}, {before}")
+    update.lines.append(
+        f"store {vector} {update.choose(worse, value, before)}, ptr {here}, align 64"
+    )
+    largest = end.let(f"load {vector}, ptr {here}, align 64")
+    largest = end.let(f"call nnan double @llvm.vector.reduce.fmax.v{width}f64({vector} {largest})")
+    largest = end.let(f"fmul double {largest}, {end.entry(1, 3, 'double')}")
+    end.lines.append(f"store double {largest}, ptr {end.number('%found', '%row')}, align 8")
+    return f"""declare double @llvm.vector.reduce.fmax.v{width}f64({vector})
+{begin.function("begin_worst", "ptr %here", "ptr %found", "i64 %forget")}{
+        update.function("update_worst", "ptr %here", "i64 %accepted")
+    }{end.function("end_worst", "ptr %here", "ptr %found")}"""
+
+
+def fan(width: int) -> str:
+    """Return the LLVM functions of `fan` of an executor: a group of W motions passes all samples
+    while its slots are in the L1 cache.
+
+    After `NODES` samples a group is predicted by `extend`. If this fails for a live motion, the
+    group goes back and is predicted by its rates.
+    """
+    vector, mask, test = f"<{width} x double>", f"<{width} x i1>", Lines(width, "test")
+    accepted = test.let(f"fcmp ogt {vector} {test.read('%plan_margin')}, zeroinitializer")
+    given = over("give", "sampled", "ptr %samples_here", "i64 %stride")
+    body = f"""%bytes = mul i64 %plan_stride, {8 * width}
+  %plane = mul i64 %columns, %lanes
+  %ahead = mul i64 %step, %lanes
+  br label %group
+group:
+  %g = phi i64 [0, %entry], [%next_group, %end_group]
+  %offset = mul i64 %g, %bytes
+  %lane = getelementptr i8, ptr %memory, i64 %offset
+  %group_at = mul i64 %g, {width}
+  %worst_here = getelementptr double, ptr %worst, i64 %group_at
+  br label %sample
+sample:
+  %k = phi i64 [0, %group], [%next, %carry]
+  %alive = phi {mask} [<{", ".join(["i1 true"] * width)}>, %group], [%still, %carry]
+  %samples_here = getelementptr double, ptr %samples, i64 %k
+  {given}
+  %smooth = icmp uge i64 %k, {NODES}
+  br i1 %smooth, label %extend, label %predict
+extend:
+  {call("on", "%plan_extend")}
+  br label %attempt
+return:
+  %before_here = getelementptr double, ptr %samples_here, i64 -1
+  {over("copy", "returned")}
+  {over("give", "sampled", "ptr %before_here", "i64 %stride")}
+  {over("calls", "onward")}
+  {over("copy", "carried")}
+  {given}
+  br label %predict
+predict:
+  {call("ahead", "%plan_predict")}
+  br label %attempt
+attempt:
+  %extended = phi i1 [true, %extend], [false, %predict]
+  call void @settle(ptr %plan, ptr %lane)
+  {over("calls", "alone")}
+  {test.text}
+  %still = and {mask} %alive, {accepted}
+  %lost = xor {mask} %alive, %still
+  %any = call i1 @llvm.vector.reduce.or.v{width}i1({mask} %lost)
+  %missed = and i1 %any, %extended
+  br i1 %missed, label %return, label %keep
+keep:
+  %steps = mul i64 %step, %k
+  %column = add i64 %first, %steps
+  %column_at = mul i64 %column, %lanes
+  %in_plane = add i64 %column_at, %group_at
+  %out_here = getelementptr double, ptr %out, i64 %in_plane
+  {over("worsen", "worst", "ptr %worst_here", "i64 %lanes")}
+  {over("keep_alive", "kept", "ptr %out_here", "i64 %plane", f"{mask} %still", "i64 %ahead")}
+  %next = add i64 %k, 1
+  %enough = icmp uge i64 %next, {NODES}
+  br i1 %enough, label %continue, label %onward
+continue:
+  {over("copy", "continued")}
+  br label %carry
+onward:
+  {over("calls", "remaining")}
+  {over("copy", "carried")}
+  br label %carry
+carry:
+  %turn = urem i64 %k, {NODES}
+  %turned = mul i64 %turn, %plan_state
+  %past_slot = add i64 %plan_past, %turned
+  %past = mul i64 %past_slot, {8 * width}
+  {over("remember", "remembered", "i64 %past")}
+  %more = icmp slt i64 %next, %wanted
+  br i1 %more, label %sample, label %end_group
+end_group:
+  {over("lose", "worst", "ptr %worst_here", "i64 %lanes", f"{mask} %still")}
+  %next_group = add i64 %g, 1
+  %more_groups = icmp slt i64 %next_group, %groups
+  br i1 %more_groups, label %group, label %end
+end:
+  fence seq_cst
+  ret void"""
+    inputs = "ptr %memory, i64 %groups, ptr %samples, i64 %stride, i64 %wanted"
+    head = (
+        f"void @fan(ptr %plan, {inputs}, ptr %out, i64 %columns, i64 %lanes, i64 %first, i64 %step,"
+        " ptr %worst)"
+    )
+    declared = (
+        "declare void @llvm.prefetch.p0(ptr, i32, i32, i32)\ndeclare i1"
+        f" @llvm.vector.reduce.or.v{width}i1({mask})\n"
+    )
+    return f"{declared}{_kept(width)}{function(head, body)}"
+
+
+def _kept(width: int) -> str:
+    """Return functions that store a sample (NaN for an ended motion), remember it, and mark ended
+    motions in the worst.
+    """
+    keep, lose, remember = Rows(width), Rows(width), Rows(width, TOGETHER)
+    # whole cache lines bypass the caches: a fetch before each overwrite takes a third of all time
+    whole = width == LINE
+    past_caches = ", !nontemporal !{i32 1}" if whole else ""
+    place = keep.number("%numbers", keep.product("%stride", "%row"))
+    value = keep.choose("%still", keep.read(keep.entry()), keep.constant(math.nan))
+    keep.lines.append(f"store {keep.vector} {value}, ptr {place}, align {8 * width}{past_caches}")
+    # partial lines are prefetched a sample ahead; collecting them into whole lines takes as long
+    # as waiting
+    if not whole:
+        keep.lines.append(
+            f"call void @llvm.prefetch.p0(ptr {keep.number(place, '%ahead')}, i32 1, i32 3, i32 1)"
+        )
+    worst = lose.number("%numbers", lose.product("%stride", "%row"))
+    known = lose.choose(
+        "%still", lose.let(f"load {lose.vector}, ptr {worst}, align 8"), lose.constant(math.nan)
+    )
+    lose.lines.append(f"store {lose.vector} {known}, ptr {worst}, align 8")
+    for k in range(TOGETHER):
+        remember.at = remember.sum("%row", k)
+        to = remember.sum("%past", remember.entry(1, 2))
+        remember.write(
+            to,
+            remember.assign(
+                f"load {remember.vector}, ptr {remember.slot(remember.entry(0, 2))}, align 8"
+            ),
+        )
+    kept = keep.function(
+        "keep_alive", "ptr %numbers", "i64 %stride", f"<{width} x i1> %still", "i64 %ahead"
+    )
+    lost = lose.function("lose", "ptr %numbers", "i64 %stride", f"<{width} x i1> %still")
+    return kept + lost + remember.function("remember", "i64 %past")
+
+
+def fold(width: int) -> str:
+    """Return the LLVM function of `fold` of an executor: totals stay in the L1 cache, inputs are
+    read once.
+    """
+    body = f"""%all = mul i64 %columns, {width}
+  %step = mul i64 %plan_taken_count, {width}
+  br label %column
+column:
+  %k = phi i64 [0, %entry], [%next, %end_column]
+  %out_at = mul i64 %k, {width}
+  %out_here = getelementptr double, ptr %out, i64 %out_at
+  {over("take", "kept", "ptr %out_here", "i64 %all")}
+  %column_at = mul i64 %k, %room
+  %table_here = getelementptr double, ptr %table, i64 %column_at
+  br label %some
+some:
+  %at = phi i64 [0, %column], [%next_at, %some]
+  %from = getelementptr double, ptr %table_here, i64 %at
+  {over("take", "taken", "ptr %from", f"i64 {width}")}
+  {over("calls", "after")}
+  %next_at = add i64 %at, %step
+  %more = icmp slt i64 %next_at, %room
+  br i1 %more, label %some, label %end_column
+end_column:
+  {over("keep", "kept", "ptr %out_here", "i64 %all")}
+  %next = add i64 %k, 1
+  %more_columns = icmp slt i64 %next, %columns
+  br i1 %more_columns, label %column, label %end
+end:
+  ret void"""
+    return function(
+        "void @fold(ptr %plan, ptr %lane, ptr %table, i64 %columns, i64 %room, ptr %out)", body
+    )

@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from ...program.llvm import code_cache, compiler
+from ...program.llvm import compiler
+from ...program.llvm import jit as code_cache
 from ...trajectory import Array
 from .rounds import Spread
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from ...joints import Inline, Joint, Revolute, Spherical
-from ...mechanism.drivers import JointAngle
 from ...mechanism.mechanism import Body, Mechanism, Point, Vector
+from ...mechanism.motions import JointAngle
 
 LEAN = 0.3
 """Angle of the cranks at design [rad]; a quarter turn from upright the ring is singular."""

@@ -24,8 +24,8 @@ from ...harness.record import Outcome
 from ...harness.standard import STANDARD
 from ...joints import Revolute, Spherical, Universal
 from ...kinematics import Method, NativeSolver
-from ...mechanism.drivers import JointAngle
 from ...mechanism.mechanism import Body, Mechanism, Point
+from ...mechanism.motions import JointAngle
 from .precision import Contestant, contestants
 from .ring import pivot, ring
 from .rounds import Spread, take_turns, warmed

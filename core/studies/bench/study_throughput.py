@@ -16,8 +16,7 @@ from ...case.case import Case, size
 from ...joints import Kind
 from ...kinematics import kinds, places
 from ..tolerance.sweep import sweep_designs
-from ..variation.distributions import Law
-from ..variation.variation import Coordinate, Mode, Variation
+from ..variation.variation import Coordinate, Law, Mode, Variation
 from .batch import SCATTER, SEED
 from .peak import Peak
 from .rounds import Spread, spread

@@ -25,8 +25,8 @@ from ...case.compliance import Load, Rig
 from ...case.suspension import Convention, Reaction, SuspensionOutput, Vehicle
 from ...errors import KincheckError
 from ...kinematics import LoadPoint
-from ...mechanism.drivers import PointCoordinate
 from ...mechanism.mechanism import Mechanism, Vector
+from ...mechanism.motions import PointCoordinate
 from ...trajectory import Array
 
 PER: Mapping[Load, str] = {

@@ -24,7 +24,7 @@ from ...kinematics import (
     describe_screws,
     freeing,
 )
-from ..variation.places import Geometry
+from ..variation.varied_places import Geometry
 from .determinacy import Determinacy, determinacy
 from .outputs import Budget, Sensitivity, binding, budgets, read_points, sensitivities
 

@@ -14,7 +14,7 @@ from ...jet import Jet
 from ...joints import Kind
 from ...kinematics import Conditioning, Gradient, PoseConditioning
 from ...trajectory import Array
-from ..variation.places import Variable
+from ..variation.varied_places import Variable
 
 # The house formula for tolerances: 10 for engines that scale their rows otherwise, 10 for
 # accelerations, whose rows carry rates.

@@ -10,17 +10,17 @@ from msgspec.structs import replace
 
 from ...case.case import MARKER, Case
 from ...case.io.atomic_files import written
-from ...case.io.case_writer import case_text
-from ...case.io.coordinates import with_all_coordinates
+from ...case.io.case_file import case_text
+from ...case.io.outputs import with_all_coordinates
 from ...errors import KincheckError
 from ...harness.engine import Engine
 from ...harness.execution import Pair
+from ..truth.motion import Truth, followed
 from .families import Specimen
 from .results import Finding
 from .run import Example
 from .shrink import fewer_samples, reduced
 from .solving import solve_all
-from .truth.reference_motion import Truth, followed
 from .verdicts import Judgement, Verdict, judged
 
 

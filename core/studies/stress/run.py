@@ -17,12 +17,12 @@ from ...harness.provenance import plain
 from ...harness.record import Outcome
 from ...kinematics import UnprovedError
 from ...version import VERSION
+from ..truth.motion import Reach, Truth
+from ..truth.proofs import distance_from_proof
+from ..truth.rows import require_extended
 from .families import Family, Specimen
 from .results import Acceptance, Cell, Finding, Proofs, Stress
 from .solving import solve_all, suited
-from .truth.long_double import require_extended
-from .truth.proofs import distance_from_proof
-from .truth.reference_motion import Reach, Truth
 from .verdicts import BAD, Judgement, Verdict, described_wrong, judged
 
 # Fewest specimens of a small share, and fewest samples of each.

@@ -17,9 +17,9 @@ from ...failures import FailureKind
 from ...harness.execution import Answer, Failure
 from ...harness.record import Outcome
 from ...trajectory import QUANTITIES, Array
+from ..truth.forces import known_forces
+from ..truth.motion import Reach, Truth
 from .families.base import MOTION_ENDS, Specimen
-from .truth.reference_forces import known_forces
-from .truth.reference_motion import Reach, Truth
 
 
 class Verdict(StrEnum):
@@ -144,7 +144,7 @@ def judged(
         verdicts[where & (verdicts == Verdict.RIGHT)] = verdict
     beyond = solved & (truth.reach == Reach.BEYOND)
     verdicts[beyond] = Verdict.SILENTLY_WRONG
-    far = (errors > ELSEWHERE * truth.system.rows.stated.unit) | beyond
+    far = (errors > ELSEWHERE * truth.system.rows.unit) | beyond
     worst = tuple(float(ratios[k].max()) if compared[k] and known.any() else None for k in range(4))
     # an engine's notes do not warn a reader of the samples, but explain the outcome
     message = "; ".join(

@@ -42,6 +42,17 @@ class Checked(msgspec.Struct, frozen=True, kw_only=True):
     ratio: float | None = None
 
 
+@dataclass(frozen=True, eq=False)
+class Check:
+    """A cross-check: another engine solves a share of the variants too."""
+
+    engine: Engine
+    share: float
+    solver: Solver
+    tol: float
+    progress: Callable[[int, int], None] = lambda done, total: None
+
+
 def chosen(samples: int, share: float, seed: int) -> frozenset[int]:
     """Return the variants to check: a random share, at least one."""
     count = min(samples, max(1, round(share * samples)))
@@ -71,43 +82,38 @@ class _Pairs(Sequence[Pair]):
         return Pair(self.study.of_variant(self.variants[index]), self.engine, self.tol, timed=False)
 
 
-def require_able(study: Study, engine: Engine, solver: Solver, tol: float) -> None:
+def require_able(study: Study, check: Check) -> None:
     """Require the engine to solve the nominal design.
 
     Raises:
         KincheckError: the engine is not installed, or cannot express the case.
     """
-    ((_, found),) = solver([Pair(study.case, engine, tol, timed=False)])
+    ((_, found),) = check.solver([Pair(study.case, check.engine, check.tol, timed=False)])
     result = found.result
     if not isinstance(result, Answer) and result.outcome in (
         Outcome.UNAVAILABLE,
         Outcome.UNSUPPORTED,
     ):
         raise KincheckError(
-            f"--check {engine.name}: {result.outcome}: {result.message}; check with another engine"
+            f"--check {check.engine.name}: {result.outcome}: {result.message}; check with"
+            " another engine"
         )
 
 
-def check(
-    study: Study,
-    engine: Engine,
-    solver: Solver,
-    picked: Mapping[int, Array],
-    tol: float,
-    progress: Callable[[int, int], None] = lambda done, total: None,
-) -> list[Checked]:
+def cross_check(study: Study, check: Check, picked: Mapping[int, Array]) -> list[Checked]:
     """Solve the picked variants with an engine and compare.
 
     Args:
         picked: the sweep's values by variant, shape (rows, n).
     """
-    pairs = _Pairs(study, engine, sorted(picked), tol)
+    pairs = _Pairs(study, check.engine, sorted(picked), check.tol)
+    tol = promised(check.engine, check.tol)
     found: dict[int, Checked] = {}
-    with closing(solver(pairs)) as attempts:
+    with closing(check.solver(pairs)) as attempts:
         for index, attempt in attempts:
             variant = pairs.variants[index]
-            found[variant] = judged(study, variant, attempt, picked[variant], promised(engine, tol))
-            progress(len(found), len(pairs))
+            found[variant] = judged(study, variant, attempt, picked[variant], tol)
+            check.progress(len(found), len(pairs))
     return [found[variant] for variant in sorted(found)]
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -15,12 +15,13 @@ from ...report.axis import Axis, driver_axis
 from ...report.figures import Figure, layout_over
 from ...report.page_parts import environment, figure_parts
 from ...unit_text import with_unit
-from .histograms import Histogram
-from .limit_words import interval, limit_notes, other_yield, percent
-from .output_view import DIGITS, OutputView, scaled_number
-from .results import Gradient, Numbers, SweepResults
+from .conformance import Capability, Histogram
+from .results import Envelope, Gradient, Numbers, SweepResults
+from .tables import effect, headline, interval, limit_notes, other_yield, percent, scaled_number
 
-_HERE = Path(__file__).parent
+DIGITS = 7
+"""Digits of a drawn number: one more than the page shows when the reader points at a curve."""
+
 
 LIMIT: Figure = {"width": 1.5, "color": "#CC79A7", "dash": "8px,3px,2px,3px"}
 """Look of a specification limit."""
@@ -28,40 +29,54 @@ LIMIT: Figure = {"width": 1.5, "color": "#CC79A7", "dash": "8px,3px,2px,3px"}
 MOST_BARS = 15
 
 
+@dataclass(frozen=True)
+class OutputView:
+    """An output as the page shows it, in display units: its number, and its gradients, the largest
+    effect first.
+    """
+
+    index: int
+    name: str
+    unit: str
+    scale: float
+    envelope: Envelope
+    gradients: Sequence[Gradient]
+    limit: Capability | None
+
+    def shown(self, value: float | None) -> str:
+        """Return a value in display units."""
+        return scaled_number(self.scale, value)
+
+    @property
+    def limits(self) -> dict[str, float]:
+        """The limits in display units, by name."""
+        ends = (None, None) if self.limit is None else (self.limit.low, self.limit.high)
+        return {
+            name: float(f"{self.scale * value:.{DIGITS}g}")
+            for name, value in zip(("low limit", "high limit"), ends, strict=True)
+            if value is not None
+        }
+
+    def figures(self, axis: Axis) -> Iterator[tuple[str, Figure]]:
+        """Yield the figures by name."""
+        yield f"envelope-{self.index}", envelope_figure(self, axis, about_nominal=False)
+        yield f"spread-{self.index}", envelope_figure(self, axis, about_nominal=True)
+        yield f"tornado-{self.index}", tornado_figure(self)
+        if self.envelope.histogram:
+            yield f"histogram-{self.index}", histogram_figure(self, self.envelope.histogram)
+
+
 def page(results: SweepResults) -> str:
     """Return the page as HTML text."""
     axis = _axis(results)
-    figures: dict[str, Figure] = {}
-    outputs: list[OutputView] = []
-    for index, (name, envelope) in enumerate(results.outputs.items()):
-        mine = sorted(
-            (each for each in results.gradients if each.output == name), key=effect, reverse=True
-        )
-        unit, scale = results.shown_unit(envelope.unit)
-        limit = next((each for each in results.limits if each.output == name), None)
-        view = OutputView(
-            name,
-            unit,
-            scale,
-            envelope,
-            f"envelope-{index}",
-            f"spread-{index}",
-            f"tornado-{index}",
-            f"histogram-{index}" if envelope.histogram else "",
-            mine,
-            limit,
-        )
-        figures[view.figure] = envelope_figure(view, axis, about_nominal=False)
-        figures[view.spread] = envelope_figure(view, axis, about_nominal=True)
-        figures[view.tornado] = tornado_figure(view)
-        if envelope.histogram:
-            figures[view.histogram] = histogram_figure(
-                view.name, unit, scale, envelope.histogram, view.limits
-            )
-        outputs.append(view)
+    outputs = [_view(results, index, name) for index, name in enumerate(results.outputs)]
 
+    def shown(unit: str, value: float | None) -> str:
+        return scaled_number(results.shown_unit(unit)[1], value)
+
+    figures = {name: figure for view in outputs for name, figure in view.figures(axis)}
     return (
-        environment(_HERE)
+        environment(Path(__file__).parent)
         .get_template("sweep.html")
         .render(
             results=results,
@@ -75,7 +90,7 @@ def page(results: SweepResults) -> str:
             },
             effect=effect,
             slopes=partial(slopes, results),
-            shown=partial(in_file_unit, results),
+            shown=shown,
             shown_unit=results.shown_unit,
             limit_notes=limit_notes(results),
             other_yield=other_yield(results),
@@ -86,23 +101,6 @@ def page(results: SweepResults) -> str:
     )
 
 
-def headline(results: SweepResults) -> str:
-    """Return one sentence about the study."""
-    said = f"{results.partial or results.samples} variants of {results.case}"
-    said += ", partial: the sweep was stopped" if results.partial else ""
-    said += (
-        f", {results.unsolved} without a solution somewhere" if results.unsolved else ", all solved"
-    )
-    if results.checked:
-        off = len(results.deviating)
-        said += f"; {len(results.checked)} checked with {results.check_engine}, " + (
-            f"{off} deviate" if off else "none deviates"
-        )
-        said += f", {results.unjudged} not judged" if results.unjudged else ""
-        said += f"; {results.partly_judged}" if results.partly_judged else ""
-    return said
-
-
 def slopes(results: SweepResults, view: OutputView, each: Gradient) -> dict[str, str]:
     """Return the numbers of a gradient, and their unit, in units of the file."""
     its, factor = results.shown_unit(results.unit_of(each.coordinate))
@@ -111,16 +109,13 @@ def slopes(results: SweepResults, view: OutputView, each: Gradient) -> dict[str,
     return {**found, "unit": f"({view.unit})/({its})"}
 
 
-def in_file_unit(results: SweepResults, unit: str, value: float | None) -> str:
-    """Return a number of an SI unit as text in the unit of the file."""
-    return scaled_number(results.shown_unit(unit)[1], value)
-
-
-def effect(gradient: Gradient) -> float:
-    """Return the size of a bar: the largest gradient times its coordinate's scale [unit of the
-    output].
-    """
-    return abs(gradient.largest or 0.0) * gradient.scale
+def _view(results: SweepResults, index: int, name: str) -> OutputView:
+    envelope = results.outputs[name]
+    gradients = [each for each in results.gradients if each.output == name]
+    limit = next((each for each in results.limits if each.output == name), None)
+    gradients.sort(key=effect, reverse=True)
+    unit, scale = results.shown_unit(envelope.unit)
+    return OutputView(index, name, unit, scale, envelope, gradients, limit)
 
 
 def _axis(results: SweepResults) -> Axis:
@@ -240,16 +235,9 @@ def tornado_figure(view: OutputView) -> Figure:
     return {"data": traces, "layout": layout}
 
 
-def histogram_figure(
-    name: str, unit: str, scale: float, found: Histogram, limits: Mapping[str, float]
-) -> Figure:
-    """Return bars of the counts of variants by output value at one sample, with the limits.
-
-    Args:
-        scale: factor from SI to the unit.
-        limits: the limits by name [unit].
-    """
-    pairs = [*pairwise(scale * edge for edge in found.edges)]
+def histogram_figure(view: OutputView, found: Histogram) -> Figure:
+    """Return bars of the counts of variants by output value at one sample, with the limits."""
+    pairs = [*pairwise(view.scale * edge for edge in found.edges)]
     bars: Figure = {
         "type": "bar",
         "x": [float(f"{0.5 * (low + high):.7g}") for low, high in pairs],
@@ -269,10 +257,11 @@ def histogram_figure(
             "line": LIMIT,
             "uid": which,
         }
-        for which, limit in limits.items()
+        for which, limit in view.limits.items()
     ]
+    title = with_unit(output_label(view.name), view.unit)
     sides: Figure = {
-        "xaxis": {"title": {"text": with_unit(output_label(name), unit)}, "hoverformat": ".5g"},
+        "xaxis": {"title": {"text": title}, "hoverformat": ".5g"},
         "yaxis": {"title": {"text": "variants"}, "rangemode": "tozero"},
     }
     return {"data": [bars, *lines], "layout": {**sides, "hovermode": "closest"}}

@@ -5,6 +5,8 @@ Numbers are in SI units. A number is null if it was not computed.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from typing import Any, Literal
 
 import msgspec
@@ -16,10 +18,12 @@ from ...errors import number_of
 from ...harness.record import Outcome
 from ...report.axis import DRIVER_UNITS
 from ...tabular import Tabular
-from .chunk import Unsolved
-from .conformance import Capability
+from ...trajectory import Array
+from ..variation.variation import Law
+from .conformance import Capability, Histogram
 from .cross_check import Checked
-from .histograms import Histogram
+from .statistics import QUANTILES, Quantiles, Summary
+from .study import Gradients, Study, Unsolved
 
 Numbers = list[float | None]
 
@@ -28,7 +32,6 @@ class VariedCoordinate(msgspec.Struct, frozen=True, kw_only=True):
     """A varied coordinate.
 
     Attributes:
-        law: normal, truncated_normal, uniform, triangular, or values.
         scale: standard deviation, half width, or the largest offset [unit].
         values: the offsets [unit], if they are listed.
         bound: largest offset of a truncated normal distribution [unit]; zero for other laws.
@@ -37,7 +40,7 @@ class VariedCoordinate(msgspec.Struct, frozen=True, kw_only=True):
     name: str
     hardpoint: str
     unit: str
-    law: str
+    law: Law
     scale: float
     values: list[float] = []
     bound: float = 0.0
@@ -75,6 +78,12 @@ class Envelope(msgspec.Struct, frozen=True, kw_only=True):
     min_variant: int | None
     max_variant: int | None
     histogram: Histogram | None = None
+
+    @property
+    def ends(self) -> tuple[float | None, ...]:
+        """The least, the most, and the largest standard deviation, over all samples."""
+        ways = ((min, self.min), (max, self.max), (max, self.standard_deviation))
+        return tuple(way((x for x in xs if x is not None), default=None) for way, xs in ways)
 
 
 class Gradient(msgspec.Struct, frozen=True, kw_only=True):
@@ -225,3 +234,109 @@ BANDS = ("nominal", "mean", "min", "max", "standard_deviation")
 
 def _bands(each: Envelope) -> list[Numbers]:
     return [getattr(each, name) for name in BANDS]
+
+
+# Tables of the results, from the chunks and gradients of a study.
+
+
+def numbers(values: Array) -> Numbers:
+    """Return numbers, None for NaN."""
+    return [value if math.isfinite(value) else None for value in values.tolist()]
+
+
+def envelopes(
+    study: Study,
+    whole: Summary,
+    found: Sequence[Quantiles],
+    nominal: Array,
+    histograms: Sequence[Histogram | None],
+) -> dict[str, Envelope]:
+    """Return the envelope of every row, by name."""
+    spread = whole.deviation
+    result: dict[str, Envelope] = {}
+    for k, (row, quantiles) in enumerate(zip(study.rows, found, strict=True)):
+        low, high = (int(each) for each in whole.extremes[k])
+        result[row.name] = Envelope(
+            unit=row.unit,
+            sense=row.output.sense or None,
+            nominal=numbers(nominal[k]),
+            count=whole.count[k].tolist(),
+            min=numbers(whole.least[k]),
+            max=numbers(whole.most[k]),
+            mean=numbers(whole.mean[k]),
+            standard_deviation=numbers(spread[k]),
+            quantiles=_by_probability(quantiles.values),
+            standard_errors=None if quantiles.errors is None else _by_probability(quantiles.errors),
+            min_variant=low if low >= 0 else None,
+            max_variant=high if high >= 0 else None,
+            histogram=histograms[k],
+        )
+    return result
+
+
+def _by_probability(values: Array) -> dict[str, Numbers]:
+    return {f"{p:g}": numbers(each) for p, each in zip(QUANTILES, values, strict=True)}
+
+
+def gradient_table(study: Study, found: Gradients) -> list[Gradient]:
+    """Return every gradient, by output and coordinate."""
+    table: list[Gradient] = []
+    for r, row in enumerate(study.rows):
+        for c, coordinate in enumerate(study.variation.coordinates):
+            along = found.along[c, r]
+            known = np.isfinite(along).any()
+            sample = int(np.nanargmax(np.abs(along))) if known else None
+            table.append(
+                Gradient(
+                    output=row.name,
+                    coordinate=coordinate.name,
+                    unit=f"({row.unit})/{coordinate.unit}",
+                    at_design=None
+                    if found.design is None
+                    else numbers(found.design[c, r : r + 1])[0],
+                    along=numbers(along),
+                    largest=None if sample is None else float(along[sample]),
+                    sample=sample,
+                    error=numbers(found.error[c, r : r + 1])[0],
+                    accurate=bool(found.accurate[c, r]),
+                    scale=coordinate.scale,
+                )
+            )
+    return table
+
+
+def effect_table(study: Study, effects: Array) -> list[Effect]:
+    """Return the effects of a study of one coordinate at a time.
+
+    Args:
+        effects: the largest changes, shape (rows, variants); the first is the nominal design.
+    """
+    table: list[Effect] = []
+    for variant, changes in [*enumerate(effects.T)][1:]:
+        offsets = study.variation.of_variant(study.seed, variant)
+        (moved,) = np.flatnonzero(offsets)
+        by_row = zip((row.name for row in study.rows), numbers(changes), strict=True)
+        table.append(
+            Effect(
+                variant=variant,
+                coordinate=study.variation.coordinates[int(moved)].name,
+                offset=float(offsets[moved]),
+                changes=dict(by_row),
+            )
+        )
+    return table
+
+
+def coordinates(study: Study) -> list[VariedCoordinate]:
+    """Return the varied coordinates."""
+    varied = study.variation.coordinates
+    return msgspec.convert(varied, list[VariedCoordinate], from_attributes=True)
+
+
+def correlations(study: Study) -> list[Correlated]:
+    """Return the correlations of coordinates."""
+    names = [each.name for each in study.variation.coordinates]
+    return [
+        Correlated(coordinates=[names[row] for row in each.rows], matrix=each.matrix.tolist())
+        for each in study.variation.correlations
+    ]

@@ -1,36 +1,142 @@
-"""Sweep over design variants: solve and reduce them chunk by chunk, differentiate, cross-check."""
+"""Sweep over design variants: solve and reduce them chunk by chunk, in threads or on a cluster;
+differentiate, cross-check.
+"""
 
 from __future__ import annotations
 
+import hashlib
+import pickle
 import sys
-from collections.abc import Callable
+from collections import OrderedDict, deque
+from collections.abc import Callable, Generator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
+from itertools import islice
+from threading import Lock
 from time import perf_counter, process_time
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeAlias
+
+import numpy as np
 
 from ...case.case import Case
 from ...errors import KincheckError
-from ...harness.engine import Engine
-from ...harness.execution import Solver
+from ...harness.execution import error_text
 from ...harness.interrupts import deferred, hold
 from ...harness.provenance import circumstances
-from ...harness.workers.distributed import ClusterError
-from ..variation.modes import Incomplete, Mode, Sampling
+from ...harness.workers.distributed import SILENT, ClusterError, Tasks, connected, loaded
+from ...harness.workers.messages import pack
+from ...version import VERSION
+from ..variation.study_choices import Incomplete, Mode, Sampling
 from ..variation.variation import Variation
-from . import cross_check, result_tables, results
-from .chunk import Chunk
-from .chunk_execution import Source, on_threads
-from .conformance import capabilities
-from .gathered import Gathered
-from .gradients import gradients
-from .histograms import histogram, worst_sample
-from .part_file import Part
-from .reduce import quantiles
-from .study import Ready, Study
+from . import results
+from .chunk_files import Part
+from .conformance import capabilities, histogram, worst_sample
+from .cross_check import Check, Checked, chosen, cross_check, require_able
+from .statistics import quantiles
+from .study import Chunk, Ready, Study, gradients
+
+Chunks: TypeAlias = Generator[Chunk]
+Source: TypeAlias = Callable[[Study, int], Chunks]
+"""Solves the chunks of a study from an index on, and yields each chunk once, in order."""
+
+# Chunks in progress for each thread: the thread solves one, the others wait for their turn.
+AHEAD = 3
+
+
+def on_threads(ready: Ready, jobs: int) -> Source:
+    """Return the source in threads of this process; the programs run without Python's lock."""
+
+    def solve(study: Study, first: int = 0) -> Chunks:
+        if jobs == 1:
+            yield from map(ready.chunk, range(first, study.chunks))
+            return
+        waiting = deque[Any]()
+        with ThreadPoolExecutor(jobs) as pool:
+            try:
+                for index in range(first, study.chunks):
+                    waiting.append(pool.submit(ready.chunk, index))
+                    if len(waiting) >= AHEAD * jobs:
+                        yield waiting.popleft().result()
+                while waiting:
+                    yield waiting.popleft().result()
+            finally:
+                pool.shutdown(wait=True, cancel_futures=True)
+
+    return solve
+
+
+def on_cluster(address: str, silent: float = SILENT) -> Source:
+    """Return the source on the workers of a dask.distributed scheduler.
+
+    If a worker is lost or silent, other workers repeat its tasks.
+
+    Args:
+        silent: longest time without a heartbeat of a worker [s].
+
+    Raises:
+        ClusterError: dask.distributed is not installed, the scheduler does not answer or
+            disappeared, every worker of a task was lost, or a worker cannot solve.
+    """
+
+    def solve(study: Study, first: int = 0) -> Chunks:
+        packed, ready = pack(study), dict[int, Chunk]()
+        with connected(loaded(), address) as client:
+            tasks = Tasks(client, address, silent)
+            waiting = iter(range(first, study.chunks))
+            for index in range(first, study.chunks):
+                while index not in ready:
+                    # asked each time: workers may come and go
+                    more = AHEAD * tasks.threads - len(tasks) - len(ready)
+                    for late in islice(waiting, max(0, more)):
+                        tasks.submit(late, (solve_there, packed, late, VERSION))
+                    number, found = tasks.next()
+                    ready[number] = _answered(found, address)
+                yield ready.pop(index)
+
+    return solve
+
+
+def _answered(found: Chunk | Exception, address: str) -> Chunk:
+    """Return a chunk; raise an exception in its place with an explanation."""
+    if isinstance(found, Chunk):
+        return found
+    if isinstance(found, ClusterError):
+        raise found
+    why = error_text(found)
+    if type(found).__name__ == "KilledWorker":
+        why = f"every worker that had some chunks was lost: {why}"
+    elif not isinstance(found, TimeoutError):
+        why = f"a worker cannot solve: {why}"
+    raise ClusterError(f"scheduler {address}: {why}") from found
+
+
+_ready: OrderedDict[bytes, Ready] = OrderedDict()
+_lock = Lock()
+
+
+def solve_there(packed: bytes, index: int, version: str) -> Chunk:
+    """Solve a chunk in a worker of a cluster. The worker keeps the compiled model for later chunks.
+
+    Raises:
+        ClusterError: the worker has another version of kincheck.
+    """
+    if version != VERSION:
+        raise ClusterError(
+            f"kincheck {VERSION} on the cluster's worker, expected {version} as in the sweep;"
+            " install the same there"
+        )
+    key = hashlib.sha256(packed).digest()
+    with _lock:  # a worker's threads share the model; a worker keeps the models of two studies
+        if key not in _ready:
+            _ready[key] = Ready.of(pickle.loads(packed))
+            if len(_ready) > 2:
+                _ready.popitem(last=False)
+        ready = _ready[key]
+    return ready.chunk(index)
+
 
 # Variants kept for quantiles: the share below a 1 % quantile then has a standard error of 0.1 %.
 KEPT = 10_000
@@ -59,17 +165,6 @@ class Store(Protocol):
     def write(self, chunk: Chunk) -> None:
         """Store a chunk's values and offsets; chunks come in order."""
         ...
-
-
-@dataclass(frozen=True, eq=False)
-class Check:
-    """A cross-check: another engine solves a share of the variants too."""
-
-    engine: Engine
-    share: float
-    solver: Solver
-    tol: float
-    progress: Callable[[int, int], None] = lambda done, total: None
 
 
 def sweep_designs(
@@ -123,61 +218,38 @@ def sweep_designs(
     variation = variation.sampled(sampling, count)
     study = Study(case, variation, count, seed, order, tol, whole=store is not None)
     if check is not None:
-        cross_check.require_able(study, check.engine, check.solver, check.tol)
-        study = replace(study, picked=cross_check.chosen(study.samples, check.share, seed))
+        require_able(study, check)
+        study = replace(study, picked=chosen(study.samples, check.share, seed))
     study = replace(study, subset=min(1.0, _kept(study) / study.samples))
     ready = Ready.of(study)
-    found = Gathered(study)
+    found = study.nothing
     for chunk in part.finished(study) if part is not None else ():
-        found.add(chunk)
-        if store is not None:
-            store.write(chunk)
-    begin, cpu, earlier = perf_counter(), process_time(), found.done
-    checked: list[cross_check.Checked] = []
-
-    def measured_so_far() -> dict[str, Any]:
-        return _measured(
-            study,
-            found.done - earlier,
-            jobs if source is None else None,
-            perf_counter() - begin,
-            process_time() - cpu,
-        )
-
+        found += _without_store(chunk, store)
+    begin, cpu, earlier = perf_counter(), process_time(), found.count
+    seconds = processor = 0.0
+    checked: list[Checked] = []
     try:
-        with closing((source or on_threads(ready, jobs))(study, found.chunks)) as chunks:
+        with closing((source or on_threads(ready, jobs))(study, found.index + 1)) as chunks:
             for chunk in chunks:
                 with deferred():  # an interrupt waits: a chunk is added everywhere or nowhere
-                    found.add(chunk)
-                    if store is not None:
-                        store.write(chunk)
                     if part is not None:
                         part.add(chunk)
-                progress(
-                    Progress(
-                        found.done,
-                        study.samples,
-                        found.failures,
-                        perf_counter() - begin,
-                        found.done - earlier,
-                    )
-                )
-        measured = measured_so_far()
+                    found += _without_store(chunk, store)
+                seconds, processor = perf_counter() - begin, process_time() - cpu
+                new = found.count - earlier
+                progress(Progress(found.count, study.samples, found.failures, seconds, new))
         if check is not None:
-            checked = cross_check.check(
-                study, check.engine, check.solver, found.picked, check.tol, check.progress
-            )
+            checked = cross_check(study, check, found.picked)
         hold()
     except (KeyboardInterrupt, ClusterError) as reason:
-        if stopped is None or not found.done:
+        if stopped is None or not found.count:
             raise
         stopped(reason)
-        measured = measured_so_far()
     slopes = gradients(ready)
     exact = (
         study.subset >= 1.0
         and variation.mode is not Mode.MONTE_CARLO
-        and found.done == study.samples
+        and found.count == study.samples
     )
     by_row = [[each[k] for each in found.kept] for k in range(len(study.rows))]
     limits = capabilities(study, found.limited, found.summary, by_row, incomplete)
@@ -189,35 +261,45 @@ def sweep_designs(
         kept = list(pool.map(partial(quantiles, exact=exact), by_row))
     run = circumstances([case], started=started, tol=tol, command=command)
     run["cases"][case.name]["notes"] += ready.designs.start_notes(tol)
+    measured = _measured(
+        study, found.count - earlier, jobs if source is None else None, seconds, processor
+    )
     return results.SweepResults(
         run=run,
         case=case.name,
         mode=str(variation.mode),
         seed=seed,
-        samples=found.done,
+        samples=found.count,
         asked=study.samples,
-        coordinates=result_tables.coordinates(study),
+        coordinates=results.coordinates(study),
         driver={name: values.tolist() for name, values in case.sweep.moved.items()},
         sampling=str(sampling),
-        correlations=result_tables.correlations(study),
+        correlations=results.correlations(study),
         length_unit=variation.units.length,
         angle_unit=variation.units.angle,
-        outputs=result_tables.envelopes(study, found.summary, kept, ready.nominal, histograms),
+        outputs=results.envelopes(study, found.summary, kept, ready.nominal, histograms),
         limits=limits,
         incomplete=str(incomplete),
         quantiles_of=kept[0].kept,
-        gradients=result_tables.gradient_table(study, slopes),
+        gradients=results.gradient_table(study, slopes),
         gradient_messages={
             variation.coordinates[k].name: message for k, message in sorted(slopes.messages.items())
         },
-        effects=result_tables.effect_table(study, found.effects),
+        effects=results.effect_table(study, np.concatenate(found.effects, axis=1)),
         unsolved=found.failures,
-        failed=found.unsolved,
+        failed=[*found.unsolved],
         retried=found.retried,
         check_engine=check.engine.name if check else None,
         checked=checked,
         measured=measured | {"peak_memory_mb": _peak_memory()},
     )
+
+
+def _without_store(chunk: Chunk, store: Store | None) -> Chunk:
+    """Return a chunk without the values of all variants, after their storage."""
+    if store is not None:
+        store.write(chunk)
+    return replace(chunk, stored=())
 
 
 def how_many(variation: Variation, samples: int | None) -> int:

@@ -1,20 +1,78 @@
-"""The results of a study on the terminal, in the units of its file."""
+"""The results of a study on the terminal and as CSV, in the units of its file."""
 
 from __future__ import annotations
 
-from typing import TextIO
+import csv
+import io
+from collections.abc import Iterable, Sequence
+from typing import Any, TextIO
 
 from rich.console import Console
 from rich.text import Text
 
+from ...case.io.escape import cell
+from ...errors import number_of
 from ...harness.labels import notes, number
 from ...report import terminal
 from ...report.fitting_table import FittingTable
 from ...report.table import print_signs
-from .histograms import sparkline
-from .limit_words import interval, limit_notes, other_yield, percent
-from .page import effect, headline
-from .results import Envelope, Numbers, SweepResults
+from ..variation.study_choices import Incomplete
+from .conformance import Capability, sparkline
+from .results import Gradient, SweepResults
+
+
+def limit_notes(results: SweepResults) -> list[str]:
+    """Return the assumptions of the table of limits, a line each."""
+    lines = ["A variant counts as inside if it is inside the limits at every sample."]
+    if any(each.cpk is not None for each in results.limits):
+        lines.append(
+            "Cp and Cpk assume a normal distribution; the last column does not. Each index is the"
+            " smallest over the samples."
+        )
+    if any(each.interval for each in results.limits) and results.sampling != "random":
+        lines.append(
+            f"The confidence interval assumes independent variants; for {results.sampling}"
+            " sampling it is usually too wide."
+        )
+    if some := _incomplete(results):
+        variants = number_of(some, "variant")
+        lines.append(
+            f"Incomplete, and left out: {variants} without all samples."
+            if results.incomplete == Incomplete.IGNORE
+            else f"Incomplete, and so outside: {variants} without all samples; --incomplete ignore"
+            " leaves them out."
+        )
+        if any(each.cpk is not None for each in results.limits):
+            lines.append("Cp and Cpk are of all variants with a value at the sample.")
+    return lines
+
+
+def _incomplete(results: SweepResults) -> int:
+    return max((each.incomplete for each in results.limits), default=0)
+
+
+def other_yield(results: SweepResults) -> list[tuple[str, str]]:
+    """Return head and attribute of the yield that is not judged; none without incomplete variants,
+    as both are equal.
+    """
+    if not _incomplete(results):
+        return []
+    if results.incomplete == Incomplete.IGNORE:
+        return [("yield of all", "share_of_all")]
+    return [("yield of complete", "share_of_complete")]
+
+
+def percent(share: float | None) -> str:
+    """Return a share in percent, to a ten-thousandth; a dash for None."""
+    return "–" if share is None else f"{100.0 * share:.2f} %"
+
+
+def interval(each: Capability) -> str:
+    """Return the confidence interval of a yield as text; a dash for None."""
+    if each.interval is None:
+        return "–"
+    low, high = each.interval
+    return f"{100.0 * low:.2f} to {100.0 * high:.2f} %"
 
 
 def print_sweep(results: SweepResults, file: TextIO) -> None:
@@ -36,14 +94,13 @@ def print_sweep(results: SweepResults, file: TextIO) -> None:
 
 
 def _extremes(results: SweepResults) -> FittingTable:
-    table = FittingTable()
-    for name in ("output", "unit"):
-        table.add_column(name)
-    for name in ("least", "variant", "most", "variant", "largest\nst. dev.", "largest\n1-99 %"):
-        table.add_column(name, justify="right", no_wrap=True)
-    table.add_column("largest effect\n(gradient x scale)")
+    table = terminal.columns(
+        *("output", "unit", ">least", ">variant", ">most", ">variant"),
+        *(">largest\nst. dev.", ">largest\n1-99 %", "largest effect\n(gradient x scale)"),
+    )
     for name, each in results.outputs.items():
         unit, scale = results.shown_unit(each.unit)
+        least, most, spread = (scaled_number(scale, value) for value in each.ends)
         bands = zip(each.quantiles["0.01"], each.quantiles["0.99"], strict=True)
         widths = [high - low for low, high in bands if low is not None and high is not None]
         known = (g for g in results.gradients if g.output == name and g.largest is not None)
@@ -51,61 +108,56 @@ def _extremes(results: SweepResults) -> FittingTable:
         table.add_row(
             Text(name),
             unit,
-            *(_shown(scale, min(_known(each.min), default=None)), _count(each.min_variant)),
-            *(_shown(scale, max(_known(each.max), default=None)), _count(each.max_variant)),
-            _shown(scale, max(_known(each.standard_deviation), default=None)),
-            _shown(scale, max(widths, default=None)),
-            Text("–" if top is None else f"{top.coordinate} {_shown(scale, effect(top))}"),
+            *(least, _count(each.min_variant), most, _count(each.max_variant), spread),
+            scaled_number(scale, max(widths, default=None)),
+            Text("–" if top is None else f"{top.coordinate} {scaled_number(scale, effect(top))}"),
         )
     return table
+
+
+def _count(number: int | None) -> str:
+    return "–" if number is None else str(number)
 
 
 def _distributions(results: SweepResults) -> FittingTable:
     swept = next(iter(results.driver))
     driver_unit, factor = results.shown_driver
-    table = FittingTable(title="Distribution at one sample")
-    table.add_column("output")
-    table.add_column("unit")
-    table.add_column(f"at {swept}\n[{driver_unit}]", justify="right", no_wrap=True)
-    for name in ("mean", "st. dev.", "1 %", "50 %", "99 %"):
-        table.add_column(name, justify="right", no_wrap=True)
-    table.add_column("histogram", no_wrap=True)
+    table = terminal.columns(
+        *("output", "unit", f">at {swept}\n[{driver_unit}]", ">mean", ">st. dev."),
+        *(">1 %", ">50 %", ">99 %", "histogram"),
+        title="Distribution at one sample",
+    )
     for name, each in results.outputs.items():
-        found = each.histogram
-        if found is None:
+        if each.histogram is None:
             continue
         unit, scale = results.shown_unit(each.unit)
-        values = [column[found.sample] for column in _columns(each)]
+        k = each.histogram.sample
+        quantiles = (each.quantiles[p] for p in ("0.01", "0.5", "0.99"))
+        columns = (each.mean, each.standard_deviation, *quantiles)
         table.add_row(
             Text(name),
             unit,
-            _shown(factor, results.driver[swept][found.sample]),
-            *(_shown(scale, value) for value in values),
-            sparkline(found),
+            scaled_number(factor, results.driver[swept][k]),
+            *(scaled_number(scale, column[k]) for column in columns),
+            sparkline(each.histogram),
         )
     return table
 
 
-def _columns(each: Envelope) -> list[Numbers]:
-    quantiles = (each.quantiles[p] for p in ("0.01", "0.5", "0.99"))
-    return [each.mean, each.standard_deviation, *quantiles]
-
-
 def _print_limits(results: SweepResults, console: Console) -> None:
-    table = FittingTable(title="Specification limits")
-    table.add_column("output")
-    table.add_column("unit")
     other = other_yield(results)
-    beside = [head.replace(" of", "\nof") for head, _ in other]
-    for name in ("low", "high", "below", "above", "yield", "95 % interval", *beside, "Cp", "Cpk"):
-        table.add_column(name, justify="right", no_wrap=True)
-    table.add_column("Cpk by\nquantiles", justify="right", no_wrap=True)
+    table = terminal.columns(
+        *("output", "unit", ">low", ">high", ">below", ">above", ">yield", ">95 % interval"),
+        *(f">{head}".replace(" of", "\nof") for head, _ in other),
+        *(">Cp", ">Cpk", ">Cpk by\nquantiles"),
+        title="Specification limits",
+    )
     for each in results.limits:
         unit, scale = results.shown_unit(each.unit)
         table.add_row(
             Text(each.output or "all together"),
             unit,
-            *(_shown(scale, value) for value in (each.low, each.high)),
+            *(scaled_number(scale, value) for value in (each.low, each.high)),
             *(str(each.below), str(each.above)),
             percent(each.share),
             interval(each),
@@ -118,16 +170,9 @@ def _print_limits(results: SweepResults, console: Console) -> None:
         console.print(Text(line), soft_wrap=True)
 
 
-def _known(values: Numbers) -> list[float]:
-    return [value for value in values if value is not None]
-
-
-def _shown(scale: float, value: float | None) -> str:
+def scaled_number(scale: float, value: float | None) -> str:
+    """Return a number times a factor, to three digits; a dash for None."""
     return number(None if value is None else scale * value)
-
-
-def _count(number: int | None) -> str:
-    return "–" if number is None else str(number)
 
 
 def remarks(results: SweepResults) -> list[str]:
@@ -180,3 +225,109 @@ def remarks(results: SweepResults) -> list[str]:
         f"{key.replace('_', ' ')} {number(value)}" for key, value in results.measured.items()
     )
     return [*lines, speed]
+
+
+def headline(results: SweepResults) -> str:
+    """Return one sentence about the study."""
+    said = f"{results.partial or results.samples} variants of {results.case}"
+    said += ", partial: the sweep was stopped" if results.partial else ""
+    said += (
+        f", {results.unsolved} without a solution somewhere" if results.unsolved else ", all solved"
+    )
+    if results.checked:
+        off = len(results.deviating)
+        said += f"; {len(results.checked)} checked with {results.check_engine}, " + (
+            f"{off} deviate" if off else "none deviates"
+        )
+        said += f", {results.unjudged} not judged" if results.unjudged else ""
+        said += f"; {results.partly_judged}" if results.partly_judged else ""
+    return said
+
+
+def effect(gradient: Gradient) -> float:
+    """Return the size of a bar: the largest gradient times its coordinate's scale [unit of the
+    output].
+    """
+    return abs(gradient.largest or 0.0) * gradient.scale
+
+
+# CSV: a missing value is an empty field.
+
+_STATISTICS = ("nominal", "count", "min", "max", "mean", "standard_deviation")
+
+
+def envelope_csv(results: SweepResults) -> str:
+    """Return a line for each output and sample."""
+    swept = next(iter(results.driver))
+    probabilities = list(next(iter(results.outputs.values())).quantiles)
+    errors = any(each.standard_errors for each in results.outputs.values())
+    columns = ["output", "unit", "sample", swept, "driver_unit", *_STATISTICS]
+    columns += [f"quantile_{p}" for p in probabilities]
+    columns += [f"standard_error_{p}" for p in probabilities] if errors else []
+    columns += ["partial"] if results.partial else []
+    partial = [f"{results.partial} variants"] if results.partial else []
+    driver_unit, driver_scale = results.shown_driver
+    rows: list[Sequence[Any]] = []
+    for name, each in results.outputs.items():
+        unit, scale = results.shown_unit(each.unit)
+        numbers = [
+            getattr(each, key) if key == "count" else scaled(scale, getattr(each, key))
+            for key in _STATISTICS
+        ]
+        quantiles = [*each.quantiles.values(), *(each.standard_errors or {}).values()]
+        numbers += [scaled(scale, column) for column in quantiles]
+        for k, value in enumerate(scaled(driver_scale, results.driver[swept])):
+            found = (column[k] for column in numbers)
+            rows.append([name, unit, k, value, driver_unit, *found, *partial])
+    return _csv(columns, rows)
+
+
+def gradient_csv(results: SweepResults) -> str:
+    """Return a line for each output and coordinate."""
+    numbers = ("at_design", "largest", "error")
+    columns = ["output", "coordinate", "unit", "at_design", "largest", "sample", "error"]
+    columns += ["accurate", "scale", "scale_unit", "effect", "effect_unit"]
+    rows: list[Sequence[Any]] = []
+    for each in results.gradients:
+        unit, scale = results.shown_unit(results.outputs[each.output].unit)
+        its, factor = results.shown_unit(results.unit_of(each.coordinate))
+        at, largest, error = scaled(scale / factor, [getattr(each, key) for key in numbers])
+        rows.append(
+            [
+                *(each.output, each.coordinate, f"({unit})/({its})"),
+                *(at, largest, each.sample, error, each.accurate),
+                *(factor * each.scale, its, scale * effect(each), unit),
+            ]
+        )
+    return _csv(columns, rows)
+
+
+def limits_csv(results: SweepResults) -> str:
+    """Return a line for each limited output, and one for all limits together."""
+    columns = ["output", "unit", "low", "high", "known", "below", "above", "outside", "incomplete"]
+    columns += ["yield", "yield_from", "yield_to", "yield_of_all", "yield_of_complete"]
+    columns += ["cp", "cpk", "cpk_by_quantiles", "sample"]
+    rows: list[Sequence[Any]] = []
+    for each in results.limits:
+        unit, scale = results.shown_unit(each.unit)
+        counts = (each.known, each.below, each.above, each.outside, each.incomplete)
+        interval = each.interval or (None, None)
+        indices = (each.cp, each.cpk, each.by_quantiles, each.sample)
+        limits = scaled(scale, [each.low, each.high])
+        name = each.output or "all"
+        shares = (each.share_of_all, each.share_of_complete)
+        rows.append([name, unit, *limits, *counts, each.share, *interval, *shares, *indices])
+    return _csv(columns, rows)
+
+
+def scaled(scale: float, values: Iterable[float | None]) -> list[float | None]:
+    """Return numbers times a factor; None stays None."""
+    return [None if value is None else scale * value for value in values]
+
+
+def _csv(columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows([cell(each) for each in row] for row in rows)
+    return text.getvalue()

@@ -8,22 +8,298 @@ and a single variant can be reproduced.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from enum import IntEnum, StrEnum
+from functools import cached_property, lru_cache
 from itertools import groupby
+from threading import Lock
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...caches import keep_last
 from ...errors import KincheckError
 from ...trajectory import Array
-from .correlations import Correlation
-from .distributions import Law, normal_quantile, normal_share, quantile
-from .file_units import SI, FileUnits
-from .limits import Limit
-from .modes import Mode, Sampling
-from .sampling import DRAWN, Stream, check_count, generator, points
+from .study_choices import Mode, Sampling
+
+
+class Law(StrEnum):
+    """Distribution of a coordinate."""
+
+    NORMAL = "normal"
+    TRUNCATED_NORMAL = "truncated_normal"
+    UNIFORM = "uniform"
+    TRIANGULAR = "triangular"
+    VALUES = "values"
+
+
+def quantile(law: Law, probability: Array, scale: float, half_width: float) -> Array:
+    """Return the quantiles of a distribution at these probabilities, in the same shape.
+
+    Args:
+        probability: between 0 and 1, both excluded.
+        scale: standard deviation of a normal distribution, before truncation [unit].
+        half_width: largest offset of the other distributions [unit].
+    """
+    match law:
+        case Law.NORMAL:
+            return scale * normal_quantile(probability)
+        case Law.TRUNCATED_NORMAL:
+            outside = float(normal_share(np.array(-half_width / scale)))
+            offsets = scale * normal_quantile(outside + probability * (1.0 - 2.0 * outside))
+            return np.clip(offsets, -half_width, half_width)  # round-off at the ends
+        case Law.TRIANGULAR:  # with its mode at the nominal value
+            low = np.sqrt(2.0 * np.minimum(probability, 1.0 - probability)) - 1.0
+            return half_width * np.where(probability < 0.5, low, -low)
+        case Law.UNIFORM:
+            return half_width * (2.0 * probability - 1.0)
+        case Law.VALUES:
+            raise ValueError("listed offsets have no distribution")
+
+
+def normal_quantile(probability: Array) -> Array:
+    """Return the quantiles of the standard normal distribution."""
+    return _special().ndtri(probability)
+
+
+def normal_share(value: Array) -> Array:
+    """Return the share of the standard normal distribution below a value."""
+    return _special().ndtr(value)
+
+
+def _special() -> Any:
+    """Return the module; few studies need its import."""
+    import scipy.special  # pyright: ignore[reportMissingTypeStubs]
+
+    return scipy.special
+
+
+# Correlated coordinates: a Gaussian copula. Each coordinate is a function of a standard normal
+# number z: its quantile at the share of z, the probability of a smaller number. The matrix
+# correlates the numbers z. So normal coordinates have exactly these correlations. Others have
+# nearly the same: for two uniform coordinates the correlation is 6/pi asin(r/2) instead of r, a
+# difference of 0.018 at most.
+
+# Matrices in files have rounded digits: this is the largest accepted negative eigenvalue.
+DIGITS = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Correlation:
+    """Correlation of some coordinates, by a matrix.
+
+    Attributes:
+        rows: indices of the coordinates, each once.
+        matrix: symmetric, positive semidefinite, ones on the diagonal, shape (rows, rows).
+    """
+
+    rows: tuple[int, ...]
+    matrix: Array
+
+    @cached_property
+    def factor(self) -> Array:
+        """The lower triangle L of the matrix L L^T; a column is zero if its coordinate depends on
+        earlier coordinates alone.
+        """
+        size = len(self.matrix)
+        found = np.zeros((size, size))
+        for k in range(size):
+            rest = self.matrix[k:, k] - found[k:, :k] @ found[k, :k]
+            if rest[0] > DIGITS:
+                found[k:, k] = rest / np.sqrt(rest[0])
+        return found
+
+    def mixed(self, independent: Array) -> Array:
+        """Return correlated standard normal numbers from independent ones, shape (rows, V).
+
+        The sum is computed term by term, as the rounding of a matrix product may depend on the
+        number of columns and on the machine.
+        """
+        found = np.zeros_like(independent)
+        for row, column in np.argwhere(self.factor).tolist():
+            found[row] += self.factor[row, column] * independent[column]
+        return found
+
+
+def problem_of(matrix: Sequence[Sequence[float]], names: Sequence[str]) -> str:
+    """Return the reason why a matrix is no correlation matrix of the named coordinates, and the
+    expectation; empty if it is one.
+    """
+    size = len(names)
+    lengths = [len(row) for row in matrix]
+    if lengths != [size] * size:
+        rows = ", ".join(map(str, lengths))
+        return (
+            f"found {len(lengths)} rows of {rows} numbers, expected {size} rows of {size}, as there"
+            f" are {size} coordinates; complete the matrix"
+        )
+    values = np.array(matrix, dtype=np.float64)
+    for i, j in np.argwhere(~(np.abs(values) <= 1.0)).tolist():
+        return (
+            f"found {matrix[i][j]:g} for {names[i]} and {names[j]}, expected a number from -1 to 1;"
+            " correct it"
+        )
+    for k in range(size):
+        if values[k, k] != 1.0:
+            return (
+                f"found {matrix[k][k]:g} on the diagonal for {names[k]}, expected 1; give"
+                " correlations, not covariances"
+            )
+    for i, j in np.argwhere(values != values.T).tolist():
+        return (
+            f"found {matrix[i][j]:g} for {names[i]} and {names[j]}, but {matrix[j][i]:g} for"
+            f" {names[j]} and {names[i]}, expected a symmetric matrix; correct one"
+        )
+    least = float(np.linalg.eigvalsh(values)[0])
+    if least < -DIGITS:
+        return (
+            f"found the eigenvalue {least:.3g}, expected a positive semidefinite matrix, as all"
+            " correlations of data are; bring the numbers closer to zero"
+        )
+    return ""
+
+
+# Samplings of a Monte Carlo study: points of the unit cube, by seed and block. Random points and
+# points of a Sobol sequence do not depend on their number: a longer series begins with the same
+# points. The points of a Latin hypercube do depend on it: each coordinate has one point in every
+# interval of length 1 / count. The order of its intervals is kept in memory: four bytes for each
+# point and coordinate.
+
+DRAWN = 256
+"""Number of variants drawn together. It is no setting: another number gives a seed other variants.
+"""
+# Binary digits of a Sobol point: the largest number with which scipy can skip points.
+BITS = 32
+# Largest table of a Latin hypercube [bytes].
+LATIN_BYTES = 1_000_000_000
+# Half a step of numbers with 52 binary digits: no point is 0 or 1, as a normal distribution has no
+# quantiles there.
+MIDDLE = 2.0**-53
+
+
+class Stream(IntEnum):
+    """Purpose of random numbers; each purpose has its own generators."""
+
+    GEOMETRY = 0
+    SUBSET = 1
+    LATIN = 2
+    SOBOL = 3
+
+
+def generator(seed: int, place: int, stream: Stream) -> np.random.Generator:
+    """Return the Philox generator of a draw of a stream, seeded by a child of the study's seed."""
+    return np.random.Generator(
+        np.random.Philox(np.random.SeedSequence(seed, spawn_key=(place, int(stream))))
+    )
+
+
+def points(sampling: Sampling, seed: int, block: int, coordinates: int, count: int) -> Array:
+    """Return all points of a block in the unit cube, shape (coordinates, DRAWN).
+
+    Args:
+        count: number of all points of a Latin hypercube; later points of a block have no meaning.
+    """
+    if sampling is Sampling.SOBOL:
+        found = _sobol(seed, coordinates).block(block)
+    else:
+        found = generator(seed, block, Stream.GEOMETRY).random((coordinates, DRAWN))
+    if sampling is Sampling.LATIN:
+        intervals = _orders(seed, coordinates, count)[:, block * DRAWN : (block + 1) * DRAWN]
+        some = slice(0, intervals.shape[1])
+        found[:, some] = (intervals + found[:, some]) / count
+    cells = 2.0**52
+    return np.minimum(np.floor(found * cells), cells - 1.0) / cells + MIDDLE
+
+
+def check_count(sampling: Sampling, coordinates: int, count: int) -> None:
+    """Raise KincheckError if a sampling cannot have as many points."""
+    if sampling is Sampling.SOBOL and count > 2**BITS:
+        raise KincheckError(
+            f"--sampling sobol: {count} variants, expected at most {2**BITS}; take fewer, or"
+            " --sampling random"
+        )
+    size = 4 * coordinates * count
+    if sampling is Sampling.LATIN and size > LATIN_BYTES:
+        raise KincheckError(
+            f"--sampling latin: the orders of {count} variants and {coordinates} coordinates take"
+            f" {size / 1e9:.3g} GB of memory, expected at most {LATIN_BYTES / 1e9:g}; take fewer"
+            " variants, or --sampling sobol, which needs none"
+        )
+
+
+class _Sobol:
+    """A scrambled Sobol sequence with a current position, for one thread."""
+
+    def __init__(self, seed: int, coordinates: int) -> None:
+        from scipy.stats import qmc  # pyright: ignore[reportMissingTypeStubs]
+
+        make: Any = qmc.Sobol
+        random = generator(seed, 0, Stream.SOBOL)
+        self._engine = make(coordinates, scramble=True, bits=BITS, seed=random)
+
+    def block(self, index: int) -> Array:
+        """Return the points of a block, shape (coordinates, DRAWN)."""
+        first = index * DRAWN
+        if first < self._engine.num_generated:
+            self._engine.reset()
+        if ahead := first - self._engine.num_generated:
+            self._engine.fast_forward(ahead)
+        return np.ascontiguousarray(self._engine.random(DRAWN).T)
+
+
+@keep_last(2, per_thread=True)
+def _sobol(seed: int, coordinates: int) -> _Sobol:
+    return _Sobol(seed, coordinates)
+
+
+_lock = Lock()
+
+
+def _orders(seed: int, coordinates: int, count: int) -> NDArray[np.uint32]:
+    with _lock:  # one table for all threads
+        return _orders_of(seed, coordinates, count)
+
+
+@lru_cache(maxsize=1)
+def _orders_of(seed: int, coordinates: int, count: int) -> NDArray[np.uint32]:
+    """Return the interval of each point, shape (coordinates, count): a permutation of each row.
+
+    `scipy.stats.qmc.LatinHypercube` does the same, but holds all points at once, and takes twenty
+    times as long.
+    """
+    found = np.empty((coordinates, count), dtype=np.uint32)
+    for row, each in enumerate(found):
+        each[:] = np.arange(count, dtype=np.uint32)
+        generator(seed, row, Stream.LATIN).shuffle(each)
+    return found
+
+
+@dataclass(frozen=True)
+class FileUnits:
+    """Names of the units of a study's outputs, for their display and limits."""
+
+    length: str = "m"
+    angle: str = "rad"
+
+
+SI = FileUnits()
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Limits of an output, or of its derivative by time, at every sample.
+
+    Attributes:
+        output: name of the output; with the suffix of a derivative, as in camber.velocity.
+        low, high: smallest and largest value [SI unit of the output]; infinite without a limit.
+    """
+
+    output: str
+    low: float = -math.inf
+    high: float = math.inf
 
 
 @dataclass(frozen=True)

@@ -3,28 +3,304 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
-from ...case.case import Case
-from ...case.io.document import fault, join, shown
-from ...case.io.typed_tables import read_tables, typed
-from ...errors import unknown
+from ...case.case import Case, Quantity
+from ...case.io.document import decimal, fault, join, read_tables, shown, typed
+from ...case.units import ANGLES, LENGTHS, RADIAN, in_units
+from ...errors import KincheckError, remedy, unknown
 from ...joints import Kind
-from ...mechanism.drivers import PointCoordinate
-from ...trajectory import Array
-from .coordinate_reader import CoordinateReader
-from .correlations import Correlation, problem_of
-from .file_units import FileUnits, unit_of_offsets
-from .limits import read_limits
-from .modes import Mode
-from .places import Geometry, PlaceError, Variable
-from .variation import Coordinate, Variation
-from .variation_schema import SCHEMA, CorrelationKeys, HardpointKeys, LineKeys, VaryKeys, VaryUnits
+from ...mechanism.body import ANGLE, LENGTH, Dimension
+from ...mechanism.motions import PointCoordinate
+from ...trajectory import PER_TIME, QUANTITIES, Array
+from .study_choices import Mode
+from .variation import Coordinate, Correlation, FileUnits, Law, Limit, Variation, problem_of
+from .variation_schema import (
+    SCHEMA,
+    CorrelationKeys,
+    HardpointKeys,
+    LimitKeys,
+    LineKeys,
+    VaryKeys,
+    VaryUnits,
+)
+from .varied_places import Geometry, PlaceError, Variable
+
+
+def unit_of_offsets(
+    file: Path, key: str, units: VaryUnits, kind: Kind, dimension: Dimension | None
+) -> tuple[str, float]:
+    """Return the SI unit of the offsets of a place, and the file's unit in this unit.
+
+    Raises:
+        CaseError: the file names no unit of length, and needs one.
+    """
+    needed = ANGLE if kind is Kind.DIRECTION else dimension or LENGTH
+    if needed.length and units.length is None:
+        raise fault(
+            file,
+            "units.length",
+            f'missing, expected "m" or "mm" for {key}; say which unit it is in',
+        )
+    length = LENGTHS[units.length or "m"]
+    angle = RADIAN if units.angle is None else ANGLES[units.angle]
+    size = angle.power(length.power(1.0, needed.length), needed.angle)
+    return str(needed), size
+
+
+_EXPECTED = "expected OUTPUT:LOW:HIGH, one number of which may be missing, such as camber:-1.5:1.5"
+
+
+def read_limits(
+    file: Path, tables: Mapping[str, Any], case: Case, units: FileUnits
+) -> tuple[Limit, ...]:
+    """Return the limits of a variation file.
+
+    Raises:
+        CaseError: there is no such output, or the limits make no sense.
+    """
+    found: list[Limit] = []
+    for name, table in tables.items():
+        key = join("limits", name)
+        keys = typed(file, key, table, LimitKeys)
+        try:
+            found.append(limit_of(case, units, name, keys.low, keys.high))
+        except ValueError as error:
+            raise fault(file, key, str(error)) from None
+    return tuple(found)
+
+
+def limits_of_texts(texts: Iterable[str], case: Case, units: FileUnits) -> tuple[Limit, ...]:
+    """Return the limits in texts OUTPUT:LOW:HIGH, in the units of a variation file.
+
+    Raises:
+        KincheckError: a text has another form, there is no such output, or the limits make no
+            sense.
+    """
+    found: list[Limit] = []
+    for text in texts:
+        name, *numbers = text.rsplit(":", 2)
+        try:
+            low, high = (decimal(each) if each.strip() else None for each in numbers)
+        except ValueError:
+            raise KincheckError(f"--limit: found {text!r}, {_EXPECTED}; correct it") from None
+        try:
+            found.append(limit_of(case, units, name, low, high))
+        except ValueError as error:
+            raise KincheckError(f"--limit {text}: {error}") from None
+    return tuple(found)
+
+
+def limit_of(
+    case: Case, units: FileUnits, name: str, low: float | None, high: float | None
+) -> Limit:
+    """Return the limits of an output, converted to SI.
+
+    Raises:
+        ValueError: there is no such output, or the limits make no sense.
+    """
+    output, derivative = _found(case, name)
+    unit = output.unit + PER_TIME[derivative]
+    _, size = in_units(unit, LENGTHS[units.length], ANGLES[units.angle])
+    numbers = [each for each in (low, high) if each is not None]
+    if not numbers:
+        raise ValueError("found neither low nor high, expected one limit at least; give one")
+    if not all(map(math.isfinite, numbers)):
+        raise ValueError(f"found {numbers}, expected finite numbers; leave out what has no limit")
+    if len(numbers) == 2 and numbers[0] >= numbers[1]:
+        raise ValueError(
+            f"found low = {numbers[0]:g} and high = {numbers[1]:g}, expected low below high;"
+            " correct them"
+        )
+    return Limit(
+        name,
+        -math.inf if low is None else size * low,
+        math.inf if high is None else size * high,
+    )
+
+
+def _found(case: Case, name: str) -> tuple[Quantity, int]:
+    """Return the output and the order of the time derivative of a name."""
+    known = {output.name: output for output in case.outputs}
+    base, _, quantity = name.rpartition(".")
+    derivative = QUANTITIES.index(quantity) if quantity in QUANTITIES[1:] else 0
+    if name in known:
+        return known[name], 0
+    if not derivative or base not in known:
+        raise ValueError(f"there is no output {name!r} of the case; {remedy(name, known)}")
+    output = known[base]
+    if derivative >= output.orders:
+        raise ValueError(f"output {base!r} has no {quantity}; limit its value")
+    return output, derivative
+
+
+# A normal offset exceeds this number of standard deviations about once in a thousand million draws.
+FARTHEST = 6.0
+
+_BOTH = frozenset(("sigma", "half_width"))
+_DRAWN: Mapping[str | None, Sequence[frozenset[str]]] = {
+    None: (frozenset({"sigma"}), frozenset({"half_width"})),
+    Law.NORMAL: (frozenset({"sigma"}),),
+    Law.UNIFORM: (frozenset({"half_width"}),),
+    Law.TRUNCATED_NORMAL: (_BOTH,),
+    Law.TRIANGULAR: (frozenset({"half_width"}),),
+}
+_LISTED: Mapping[Mode, Sequence[frozenset[str]]] = {
+    Mode.GRID: (frozenset({"values"}), frozenset({"half_width", "steps"})),
+    Mode.ONE_AT_A_TIME: tuple(
+        map(frozenset, ({"values"}, {"half_width"}, {"half_width", "steps"}, {"sigma"}))
+    ),
+}
+
+
+@dataclass(frozen=True)
+class CoordinateReader:
+    """Reads the coordinates of a hardpoint.
+
+    Attributes:
+        key: key of the hardpoint in the file.
+        name: name of the hardpoint.
+        unit, scale: SI unit of the offsets, and the file's unit in this unit.
+    """
+
+    file: Path
+    key: str
+    name: str
+    mode: Mode
+    unit: str
+    scale: float
+
+    def read(self, keys: HardpointKeys, count: int) -> list[tuple[int, Coordinate]]:
+        """Return the varied coordinates, each with its index in the hardpoint.
+
+        Args:
+            count: number of coordinates: one, or three for a position or direction.
+
+        Raises:
+            CaseError: keys are missing or superfluous, or a value makes no sense.
+        """
+        self._check_keys(keys)
+        axes = ("",) if count == 1 else ("x", "y", "z")
+        if keys.values is not None:
+            lists = self._lists(keys.values, count)
+            return [
+                each
+                for row, offsets in enumerate(lists)
+                for each in self._listed(row, axes[row], [self.scale * x for x in offsets])
+            ]
+        sigma, half_width = self._sizes(keys.sigma, count), self._sizes(keys.half_width, count)
+        law = Law.UNIFORM if keys.sigma is None else Law.NORMAL
+        if keys.distribution is not None:
+            law = Law(keys.distribution)
+        found: list[tuple[int, Coordinate]] = []
+        for row, axis in enumerate(axes):
+            sizes = [self.scale * each[row] for each in (sigma, half_width) if each]
+            if 0.0 in sizes:
+                continue
+            if self.mode is Mode.MONTE_CARLO:
+                bound = sizes[1] if law is Law.TRUNCATED_NORMAL else 0.0
+                each = Coordinate(self.name, axis, self.unit, law, sizes[0], bound=bound)
+                found.append((row, each))
+            else:
+                steps = sizes[0] * np.linspace(-1.0, 1.0, keys.steps or 2)
+                found += self._listed(row, axis, steps.tolist())
+        return found
+
+    def require_physical(self, value: float, each: Coordinate, dimension: Dimension) -> None:
+        """Raise CaseError if a mass or another size of a load may become negative.
+
+        Args:
+            value: value at the nominal design [SI].
+        """
+        if each.law is Law.VALUES:
+            lowest = min(each.values)
+        else:
+            lowest = -(FARTHEST if each.law is Law.NORMAL else 1.0) * (each.bound or each.scale)
+        if dimension is ANGLE or value + lowest >= 0.0:
+            return
+        remedy = "vary it less"
+        if each.law is Law.NORMAL:
+            remedy += ', or give distribution = "truncated_normal" with a half_width'
+        raise self._fault(
+            f"found offsets down to {lowest:g} {self.unit} from {value:g} {self.unit}, expected"
+            f" zero or more of every variant; {remedy}"
+        )
+
+    def _check_keys(self, keys: HardpointKeys) -> None:
+        given = frozenset(
+            each
+            for each in ("sigma", "half_width", "values", "steps")
+            if getattr(keys, each) is not None
+        )
+        if keys.distribution is not None and self.mode is not Mode.MONTE_CARLO:
+            raise fault(
+                self.file,
+                join(self.key, "distribution"),
+                f"found {shown(keys.distribution)}, expected none, for {self.mode} draws"
+                " nothing; leave it out",
+            )
+        takes = _LISTED.get(self.mode) or _DRAWN[keys.distribution]
+        if given in takes:
+            return
+        there = " and ".join(sorted(given)) or "none of them"
+        choices = ", or ".join(" and ".join(sorted(each)) for each in takes)
+        what = self.mode if keys.distribution is None else f"distribution {keys.distribution}"
+        if keys.distribution is None and given == _BOTH:
+            choices += ', or both with distribution = "truncated_normal"'
+        raise self._fault(f"found {there}, expected for {what}: {choices}; correct the keys")
+
+    def _sizes(self, given: float | list[float] | None, count: int) -> list[float]:
+        """Return the size of the offsets of each coordinate; empty if the file gives none."""
+        if given is None:
+            return []
+        if not isinstance(given, list):
+            return [given] * count
+        if count == 1:
+            raise self._fault(
+                f"found {shown(given)}, expected one number, for it is {self._single}; give one"
+            )
+        return given
+
+    def _listed(self, row: int, axis: str, values: Sequence[float]) -> list[tuple[int, Coordinate]]:
+        """Return the coordinate with its values.
+
+        One at a time, the values omit zero: it is the nominal design.
+        """
+        if self.mode is Mode.ONE_AT_A_TIME:
+            values = [value for value in values if value]
+        if not any(values):
+            return []
+        largest = max(map(abs, values))
+        return [(row, Coordinate(self.name, axis, self.unit, Law.VALUES, largest, tuple(values)))]
+
+    def _lists(self, given: list[float | list[float]], count: int) -> list[list[float]]:
+        """Return the offsets of each coordinate: one list for all, or a list for each."""
+        key = join(self.key, "values")
+        flat: list[float] = [each for each in given if not isinstance(each, list)]
+        lists = [each for each in given if isinstance(each, list)]
+        found: list[list[float]] = [flat] * count if len(flat) == len(given) else lists
+        if len(found) != count or (flat and lists) or not all(found):
+            expected = "a list of offsets" + (
+                ", or three of them" if count == 3 else f", for it is {self._single}"
+            )
+            what = f"found {shown(given)}, expected {expected}"
+            raise fault(self.file, key, f"{what}; correct the lists")
+        if any(len(set(each)) < len(each) for each in found):
+            raise fault(self.file, key, "found an offset twice, expected each once; remove one")
+        return found
+
+    @property
+    def _single(self) -> str:
+        return "a length" if self.unit == "m" else "a number"
+
+    def _fault(self, problem: str) -> Exception:
+        return fault(self.file, self.key, problem)
+
 
 _Named = TypeVar("_Named")
 
@@ -81,7 +357,9 @@ class _Reader:
             self._line(join("lines", name), table, moves)
         self._check_drivers(moves)
         values = self.geometry.values
-        units = FileUnits.of(self.units, self.case)
+        units = FileUnits(
+            self.units.length or self.case.length_unit, self.units.angle or self.case.angle_unit
+        )
         return Variation(
             self.keys.mode,
             tuple(coordinates),

@@ -58,7 +58,7 @@ from typing import Annotated, Any, Literal
 import msgspec
 from msgspec import Meta
 
-from .modes import Mode
+from .study_choices import Mode
 
 SCHEMA = "kincheck-vary/1"
 MOST_STEPS = 10_000
@@ -153,7 +153,7 @@ class CorrelationKeys(msgspec.Struct, forbid_unknown_fields=True):
 
 def variation_schema() -> dict[str, Any]:
     """Return the schema of variation files."""
-    from ...case.io.json_schema import document_schema
+    from ...case.io.catalogue import document_schema
 
     tables = {
         "hardpoints": HardpointKeys,

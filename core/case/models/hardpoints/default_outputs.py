@@ -1,129 +1,158 @@
-"""Suspension outputs of a case of hardpoints: all outputs defined by its points and template."""
+"""Vehicle and suspension outputs of a case of hardpoints: all outputs defined by its points, its
+template and the options; and the rows of its table as hardpoints of the case.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
-from ....algebra import vec
-from ....mechanism.mechanism import Vector
-from ...case import Case, Quantity, size
-from ...io.coordinates import with_all_coordinates
-from ...io.document import fault
-from ...io.suspension import with_slopes
-from ...io.tolerance import default
-from ...quantity import with_markers
-from ...suspension import Convention, Side, SuspensionOutput, Vehicle
-from ...suspension.vehicle import MARKER_DISTANCE
-from ...suspension.wheel import Place
-from .axle import STROKE, AxleMotion, name_of
-from .car import Car, read_length
-from .table import HardpointTable
-from .templates.base import (
-    WHEEL_AXIS,
-    WHEEL_CENTER,
-    WHEEL_CONTACT,
-    Template,
-    prefixed,
-)
+import numpy as np
 
-WHEEL = ("toe", "camber")
-STEERING_AXIS = ("caster", "kingpin_inclination")
-ON_THE_ROAD = ("roll_center_height",)
-AXIS_ON_THE_ROAD = ("scrub_radius", "mechanical_trail")
+from ....algebra import vec
+from ....dual_numbers import Slope, derivatives
+from ....kinematics import places
+from ....mechanism.mechanism import Mechanism, Vector
+from ...case import Case, Hardpoint, Quantity, size
+from ...io.document import decimal, fault, shown, unknown_name
+from ...io.outputs import default, with_all_coordinates, with_slopes
+from ...io.reader_options import Supplied
+from ...quantity import with_markers
+from ...suspension import Axle, Convention, Side, SuspensionOutput, Vehicle
+from ...suspension.corner import MARKER_DISTANCE
+from ...suspension.wheel import Place
+from .axle import STROKE, AxleMotion
+from .table import Axes, HardpointTable
+from .templates import WHEEL_AXIS, WHEEL_CENTER, WHEEL_CONTACT, Template
+
+ON_THE_ROAD = ("scrub_radius", "mechanical_trail")
 AXLE = ("track", "roll_angle", "axle_roll_center_height", "axle_roll_center_offset")
-ACKERMANN = ("ackermann",)
 RADII = (0.02, 3.0)
 """Radii of wheels [m], from model cars to haulage trucks."""
 
 
-@dataclass(frozen=True)
-class Wheel:
-    """The wheel of a table of hardpoints.
-
-    Attributes:
-        radius: distance from the centre to the road in the wheel plane [m]; None if unknown.
-        toe, camber: angles at design, unless a point gives the axis of rotation [rad].
-        by_points: whether points give the axis and the radius.
-    """
-
-    radius: float | None
-    toe: float
-    camber: float
-    by_points: tuple[bool, bool]
-
-
-def wheel_of(
+def vehicle_of(
     table: HardpointTable,
+    template: Template,
     named: Mapping[str, str],
     at: Mapping[str, Vector],
-    radius: str | None,
-) -> Wheel:
-    """Return the wheel; its radius and axis follow from points if the table has them.
+    supplied: Supplied,
+) -> Vehicle:
+    """Return the vehicle around the left wheel; the wheel's radius and axis follow from points if
+    the table has them.
 
     Args:
         named: names of the points in the file, by role.
         at: positions by role [m].
-        radius: the radius from the user [m].
 
     Raises:
-        CaseError: a length is unusable or contradicts the points, or the axis points inboard.
+        CaseError: a length is unusable or contradicts the points, the axis points inboard, or an
+            option is not a length, a share, or an axle.
     """
-    center = at[WHEEL_CENTER.name]
-    if WHEEL_AXIS.name in at and at[WHEEL_AXIS.name][1] <= center[1]:
+    file, center = table.file, at[WHEEL_CENTER]
+    axis, contact, radius = at.get(WHEEL_AXIS), at.get(WHEEL_CONTACT), supplied.wheel_radius
+    if axis is not None and axis[1] <= center[1]:
         raise fault(
-            table.file,
-            named[WHEEL_AXIS.name],
-            f"found a point inboard of {named[WHEEL_CENTER.name]}, expected one outboard;"
+            file,
+            named[WHEEL_AXIS],
+            f"found a point inboard of {named[WHEEL_CENTER]}, expected one outboard;"
             " mirror it at the wheel's centre",
         )
-    contact = at.get(WHEEL_CONTACT.name)
-    measured = None if contact is None else math.dist(center, contact)
-    if radius is not None and measured is not None:
+    if contact is not None and radius is not None:
         raise fault(
-            table.file,
+            file,
             "--wheel-radius",
-            f"found {radius}, and the point {named[WHEEL_CONTACT.name]}, expected one of them;"
+            f"found {radius}, and the point {named[WHEEL_CONTACT]}, expected one of them;"
             " leave out --wheel-radius",
         )
-    given = read_length(table.file, "wheel-radius", radius) if measured is None else measured
-    if given is not None and not RADII[0] <= given <= RADII[1]:
-        where = "--wheel-radius" if measured is None else named[WHEEL_CONTACT.name]
+    size = math.dist(center, contact) if contact else _length(file, "wheel-radius", radius)
+    if size is not None and not RADII[0] <= size <= RADII[1]:
         raise fault(
-            table.file,
-            where,
-            f"found a wheel's radius of {given:.6g} m, expected {RADII[0]:g} to {RADII[1]:g} m;"
+            file,
+            named[WHEEL_CONTACT] if contact else "--wheel-radius",
+            f"found a wheel's radius of {size:.6g} m, expected {RADII[0]:g} to {RADII[1]:g} m;"
             " correct it",
         )
-    by_points = WHEEL_AXIS.name in at, contact is not None
-    toe, camber = (0.0, 0.0) if by_points[0] else (table.static_toe, table.static_camber)
-    return Wheel(given, toe, camber, by_points)
+    position = supplied.position
+    if position is not None and position not in list(Axle):
+        raise unknown_name(file, "--position", position, [*Axle], "an axle")
+    return Vehicle(
+        convention=Convention.ISO_8855,
+        side=Side.LEFT,
+        forward=(1.0, 0.0, 0.0),
+        up=(0.0, 0.0, 1.0),
+        wheel_center=WHEEL_CENTER,
+        static_toe=0.0 if axis else table.static_toe,
+        static_camber=0.0 if axis else table.static_camber,
+        wheel_axis=WHEEL_AXIS if axis else None,
+        wheel_radius=size,
+        wheel_contact=WHEEL_CONTACT if contact else None,
+        axle=None if position is None else Axle(position),
+        wheelbase=_length(file, "wheelbase", supplied.wheelbase),
+        cg_height=_length(file, "cg-height", supplied.cg_height),
+        brake_share=_share(file, "brake-share", supplied.brake_share),
+        drive_share=_share(file, "drive-share", supplied.drive_share),
+        kingpin=template.kingpin or None,
+    )
+
+
+def _length(file: Path, option: str, text: str | None) -> float | None:
+    """Return the length stated by an option [m]."""
+    if text is None:
+        return None
+    try:
+        found = decimal(text)
+    except ValueError:
+        raise fault(
+            file,
+            f"--{option}",
+            f"found {shown(text)}, expected metres; say --{option} 0.3",
+        ) from None
+    if not 0.0 < found < float("inf"):
+        raise fault(file, f"--{option}", f"found {found:.6g} m, expected a length; correct it")
+    return found
+
+
+def _share(file: Path, option: str, text: str | None) -> float | None:
+    if text is None:
+        return None
+    try:
+        found = decimal(text)
+    except ValueError:
+        found = float("nan")
+    if not 0.0 <= found <= 1.0:
+        raise fault(
+            file,
+            f"--{option}",
+            f"found {shown(text)}, expected the part of a force, 0 to 1; say --{option} 0.6",
+        )
+    return found
 
 
 def far_out(at: Mapping[str, Vector]) -> float:
     """Return the factor from the distance of the given point of the wheel's axis to the distance of
     markers from the wheel's centre: directions then keep all digits of positions.
     """
-    axis = at.get(WHEEL_AXIS.name)
-    return 1.0 if axis is None else MARKER_DISTANCE / math.dist(at[WHEEL_CENTER.name], axis)
+    axis = at.get(WHEEL_AXIS)
+    return 1.0 if axis is None else MARKER_DISTANCE / math.dist(at[WHEEL_CENTER], axis)
 
 
 def with_axis(at: Mapping[str, Vector], far: float) -> Mapping[str, Vector]:
     """Return the positions by role with the point of the wheel's axis so many times as far out."""
-    if WHEEL_AXIS.name not in at:
+    if WHEEL_AXIS not in at:
         return at
-    center = vec(at[WHEEL_CENTER.name])
-    place = center + far * (vec(at[WHEEL_AXIS.name]) - center)
-    return {**at, WHEEL_AXIS.name: (place.x, place.y, place.z)}
+    center = vec(at[WHEEL_CENTER])
+    place = center + far * (vec(at[WHEEL_AXIS]) - center)
+    return {**at, WHEEL_AXIS: (place.x, place.y, place.z)}
 
 
 def with_suspension_outputs(
     case: Case,
     template: Template,
-    wheel: Wheel,
-    car: Car,
+    vehicle: Vehicle,
     at: Mapping[str, Vector],
     motion: str | None,
     *,
@@ -133,33 +162,35 @@ def with_suspension_outputs(
     template's watched points.
 
     Args:
+        vehicle: the vehicle around the left wheel.
         motion: motion of both wheels; None for one wheel.
         steered: whether the rack moves during the wheel's travel.
     """
-    axle = motion is not None
-    extent = size(case)
+    extent, types = size(case), SuspensionOutput.registry
     outputs: list[Quantity] = []
     watched: list[str] = []
-    travel = tuple(name_of(each, STROKE) for each in Side) if axle else (STROKE,) * steered
-    vehicles = [
-        replace(_vehicle(side, template, wheel, car, axle), travel=travel)
-        for side in (Side if axle else [Side.LEFT])
-    ]
-    for vehicle in vehicles:
-        prefix = f"{vehicle.side}_" if axle else ""
-        for name, cls, own in _types(template, wheel, car, at):
-            ends = {key: tuple(prefix + each for each in own[key]) for key in own if key != "at"}
-            given = default(extent, cls.measure)
-            outputs.append(cls(prefix + name, vehicle, *given, **{**own, **ends}))
+
+    def add(name: str, kind: str, wheel: Vehicle, **own: Any) -> None:
+        outputs.append(types[kind](name, wheel, *default(extent, types[kind].measure), **own))
+
+    vehicles = {"": replace(vehicle, travel=(STROKE,) * steered)}
+    if motion is not None:
+        vehicles = {f"{side}_": _on_side(vehicle, side) for side in Side}
+    place = Place.WHEEL_CENTER if vehicle.wheel_radius is None else Place.CONTACT
+    for prefix, wheel in vehicles.items():
+        for kind in _defined(vehicle):
+            add(prefix + kind, kind, wheel)
+        add(f"{prefix}half_track_change", "half_track_change", wheel, at=place)
+        for name, ends in template.springs.items():
+            if all(role in at for role in ends):
+                between = tuple(prefix + role for role in ends)
+                add(prefix + name, "motion_ratio", wheel, between=between)
         watched += [prefix + role for role in template.watched]
-    if axle and wheel.radius is not None:
+    if motion is not None and vehicle.wheel_radius is not None:
+        left, right = vehicles.values()
         turning = steered or motion == AxleMotion.STEER
-        names = [*AXLE, *(ACKERMANN if car.wheelbase and turning else ())]
-        for name in names:
-            cls = SuspensionOutput.registry[name]
-            given = default(extent, cls.measure)
-            beside: Mapping[str, Any] = {"other": vehicles[1]}
-            outputs.append(cls(name, vehicles[0], *given, **beside))
+        for kind in (*AXLE, *["ackermann"] * bool(vehicle.wheelbase and turning)):
+            add(kind, kind, left, other=right)
     outputs += with_all_coordinates(case, watched).outputs
     return replace(
         case,
@@ -168,43 +199,87 @@ def with_suspension_outputs(
     )
 
 
-def _vehicle(side: Side, template: Template, wheel: Wheel, car: Car, axle: bool) -> Vehicle:
-    """Return the vehicle with the wheel of a side."""
-    prefix, (axis, contact) = f"{side}_" if axle else "", wheel.by_points
-    return Vehicle(
-        convention=Convention.ISO_8855,
+def _on_side(vehicle: Vehicle, side: Side) -> Vehicle:
+    """Return the vehicle with the names of a side of an axle."""
+    prefix = f"{side}_"
+    kingpin: Any = tuple(
+        prefix + each if isinstance(each, str) else tuple(prefix + end for end in each)
+        for each in vehicle.kingpin or ()
+    )
+    return replace(
+        vehicle,
         side=side,
-        forward=(1.0, 0.0, 0.0),
-        up=(0.0, 0.0, 1.0),
-        wheel_center=prefix + WHEEL_CENTER.name,
-        static_toe=wheel.toe,
-        static_camber=wheel.camber,
-        wheel_axis=prefix + WHEEL_AXIS.name if axis else None,
-        wheel_radius=wheel.radius,
-        wheel_contact=prefix + WHEEL_CONTACT.name if contact else None,
-        axle=car.position,
-        wheelbase=car.wheelbase,
-        cg_height=car.cg_height,
-        brake_share=car.brake_share,
-        drive_share=car.drive_share,
-        kingpin=prefixed(prefix, template.kingpin),
+        wheel_center=prefix + vehicle.wheel_center,
+        wheel_axis=vehicle.wheel_axis and prefix + vehicle.wheel_axis,
+        wheel_contact=vehicle.wheel_contact and prefix + vehicle.wheel_contact,
+        kingpin=kingpin or None,
+        travel=tuple(f"{each}_{STROKE}" for each in Side),
     )
 
 
-def _types(
-    template: Template, wheel: Wheel, car: Car, at: Mapping[str, Vector]
-) -> Iterator[tuple[str, type[SuspensionOutput], Mapping[str, Any]]]:
-    """Yield name, class and own fields of each defined output."""
-    types = [*WHEEL]
-    if template.kingpin:
-        types += STEERING_AXIS
-    if wheel.radius is not None:
-        types += [*ON_THE_ROAD, *(AXIS_ON_THE_ROAD if template.kingpin else ())]
-        types += car.anti_outputs
-    for name in types:
-        yield name, SuspensionOutput.registry[name], {}
-    place = Place.WHEEL_CENTER if wheel.radius is None else Place.CONTACT
-    yield "half_track_change", SuspensionOutput.registry["half_track_change"], {"at": place}
-    for name, ends in template.springs.items():
-        if all(role in at for role in ends):
-            yield name, SuspensionOutput.registry["motion_ratio"], {"between": ends}
+def _defined(vehicle: Vehicle) -> Iterator[str]:
+    """Yield the types of the outputs of a wheel that the data of its vehicle define."""
+    yield from ("toe", "camber")
+    if vehicle.kingpin:
+        yield from ("caster", "kingpin_inclination")
+    if vehicle.wheel_radius is None:
+        return
+    yield "roll_center_height"
+    if vehicle.kingpin:
+        yield from ON_THE_ROAD
+    if vehicle.axle is None:
+        return
+    yield "wheelbase_change"
+    if vehicle.wheelbase is None or vehicle.cg_height is None:
+        return
+    if vehicle.brake_share is not None:
+        yield "anti_dive" if vehicle.axle is Axle.FRONT else "anti_lift"
+    if vehicle.drive_share is not None and vehicle.axle is Axle.REAR:
+        yield "anti_squat"
+
+
+def hardpoints_of(
+    named: Mapping[str, str],
+    at: Mapping[str, Vector],
+    axes: Axes,
+    mechanism_at: Callable[[Mapping[str, Vector]], Mechanism],
+) -> tuple[Hardpoint, ...]:
+    """Return a hardpoint for each row that fills a role.
+
+    The template itself states what follows: its mechanism is made once more, of positions with
+    their derivatives by the coordinates of the rows. Places are linear in positions.
+
+    Args:
+        named: names of the rows by role.
+        at: positions by role [m], axes of the case.
+        axes: of the table.
+        mechanism_at: makes the mechanism from positions by role.
+    """
+    rows = list(dict.fromkeys(named.values()))
+    by_table = np.zeros((len(rows), 3, 3 * len(rows)))
+    for row, seeds in enumerate(by_table):
+        for column, (k, sign) in enumerate(axes):
+            seeds[k, 3 * row + column] = sign
+    moving: dict[str, Any] = {
+        role: tuple(
+            Slope(x, seed) for x, seed in zip(place, by_table[rows.index(named[role])], strict=True)
+        )
+        for role, place in at.items()
+    }
+    found = places(mechanism_at(moving))
+    slopes = {
+        place: np.array([np.broadcast_to(derivatives(x), by_table.shape[2]) for x in value])
+        for place, value in found.items()
+    }
+    return tuple(
+        Hardpoint(
+            name,
+            tuple(role for role, filled in named.items() if filled == name),
+            {
+                place: each[:, 3 * row : 3 * row + 3]
+                for place, each in slopes.items()
+                if each[:, 3 * row : 3 * row + 3].any()
+            },
+        )
+        for row, name in enumerate(rows)
+    )

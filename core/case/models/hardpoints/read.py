@@ -6,7 +6,8 @@ rack move.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,17 +17,22 @@ from ...case import Case, Sweep, Truth
 from ...io.document import explained, fault, parse, read_text, shown, unknown_name
 from ...io.escape import visible
 from ...io.reader_options import LEFT_OUT, Supplied
+from ...notes import SUSPENSIONS
 from ...quantity import with_markers
-from .axle import one_wheel, whole_axle
-from .car import read_car
-from .default_outputs import far_out, wheel_of, with_axis, with_suspension_outputs
-from .followers import hardpoints_of
-from .table import HardpointTable, axes_of, coordinate, placed, require_size, unit_of
-from .templates import TEMPLATES, Template
-from .templates.base import WHEEL_CONTACT, compact, side_of
-from .travels import read_travels
+from ...units import plain
+from .axle import mechanism_of, read_travels
+from .default_outputs import far_out, hardpoints_of, vehicle_of, with_axis, with_suspension_outputs
+from .table import HardpointTable, axes_of, placed, unit_of
+from .templates import (
+    TEMPLATE_NAMES,
+    TEMPLATES,
+    WHEEL_CENTER,
+    WHEEL_CONTACT,
+    Template,
+    compact,
+    side_of,
+)
 
-WHEEL = "wheel_center"
 # Inner joints of a rack near the middle may be a little beyond it. No point of a wheel's suspension
 # is farther beyond the middle than this share of the half track.
 ACROSS = 0.25
@@ -54,38 +60,43 @@ def case_of_hardpoints(table: HardpointTable, supplied: Supplied) -> Case:
             " take out the others",
         )
     template = _template(table, supplied.template)
-    points = placed(table, supplied.units, supplied.axes)
+    unit, axes = unit_of(table, supplied.units), axes_of(table, supplied.axes)
+    points = placed(table, unit, axes)
     named = _filled(table, template, supplied.names)
     at = {role: points[name] for role, name in named.items()}
-    require_size(table, at, supplied.units)
-    wheel = wheel_of(table, named, at, supplied.wheel_radius)
-    car = read_car(file, supplied)
+    size = max(math.dist(a, b) for a in at.values() for b in at.values())
+    if improbable := SUSPENSIONS.improbable(size, unit):
+        problem = f"the points span {improbable} They are in another unit"
+        raise fault(file, "", f"{problem}; correct --units, or the unit in the file")
+    vehicle = vehicle_of(table, template, named, at, supplied)
     travels = read_travels(file, supplied.travel, supplied.rack)
-    _require_left_and_upright(table, template, named, at, supplied)
+
+    def written(role: str, k: int) -> str:
+        column = next(column for column, (axis, _) in enumerate(axes) if axis == k)
+        number = plain(table.points[named[role]].position[column])
+        return f"{'xyz'[column]} = {number} {unit.name}"
+
+    _require_left_and_upright(table, template, named, at, written)
     far = far_out(at)
 
     def design(at: Mapping[str, Vector]) -> tuple[Mechanism, Sweep]:
-        moved = with_axis(at, far)
-        if supplied.axle is None:
-            return one_wheel(file, template, moved, travels)
-        return whole_axle(file, supplied.axle, template, moved, travels)
+        return mechanism_of(file, supplied.axle, template, with_axis(at, far), travels)
 
-    with explained(file, "", unit_of(table, supplied.units)):
+    with explained(file, "", unit):
         mechanism, sweep = design(at)
     others = [*(name for name in points if name not in named.values()), *table.left_out]
     source = (
         f"{table.tool} hardpoints of {file.name} on the template {template.name},"
         f" {'left side' if supplied.axle is None else 'both sides'}, x forward, y left, z up"
     )
-    if wheel.radius is None:
+    if vehicle.wheel_radius is None:
         source += "; without a wheel's radius (--wheel-radius) no outputs at the road"
     source += f"{LEFT_OUT}{_listed(others)}"
     case = Case(file.stem, source, Truth.CONSENSUS_ONLY, mechanism, sweep, ())
-    case = replace(case, length_unit=unit_of(table, supplied.units).name)
+    case = replace(case, length_unit=unit.name)
     case = with_suspension_outputs(
-        case, template, wheel, car, at, supplied.axle, steered=supplied.rack is not None
+        case, template, vehicle, at, supplied.axle, steered=supplied.rack is not None
     )
-    axes = axes_of(table, supplied.axes)
     hardpoints = hardpoints_of(
         named, at, axes, lambda at: with_markers(design(at)[0], case.outputs)
     )
@@ -93,7 +104,7 @@ def case_of_hardpoints(table: HardpointTable, supplied: Supplied) -> Case:
 
 
 def _template(table: HardpointTable, said: str | None) -> Template:
-    known = {compact(name): each for each in TEMPLATES.values() for name in (each.name, *each.also)}
+    known = TEMPLATE_NAMES
     if said is not None and compact(said) not in known:
         raise unknown_name(table.file, "--template", said, TEMPLATES, "a template")
     names = ", ".join(TEMPLATES)
@@ -187,29 +198,29 @@ def _require_left_and_upright(
     template: Template,
     named: Mapping[str, str],
     at: Mapping[str, Vector],
-    supplied: Supplied,
+    written: Callable[[str, int], str],
 ) -> None:
-    """Refuse mirrored points and points upside down: the stated axes are wrong."""
+    """Refuse mirrored points and points upside down: the stated axes are wrong.
 
-    def written(role: str, k: int) -> str:
-        return coordinate(table, named[role], k, supplied.units, supplied.axes)
-
+    Args:
+        written: returns x, y or z (0, 1, 2) of a role as in the file: "y = 750 mm".
+    """
     advice = "correct --axes" if table.axes is None else "correct the points"
-    if at[WHEEL][1] <= 0.0:
+    if at[WHEEL_CENTER][1] <= 0.0:
         raise fault(
             table.file,
-            named[WHEEL],
-            f"found {written(WHEEL, 1)}, not left of the middle, expected the left side; {advice},"
-            " or give the left points; those of the right side are read as left ones if --axes"
-            " says left for right",
+            named[WHEEL_CENTER],
+            f"found {written(WHEEL_CENTER, 1)}, not left of the middle, expected the left side;"
+            f" {advice}, or give the left points; those of the right side are read as left ones if"
+            " --axes says left for right",
         )
-    across = [role for role, (_, y, _) in at.items() if y < -ACROSS * at[WHEEL][1]]
+    across = [role for role, (_, y, _) in at.items() if y < -ACROSS * at[WHEEL_CENTER][1]]
     for role in across[:1]:
         raise fault(
             table.file,
             named[role],
-            f"found {written(role, 1)}, on the other side than {named[WHEEL]} with"
-            f" {written(WHEEL, 1)}, expected all points on one side; correct its sign",
+            f"found {written(role, 1)}, on the other side than {named[WHEEL_CENTER]} with"
+            f" {written(WHEEL_CENTER, 1)}, expected all points on one side; correct its sign",
         )
     arms = [(f"{role.removesuffix('_rear')}_front", role) for role in at if role.endswith("_rear")]
     for front, rear in (*arms, *template.ahead):
@@ -220,7 +231,7 @@ def _require_left_and_upright(
                 f"found {written(front, 0)}, and {named[rear]} with {written(rear, 0)}, expected it"
                 f" in front of that; {advice}",
             )
-    for high, low in (*template.above, (WHEEL, WHEEL_CONTACT.name)):
+    for high, low in (*template.above, (WHEEL_CENTER, WHEEL_CONTACT)):
         if low in at and at[high][2] <= at[low][2]:
             raise fault(
                 table.file,

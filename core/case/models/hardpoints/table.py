@@ -6,17 +6,17 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
 
 from ....errors import CaseError
 from ....mechanism.mechanism import Vector
-from ...io.column_units import UNIT_NAMES
 from ...io.document import decimal, fault, shown, unknown_name, usable
-from ...sizes import SUSPENSIONS
-from ...units import LENGTHS, Unit, plain
+from ...io.table import UNIT_NAMES, numeral
+from ...units import LENGTHS, Unit
 
 _DIRECTIONS: Mapping[str, tuple[int, float]] = {
     "forward": (0, 1.0),
@@ -91,6 +91,32 @@ def twice(file: Path, where: str, name: str, before: str) -> CaseError:
     )
 
 
+def incomplete(file: Path, where: str, name: str, axes: Collection[str]) -> CaseError:
+    """Return the error of a point of which a file gives some coordinates."""
+    missing = " and ".join(axis for axis in "xyz" if axis not in axes)
+    return fault(file, where, f"found {name} without {missing}, expected all three; add it")
+
+
+def one_unit(file: Path, units: Mapping[str, str]) -> str:
+    """Return the only unit; empty without any.
+
+    Args:
+        units: places of coordinates by their unit.
+
+    Raises:
+        CaseError: there are several units.
+    """
+    if len(units) > 1:
+        first, other, *_ = units
+        raise fault(
+            file,
+            units[other],
+            f"found {shown(other)}, and {shown(first)} above, expected one unit; write all"
+            " coordinates in one",
+        )
+    return next(iter(units), "")
+
+
 def require_name(file: Path, where: str, name: str) -> None:
     """Refuse a name of a point that cannot be printed, or none."""
     if not name or not name.isprintable():
@@ -110,15 +136,8 @@ def number(file: Path, where: str, text: object, sign: str = ".") -> float:
     """
     found = math.nan
     if isinstance(text, str | int | float) and not isinstance(text, bool):
-        try:
-            # word processors write the typographic minus sign
-            found = (
-                decimal(text.replace(sign, ".").replace("\u2212", "-"))
-                if isinstance(text, str)
-                else float(text)
-            )
-        except (ValueError, OverflowError):
-            found = math.nan
+        with suppress(ValueError, OverflowError):
+            found = decimal(numeral(text, sign)) if isinstance(text, str) else float(text)
     if not usable(found):
         advice = next((advice for kind, advice in _ADVICE if kind.match(str(text))), "")
         raise fault(
@@ -129,54 +148,27 @@ def number(file: Path, where: str, text: object, sign: str = ".") -> float:
     return found
 
 
-def placed(table: HardpointTable, units: str | None, axes: str | None) -> dict[str, Vector]:
-    """Return the points in metres, x forward, y left, z up.
-
-    Args:
-        units, axes: values from the user, required if the file gives none; they must not contradict
-            the file.
-
-    Raises:
-        CaseError: unit or axes are unknown, or the user contradicts the file.
-    """
-    convert = unit_of(table, units)
-    places = axes_of(table, axes)
+def placed(table: HardpointTable, unit: Unit, axes: Axes) -> dict[str, Vector]:
+    """Return the points in metres, x forward, y left, z up."""
     points: dict[str, Vector] = {}
     for name, point in table.points.items():
         position = [0.0, 0.0, 0.0]
-        for value, (k, sign) in zip(point.position, places, strict=True):
-            place = sign * convert(value)
+        for value, (k, sign) in zip(point.position, axes, strict=True):
+            place = sign * unit(value)
             position[k] = place if usable(place) else 0.0  # too small to be squared
         points[name] = (position[0], position[1], position[2])
     return points
 
 
-def coordinate(
-    table: HardpointTable, name: str, k: int, units: str | None, axes: str | None
-) -> str:
-    """Return the source of a point's x, y or z (0, 1, 2) as text, as in the file: "y = 750 mm"."""
-    column = next(column for column, (axis, _) in enumerate(axes_of(table, axes)) if axis == k)
-    return (
-        f"{'xyz'[column]} = {plain(table.points[name].position[column])}"
-        f" {unit_of(table, units).name}"
-    )
-
-
-def require_size(table: HardpointTable, used: Mapping[str, Vector], units: str | None) -> None:
-    """Refuse points too far apart for a suspension: their unit is wrong."""
-    positions = list(used.values())
-    size = max(math.dist(a, b) for a in positions for b in positions)
-    if found := SUSPENSIONS.improbable(size, unit_of(table, units)):
-        problem = f"the points span {found} They are in another unit"
-        raise fault(table.file, "", f"{problem}; correct --units, or the unit in the file")
-
-
 def unit_of(table: HardpointTable, said: str | None) -> Unit:
-    """Return the unit of the coordinates, for their conversion to SI."""
-    return LENGTHS[_unit(table, said)]
+    """Return the unit of the coordinates, for their conversion to SI.
 
+    Args:
+        said: unit from the user.
 
-def _unit(table: HardpointTable, said: str | None) -> str:
+    Raises:
+        CaseError: it is unknown, or the user contradicts the file.
+    """
     written = None if table.unit is None else length_name(table.unit)
     if written is not None and written not in LENGTHS:
         raise unknown_name(table.file, "unit", table.unit, LENGTHS, "a length")
@@ -188,7 +180,7 @@ def _unit(table: HardpointTable, said: str | None) -> str:
                 "does not say in which unit its coordinates are, expected it from you; add --units"
                 " mm or --units m, or else cm, inch or foot",
             )
-        return written
+        return LENGTHS[written]
     name = length_name(said)
     if name not in LENGTHS:
         raise unknown_name(table.file, "--units", said, LENGTHS, "a length")
@@ -198,7 +190,7 @@ def _unit(table: HardpointTable, said: str | None) -> str:
             "--units",
             f"found {said}, but the file is in {written}; leave out --units, or correct the file",
         )
-    return name
+    return LENGTHS[name]
 
 
 def length_name(text: str) -> str:

@@ -1,8 +1,11 @@
-"""Hardpoints in a tree of names: YAML or JSON files, and assignments of scripts.
+"""Hardpoints in a tree of names: YAML or JSON files, and assignments of scripts and lists of
+parameters, `lca_front = [1, 2, 3]`, `UCA_FL.x = 123.4`. Nothing is evaluated: assignments of
+anything but numbers are left out.
 
 A point is three numbers, `lca_front: [1, 2, 3]`, or one number for each coordinate: keys x, y and z
 below its name, or names with the coordinate at their end, `lca_front_x`. Its name is its path in
-the tree without what all points share, and without a key `left`.
+the tree without what all points share, and without a key `left`. Of the points of a car, those of
+one suspension are read.
 """
 
 from __future__ import annotations
@@ -12,26 +15,64 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, TypeAlias, cast
 
-from ....errors import brief, shortened
+from ....errors import brief, remedy, shortened
 from ....mechanism.mechanism import Vector
-from ...io.document import fault, parse
-from ...io.yaml_document import parse_yaml
+from ...io.document import fault, parse, parse_yaml, shown
+from ...io.table import is_number
 from ...units import LENGTHS
-from .chrono import without_comments
-from .forms import FEWEST, axis_of, is_number
-from .sections import Keys, chosen_points
-from .table import Hardpoint, HardpointTable, is_axes, length_name, number, twice
-from .templates import ROLES, TEMPLATES
-from .templates.base import compact, normal
+from .programs import without_comments
+from .table import (
+    Hardpoint,
+    HardpointTable,
+    incomplete,
+    is_axes,
+    length_name,
+    number,
+    one_unit,
+    twice,
+)
+from .templates import ROLES, TEMPLATE_NAMES, compact, normal
 
+FEWEST = 3
+"""Fewest points, rows or assignments to recognise a form."""
+MOST_LINES = 20_000
+Keys: TypeAlias = tuple[str, ...]
+"""Path of a value: the keys of the tree from its root."""
+
+_AXIS = re.compile(
+    r"(?P<name>.*[^\s_.\-\[(:])(?:[\s_.\-\[(:]+(?P<axis>[xyzXYZ])|(?<=[a-z0-9])(?P<bare>[XYZ]))[\])]?"
+)
+_AXIS_FIRST = re.compile(r"(?P<axis>[xyzXYZ])[\s_.\-:]+(?P<name>.+)")
+_FACT = re.compile(r"#?\s*(unit|axes|template)s?\s*[:=,]+\s*(.+)", re.IGNORECASE)
 _LAST = ("position", "pos", "coordinates", "coords", "coord", "location", "loc", "xyz", "point")
 _NAMES = ("name", "id", "label", "point")
 # Three numbers that are no place.
 _NO_PLACE = re.compile(
     r"axis|(?:.+_)?(?:spin_axis|direction|normal|vector|rotation|orientation|rpy|inertia|euler\w*)"
 )
+_CONTAINERS = ("hardpoints", "hard_points", "hardpoint", "points", "coordinates", "geometry")
+_OF = "axle|suspension|hardpoints|points|geometry|corner|wheel"
+_LEFT = re.compile(r"(?:.+_)?left|[fr]?l|l[fr]")
+_RIGHT = re.compile(r"(?:.+_)?right|[fr]?r|r[fr]")
+_AXLES = [
+    re.compile(rf"{axle}(?:_(?:left|{_OF}))?|(?:{_OF})_{axle}|{axle[0]}l?|l{axle[0]}")
+    for axle in ("front", "rear")
+]
+_NUMBER = r"[-+\u2212]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_ASSIGNED = re.compile(
+    r"\s*(?:(?:const|let|var|static|final|double|set)\s+)*"
+    r"[\"']?([A-Za-z_][\w.\- ]*(?:[\[({][\"']\w+[\"'][\])}])*)[\"']?\s*=(?!=)\s*(.+)"
+)
+_KEY = re.compile(r"""[\[({]["'](\w+)["'][\])}]""")
+_VECTOR = re.compile(
+    rf"(?:[\w.]+\s*\(\s*)?[\[({{]?\s*({_NUMBER})\s*[,;\s]\s*({_NUMBER})\s*[,;\s]\s*({_NUMBER})"
+    r"\s*[\])}]?\s*\)?\s*(?:'|\.T)?\s*[;,]?\s*"
+)
+_SCALAR = re.compile(rf"({_NUMBER})\s*\*?\s*([A-Za-z\"]+)?\s*[;,]?\s*")
+_COMMENT = re.compile(r"\s*(?:%|//|#).*")
+_UNIT = re.compile(r"[\[(]\s*([A-Za-z]+)\s*[\])]")
 
 
 @dataclass(frozen=True)
@@ -41,6 +82,24 @@ class Leaf:
     keys: Keys
     value: Any
     where: str
+
+    @property
+    def triple(self) -> list[Any]:
+        """The three numbers of the value; none if it is another."""
+        value = self.value
+        items = cast("list[Any]", value) if isinstance(value, list) else []
+        return items if len(items) == 3 and all(map(is_number, items)) else []
+
+    @property
+    def coordinate(self) -> tuple[Keys, str] | None:
+        """The path of a point and the coordinate that the value is; None for another value."""
+        if not self.keys or not is_number(self.value):
+            return None
+        *above, last = self.keys
+        if last.strip().lower() in ("x", "y", "z"):
+            return self.keys[:-1], last.strip().lower()
+        split = axis_of(last)
+        return ((*above, split[0]), split[1]) if split else None
 
 
 def read_tree(file: Path, text: str, wanted: str | None) -> HardpointTable:
@@ -53,8 +112,8 @@ def read_tree(file: Path, text: str, wanted: str | None) -> HardpointTable:
         CaseError: no YAML or JSON, no points, or points of several suspensions.
     """
     if file.suffix.lower() == ".json":
-        return table_of(file, "JSON", json_tree(file, without_comments(text)), wanted)
-    return table_of(file, "YAML", [*leaves(parse_yaml(file, text))], wanted)
+        return _table(file, "JSON", json_tree(file, without_comments(text)), wanted)
+    return _table(file, "YAML", [*_leaves(parse_yaml(file, text))], wanted)
 
 
 def json_tree(file: Path, text: str) -> list[Leaf]:
@@ -63,74 +122,127 @@ def json_tree(file: Path, text: str) -> list[Leaf]:
     Raises:
         CaseError: not JSON.
     """
-    if not text.lstrip().startswith("["):
-        return [*leaves(parse(file, text))]
-    return [*leaves(parse(file, f'{{"points": {text}}}'))]
+    listed = text.lstrip().startswith("[")
+    return [*_leaves(parse(file, f'{{"points": {text}}}' if listed else text))]
 
 
 def has_points(tree: Sequence[Leaf]) -> bool:
     """Return whether a tree has values that may be points."""
-    return sum(_is_place(leaf) for leaf in tree) >= FEWEST
+    return sum(bool(leaf.triple or leaf.coordinate) for leaf in tree) >= FEWEST
 
 
-def _is_place(leaf: Leaf) -> bool:
-    if _is_list(leaf.value):
-        items: list[Any] = leaf.value
-        return len(items) == 3 and all(map(is_number, items))
-    return bool(leaf.keys) and is_number(leaf.value) and _coordinate(leaf.keys) is not None
+def axis_of(name: str) -> tuple[str, str] | None:
+    """Return the name of a point and the coordinate in a name such as `lca_front_x`, `UCA_FL.x` or
+    `x_lca_front`; None for another name.
+    """
+    name = name.strip()
+    found = _AXIS.fullmatch(name) or _AXIS_FIRST.fullmatch(name)
+    if found is None:
+        return None
+    parts = found.groupdict()
+    return parts["name"].strip(), (parts["axis"] or parts["bare"]).lower()
 
 
-def leaves(value: Any, keys: Keys = ()) -> Iterator[Leaf]:
-    """Yield the values of a tree; a list of three or more items with a number is one value."""
+def fact_of(text: str) -> tuple[str, str] | None:
+    """Return the fact in a comment or title, `units: mm`: its name and its value; None without."""
+    found = _FACT.fullmatch(text.strip())
+    return (found[1].lower(), found[2].strip()) if found else None
+
+
+def is_assignments(lines: Sequence[tuple[str, str]]) -> bool:
+    """Return whether most lines of a text, without comments, assign something."""
+    assigned = sum(_ASSIGNED.fullmatch(line) is not None for _, line in lines[:MOST_LINES])
+    return assigned >= FEWEST and 2 * assigned >= len(lines[:MOST_LINES])
+
+
+def read_assignments(
+    file: Path, lines: Sequence[tuple[str, str]], facts: dict[str, str], wanted: str | None
+) -> HardpointTable:
+    """Return the points of assignments.
+
+    Args:
+        lines: places and texts of the lines.
+        facts: unit, axes and template, from comments.
+        wanted: section of the names, such as `front` in `front.lca_front`, if several have points.
+
+    Raises:
+        CaseError: no points, several units, or points of several suspensions.
+    """
+    found: list[Leaf] = []
+    left_out: list[str] = []
+    units: dict[str, str] = {}
+    for where, line in lines:
+        assigned = _ASSIGNED.fullmatch(line)
+        if assigned is None:
+            if fact := fact_of(line):
+                facts.setdefault(*fact)
+            elif line.strip():
+                left_out.append(where)
+            continue
+        keys = tuple(each.strip() for each in _KEY.sub(r".\1", assigned[1]).split(".") if each)
+        text, comment = assigned[2], _COMMENT.search(assigned[2])
+        if comment:
+            text = text[: comment.start()]
+        value: Any = text.strip().rstrip(";").strip("\"'")
+        unit = ""
+        if vector := _VECTOR.fullmatch(text):
+            value = [*vector.groups()]
+        elif scalar := _SCALAR.fullmatch(text):
+            unit = scalar[2] or ""
+            if not unit or length_name(unit) in LENGTHS:
+                value = scalar[1]
+        if comment and (stated := _UNIT.search(comment[0])):
+            unit = unit or stated[1]
+        leaf = Leaf(keys or ("",), value, f"{where} ({'.'.join(keys)})")
+        if (isinstance(value, list) or leaf.coordinate) and length_name(unit) in LENGTHS:
+            units.setdefault(length_name(unit), where)
+        found.append(leaf)
+    if unit := one_unit(file, units):
+        if length_name(facts.get("unit", unit)) != unit:
+            problem = f"found {unit}, and {facts['unit']} in a comment, expected one unit"
+            raise fault(file, units[unit], f"{problem}; correct either")
+        facts.setdefault("unit", unit)
+    stated_facts = [Leaf((key,), value, key) for key, value in facts.items()]
+    return _table(file, "Assigned", [*found, *stated_facts], wanted, left_out)
+
+
+def _leaves(value: Any, keys: Keys = ()) -> Iterator[Leaf]:
+    """Yield the values of a tree; a list of numbers or texts is one value."""
     if isinstance(value, Mapping):
-        table = cast("Mapping[str, Any]", value)
-        for key, each in table.items():
-            yield from leaves(each, (*keys, str(key)))
-    elif _is_list(value):
-        items: list[Any] = value
-        if items and not any(isinstance(each, dict | list) for each in items):
-            yield Leaf(keys, items, ".".join(keys))
-            return
+        for key, each in cast("Mapping[str, Any]", value).items():
+            yield from _leaves(each, (*keys, str(key)))
+        return
+    items = cast("list[Any]", value) if isinstance(value, list) else []
+    if isinstance(value, list) and (
+        not items or any(isinstance(each, dict | list) for each in items)
+    ):
         for k, each in enumerate(items):
-            yield from leaves(_unnamed(each), (*keys, _name_of(each) or f"[{k}]"))
+            name, unnamed = _named(each)
+            yield from _leaves(unnamed, (*keys, name or f"[{k}]"))
     else:
         yield Leaf(keys, value, ".".join(keys))
 
 
-def _is_list(value: Any) -> bool:
-    return isinstance(value, list)
-
-
-def _name_of(item: Any) -> str:
-    """Return the name of a point in a list of points; empty if it has none."""
+def _named(item: Any) -> tuple[str, Any]:
+    """Return the name of a point in a list of points, empty if it has none, and the rest of it."""
     if isinstance(item, dict):
         table = cast("dict[str, Any]", item)
-        return next((str(table[key]) for key in table if normal(key) in _NAMES), "")
-    if isinstance(item, list):
-        cells = cast("list[Any]", item)
-        if len(cells) == 4 and isinstance(cells[0], str) and not is_number(cells[0]):
-            return cells[0]
-    return ""
+        names = [str(table[key]) for key in table if normal(key) in _NAMES]
+        rest = {key: each for key, each in table.items() if normal(key) not in _NAMES}
+        return next(iter(names), ""), rest
+    cells = cast("list[Any]", item) if isinstance(item, list) else []
+    if len(cells) == 4 and isinstance(cells[0], str) and not is_number(cells[0]):
+        return cells[0], cells[1:]
+    return "", cast("Any", item)
 
 
-def _unnamed(item: Any) -> Any:
-    """Return a point in a list of points without its name."""
-    if isinstance(item, dict):
-        table = cast("dict[str, Any]", item)
-        return {key: each for key, each in table.items() if normal(key) not in _NAMES}
-    return item[1:] if _name_of(item) else item
-
-
-def table_of(
+def _table(
     file: Path, tool: str, tree: Sequence[Leaf], wanted: str | None, left_out: Sequence[str] = ()
 ) -> HardpointTable:
     """Return the points of a tree.
 
     Args:
         wanted: section of the tree, if several have points.
-
-    Raises:
-        CaseError: no points, points of several suspensions, or a point without a coordinate.
     """
     points, others = _points(file, tree)
     facts = _facts(others)
@@ -141,7 +253,7 @@ def table_of(
             "found no point, expected three numbers such as lca_front: [0.1, 0.3, 0.2], or x, y and"
             " z below a name; give a file of hardpoints (beside a URDF, give the URDF)",
         )
-    chosen, dropped = chosen_points(file, [*points], wanted)
+    chosen, dropped = _of_one_suspension(file, [*points], wanted)
     found: dict[str, Hardpoint] = {}
     for keys, name in chosen.items():
         if name in found:
@@ -149,7 +261,7 @@ def table_of(
         found[name] = points[keys]
     values = {leaf.keys: leaf.value for leaf in others}
     millimetres = length_name(facts.get("unit", "")) == "mm"
-    found |= wheel_points(found, values, millimetres=millimetres)
+    found |= _wheel_points(found, values, millimetres=millimetres)
     listed = [*left_out, *dropped]
     if unused := [leaf.where for leaf in others if leaf.value not in facts.values()]:
         listed.append(f"values {shortened([brief(each) for each in unused], 8)}")
@@ -163,62 +275,39 @@ def _points(file: Path, tree: Sequence[Leaf]) -> tuple[dict[Keys, Hardpoint], li
     points: dict[Keys, Hardpoint] = {}
     single: dict[Keys, dict[str, Leaf]] = {}
     others: list[Leaf] = []
+
+    def add(keys: Keys, where: str, x: float, y: float, z: float) -> None:
+        if keys in points:
+            raise twice(file, where, ".".join(keys), points[keys].where)
+        points[keys] = Hardpoint((x, y, z), where)
+
     for leaf in tree:
-        keys = leaf.keys
-        if _is_list(leaf.value):
-            items: list[Any] = leaf.value
-            last = normal(keys[-1]) if keys else ""
-            if len(items) == 3 and all(map(is_number, items)) and not _NO_PLACE.fullmatch(last):
-                keys = keys[:-1] if last in _LAST and len(keys) > 1 else keys
-                x, y, z = (number(file, leaf.where, each) for each in items)
-                _add(file, points, keys, Hardpoint((x, y, z), leaf.where))
-                continue
-        elif keys and (split := _coordinate(keys)) and is_number(leaf.value):
-            place, axis = split
-            last = normal(place[-1]) if place else ""
-            if place and not _NO_PLACE.fullmatch(last):
-                place = place[:-1] if last in _LAST and len(place) > 1 else place
-                before = single.setdefault(place, {}).setdefault(axis, leaf)
-                if before is not leaf:
-                    raise twice(file, leaf.where, f"{'.'.join(place)} {axis}", before.where)
-                continue
-        others.append(leaf)
+        keys, axis = leaf.coordinate or (leaf.keys if leaf.triple else (), "")
+        last = normal(keys[-1]) if keys else ""
+        if _NO_PLACE.fullmatch(last) or not (keys or leaf.triple):
+            others.append(leaf)
+            continue
+        keys = keys[:-1] if last in _LAST and len(keys) > 1 else keys
+        if leaf.triple:
+            add(keys, leaf.where, *(number(file, leaf.where, each) for each in leaf.triple))
+            continue
+        before = single.setdefault(keys, {}).setdefault(axis, leaf)
+        if before is not leaf:
+            raise twice(file, leaf.where, f"{'.'.join(keys)} {axis}", before.where)
     for keys, found in single.items():
         if len(found) == 3:
-            x, y, z = (number(file, found[axis].where, found[axis].value) for axis in "xyz")
-            _add(file, points, keys, Hardpoint((x, y, z), found["x"].where))
+            values = (number(file, found[axis].where, found[axis].value) for axis in "xyz")
+            add(keys, found["x"].where, *values)
         elif compact(".".join(keys[-2:])) in ROLES or compact(keys[-1]) in ROLES:
-            missing = " and ".join(axis for axis in "xyz" if axis not in found)
-            raise fault(
-                file,
-                next(iter(found.values())).where,
-                f"found {'.'.join(keys)} without {missing}, expected all three; add it",
-            )
+            raise incomplete(file, next(iter(found.values())).where, ".".join(keys), found)
         else:
             others += found.values()
     return points, others
 
 
-def _add(file: Path, points: dict[Keys, Hardpoint], keys: Keys, point: Hardpoint) -> None:
-    if keys in points:
-        raise twice(file, point.where, f"{'.'.join(keys)}", points[keys].where)
-    points[keys] = point
-
-
-def _coordinate(keys: Keys) -> tuple[Keys, str] | None:
-    """Return the path of a point and the coordinate that a path names; None for another path."""
-    if keys[-1].strip().lower() in ("x", "y", "z"):
-        return keys[:-1], keys[-1].strip().lower()
-    split = axis_of(keys[-1])
-    return ((*keys[:-1], split[0]), split[1]) if split else None
-
-
 def _facts(others: Sequence[Leaf]) -> dict[str, str]:
     """Return unit, axes and template, if the tree names them."""
     facts: dict[str, str] = {}
-    templates = {
-        compact(each) for known in TEMPLATES.values() for each in (known.name, *known.also)
-    }
     for leaf in others:
         if not leaf.keys or not isinstance(leaf.value, str):
             continue
@@ -229,15 +318,87 @@ def _facts(others: Sequence[Leaf]) -> dict[str, str]:
         elif key in ("axes", "coordinate_system", "frame", "axis_system") and is_axes(value):
             facts.setdefault("axes", value)
         elif key in ("type", "template", "suspension_type", "suspension") and (
-            compact(value) in templates
+            compact(value) in TEMPLATE_NAMES
         ):
             facts.setdefault("template", value)
     return facts
 
 
-def wheel_points(
+def _of_one_suspension(
+    file: Path, paths: Sequence[Keys], wanted: str | None
+) -> tuple[dict[Keys, str], list[str]]:
+    """Return the names of the points of one suspension by their paths, and what was left out."""
+    left_out: list[str] = []
+    kept = {keys: keys for keys in paths}
+    contained = {
+        keys: (*keys[:k], *keys[k + 1 :])
+        for keys in paths
+        for k in [k for k, key in enumerate(keys[:-1]) if normal(key) in _CONTAINERS][:1]
+    }
+    if contained:
+        outside = [".".join(keys) for keys in paths if keys not in contained]
+        if outside:
+            left_out.append(f"values {shortened(outside, 8)}")
+        kept = contained
+    if wanted is not None:
+        inside = {keys: _below(short, wanted) for keys, short in kept.items()}
+        found = {keys: short for keys, short in inside.items() if short}
+        if not found:
+            known = {".".join(short[:k]) for short in kept.values() for k in range(1, len(short))}
+            raise fault(
+                file,
+                "--sheet",
+                f"found no section {shown(wanted)}, expected one with points;"
+                f" {remedy(wanted, known)}",
+            )
+        if rest := len(kept) - len(found):
+            left_out.append(f"{rest} points of other sections")
+        kept = found
+    sides = {keys: _side(short) for keys, short in kept.items()}
+    right = [keys for keys, side in sides.items() if side is _RIGHT]
+    if right and _LEFT in sides.values():
+        left_out.append(f"{len(right)} points of the right side")
+        kept = {keys: short for keys, short in kept.items() if keys not in right}
+    first, *others = kept.values()
+    most = min(map(len, kept.values())) - 1
+    differ = (k for k in range(most) if any(keys[k] != first[k] for keys in others))
+    shared = next(differ, max(most, 0))
+    kept = {keys: short[shared:] for keys, short in kept.items()}
+    sections = dict.fromkeys(short[0] for short in kept.values() if len(short) > 1)
+    if all(any(axle.fullmatch(normal(each)) for each in sections) for axle in _AXLES):
+        raise fault(
+            file,
+            "",
+            f"found points in {', '.join(map(shown, sections))}, expected those of one suspension;"
+            " choose a section by --sheet NAME",
+        )
+    names = {
+        keys: ".".join(
+            each for k, each in enumerate(short, 1) if k == len(short) or normal(each) != "left"
+        )
+        for keys, short in kept.items()
+    }
+    return names, left_out
+
+
+def _below(keys: Keys, wanted: str) -> Keys:
+    """Return the keys below a section; none if the path is not in it."""
+    for first in range(len(keys) - 1):
+        for last in range(first + 1, len(keys)):
+            if normal(".".join(keys[first:last])) == normal(wanted):
+                return keys[last:]
+    return ()
+
+
+def _side(keys: Keys) -> re.Pattern[str] | None:
+    """Return the pattern of the side that a key above the point's names; None without one."""
+    sides = (side for key in keys[:-1] for side in (_LEFT, _RIGHT) if side.fullmatch(normal(key)))
+    return next(sides, None)
+
+
+def _wheel_points(
     points: Mapping[str, Hardpoint],
-    values: Mapping[tuple[str, ...], object],
+    values: Mapping[Keys, object],
     *,
     millimetres: bool,
 ) -> dict[str, Hardpoint]:
@@ -253,11 +414,9 @@ def wheel_points(
     offset = given.get(("wheel", "offset"))
     if "wheel_center" in at or not {"axle_inboard", "axle_outboard"} <= at.keys():
         return {}
-    if not is_number(offset):
-        return {}
     inner, outer = at["axle_inboard"], at["axle_outboard"]
     length = math.dist(inner, outer)
-    if length == 0.0:
+    if length == 0.0 or not is_number(offset):
         return {}
     axis = [(b - a) / length for a, b in zip(inner, outer, strict=True)]
     center = _moved(outer, axis, -float(str(offset)))
@@ -267,15 +426,13 @@ def wheel_points(
         "wheel_axis": Hardpoint(_moved(center, axis, length), where),
     }
     tire = [given.get(("tire", key)) for key in ("rim_diameter", "aspect_ratio", "section_width")]
-    if millimetres and all(map(is_number, tire)):
+    down = [axis[2] * axis[0], axis[2] * axis[1], axis[2] * axis[2] - 1.0]
+    size = math.hypot(*down)
+    if millimetres and size > 0.0 and all(map(is_number, tire)):
         rim, ratio, width = (float(str(each)) for each in tire)
-        down = [axis[2] * axis[0], axis[2] * axis[1], axis[2] * axis[2] - 1.0]
-        size = math.hypot(*down)
-        if size > 0.0:
-            radius = 0.5 * rim * 25.4 + ratio * width
-            found["wheel_contact"] = Hardpoint(
-                _moved(center, [each / size for each in down], radius), f"{where}, tire"
-            )
+        radius = 0.5 * rim * 25.4 + ratio * width
+        contact = _moved(center, [each / size for each in down], radius)
+        found["wheel_contact"] = Hardpoint(contact, f"{where}, tire")
     return found
 
 

@@ -10,13 +10,11 @@ import numpy as np
 
 from ....algebra import triple
 from ....joints import AxialJoint, Cylindrical, Fixed, Joint, Revolute, Screw, Translational
-from ....mechanism.drivers import Driver, JointAngle, JointDisplacement
 from ....mechanism.mechanism import GROUND, Body, Mechanism, Point
-from ....mechanism.motions import Motion, Ramp, Sine
-from ..truth.evaluation import Poses
-from ..truth.long_double import PI, Real, extended, unit
-from ..truth.reference_motion import Motion as Closed
-from ..truth.reference_motion import closed
+from ....mechanism.motions import Driver, JointAngle, JointDisplacement, Motion, Ramp, Sine
+from ...truth.motion import Motion as Closed
+from ...truth.motion import closed
+from ...truth.rows import PI, Poses, Real, extended, unit
 from .base import Family, Rng, Specimen, as_case, bodies, direction
 
 KINDS: Sequence[type[Joint]] = (Revolute, Revolute, Translational, Cylindrical, Screw, Fixed)

@@ -12,13 +12,13 @@ from typing import ClassVar
 import numpy as np
 
 from ....case.case import Case, Sweep, Truth
-from ....case.io.coordinates import with_all_coordinates
+from ....case.io.outputs import with_all_coordinates
 from ....failures import FailureKind
 from ....mechanism.mechanism import Mechanism
 from ....mechanism.motions import Motion
 from ....trajectory import Array
-from ..truth.reference_motion import Truth as Known
-from ..truth.reference_motion import followed
+from ...truth.motion import Truth as Known
+from ...truth.motion import followed
 
 TOL = 1e-12
 """Largest accepted residual, as in `kincheck run`."""

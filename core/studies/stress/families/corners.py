@@ -9,8 +9,8 @@ from functools import partial
 
 import numpy as np
 
-from ..truth.long_double import extended
-from ..truth.reference_motion import closed
+from ...truth.motion import closed
+from ...truth.rows import extended
 from .base import Family, Rng, Specimen, as_case, power
 from .dimensions import crank_rocker
 from .pairs import beside, beside_motion

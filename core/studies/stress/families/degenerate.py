@@ -23,9 +23,9 @@ from ....joints import (
     Spherical,
     Universal,
 )
-from ....mechanism.drivers import JointAngle, PointCoordinate
 from ....mechanism.mechanism import GROUND, Body, Mechanism, Point
-from ..truth.reference_motion import followed
+from ....mechanism.motions import JointAngle, PointCoordinate
+from ...truth.motion import followed
 from .base import MOTION_ENDS, Family, Rng, Specimen, as_case, direction
 from .dimensions import crank_rocker
 from .planar import any_plane, four_bar, slider_crank

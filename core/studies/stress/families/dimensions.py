@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ....trajectory import Array
-from ..truth.long_double import extended
+from ...truth.rows import extended
 from .base import Rng, power
 from .planar import Plan, meet
 

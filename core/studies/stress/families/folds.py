@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from ....mechanism.motions import Motion, Sine
-from ..truth.first_fold import turning
+from ...truth.fold import first_fold
 from .base import Family, Rng, Specimen, as_case, power
 from .loops import random_mechanism
 
@@ -45,7 +45,7 @@ class Folds(Family):
             return Sine(float(amplitude) * reach, float(turns) / reach)
 
         motions = {driver.name: swing() for driver in mechanism.drivers[1:]}
-        fold = turning(as_case(mechanism, driver, np.array([stop]), motions=motions), stop)
+        fold = first_fold(as_case(mechanism, driver, np.array([stop]), motions=motions), stop)
         last = stop if fold is None else fold * (1.0 - power(rng, *BEFORE))
         step = (last if fold is None else fold) * power(rng, *STEP)
         values = np.linspace(last - (samples - 2) * step, last + step, samples)

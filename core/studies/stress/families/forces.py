@@ -14,7 +14,6 @@ from ....case.measures import DriverEffort, ElementForce, ForceMeasure, JointFor
 from ....case.quantity import with_markers
 from ....joints import Cylindrical, Joint, RackPinion, Revolute, Screw, Translational
 from ....mechanism.body import Body, Inertia
-from ....mechanism.drivers import JointAngle, JointDisplacement
 from ....mechanism.loads import (
     Axes,
     Force,
@@ -24,7 +23,7 @@ from ....mechanism.loads import (
     TorsionSpringDamper,
 )
 from ....mechanism.mechanism import GROUND, Mechanism
-from ....mechanism.motions import Motion, Sine
+from ....mechanism.motions import JointAngle, JointDisplacement, Motion, Sine
 from .arms import random_arm
 from .base import Family, Rng, Specimen, as_case, bodies, direction, power
 from .dimensions import crank_rocker

@@ -9,8 +9,8 @@ import numpy as np
 
 from ....algebra import triple
 from ....joints import Distance, Revolute, Spherical, Translational
-from ....mechanism.drivers import PointCoordinate
 from ....mechanism.mechanism import GROUND, Body, Mechanism, Point
+from ....mechanism.motions import PointCoordinate
 from .base import Family, Rng, Specimen, as_case, power
 
 At = Callable[[float, float, float], tuple[float, float, float]]

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from ....failures import FailureKind
-from ..truth.reference_motion import closed
+from ...truth.motion import closed
 from .base import Family, Rng, Specimen, as_case, power
 from .dimensions import crank_rocker
 from .planar import JOINTS_OF_A_LOOP, any_plane, four_bar, four_bar_motion

@@ -18,12 +18,17 @@ import numpy as np
 from ....algebra import triple
 from ....errors import MechanismError
 from ....joints import AxialJoint, Coupler, Gear, Joint, Kind, RackPinion
-from ....mechanism.drivers import Driver, JointAngle, JointDisplacement, PointCoordinate
 from ....mechanism.mechanism import GROUND, Body, Mechanism, Point
-from ....mechanism.motions import Motion, Sine
+from ....mechanism.motions import (
+    Driver,
+    JointAngle,
+    JointDisplacement,
+    Motion,
+    PointCoordinate,
+    Sine,
+)
 from ....trajectory import Array
-from ..truth.conditions import conditions
-from ..truth.evaluation import Evaluator, Poses
+from ...truth.rows import Poses, Rows
 from .base import Family, Rng, Specimen, as_case, bodies, direction
 
 LARGEST = 30
@@ -139,9 +144,9 @@ class Builder:
 
     def _rows(self, mechanism: Mechanism, drop: int = 0) -> Array:
         """Return rows of unit length, translations in metres, without the first `drop` rows."""
-        rows = Evaluator(conditions(mechanism))
+        rows = Rows(mechanism)
         found: Array = rows.jacobian(Poses.design(len(self.bodies), 1))[0][drop:]
-        found[:, np.arange(found.shape[1]) % 6 < 3] /= rows.stated.unit
+        found[:, np.arange(found.shape[1]) % 6 < 3] /= rows.unit
         return found / np.linalg.norm(found, axis=1, keepdims=True)
 
     def _take(self, rows: Array, leave: int) -> bool:

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 from ....joints import Revolute
 from ....mechanism.mechanism import Body, Mechanism, Point
-from ..truth.long_double import Real
-from ..truth.reference_motion import Motion
+from ...truth.motion import Motion
+from ...truth.rows import Real
 from .planar import Plan, Plane, coupled
 
 

@@ -10,11 +10,11 @@ import numpy as np
 
 from ....algebra import triple
 from ....joints import Cylindrical, Distance, Joint, Revolute, Spherical, Translational, Universal
-from ....mechanism.drivers import JointAngle, JointDisplacement
 from ....mechanism.mechanism import Body, Mechanism, Point
+from ....mechanism.motions import JointAngle, JointDisplacement
 from ....trajectory import Array
-from ..truth.long_double import Real, extended, unit
-from ..truth.reference_motion import Motion
+from ...truth.motion import Motion
+from ...truth.rows import Real, extended, unit
 from .base import Rng, direction
 
 Plan = tuple[float, float]

@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from ..truth.reference_motion import closed
+from ...truth.motion import closed
 from .base import Family, Rng, Specimen, as_case, power
 from .dimensions import rockers
 from .planar import (

@@ -12,8 +12,8 @@ from ....algebra import triple
 from ....case.case import Case
 from ....failures import FailureKind
 from ....mechanism.mechanism import Mechanism
-from ..truth.newton_kantorovich import LANES, System
-from ..truth.reference_motion import Motion, Truth, closed, closed_poses
+from ...truth.motion import Motion, Truth, closed, closed_poses
+from ...truth.path import LANES, System
 from .base import TOL, Family, Rng, Specimen, as_case, direction, power
 from .dimensions import crank_rocker
 from .planar import any_plane, four_bar, four_bar_motion
@@ -74,9 +74,9 @@ def _tilted(case: Case, sound: Mechanism, motion: Motion, tilt: float) -> Truth:
     system = System(case)
     exact = System(replace(case, mechanism=sound))
     violated = np.zeros(len(case.sweep.values))
-    size = system.rows.stated.unit
+    size = system.rows.unit
     for sample in np.split(np.arange(len(violated)), range(LANES, len(violated), LANES)):
-        poses = closed_poses(exact, motion, exact.sampled(sample)[0])
+        poses = closed_poses(exact.rows, motion, exact.sampled(sample)[0])
         drives = system.sampled(sample)
         at = system.solved(poses, drives, system.path.times[sample], system.rows.angles(poses))
         violated[sample] = np.abs(system.rows.residual(at.poses, drives[0], at.angles)).max(axis=0)

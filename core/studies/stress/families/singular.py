@@ -12,10 +12,10 @@ import numpy as np
 from ....algebra import triple
 from ....failures import FailureKind
 from ....joints import Cylindrical, Distance, Joint, Revolute, Spherical, Translational, Universal
-from ....mechanism.drivers import JointAngle, JointDisplacement
 from ....mechanism.mechanism import GROUND, Body, Mechanism, Point
+from ....mechanism.motions import JointAngle, JointDisplacement
 from ....trajectory import Array
-from ..truth.reference_motion import closed, followed
+from ...truth.motion import closed, followed
 from .base import Family, Rng, Specimen, as_case, direction, power
 from .dimensions import nearly_kite, nearly_parallel
 from .planar import JOINTS_OF_A_LOOP, any_plane, flats, four_bar, four_bar_motion

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from ....algebra import triple
-from ..truth.reference_motion import closed
+from ...truth.motion import closed
 from .base import Family, Rng, Specimen, as_case, power
 from .dimensions import crank_rocker, turning_crank
 from .planar import (

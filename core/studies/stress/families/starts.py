@@ -12,9 +12,8 @@ import numpy as np
 from ....algebra import triple
 from ....case.case import TIME
 from ....joints import RackPinion, Revolute, Translational
-from ....mechanism.drivers import PointCoordinate
 from ....mechanism.mechanism import GROUND, Body, Mechanism, Point
-from ....mechanism.motions import Absolute, Motion, Sine
+from ....mechanism.motions import Absolute, Motion, PointCoordinate, Sine
 from .base import Family, Rng, Specimen, as_case
 from .loops import random_mechanism
 from .planar import any_plane, flat_plane

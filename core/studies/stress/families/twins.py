@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from ..truth.reference_motion import closed
+from ...truth.motion import closed
 from .base import Family, Rng, Specimen, as_case
 from .dimensions import nearly_kite, nearly_parallel, rockers
 from .pairs import beside, beside_motion

@@ -1,0 +1,203 @@
+"""Hardpoints in files of other programs: Adams/Car and Project Chrono."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, cast
+
+from ....errors import MOST_NAMED, remedy, shortened
+from ...io.document import fault, parse, shown
+from .table import Hardpoint, HardpointTable, number, require_name, twice
+
+BLOCK = "[HARDPOINT]"
+COLUMNS = ("hardpoint_name", "symmetry", "x_value", "y_value", "z_value")
+LEFT, RIGHT = ("left/right", "left", "single"), "right"
+
+_SECTION = re.compile(r"\[\s*([A-Za-z_]+)\s*\]")
+_SUBSECTION = re.compile(r"\(\s*([A-Za-z_]+)\s*\)")
+_FIELD = re.compile(r"'([^']*)'|(\S+)")
+
+
+def read_adams(file: Path, text: str) -> HardpointTable:
+    """Return the points of the left side and of the middle, by name.
+
+    Raises:
+        CaseError: there is no such block, or one of its rows is incomplete.
+    """
+    points: dict[str, Hardpoint] = {}
+    unit: str | None = None
+    section, sections, right = "", dict[str, int](), 0
+    inner, variants = "", dict[str, list[str]]()
+    columns = COLUMNS
+    for k, line in enumerate(text.splitlines(), 1):
+        row, where = line.strip(), f"line {k}"
+        if not row or row.startswith(("$", "!")):
+            continue
+        if head := _SECTION.fullmatch(row):
+            section, inner = head.group(1).upper(), ""
+            sections.setdefault(section, 0)
+            columns = COLUMNS
+            continue
+        if section == "HARDPOINT" and (found := _SUBSECTION.fullmatch(row)):
+            inner = found.group(1).upper()
+            continue
+        sections[section] = sections.get(section, 0) + 1
+        if section == "UNITS" and (found := re.fullmatch(r"LENGTH\s*=(.*)", row, re.IGNORECASE)):
+            unit = found.group(1).strip().removeprefix("'").removesuffix("'").strip()
+        elif section == "HARDPOINT" and row.startswith("{"):
+            columns = tuple(row.strip("{}").split())
+            if sorted(columns) != sorted(COLUMNS):
+                raise fault(
+                    file,
+                    where,
+                    f"found the columns {shown(row)}, expected {{{' '.join(COLUMNS)}}}; correct"
+                    " them",
+                )
+        elif section == "HARDPOINT":
+            name, symmetry, point = _row(file, where, row, columns)
+            if inner:
+                variants.setdefault(inner, []).append(f"{name} in {where}")
+            elif symmetry == RIGHT:
+                right += 1
+            elif name in points:
+                raise twice(file, where, name, points[name].where)
+            else:
+                points[name] = point
+    if not points:
+        raise fault(
+            file,
+            "",
+            f"found no row in a block {BLOCK}, expected hardpoints; give a subsystem file of"
+            " Adams/Car",
+        )
+    left_out = [
+        f"[{name}] ({rows} rows)"
+        for name, rows in sections.items()
+        if name not in ("HARDPOINT", "UNITS", "") and rows
+    ]
+    left_out += [f"({name}): {shortened(rows, MOST_NAMED)}" for name, rows in variants.items()]
+    left_out += [f"{right} points of the right side"] * bool(right)
+    return HardpointTable(file, "Adams/Car", points, unit, "rearward,right,up", None, left_out)
+
+
+def _row(file: Path, where: str, row: str, columns: tuple[str, ...]) -> tuple[str, str, Hardpoint]:
+    fields = [(quoted or bare).strip() for quoted, bare in _FIELD.findall(row)]
+    if len(fields) != len(columns):
+        raise fault(
+            file,
+            where,
+            f"found {len(fields)} fields, expected {len(columns)}: {' '.join(columns)}; complete"
+            " the row",
+        )
+    cells = dict(zip(columns, fields, strict=True))
+    name, symmetry = cells["hardpoint_name"], cells["symmetry"].lower()
+    require_name(file, where, name)
+    if symmetry not in (*LEFT, RIGHT):
+        raise fault(
+            file,
+            where,
+            f"{name}: found symmetry {shown(symmetry)}, expected a side;"
+            f" {remedy(symmetry, (*LEFT, RIGHT))}",
+        )
+    x, y, z = (number(file, f"{where}: {name}: {axis}", cells[axis]) for axis in COLUMNS[2:])
+    return name, symmetry, Hardpoint((x, y, z), where)
+
+
+WHEEL_CENTER = "Spindle/COM"
+"""The centre of mass of the spindle: Chrono places the wheel there."""
+
+TOE, CAMBER = "Toe Angle (deg)", "Camber Angle (deg)"
+"""Angles of the wheel at design; positive: toe-in, top outboard. ChDoubleWishbone.cpp turns the
+spindle by them about z, then about x."""
+
+# An unclosed text or comment matches to the end of the line or file. Without a match, the search
+# would start anew at every quote and every /*.
+_STRING_OR_COMMENT = re.compile(r'"(?:\\.|[^"\\\n])*+"?|//[^\n]*|/\*.*?(?:\*/|\Z)', re.DOTALL)
+
+
+def without_comments(text: str) -> str:
+    """Return JSON without Chrono's comments; lines and columns stay the same."""
+
+    def blank(found: re.Match[str]) -> str:
+        part = found.group()
+        return part if part.startswith('"') else re.sub(r"[^\n]", " ", part)
+
+    return _STRING_OR_COMMENT.sub(blank, text)
+
+
+def is_chrono(tables: Mapping[str, Any]) -> bool:
+    """Return whether the tables of a JSON file are of a vehicle model of Chrono."""
+    sections = [cast("dict[str, Any]", each) for each in tables.values() if isinstance(each, dict)]
+    return (
+        "Template" in tables
+        or isinstance(tables.get("Type"), str)
+        or any(key.startswith("Location") for section in sections for key in section)
+    )
+
+
+def read_chrono(file: Path, text: str) -> HardpointTable:
+    """Return the points of a suspension, named "Section/Key" as in the file.
+
+    Raises:
+        CaseError: not JSON, no suspension, or an invalid point.
+    """
+    tables = parse(file, without_comments(text))
+    kind = tables.get("Type", "Suspension")
+    if kind != "Suspension":
+        raise fault(
+            file,
+            "Type",
+            f'found {shown(kind)}, expected "Suspension"; give the JSON file of a suspension',
+        )
+    template = tables.get("Template")
+    if template is not None and not isinstance(template, str):
+        raise fault(
+            file,
+            "Template",
+            f"found {shown(template)}, expected the name of a suspension template; correct the"
+            " value",
+        )
+    points: dict[str, Hardpoint] = {}
+    left_out: list[str] = []
+    toe, camber = (math.radians(number(file, key, tables.pop(key, 0.0))) for key in (TOE, CAMBER))
+    for section, content in tables.items():
+        if section in ("Name", "Type", "Template"):
+            continue
+        if not isinstance(content, dict):
+            left_out.append(section)
+            continue
+        others: list[str] = []
+        for key, value in cast("dict[str, Any]", content).items():
+            name = f"{section}/{key}"
+            if key.startswith("Location") or name == WHEEL_CENTER:
+                points[name] = Hardpoint(_point(file, name, value), name)
+            else:
+                others.append(key)
+        if others:
+            left_out.append(f"{section} ({', '.join(others)})")
+    if not points:
+        raise fault(
+            file,
+            "",
+            'found no key "Location ...", expected the points of a suspension; give a suspension'
+            " file of Chrono",
+        )
+    return HardpointTable(
+        file, "Project Chrono", points, "m", "forward,left,up", template, left_out, toe, camber
+    )
+
+
+def _point(file: Path, key: str, value: object) -> tuple[float, float, float]:
+    numbers = cast("list[object]", value) if isinstance(value, list) else []
+    if len(numbers) != 3:
+        raise fault(
+            file,
+            key,
+            f"found {shown(cast('object', value))}, expected three numbers [x, y, z]; correct the"
+            " point",
+        )
+    x, y, z = (number(file, key, each) for each in numbers)
+    return x, y, z

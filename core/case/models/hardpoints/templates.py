@@ -1,0 +1,247 @@
+"""Templates of suspensions: the roles of their hardpoints, and the joints at their places, from
+`templates.toml`, which explains their keys.
+
+Places are in metres, x forward, y left, z up. A template describes the left side; the chassis is
+the ground, and the steering is locked.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ....errors import CaseError, unknown
+from ....joints import Distance, Joint
+from ....mechanism.mechanism import Point, Vector
+
+KNUCKLE = "knuckle"
+"""The wheel carrier in every template."""
+WHEEL_CENTER, WHEEL_CONTACT, WHEEL_AXIS = "wheel_center", "wheel_contact", "wheel_axis"
+TIEROD_INNER = "tierod_inner"
+
+_SIDES = (
+    re.compile(r"(?P<name>.+?)_(?P<side>left|right|l|r|fl|fr|rl|rr)"),
+    re.compile(r"(?P<side>left|right|fl|fr|rl|rr)_(?P<name>.+)"),
+)
+"""Side or corner at the end of a normal name, or at its start."""
+_ARM = re.compile(r"([ul])ca_(front|rear|outer)")
+_ARMS = ("{}_arm", "{}_wishbone", "{}_a_arm", "{}_control_arm", "{0[0]}ca", "{0[0]}wb")
+_ENDS: Mapping[str, Sequence[str]] = {
+    end: (
+        *(f"{word}{joined}" for word in words for joined in ("", "_pivot", "_inboard", "_inner")),
+        *(f"{before}_{word}" for word in words for before in ("inboard", "inner", "chassis")),
+        short,
+    )
+    for end, words, short in (("front", ("front", "fore"), "if"), ("rear", ("rear", "aft"), "ir"))
+} | {"outer": ("outer", "outboard", "outer_ball_joint", "ball_joint", "knuckle", "upright", "o")}
+_OPTIMUM = {"front": "CHAS_{}For", "rear": "CHAS_{}Aft", "outer": "UPRI_{}Pnt"}
+_RODS = ("tierod", "trackrod", "track_rod", "steering_rod", "tr")
+_ROD_ENDS: Mapping[str, Sequence[str]] = {
+    TIEROD_INNER: ("inner", "inboard", "chassis", "rack", "i", "inner_ball_joint"),
+    "tierod_outer": ("outer", "outboard", "upright", "knuckle", "hub", "o", "outer_ball_joint"),
+}
+
+
+@dataclass(frozen=True)
+class Role:
+    """A hardpoint of a template.
+
+    Attributes:
+        meaning: description of the hardpoint, for messages.
+        also: other names of the hardpoint; one point may fill several roles.
+    """
+
+    name: str
+    meaning: str
+    also: Sequence[str]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All names of the hardpoint, in their compact form."""
+        return tuple(map(compact, (self.name, *self.also)))
+
+
+@dataclass(frozen=True)
+class Template:
+    """A kind of suspension; `templates.toml` explains its attributes.
+
+    Attributes:
+        joint_rows: type, bodies and roles of places of each joint, by its name.
+    """
+
+    name: str
+    also: Sequence[str]
+    roles: Sequence[Role]
+    optional: Sequence[Role]
+    joint_rows: Mapping[str, Sequence[str]]
+    watched: Sequence[str]
+    sample: Mapping[str, Vector]
+    springs: Mapping[str, tuple[str, str]]
+    bodies: Mapping[str, str]
+    above: Sequence[tuple[str, str]]
+    ahead: Sequence[tuple[str, str]]
+    kingpin: tuple[str, str] | tuple[tuple[str, str], ...] | None
+    steered: str
+
+    def joints(self, at: Mapping[str, Vector]) -> list[Joint]:
+        """Return the joints for the places of the roles; they name the bodies."""
+        joints: list[Joint] = []
+        for name, (kind, i, j, role, *other) in self.joint_rows.items():
+            cls: Any = Joint.registry[kind]
+            given: list[Any] = [at[role]]
+            if cls is Distance:
+                given = [(at[role], at[other[0]])]
+            elif other:
+                a, b = at[role], at[other[0]]
+                given.append((b[0] - a[0], b[1] - a[1], b[2] - a[2]))
+            joints.append(cls(name, i, j, *given))
+        return joints
+
+    def points(self, at: Mapping[str, Vector]) -> list[Point]:
+        """Return the points for outputs, from the roles with a place."""
+        read = [
+            *self.watched,
+            *(
+                role
+                for each in self.kingpin or ()
+                for role in ([each] if isinstance(each, str) else each)
+            ),
+        ]
+        read += [role for ends in self.springs.values() if all(map(at.get, ends)) for role in ends]
+        read += [role for role in (WHEEL_CONTACT, WHEEL_AXIS) if role in at]
+        return [
+            Point(role, self.bodies.get(role, KNUCKLE), at[role]) for role in dict.fromkeys(read)
+        ]
+
+
+def normal(name: str) -> str:
+    """Return a hardpoint's name in normal form: without differences in case, blanks, the prefix of
+    Adams/Car, and the spelling of centre.
+    """
+    plain = (
+        re.sub(r"[^a-z0-9]+", "_", name.lower())
+        .strip("_")
+        .replace("centre", "center")
+        .replace("tie_rod", "tierod")
+    )
+    return re.sub(r"^hp[ls]_", "", plain)
+
+
+def compact(name: str) -> str:
+    """Return a hardpoint's name in normal form without separators, also of words written together:
+    `upperBallJoint`.
+    """
+    return normal(name).replace("_", "")
+
+
+def side_of(name: str) -> tuple[str, str]:
+    """Return a hardpoint's normal name without its side or corner, and the side: "left", "right" or
+    an empty text.
+    """
+    plain = normal(name)
+    for pattern in _SIDES:
+        if found := pattern.fullmatch(plain):
+            side = found["side"]
+            return found["name"], "left" if side in ("left", "l", "fl", "rl") else "right"
+    return plain, ""
+
+
+def _further_names(role: str) -> Iterable[str]:
+    """Yield names of wishbones and tie rods in tables of Adams/Car, Lotus Suspension Analysis,
+    suspension-explorer, OptimumK and others.
+    """
+    yield from (f"{rod}_{end}" for rod in _RODS for end in _ROD_ENDS.get(role, ()))
+    if found := _ARM.fullmatch(role):
+        level, end = {"u": "upper", "l": "lower"}[found[1]], found[2]
+        yield from (f"{arm.format(level)}_{name}" for arm in _ARMS for name in _ENDS[end])
+        if end == "outer":
+            yield from (f"{level}_ball_joint", f"{level[0]}bj")
+        yield _OPTIMUM[end].format(level[:3].capitalize())
+
+
+def _read_templates() -> dict[str, Template]:
+    text = Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
+    written: dict[str, Any] = tomllib.loads(text)
+    common = written.pop("common")
+
+    def roles(rows: Mapping[str, list[str]]) -> list[Role]:
+        found: list[Role] = []
+        for name, row in rows.items():
+            meaning, *also = row or common["roles"][name]
+            found.append(Role(name, meaning, (*also, *_further_names(name))))
+        return found
+
+    templates: dict[str, Template] = {}
+    for name, own in written.items():
+        like: dict[str, Any] = written.get(own.get("like"), {})
+        both = {key: {**like.get(key, {}), **own.get(key, {})} for key in ("roles", "sample")}
+        keys: dict[str, Any] = {"springs": common["springs"], **like, **own, **both}
+        written[name] = keys
+        wanted = roles(keys["roles"])
+        optional = roles({**common["optional"], **keys.get("optional", {})})
+        known = [role.name for role in (*wanted, *optional)]
+        kingpin: Any = tuple(
+            each if isinstance(each, str) else tuple(each) for each in keys.get("kingpin", ())
+        )
+        templates[name] = Template(
+            *(name, own["also"], wanted, optional, keys["joints"], keys["watched"]),
+            sample={role: place for role, place in keys["sample"].items() if role in known},
+            springs=keys["springs"],
+            bodies={**common["bodies"], **keys.get("bodies", {})},
+            above=keys.get("above", ()),
+            ahead=keys.get("ahead", ()),
+            kingpin=kingpin or None,
+            steered=keys.get("steered", ""),
+        )
+    return templates
+
+
+TEMPLATES = _read_templates()
+"""Templates by name, as for --template."""
+
+TEMPLATE_NAMES = {
+    compact(name): template
+    for template in TEMPLATES.values()
+    for name in (template.name, *template.also)
+}
+"""Templates by all their names, in their compact form."""
+
+ROLES = frozenset(
+    name
+    for template in TEMPLATES.values()
+    for role in (*template.roles, *template.optional)
+    for name in role.names
+)
+"""All names of all roles, in their compact form."""
+
+
+def sample_tables(names: Sequence[str]) -> list[str]:
+    """Return the sample tables of the templates of these names; of all templates without names.
+
+    Raises:
+        CaseError: there is no such template.
+    """
+    for name in names:
+        if name not in TEMPLATES:
+            raise CaseError(unknown("template", name, TEMPLATES))
+    return [sample_table(TEMPLATES[name]) for name in names or TEMPLATES]
+
+
+def sample_table(template: Template) -> str:
+    """Return the text of a table to begin one's own with, in mm; its numbers are invented."""
+    text = io.StringIO()
+    text.write(f"# template: {template.name}\n# units: mm\n# axes: forward,left,up\n")
+    rows = csv.writer(text, lineterminator="\n")
+    rows.writerow(("name", "x", "y", "z", "meaning"))
+    for roles, note in ((template.roles, ""), (template.optional, "optional: ")):
+        for role in roles:
+            if role.name in template.sample:
+                place = (f"{1000.0 * x:.6g}" for x in template.sample[role.name])
+                rows.writerow((role.name, *place, f"{note}{role.meaning}"))
+    return text.getvalue()

@@ -1,0 +1,379 @@
+"""Start and drive of a model, by the options --start, --drive, --hold and --hold-rest: its file
+says neither.
+
+Degrees of freedom are counted by the motions left by the ties to the moves' coordinates, so the
+count is the same whatever is held or driven.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ....algebra import quat, vec
+from ....errors import CaseError, remedy, with_article
+from ....trajectory import Array
+from ...io.document import decimal, fault, shown, unknown_name, usable
+from ...io.reader_options import Supplied
+from ...io.schema import MOST_SAMPLES
+from .assembly import Assembled, Pose, Start, Value
+from .element import Element
+from .place import ORIGIN, Place, unit_quaternion
+from .tree import UNKNOWNS, Move, Tree
+
+COORDINATES = {"hinge": 1, "slide": 1, "ball": 4, "free": 7}
+KEYFRAME = "keyframe:"
+SAMPLES = 41
+# Of motions of length one: less of a coordinate is round-off, or at rest within the digits.
+AT_REST = 1e-6
+# A move that has less of them may have it by the file's digits alone, which lead the mechanism
+# anywhere when it is held. It is held if no other one can be.
+CLEARLY = 0.01
+
+
+def read_start(tree: Tree, said: Sequence[str]) -> Start:
+    """Return the start of a model: its zero pose, or what --start says.
+
+    Raises:
+        CaseError: there is no such keyframe or move, one is given twice, or its numbers are not
+            those of the move.
+    """
+    file, values = tree.file, dict(Pose.of(tree).value_of)
+    given: list[str] = []
+    keyframes = [each for each in said if each.startswith(KEYFRAME)]
+    if len(keyframes) > 1:
+        raise fault(file, "--start", f"found {len(keyframes)} keyframes, expected one; name one")
+    if keyframes:
+        values |= _keyframe(tree, keyframes[0].removeprefix(KEYFRAME))
+    for each in said:
+        if each in keyframes:
+            continue
+        name, sign, text = each.rpartition("=")
+        if not sign:
+            form = f"{KEYFRAME}NAME or JOINT=VALUE [rad or m, as qpos]"
+            raise fault(file, "--start", f"found {shown(each)}, expected {form}; say the value")
+        if name not in tree.moves:
+            raise unknown_name(file, "--start", name, tree.moves, "a joint")
+        if name in given:
+            raise fault(file, "--start", f"found {shown(name)} twice; give one value")
+        values[name] = _value(tree, tree.moves[name], text.split(","))
+        given.append(name)
+    text = ", ".join(said) if said else tree.zero
+    return Start(Pose(tree, [*values.values()]), tuple(given), text, tree.closes and not given)
+
+
+def _keyframe(tree: Tree, name: str) -> dict[str, Value]:
+    if name not in tree.keyframes:
+        raise fault(
+            tree.file,
+            "--start",
+            f"found {shown(KEYFRAME + name)}, expected a keyframe of the model, by name or by"
+            f" number from 0; {remedy(name, tree.keyframes)}",
+        )
+    element, numbers = tree.keyframes[name]
+    if numbers is None:
+        return {}
+    count = sum(COORDINATES[move.kind] for move in tree.moves.values())
+    if len(numbers) != count:
+        raise element.fault(
+            f"qpos: found {len(numbers)} numbers, expected {count}, of the joints in order; correct"
+            " the attribute"
+        )
+    found: dict[str, Value] = {}
+    for move in tree.moves.values():
+        found[move.name] = _value(tree, move, numbers[: COORDINATES[move.kind]], element)
+        numbers = numbers[COORDINATES[move.kind] :]
+    return found
+
+
+def _value(tree: Tree, move: Move, texts: Sequence[str], key: Element | None = None) -> Value:
+    """Return a move's change since the zero pose from its coordinates, those of a keyframe or of
+    --start.
+    """
+
+    def error(problem: str) -> CaseError:
+        problem = f"{problem}; correct it"
+        return key.fault(f"qpos: {problem}") if key else fault(tree.file, "--start", problem)
+
+    expected = COORDINATES[move.kind]
+    try:
+        numbers = [decimal(each) for each in texts]
+    except ValueError:
+        numbers = [math.nan]
+    if len(numbers) != expected or not all(map(usable, numbers)):
+        raise error(
+            f"found {shown(' '.join(texts))} for {move.name!r}, {with_article(move.kind)} joint,"
+            f" expected {expected} finite number{'s' * (expected > 1)}"
+        )
+    if expected == 1:
+        return numbers[0] - move.value
+    if not any(numbers[-4:]):
+        raise error(f"the quaternion of {move.name!r} is zero, expected one of length one")
+    turn, frame = unit_quaternion(quat(numbers[-4:])), tree.moving[move.inner]
+    if move.kind == "free":
+        return Place(vec(numbers[:3]), turn).then(ORIGIN.seen_from(frame))
+    # MuJoCo has the turn in the axes of the body
+    turn = frame.turn * turn * frame.turn.conjugate()
+    return Place(move.point - Place(turn=turn).direction(move.point), turn)
+
+
+@dataclass(frozen=True)
+class Driving:
+    """Driven and held moves of a model.
+
+    Attributes:
+        driven: by move, its coordinates in the model, reference included [rad or m]; the first one
+            is swept, the others follow it.
+        held: hinges and slides with their coordinate in the start.
+        fixed: balls, and otherwise free links, at their place in the start.
+    """
+
+    driven: Mapping[str, Array]
+    held: tuple[str, ...]
+    fixed: tuple[str, ...]
+
+    @property
+    def moves(self) -> tuple[str, ...]:
+        """Driven and held hinges and slides, the swept one first."""
+        return (*self.driven, *self.held)
+
+
+def read_driving(tree: Tree, supplied: Supplied) -> Driving:
+    """Read --drive and --hold.
+
+    Raises:
+        CaseError: they name an unknown move, name one twice, or give different samples.
+    """
+
+    def error(option: str, problem: str) -> CaseError:
+        return fault(tree.file, option, problem)
+
+    driven: dict[str, Array] = {}
+    given: dict[str, int] = {}
+    for text in supplied.drive:
+        name, values, samples = _swept(tree, text)
+        if name in driven:
+            raise error("--drive", f"found {name!r} twice; give one range")
+        driven[name] = values
+        if samples is not None:
+            given[name] = samples
+    if len({*given.values()}) > 1:
+        counts = ", ".join(f"{count} of {name!r}" for name, count in given.items())
+        raise error(
+            "--drive",
+            f"found {counts} samples, expected as many of each; all joints move together",
+        )
+    for count in given.values():
+        driven = {name: np.linspace(each[0], each[-1], count) for name, each in driven.items()}
+    held: list[str] = []
+    fixed: list[str] = []
+    for name in dict.fromkeys(supplied.hold):
+        if name in driven:
+            raise error(
+                "--hold", f"found {name!r}, which is driven, expected another joint; leave it out"
+            )
+        if name in tree.joints and tree.joints[name].is_axial:
+            held.append(name)
+        elif name in tree.joints or name in tree.free:
+            fixed.append(name)
+        else:
+            known = [*tree.joints, *tree.free]
+            raise unknown_name(tree.file, "--hold", name, known, "a joint or a free body")
+    return Driving(driven, tuple(held), tuple(fixed))
+
+
+def _swept(tree: Tree, text: str) -> tuple[str, Array, int | None]:
+    """Return the move, its values, and how many were asked for; names may hold colons too."""
+    form = (
+        "JOINT:START:STOP or JOINT:START:STOP:SAMPLES, in the model's coordinates [rad, m], 2 to"
+        f" {MOST_SAMPLES} samples"
+    )
+
+    def error(problem: str) -> CaseError:
+        return fault(tree.file, "--drive", problem)
+
+    parts = text.split(":")
+    named = {":".join(parts[:k]): parts[k:] for k in range(max(1, len(parts) - 3), len(parts) + 1)}
+    name = next((name for name in named if name in tree.joints), None)
+    if name is None:
+        axial = [name for name, move in tree.joints.items() if move.is_axial]
+        raise error(f"found {shown(text)}, expected {form}; {remedy(next(iter(named)), axial)}")
+    if not tree.joints[name].is_axial:
+        raise error(f"{name!r} is a ball joint, expected a hinge or a slide; drive one of those")
+    numbers = named[name]
+    if len(numbers) < 2:
+        raise error(
+            f"found {shown(text)}, expected {form}; say from where to where: {name}:START:STOP"
+        )
+    samples = None
+    try:
+        start, stop = map(decimal, numbers[:2])
+        if len(numbers) == 3:
+            samples = int(numbers[2])
+    except ValueError:
+        start = stop = math.nan
+    count = SAMPLES if samples is None else samples
+    if not (math.isfinite(stop - start) and start != stop and 1 < count <= MOST_SAMPLES):
+        raise error(f"found {shown(text)}, expected {form}; correct the numbers")
+    return name, np.linspace(start, stop, count), samples
+
+
+class Freedom:
+    """The motions of a model not driven or held so far.
+
+    Attributes:
+        dof: their number at the beginning.
+        taken: coordinates of driven and held moves.
+    """
+
+    def __init__(self, model: Assembled, spins: Mapping[str, Array]) -> None:
+        """Begin with the motions left by the ties, without the spins of rods.
+
+        Args:
+            spins: by ball or free move, the axis about which its rod turns freely, shape (3,).
+        """
+        self._columns, self._free = model.columns, model.free
+        for name, axis in spins.items():
+            turning = [*self._columns[name]][-3:]
+            self._leave(axis[None] @ self._free[:, turning].T)
+        self.dof, self.taken = len(self._free), 0
+
+    @property
+    def left(self) -> int:
+        """Number of motions left."""
+        return len(self._free)
+
+    def sizes(self, move: str) -> Array:
+        """Return how much of a move's unknowns the motions have, the most first."""
+        rows = self._free[:, [*self._columns[move]]]
+        return np.linalg.svd(rows, full_matrices=False)[1] if rows.size else np.zeros(0)
+
+    def count(self, move: str) -> int:
+        """Return how many of a move's motions are left."""
+        return int((self.sizes(move) > AT_REST).sum())
+
+    def can_hold(self, move: str, clearly: float) -> bool:
+        """Return whether each of a move's unknowns can be held: it has more than this."""
+        sizes = self.sizes(move)
+        return len(sizes) == len(self._columns[move]) and bool(sizes[-1] > clearly)
+
+    def take(self, move: str) -> None:
+        """Drive or hold a move."""
+        self.taken += len(self._columns[move])
+        self._leave(self._free[:, [*self._columns[move]]].T)
+
+    def _leave(self, rows: Array) -> None:
+        """Leave the motions on which rows over them vanish, shape (rows, motions)."""
+        _, sizes, right = np.linalg.svd(rows, full_matrices=True)
+        self._free = right[int((sizes > AT_REST).sum()) :] @ self._free
+
+
+def choose_held(
+    model: Assembled, driving: Driving, spins: Mapping[str, Array], *, hold_rest: bool
+) -> Driving:
+    """Return the driving, with moves held for the rest if wanted: free links, then moves with an
+    actuator, then others, then balls.
+
+    Raises:
+        CaseError: freedoms are left, or more are driven and held than there are.
+    """
+    freedom, tree = Freedom(model, spins), model.tree
+    free = {link: move.name for move in tree.moves.values() for link in (move.name, move.inner)}
+    for option, names in (("--drive", driving.driven), ("--hold", driving.held + driving.fixed)):
+        for name in names:
+            if not freedom.count(free.get(name, name)):
+                advice = "name another" if option == "--drive" else "leave it out"
+                raise fault(
+                    tree.file,
+                    option,
+                    f"found {name!r}, which an equality of the file locks, expected a joint that"
+                    f" moves; {advice}, or start elsewhere by --start",
+                )
+    for name in (*driving.moves, *driving.fixed):
+        freedom.take(free[name] if name in tree.free else name)
+    candidates = _candidates(tree, driving)
+    if hold_rest and driving.driven:
+        for clearly in (CLEARLY, AT_REST):
+            for move in candidates:
+                if move.name in (*driving.held, *driving.fixed):
+                    continue
+                if freedom.can_hold(move.name, clearly):
+                    freedom.take(move.name)
+                    more = (move.name,)
+                    driving = (
+                        replace(driving, held=driving.held + more)
+                        if move.is_axial
+                        else replace(driving, fixed=driving.fixed + more)
+                    )
+    if freedom.left or freedom.taken != freedom.dof or not driving.driven:
+        raise _undriven(tree, driving, freedom)
+    return driving
+
+
+def _candidates(tree: Tree, driving: Driving) -> list[Move]:
+    """Return the moves to hold, the first ones first."""
+    named = {*driving.moves, *driving.fixed}
+
+    def order(move: Move) -> int:
+        if move.is_axial:
+            return 1 if move.name in tree.actuated else 2
+        return 0 if move.kind == "free" else 3
+
+    loose = [move for move in tree.moves.values() if not {move.name, move.inner} & named]
+    return sorted(loose, key=order)
+
+
+def _undriven(tree: Tree, driving: Driving, freedom: Freedom) -> CaseError:
+    """Return the error of a model whose degrees of freedom differ from the driven ones."""
+    dof, count = freedom.dof, freedom.taken
+    if dof == 0:
+        return fault(
+            tree.file,
+            "",
+            "the model has no freedom in its start, expected one that moves; give another model or"
+            " another start by --start",
+        )
+    what = f"{count} driven or held" if count else "nothing said of what drives it"
+    advice: list[str] = []
+    if not driving.driven:
+        advice.append("--drive JOINT:START:STOP for the one that moves")
+    wanted = freedom.left - (not driving.driven)
+    if wanted > 0:
+        bodies = " (a free body counts for 6, a ball for 3)" * (
+            not all(move.is_axial for move in tree.moves.values())
+        )
+        advice.append(f"--hold JOINT for {wanted} more{bodies}, or --hold-rest")
+    elif count > dof:
+        advice.append(f"fewer --hold, by {count - dof}")
+    if count <= dof < freedom.left + count:
+        advice.append(
+            f"others for {freedom.left + count - dof} that depend on each other by the equalities"
+        )
+    return fault(
+        tree.file,
+        "",
+        f"the model has {dof} degree{'s' * (dof != 1)} of freedom, and {what}, expected as many of"
+        f" either; say {' and '.join(advice)}{_to_hold(_candidates(tree, driving), freedom)}",
+    )
+
+
+def _to_hold(candidates: Sequence[Move], freedom: Freedom) -> str:
+    """Return the complete list of moves to hold, by their kinds."""
+    counts = [(move, freedom.count(move.name)) for move in candidates]
+    loose = [move for move, count in counts if count == UNKNOWNS[move.kind]]
+    kinds = {
+        "joints, actuated ones first": [move.name for move in loose if move.is_axial],
+        "ball joints": [move.name for move in loose if move.kind == "ball"],
+        "free bodies": [move.inner for move in loose if move.kind == "free"],
+    }
+    if loose:
+        return "".join(f"; {what}: {', '.join(names)}" for what, names in kinds.items() if names)
+    partly = ", ".join(move.name for move, count in counts if count)
+    return (
+        f"; only in part free, so that they cannot be held: {partly}"
+        if partly
+        else ("; none can be held")
+    )

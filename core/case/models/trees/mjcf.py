@@ -1,0 +1,591 @@
+"""MJCF: models of MuJoCo, a tree of bodies closed by equalities; elements without meaning for
+kinematics are counted, not read.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from itertools import islice
+from pathlib import Path
+from typing import cast
+
+import numpy as np
+
+from ....algebra import ZERO, X, quat, vec
+from ....errors import MOST_NAMED, CaseError, remedy, shortened
+from ....mechanism.mechanism import GROUND, Vector
+from ...io.document import usable
+from .element import Element, significant_digits, words
+from .mjcf_language import (
+    DYNAMIC,
+    EXPANDED,
+    IN_BODY,
+    MAIN,
+    MAKE_BODIES,
+    ROOT,
+    WRITE_OUT,
+    Classes,
+    Compiler,
+    direction,
+    expanded,
+    read_compiler,
+    require_known_attributes,
+)
+from .place import ORIGIN, Place, coordinates, unit_quaternion
+from .tree import (
+    MOST_MOVING,
+    UNKNOWNS,
+    WORLD,
+    Closure,
+    Coupling,
+    Kind,
+    Mass,
+    Move,
+    Spring,
+    Strut,
+    Tree,
+    together,
+)
+
+# What these hold is for looks, actuators and measurements.
+_LEFT_OUT = words("contact actuator sensor keyframe custom extension deformable asset")
+OTHERS = {
+    "mujocoinclude": "is a part of a model; give the file that includes it",
+    "OpenSimDocument": (
+        "is a model of OpenSim, which kincheck writes and does not read; give MJCF or a case file"
+    ),
+    "COLLADA": "holds shapes, which say nothing of joints; give the model that names it",
+    "launch": "starts programs of ROS; give the URDF that it names",
+    "model": "describes a package of Gazebo; give the SDF beside it",
+}
+"""Other documents in XML, and the remedy, by their root."""
+_EQUALITIES = ("connect", "weld", "joint", "tendon")
+_ACTUATORS = words("general motor position velocity intvelocity damper cylinder muscle dcmotor")
+
+
+def read_mjcf(file: Path, root: Element) -> Tree:
+    """Return the tree of a model, in its pose qpos0.
+
+    Raises:
+        CaseError: an unknown element or one of new bodies, a name given twice, a joint, place
+            or equality without a sense.
+    """
+    _require_model(root)
+    root = expanded(file, root)
+    _require_model(root)
+    require_known_attributes(root)
+    _require_rigid(root)
+    return _Reader(file, root).read()
+
+
+def _require_model(root: Element) -> None:
+    """Refuse other documents, and elements in place of parts elsewhere."""
+    if root.tag in OTHERS:
+        raise root.fault(OTHERS[root.tag])
+    if root.tag != "mujoco":
+        raise root.fault(
+            "found another document, expected a model <mujoco>, <robot> or <sdf>; give a file of"
+            " MJCF, URDF or SDF"
+        )
+    for element in root.children:
+        _require_written_out(element)
+        if element.tag not in (*ROOT, *EXPANDED):
+            raise element.fault(f"unknown in a model; {remedy(element.tag, ROOT)}")
+
+
+def _require_written_out(element: Element) -> None:
+    if element.tag in MAKE_BODIES:
+        raise element.fault(f"cannot be read, because {MAKE_BODIES[element.tag]}; {WRITE_OUT}")
+
+
+def _require_rigid(root: Element) -> None:
+    """Refuse soft bodies between bodies."""
+    for section in root.only("deformable"):
+        for flex in section.only("flex"):
+            names = {
+                name for key in ("body", "node") for name in flex.attributes.get(key, "").split()
+            }
+            if len(names) > 1:
+                raise flex.fault(
+                    f"holds the bodies {shortened(sorted(names), MOST_NAMED)} together as a soft"
+                    " one, expected rigid bodies; remove it, or write what joins them as <equality>"
+                )
+
+
+class _Reader:
+    """A model during its reading."""
+
+    def __init__(self, file: Path, root: Element) -> None:
+        self.root, self.classes, self.compiler = root, Classes(root), read_compiler(root)
+        model = root.attributes.get("model", file.stem)
+        described = f"MJCF model {model!r} of {file.name}"
+        self.tree = Tree(file, described, "its pose qpos0", digits=significant_digits(root))
+        flags = [flag for option in root.only("option") for flag in option.only("flag")]
+        self.disabled = {
+            key for flag in flags for key, value in flag.attributes.items() if value == "disable"
+        }
+        self.stand_ins = any(
+            text.attributes.get("name") == STAND_INS
+            for custom in root.only("custom")
+            for text in custom.only("text")
+        )
+        tendons = [each for section in root.only("tendon") for each in section.children]
+        self.tendons = {each.attributes.get("name", ""): each for each in tendons}
+
+    def read(self) -> Tree:
+        """Return the tree."""
+        root, tree = self.root, self.tree
+        worlds = [*root.only("worldbody")]
+        for world in worlds:
+            bodies = (each for each in world.below() if each.tag == "body")
+            tree.names.update(
+                each.attributes["name"] for each in bodies if "name" in each.attributes
+            )
+            self._inside(world, ORIGIN, WORLD, MAIN)
+        tree.require_moving(root)
+        for section in root.only(*_LEFT_OUT):
+            for element in section.children:
+                tree.count(f"{section.tag}: {element.tag}")
+        self._equalities()
+        self._springs()
+        keys = [each for section in root.only("keyframe") for each in section.only("key")]
+        for k, key in enumerate(keys):
+            qpos = key.attributes.get("qpos")
+            numbers = None if qpos is None else qpos.split()
+            tree.keyframes[key.attributes.get("name", str(k))] = key, numbers
+        driven = [each.attributes.get("joint") for each in root.below() if each.tag in _ACTUATORS]
+        tree.actuated.update(filter(None, driven))
+        if tree.masses:
+            tree.gravity = self._gravity()
+        return tree
+
+    def _inside(self, around: Element, place: Place, link: str, childclass: str) -> None:
+        """Read what is in a body, or in a frame of it, at a place."""
+        for element in around.children:
+            _require_written_out(element)
+            if element.tag not in IN_BODY:
+                raise element.fault(f"unknown in a body; {remedy(element.tag, IN_BODY)}")
+            match element.tag:
+                case "body":
+                    self._body(element, place, link, _class(element, childclass))
+                case "frame":
+                    if around.tag == "worldbody" and any(element.only("joint", "freejoint")):
+                        raise element.fault("holds a joint, expected joints in bodies; remove it")
+                    inner = place.then(self.compiler.place(element))
+                    self._inside(element, inner, link, _class(element, childclass))
+                case "site":
+                    site = self.classes.complete(element, "site", childclass)
+                    if (name := site.attributes.get("name")) is not None:
+                        at = place.then(self.compiler.place(site))
+                        self.tree.mark(site, name, link, at)
+                case "joint" | "freejoint" | "inertial":
+                    pass
+                case _:
+                    self.tree.count(f"{element.tag}s")
+
+    def _body(self, element: Element, around: Place, outer: str, childclass: str) -> None:
+        tree = self.tree
+        if (name := element.attributes.get("name")) is None:
+            name = tree.names.new(f"body{len(tree.places)}")
+        place = around.then(self.compiler.place(element))
+        # one more than are read is too many already
+        moves = [*islice(self._moves(element, name, place, childclass), MOST_MOVING + 1)]
+        tree.hang(element, name, outer, place, moves)
+        if not moves and element.attributes.get("mocap") == "true":
+            tree.count("mocap bodies, which stand still")
+        if tree.carriers[name] != GROUND:
+            if element.number("gravcomp", 0.0) != 0.0:
+                tree.count("gravity compensation of bodies")
+            self._weigh(element, name, childclass)
+        self._inside(element, place, name, childclass)
+
+    def _weigh(self, element: Element, name: str, childclass: str) -> None:
+        """Read the mass of a body, which motion does not need: what makes no sense is left out."""
+        if self.stand_ins:
+            return
+        try:
+            parts = [*self._in_frames(element, ORIGIN, childclass)]
+            if (mass := mass_of(element, parts, self.classes, self.compiler)) is not None:
+                self.tree.weigh(name, mass)
+        except CaseError:
+            self.tree.weigh(name, None)
+
+    def _in_frames(
+        self, around: Element, place: Place, childclass: str
+    ) -> Iterator[tuple[Element, Place, str]]:
+        """Yield what is in a body or its frames, with the place and the class of the frame."""
+        for element in around.children:
+            if element.tag == "frame":
+                inner = place.then(self.compiler.place(element))
+                yield from self._in_frames(element, inner, _class(element, childclass))
+            else:
+                yield element, place, childclass
+
+    def _moves(self, body: Element, name: str, place: Place, childclass: str) -> Iterator[Move]:
+        """Yield the joints of a body."""
+        found = [
+            (element, at, within)
+            for element, at, within in self._in_frames(body, place, childclass)
+            if element.tag in ("joint", "freejoint")
+        ]
+        for k, (element, at, within) in enumerate(found, 1):
+            if element.tag == "joint":
+                element = self.classes.complete(element, "joint", within)
+            own = name if len(found) == 1 else f"{name}.{k}"
+            yield self._move(element, element.attributes.get("name", own), at, place)
+
+    def _move(self, element: Element, name: str, given: Place, body: Place) -> Move:
+        kind: Kind = "free"
+        if element.tag == "joint":
+            kind = cast("Kind", element.choice("type", (*UNKNOWNS,), "hinge"))
+        align = element.choice("align", ("true", "false", "auto"), "auto")
+        if kind == "free":
+            if align == "true" or (align == "auto" and self.compiler.align):
+                raise element.fault(
+                    "its body's frame is moved to its inertia (align, or alignfree of <compiler>),"
+                    " where anchors and relpose mean something else, expected the frame of the"
+                    ' file; set align="false" and give them in that'
+                )
+            return Move(name, kind, body.at, X, element)
+        for attribute, what in DYNAMIC.items():
+            if attribute in element.attributes:
+                self.tree.count(f"{what} of joints")
+        reference = element.number("ref", 0.0)
+        point = given.point(vec(element.numbers("pos", 3, default=(0.0, 0.0, 0.0))))
+        if kind == "hinge":
+            reference = self.compiler.angle(reference)
+        axis = direction(element, "axis", element.numbers("axis", 3, default=(0.0, 0.0, 1.0)))
+        return Move(name, kind, point, given.direction(axis), element, reference)
+
+    def _equalities(self) -> None:
+        names = set[str]()
+        for section in self.root.only("equality"):
+            for k, bare in enumerate(section.children, 1):
+                element = self.classes.complete(bare, "equality")
+                if element.tag not in _EQUALITIES:
+                    raise element.fault(
+                        "cannot be read: there is no joint for it; expected one of"
+                        f" {', '.join(_EQUALITIES)}; remove it"
+                    )
+                if "equality" in self.disabled or not element.flag("active", default=True):
+                    self.tree.count("equalities that are not active")
+                    continue
+                name = element.attributes.get("name", f"{element.tag}{k}")
+                if name in names:
+                    raise element.repeated_name(name, "the equalities")
+                names.add(name)
+                match element.tag:
+                    case "connect" | "weld":
+                        tie = self._closure(name, element)
+                    case "joint":
+                        tie = self._coupling(name, element)
+                    case _:
+                        tie = self._of_tendon(name, element)
+                self.tree.tie(tie)
+
+    def _closure(self, name: str, element: Element) -> Closure:
+        tree, welded = self.tree, element.tag == "weld"
+        if welded and element.number("torquescale", 1.0) == 0.0:
+            raise element.fault(
+                "torquescale: found 0, which leaves all turning free, expected more; write it as"
+                " <connect>"
+            )
+        holds = "frame" if welded else "point"
+        if "site1" in element.attributes:
+            (i, first), (j, second) = (self._site(element, key) for key in ("site1", "site2"))
+            if welded:
+                first = first.then(ORIGIN)
+            return Closure(name, (i, j), (first, second), element, holds)
+        if "body1" not in element.attributes:
+            raise element.fault(
+                "body1: missing, expected two bodies or two sites; add body1 and body2, or site1"
+                " and site2"
+            )
+        names = element.attributes["body1"], element.attributes.get("body2", WORLD)
+        for key, body in zip(("body1", "body2"), names, strict=True):
+            if body not in tree.places:
+                raise element.unknown_name(key, body, tree.places, "a body")
+        links = tree.carriers[names[0]], tree.carriers[names[1]]
+        first, second = tree.places[names[0]], tree.places[names[1]]
+        if not welded:
+            point = Place(first.point(vec(element.numbers("anchor", 3))))
+            return Closure(name, links, (point, point), element, holds)
+        relpose = element.numbers("relpose", 7, default=(0.0,) * 7)
+        # zeros for the quaternion mean: as in qpos0
+        wanted = second.seen_from(first)
+        if any(relpose[3:]):
+            wanted = Place(vec(relpose[:3]), unit_quaternion(quat(relpose[3:])))
+        return Closure(name, links, (first.then(wanted), second), element, holds)
+
+    def _site(self, element: Element, key: str) -> tuple[str, Place]:
+        name = element.attributes.get(key, "")
+        if name not in self.tree.sites:
+            raise element.unknown_name(key, name, self.tree.sites, "a site")
+        return self.tree.sites[name]
+
+    def _coupling(self, name: str, element: Element) -> Coupling:
+        first = self.tree.axial(element, "joint1", element.attributes.get("joint1"))
+        driving: dict[str, float] = {}
+        if "joint2" in element.attributes:
+            second = self.tree.axial(element, "joint2", element.attributes["joint2"])
+            if first == second:
+                raise element.fault(
+                    f"couples the joint {first!r} with itself, expected two; correct joint2"
+                )
+            driving = {second: 1.0}
+        return Coupling(name, {first: 1.0}, driving, _coefficients(element), element)
+
+    def _of_tendon(self, name: str, element: Element) -> Closure | Coupling:
+        single = self.tendons.get(element.attributes.get("tendon1", ""))
+        if single is not None and single.tag == "spatial" and "tendon2" not in element.attributes:
+            return self._rod(name, element, single)
+        first = self._sum(element, "tendon1")
+        second = self._sum(element, "tendon2") if "tendon2" in element.attributes else {}
+        return Coupling(name, first, second, _coefficients(element), element)
+
+    def _sum(self, element: Element, key: str) -> dict[str, float]:
+        """Return the weights of the joints of a fixed tendon."""
+        name = element.attributes.get(key, "")
+        if name not in self.tendons:
+            raise element.unknown_name(key, name, self.tendons, "a tendon")
+        if self.tendons[name].tag != "fixed":
+            raise element.fault(
+                f"{key}: {name!r} is a spatial tendon, whose length is not linear in joint"
+                " coordinates, expected a fixed one; only alone, and between two sites, is there a"
+                " joint for it"
+            )
+        weights: dict[str, float] = {}
+        for wrap in self.tendons[name].only("joint"):
+            joint = self.tree.axial(wrap, "joint", wrap.attributes.get("joint"))
+            weights[joint] = weights.get(joint, 0.0) + wrap.number("coef")
+        return weights
+
+    def _rod(self, name: str, element: Element, tendon: Element) -> Closure:
+        """Return the distance of a spatial tendon of constant length."""
+        if [child.tag for child in tendon.children] != ["site", "site"]:
+            way = ", ".join(child.tag for child in tendon.children) or "nothing"
+            raise element.fault(
+                f"tendon1: {tendon} goes over {way}, expected two sites; there is no joint for"
+                " others"
+            )
+        (i, first), (j, second) = (self._site(child, "site") for child in tendon.children)
+        apart = second.at - first.at
+        length = math.sqrt(apart @ apart) + _coefficients(element)[0]
+        if i == j or not (apart @ apart > 0.0 and length > 0.0):
+            what = (
+                f"is between two points of {i!r}"
+                if i == j
+                else "has no length in the pose of the file"
+            )
+            raise element.fault(
+                f"tendon1: {tendon} {what}, expected two points of two bodies; remove the equality,"
+                " or write <connect>"
+            )
+        return Closure(name, (i, j), (first, second), element, "distance", length)
+
+    def _springs(self) -> None:
+        """Read springs and dampers of joints and tendons; a law that is not linear, or that
+        MuJoCo's compiler tunes, is counted.
+        """
+        tree = self.tree
+        for move in tree.moves.values():
+            element = move.element
+            try:
+                law = self._law(element)
+                if any(law):
+                    rest = element.number("springref", 0.0)
+                    rest = self.compiler.angle(rest) if move.kind == "hinge" else rest
+                    tree.springs[move.name] = Spring(*law, rest)
+            except CaseError:
+                for key, what in (("stiffness", "springs"), ("damping", "damping")):
+                    if {key, "springdamper"} & element.attributes.keys():
+                        tree.count(f"{what} of joints")
+        for section in self.root.only("tendon"):
+            for tendon in section.children:
+                try:
+                    strut = self._strut(tendon)
+                except CaseError:
+                    tree.count(f"tendon: {tendon.tag}")
+                else:
+                    tree.add_strut(strut)
+
+    def _law(self, element: Element) -> tuple[float, float]:
+        """Return stiffness and damping."""
+        frequency, ratio = element.numbers("springdamper", 2, default=(0.0, 0.0))
+        if frequency > 0.0 and ratio > 0.0:
+            raise element.fault("springdamper: is tuned by MuJoCo, expected stiffness and damping")
+        found: list[float] = []
+        for key, switch in (("stiffness", "spring"), ("damping", "damper")):
+            linear, *more = element.numbers(key, 1, 2, 3, default=(0.0,))
+            acts = not self.disabled & {switch, "passive"}
+            if acts and (any(more) or linear < 0.0):
+                raise element.fault(f"{key}: is no linear law, expected one positive number")
+            found.append(linear if acts else 0.0)
+        return found[0], found[1]
+
+    def _strut(self, bare: Element) -> Strut:
+        """Return the spring of a tendon between two sites.
+
+        Raises:
+            CaseError: it is none.
+        """
+        tendon, tree = self.classes.complete(bare, "tendon"), self.tree
+        stiffness, damping = self._law(tendon)
+        sites = [str(child.attributes.get("site")) for child in tendon.children]
+        if tendon.tag != "spatial" or len(sites) != 2 or not {*sites} <= tree.sites.keys():
+            raise tendon.fault("goes elsewhere than between two sites")
+        (i, first), (j, second) = (tree.sites[site] for site in sites)
+        shortest, longest = (2 * tendon.numbers("springlength", 1, 2, default=(-1.0,)))[:2]
+        if shortest != longest:
+            raise tendon.fault("springlength: is a dead band, expected one length")
+        if shortest < 0.0:
+            rests = {key for move in tree.moves.values() for key in move.element.attributes}
+            if stiffness and rests & {"ref", "springref"}:
+                raise tendon.fault("has the length of a rest pose of its own")
+            shortest = math.dist(coordinates(first.at), coordinates(second.at))
+        name, spring = tendon.attributes.get("name", "tendon"), Spring(stiffness, damping, shortest)
+        points = first.at, second.at
+        return Strut(name, (i, j), points, spring, tendon, "tendon: spatial")
+
+    def _gravity(self) -> Vector:
+        """Return the gravity [m/s^2]; the last option counts."""
+        found = self.tree.gravity
+        for option in self.root.only("option"):
+            if any(flag.attributes.get("gravity") == "disable" for flag in option.only("flag")):
+                return (0.0, 0.0, 0.0)
+            x, y, z = option.numbers("gravity", 3, default=found)
+            found = x, y, z
+        return found
+
+
+def _class(element: Element, childclass: str) -> str:
+    return element.attributes.get("childclass", childclass)
+
+
+def _coefficients(element: Element) -> tuple[float, ...]:
+    """Return five coefficients; omitted ones of polycoef have their defaults."""
+    found = element.numbers("polycoef", 1, 2, 3, 4, 5, default=(0.0, 1.0))
+    return (*found, *(0.0, 1.0, 0.0, 0.0, 0.0)[len(found) :])
+
+
+WATER = 1000.0
+"""Density of geoms unless given, as water has [kg/m^3]."""
+SHAPES = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}
+"""Geoms with a volume, and how many sizes they have."""
+MASSLESS = ("plane", "hfield")
+STAND_INS = "kincheck.stand_ins"
+"""Name of the custom text of a model written by kincheck without masses."""
+
+
+def mass_of(
+    body: Element,
+    parts: Sequence[tuple[Element, Place, str]],
+    classes: Classes,
+    compiler: Compiler,
+) -> Mass | None:
+    """Return the mass of a body in its frame; None without one.
+
+    Args:
+        parts: its content, with the places and the default classes of the frames it is given in.
+
+    Raises:
+        CaseError: a number or shape makes no sense, or a mesh has the mass.
+    """
+    if compiler.total > 0.0:
+        raise body.fault("settotalmass: scales all masses, expected masses; write them out")
+    inertials = [each for each in parts if each[0].tag == "inertial"]
+    geoms = [each for each in parts if each[0].tag == "geom"]
+    if inertials and not (compiler.from_geoms == "true" and geoms):
+        element, at, _ = inertials[-1]
+        found = _inertial(element)
+        place = at.then(compiler.place(element))
+        return None if found.is_stand_in else _bounded(found.seen_in(place), compiler)
+    masses: list[Mass] = []
+    for element, at, within in geoms if compiler.from_geoms != "false" else ():
+        complete = classes.complete(element, "geom", within)
+        if (found := _geom(complete, compiler)) is not None:
+            masses.append(found.seen_in(at.then(compiler.place(complete))))
+    if not masses and any(compiler.least):
+        # the least mass is at the body's own `pos`, in its own axes (measured: MuJoCo 4.0)
+        masses.append(Mass(0.0, compiler.place(body).at, np.zeros((3, 3))))
+    return _bounded(together(masses), compiler) if masses else None
+
+
+def _inertial(element: Element) -> Mass:
+    """Return the mass of an <inertial> in its own frame."""
+    mass = element.number("mass")
+    if mass < 0.0:
+        raise element.fault("mass: is negative, expected a positive number of kg; correct it")
+    if "fullinertia" in element.attributes:
+        xx, yy, zz, xy, xz, yz = element.numbers("fullinertia", 6)
+        return Mass(mass, ZERO, np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+    moments = element.numbers("diaginertia", 3, default=(0.0, 0.0, 0.0))
+    return Mass(mass, ZERO, np.diag(moments))
+
+
+def _geom(element: Element, compiler: Compiler) -> Mass | None:
+    """Return the mass of a geom in its own frame; None without one."""
+    kind = element.attributes.get("type", "sphere")
+    first, last = map(int, compiler.groups)
+    group, density = element.number("group", 0.0), element.number("density", WATER)
+    mass = element.number("mass", math.nan)
+    heavy = (density if math.isnan(mass) else mass) != 0.0
+    if kind in MASSLESS or not first <= group <= last or not heavy:
+        return None
+    if kind not in SHAPES or "mesh" in element.attributes:
+        raise element.fault("is a mesh, expected a simple shape; give <inertial>")
+    if element.attributes.get("shellinertia") == "true":
+        raise element.fault("shellinertia: is a shell, expected a solid; give <inertial>")
+    volume, moments = _solid(kind, _sizes(element, kind))
+    mass = density * volume if math.isnan(mass) else mass
+    if not (mass > 0.0 and volume > 0.0 and usable(mass)):
+        raise element.fault("has a mass or size that is not positive or huge; correct it")
+    return Mass(mass, ZERO, mass * np.diag(moments))
+
+
+def _bounded(found: Mass, compiler: Compiler) -> Mass:
+    """Return a mass within the bounds of the compiler."""
+    if not (any(compiler.least) or compiler.balanced):
+        return found
+    moments, axes = np.linalg.eigh(found.inertia)
+    moments = np.maximum(moments, compiler.least[1])
+    if compiler.balanced and moments[2] > moments[0] + moments[1]:
+        moments[:] = moments.mean()
+    return Mass(max(found.mass, compiler.least[0]), found.center, (axes * moments) @ axes.T)
+
+
+def _sizes(element: Element, kind: str) -> Sequence[float]:
+    """Return the sizes of a shape: radius and half length, or three half lengths [m]."""
+    sizes = [*element.numbers("size", 1, 2, 3, default=(0.0,))]
+    if "fromto" in element.attributes and kind != "sphere":  # two radii alike, then the half length
+        ends = np.array(element.numbers("fromto", 6), dtype=np.float64).reshape(2, 3)
+        return [
+            *[sizes[0]] * (SHAPES[kind] - 1),
+            0.5 * float(np.linalg.norm(np.diff(ends, axis=0))),
+        ]
+    if len(sizes) < SHAPES[kind]:
+        raise element.fault(f"size: found {len(sizes)} numbers, expected {SHAPES[kind]}; add them")
+    return sizes[: SHAPES[kind]]
+
+
+def _solid(kind: str, sizes: Sequence[float]) -> tuple[float, Sequence[float]]:
+    """Return the volume [m^3] and the principal moments over the mass [m^2] of a solid."""
+    a, b, c = (*sizes, 0.0, 0.0)[:3]
+    match kind:
+        case "box":
+            return 8.0 * a * b * c, [(x * x + y * y) / 3.0 for x, y in ((b, c), (a, c), (a, b))]
+        case "cylinder":
+            across = (3.0 * a * a + 4.0 * b * b) / 12.0
+            return 2.0 * math.pi * a * a * b, [across, across, 0.5 * a * a]
+        case "capsule":
+            round_, straight = 4.0 / 3.0 * math.pi * a**3, 2.0 * math.pi * a * a * b
+            share = round_ / (round_ + straight) if round_ else 0.0
+            # two half balls, each with its centre 3/8 of the radius outside the cylinder
+            ends = 0.4 * a * a + b * b + 0.75 * a * b
+            across = (1.0 - share) * (3.0 * a * a + 4.0 * b * b) / 12.0 + share * ends
+            return round_ + straight, [across, across, (0.5 - 0.1 * share) * a * a]
+        case _:
+            a, b, c = (a, a, a) if kind == "sphere" else (a, b, c)
+            moments = [(x * x + y * y) / 5.0 for x, y in ((b, c), (a, c), (a, b))]
+            return 4.0 / 3.0 * math.pi * a * b * c, moments

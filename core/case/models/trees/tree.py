@@ -1,0 +1,387 @@
+"""The tree of links of a model: the content of a MJCF, URDF or SDF file, and all that
+its case is made of.
+
+A link without a move of its own is part of the link around it. A link with several moves hangs on a
+chain of massless ones, a move each. Loops are closed by ties.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from ....algebra import ZERO, Vec3, X, Y, Z
+from ....mechanism.mechanism import GROUND, Vector
+from ....trajectory import Array
+from ...io.document import LARGEST, shown
+from .element import Element, Names
+from .place import ORIGIN, Place
+
+WORLD = "world"
+# Scenes have many links, robots and hands at most some tens that move, a joint each; the freedom
+# of all is counted at once, in a time that grows with the cube of their number: some seconds for as
+# many as these. The rows of ties are solved together, in some seconds.
+MOST_LINKS, MOST_MOVING, MOST_TIES = 2_000, 150, 6_000
+STAND_IN = 1e-6
+"""Mass and moments written by kincheck for a body without a mass [kg, kg m^2]."""
+# Of the stand-in's moments, turned into the axes of a body [kg m^2].
+_ROUND_OFF = 1e-9 * STAND_IN
+
+Kind: TypeAlias = Literal["hinge", "slide", "ball", "free"]
+UNKNOWNS: Mapping[str, int] = {"hinge": 1, "slide": 1, "ball": 3, "free": 6}
+"""Unknowns of a move, by its kind."""
+
+
+@dataclass(frozen=True)
+class Spring:
+    """A linear spring and damper.
+
+    Attributes:
+        stiffness: [N/m or N m/rad].
+        damping: [N s/m or N m s/rad].
+        rest: coordinate or length without force [m or rad].
+    """
+
+    stiffness: float
+    damping: float
+    rest: float
+
+
+@dataclass(frozen=True)
+class Move:
+    """A hinge, a slide, a ball, or the six freedoms of a link that nothing holds; global in the
+    pose of the tree [m].
+
+    Attributes:
+        point: on the axis, or the centre of the ball; without meaning for a slide.
+        axis: unit vector [-]; without meaning for a ball and a free link.
+        element: its place in the file.
+        reference: its coordinate in the zero pose [rad or m].
+        moved: change of its coordinate since the zero pose [rad or m].
+        outer, inner: links it joins; the inner one moves on the outer.
+    """
+
+    name: str
+    kind: Kind
+    point: Vec3
+    axis: Vec3
+    element: Element
+    reference: float = 0.0
+    moved: float = 0.0
+    outer: str = ""
+    inner: str = ""
+
+    @property
+    def value(self) -> float:
+        """Its coordinate in the pose of the tree [rad or m]."""
+        return self.reference + self.moved
+
+    @property
+    def is_axial(self) -> bool:
+        """Whether it has one coordinate."""
+        return self.kind in ("hinge", "slide")
+
+
+@dataclass(frozen=True)
+class Closure:
+    """A frame of each of two links, global in the pose of the tree, that are held together.
+
+    Attributes:
+        holds: "point", their origins coincide; "frame", their axes too; "distance", their origins
+            have a constant distance.
+        length: the distance [m].
+    """
+
+    name: str
+    links: tuple[str, str]
+    places: tuple[Place, Place]
+    element: Element
+    holds: Literal["point", "frame", "distance"] = "frame"
+    length: float = 0.0
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """Changes of coordinates since the zero pose [rad, m]: a weighted sum, by move, follows a
+    polynomial of another.
+
+    Attributes:
+        coefficients: from the constant on.
+    """
+
+    name: str
+    driven: Mapping[str, float]
+    driving: Mapping[str, float]
+    coefficients: Sequence[float]
+    element: Element
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether no power above the first takes part."""
+        return not (self.driving and any(self.coefficients[2:]))
+
+    @property
+    def moves(self) -> set[str]:
+        """The moves it ties to one another, or locks."""
+        return {*(self.weights if self.is_linear else (*self.driven, *self.driving))}
+
+    @property
+    def weights(self) -> dict[str, float]:
+        """Of a linear coupling, the weights of the constant sum; without zeros."""
+        found = dict(self.driven)
+        for move, weight in self.driving.items():
+            slope = self.coefficients[1] if len(self.coefficients) > 1 else 0.0
+            found[move] = found.get(move, 0.0) - slope * weight
+        return {move: weight for move, weight in found.items() if weight}
+
+
+Tie: TypeAlias = Closure | Coupling
+Keyframe: TypeAlias = tuple[Element, Sequence[str] | None]
+"""Coordinates of all moves in order, as written, and their place; None for the zero pose."""
+
+
+@dataclass(frozen=True)
+class Strut:
+    """A spring and damper between points of two links, global in the pose of the tree [m].
+
+    Attributes:
+        described: its name in the list of parts left out.
+    """
+
+    name: str
+    links: tuple[str, str]
+    points: tuple[Vec3, Vec3]
+    spring: Spring
+    element: Element
+    described: str
+
+
+@dataclass(frozen=True, eq=False)
+class Mass:
+    """A mass in a frame.
+
+    Attributes:
+        mass: [kg].
+        center: centre of mass [m].
+        inertia: about the centre, in the axes of the frame [kg m^2], shape (3, 3).
+    """
+
+    mass: float
+    center: Vec3
+    inertia: Array
+
+    @property
+    def is_stand_in(self) -> bool:
+        """Whether it is what kincheck itself writes for none."""
+        alike = np.allclose(self.inertia, STAND_IN * np.eye(3), rtol=0, atol=_ROUND_OFF)
+        return self.mass == STAND_IN and alike
+
+    def seen_in(self, place: Place) -> Mass:
+        """Return the mass in another frame, in which the place of its own one is given."""
+        axes = np.array([[*place.direction(axis)] for axis in (X, Y, Z)]).T
+        return Mass(self.mass, place.point(self.center), axes @ self.inertia @ axes.T)
+
+
+def together(masses: Sequence[Mass]) -> Mass:
+    """Return several masses in a frame as one."""
+    total = sum(each.mass for each in masses)
+    if len(masses) == 1 or total == 0.0:
+        return masses[0] if masses else Mass(0.0, ZERO, np.zeros((3, 3)))
+    center = sum(((each.mass / total) * each.center for each in masses), ZERO)
+    inertia = np.zeros((3, 3))
+    for each in masses:
+        arm = np.array([*(each.center - center)], dtype=np.float64)
+        inertia += each.inertia + each.mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    return Mass(total, center, inertia)
+
+
+@dataclass(eq=False)
+class Tree:
+    """The links of a model, global in its zero pose, until it is posed; a reader fills it.
+
+    Attributes:
+        described: the model and its file, for the source of the case.
+        zero: its zero pose, in words.
+        closes: whether it is meant to close.
+        digits: significant digits of the numbers of the file.
+        gravity: [m/s^2].
+        places: of all links of the file, global.
+        carriers: by link of the file, the moving one it is part of.
+        moving: places of the moving links, global; the massless ones of chains too.
+        massless: the names of those.
+        moves: by name, outer ones first.
+        free: by name, of the move or of its link, links held by nothing.
+        sites: by name, the moving link they are on, and their global places.
+        masses: of moving links with a mass, in the frame of each; several of links that move as
+            one.
+        unweighed: moving links whose masses cannot be read.
+        springs: by move; others are of no move of the tree.
+        actuated: moves with a motor.
+        keyframes: by name.
+        left_out: numbers of parts without a meaning for kinematics, by name.
+    """
+
+    file: Path
+    described: str
+    zero: str
+    closes: bool = True
+    digits: int = 0
+    gravity: Vector = (0.0, 0.0, -9.81)
+    places: dict[str, Place] = field(default_factory=lambda: {WORLD: ORIGIN})
+    carriers: dict[str, str] = field(default_factory=lambda: {WORLD: GROUND})
+    moving: dict[str, Place] = field(default_factory=dict[str, Place])
+    massless: set[str] = field(default_factory=set[str])
+    moves: dict[str, Move] = field(default_factory=dict[str, Move])
+    free: dict[str, str] = field(default_factory=dict[str, str])
+    sites: dict[str, tuple[str, Place]] = field(default_factory=dict[str, tuple[str, Place]])
+    masses: dict[str, list[Mass]] = field(default_factory=dict[str, list[Mass]])
+    unweighed: set[str] = field(default_factory=set[str])
+    ties: list[Tie] = field(default_factory=list[Tie])
+    springs: dict[str, Spring] = field(default_factory=dict[str, Spring])
+    struts: list[Strut] = field(default_factory=list[Strut])
+    actuated: set[str] = field(default_factory=set[str])
+    keyframes: dict[str, Keyframe] = field(default_factory=dict[str, Keyframe])
+    left_out: dict[str, int] = field(default_factory=dict[str, int])
+    names: Names = field(default_factory=Names)
+
+    @cached_property
+    def joints(self) -> Mapping[str, Move]:
+        """The moves of links that something holds."""
+        return {name: move for name, move in self.moves.items() if move.kind != "free"}
+
+    def count(self, what: str) -> None:
+        """Count one more omitted item."""
+        self.left_out[what] = self.left_out.get(what, 0) + 1
+
+    def hang(
+        self, element: Element, name: str, outer: str, place: Place, moves: Sequence[Move] = ()
+    ) -> None:
+        """Hang a link on another one by a chain of moves; without any it is part of that.
+
+        Raises:
+            CaseError: a name is taken, a place is beyond all numbers, or there are too many.
+        """
+        if name in self.places:
+            raise element.repeated_name(name, "the bodies")
+        _require_few(element, MOST_LINKS, len(self.places), "bodies; take out what does not move")
+        _require_few(element, MOST_MOVING, len(self.moving) + len(moves), f"joints; {_TAKE_OUT}")
+        carrier = self.carriers[outer]
+        if name == GROUND and (moves or carrier != GROUND):
+            raise element.fault(
+                f"name: found {shown(name)}, which is what does not move in a mechanism; rename the"
+                " body"
+            )
+        _require_within(element, place.at)
+        for k, move in enumerate(moves):
+            if move.name in self.moves or (move.kind == "free" and move.name in self.free):
+                raise move.element.repeated_name(move.name, "the joints")
+            if move.kind == "free" and (len(moves) > 1 or carrier != GROUND):
+                raise move.element.fault(
+                    "frees a body that other joints hold, expected a body in worldbody alone;"
+                    " remove one of them"
+                )
+            _require_within(move.element, move.point)
+            inner = name if k == len(moves) - 1 else self.names.new(f"{name}.{move.name}")
+            self.moving[inner] = place
+            if inner != name:
+                self.massless.add(inner)
+            if move.kind == "free":
+                self.free.update({move.name: name, name: name})
+            self.moves[move.name] = replace(move, outer=carrier, inner=inner)
+            carrier = inner
+        self.places[name], self.carriers[name] = place, carrier
+
+    def mark(self, element: Element, name: str, link: str, place: Place) -> None:
+        """Add a site of a name to a link.
+
+        Raises:
+            CaseError: the name is taken, or the place is beyond all numbers.
+        """
+        if name in self.sites:
+            raise element.repeated_name(name, "the sites")
+        _require_within(element, place.at)
+        self.sites[name] = self.carriers[link], place
+
+    def weigh(self, link: str, mass: Mass | None) -> None:
+        """Add the mass of a link, in its frame, to what carries it; None if it cannot be read."""
+        carrier = self.carriers[link]
+        if carrier == GROUND:
+            return
+        if mass is None:
+            self.unweighed.add(carrier)
+        else:
+            seen = mass.seen_in(self.places[link].seen_from(self.moving[carrier]))
+            self.masses.setdefault(carrier, []).append(seen)
+
+    def require_moving(self, root: Element) -> None:
+        """Refuse a model in which nothing moves."""
+        if not self.moving:
+            raise root.fault(
+                "has no body with a joint, expected a mechanism; give a model that moves"
+            )
+
+    def tie(self, tie: Tie) -> None:
+        """Add a tie; one between parts of the ground is counted.
+
+        Raises:
+            CaseError: it ties a link to itself, or there are too many.
+        """
+        _require_few(tie.element, MOST_TIES, len(self.ties) + 1, f"equalities; {_TAKE_OUT}")
+        if isinstance(tie, Closure) and tie.links[0] == tie.links[1]:
+            if tie.links[0] == GROUND:
+                self.count("equalities of what stands still")
+                return
+            raise tie.element.fault(
+                f"joins {tie.links[0]!r} with itself, expected two bodies that move otherwise;"
+                " remove it"
+            )
+        self.ties.append(tie)
+
+    def add_strut(self, strut: Strut) -> None:
+        """Add a strut; one without a law is counted.
+
+        Raises:
+            CaseError: there are too many.
+        """
+        if not (strut.spring.stiffness or strut.spring.damping):
+            self.count(strut.described)
+            return
+        _require_few(strut.element, MOST_TIES, len(self.struts) + 1, f"springs; {_TAKE_OUT}")
+        self.struts.append(strut)
+
+    def axial(self, element: Element, key: str, name: str | None) -> str:
+        """Return the name of a move with one coordinate.
+
+        Raises:
+            CaseError: there is none of the name.
+        """
+        if name is None or name not in self.joints:
+            raise element.unknown_name(key, name, self.joints, "a joint")
+        if self.joints[name].kind == "ball":
+            raise element.fault(
+                f"{key}: {name!r} is a ball joint, expected a hinge or a slide; couple one of those"
+            )
+        return name
+
+
+_TAKE_OUT = "take out those that are not looked at"
+
+
+def _require_few(element: Element, most: int, count: int, what: str) -> None:
+    """Refuse more than can be read in some seconds."""
+    if count > most:
+        raise element.fault(f"found more than the {most} that are read, expected fewer {what}")
+
+
+def _require_within(element: Element, point: Vec3) -> None:
+    """Refuse a place beyond all numbers, to which the places of many links may add up."""
+    if not all(math.isfinite(x) and abs(x) <= LARGEST for x in point):
+        raise element.fault(
+            f"is farther than {LARGEST:g} m from the origin, expected a mechanism; correct places"
+        )

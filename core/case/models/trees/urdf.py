@@ -1,0 +1,402 @@
+"""URDF: a tree of links, and its loops: <constraint> elements, joints of SDF in <gazebo>, Drake's
+ball constraints, or a file beside it.
+
+Two forms of <constraint> are read, which are no part of URDF yet: the one proposed to urdfdom
+(github.com/ros/urdfdom/pull/264), with parent, child, parent_origin, child_origin and parent_axis,
+and the one of generalized rigid-body dynamics (github.com/mit-biomimetics/URDF-Parser), with
+predecessor, successor and an origin in each.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from ....algebra import IDENTITY, Quat, Vec3, X, Y, Z, vec
+from ....errors import CaseError
+from ....joints.base import triad
+from ...io.document import shown
+from .beside import read_beside
+from .element import Element, words
+from .graph import Freedom, Graph, Joint, Loop
+from .place import ORIGIN, Place, roll_pitch_yaw, unit_quaternion
+from .robot_elements import (
+    BALL,
+    ENTRIES,
+    FRICTION,
+    LAW,
+    STRUT,
+    Unread,
+    add_spring,
+    add_ties,
+    direction,
+    mass_in,
+    mimic,
+    screw,
+)
+from .sdf import Frames, joints_of
+from .tree import WORLD, Kind, Mass, Move, Tree
+
+GAZEBO, DRAKE_JOINT, PITCH = "gazebo", "drake:joint", "drake:screw_thread_pitch"
+JOINTS = ("joint", DRAKE_JOINT)
+READ = ("link", *JOINTS, "constraint", BALL, STRUT)
+IN_ROBOT = (*READ, "material", "transmission", "gazebo")
+IN_LINK = ("inertial", "visual", "collision")
+IN_GAZEBO = ("joint", "frame")
+IN_JOINT = (
+    *words("origin parent child axis mimic limit"),
+    *("calibration", "dynamics", "safety_controller", PITCH, "joint_properties"),
+)
+IN_CONSTRAINT = words(
+    "parent child parent_origin child_origin parent_axis child_axis predecessor successor"
+)
+POSE = ("xyz", "rpy")
+TYPES = words("revolute continuous prismatic fixed floating planar spherical ball")
+"""Types of joints; balls are no part of URDF, and several simulators read them."""
+DRAKE_TYPES = ("ball", "planar", "screw", "universal")
+# Of the axes of SDF in <gazebo>: those in the joint's own frame.
+SDF_VERSION = (1, 7)
+
+CLOSING: Mapping[str, Sequence[Kind]] = {
+    "fixed": (),
+    "link": (),
+    "revolute": ("hinge",),
+    "continuous": ("hinge",),
+    "prismatic": ("slide",),
+    "cylindrical": ("slide", "hinge"),
+    "universal": ("hinge", "hinge"),
+    "spherical": ("ball",),
+    "ball": ("ball",),
+    "position": ("ball",),
+}
+"""Moves of a <constraint>, by its type; `link` joins the halves of a link."""
+_AXES = {"x": X, "y": Y, "z": Z}
+
+
+def read_urdf(file: Path, root: Element) -> Tree:
+    """Return the tree of a robot, in its zero pose.
+
+    Raises:
+        CaseError: no tree of links, or an unknown joint or condition.
+    """
+    robot = _Robot(file, root)
+    robot.read()
+    return robot.graph.hang()
+
+
+class _Robot:
+    """A robot during its reading."""
+
+    def __init__(self, file: Path, root: Element) -> None:
+        self.root, self.beside = root, read_beside(file, root)
+        name, beside = root.attributes.get("name", file.stem), self.beside.names
+        others = f" with {', '.join(beside)}" if beside else ""
+        described = f"URDF robot {name!r} of {file.name}{others}"
+        self.graph = Graph.of(root, described, closes=self.beside.pairs is None)
+        self.joints: dict[str, Element] = {}
+
+    def read(self) -> None:
+        """Read everything."""
+        root, graph = self.root, self.graph
+        for child in root.children:
+            if child.tag.startswith("xacro:"):
+                raise child.fault(
+                    "is a macro, expected plain URDF; expand the file: xacro FILE > robot.urdf"
+                )
+            if child.tag not in READ and not any(_joints_of_sdf(child)):
+                graph.tree.count(child.tag)
+        root.require_children(IN_ROBOT)
+        self._links()
+        self._hang()
+        for name, element in self.joints.items():
+            graph.joints.append(self._joint(name, element))
+        for name, element in self.joints.items():
+            if (each := element.child("mimic")) is not None:
+                each.require_known(("joint", "multiplier", "offset"), "URDF")
+                leader = each.required("joint")
+                if leader not in self.joints:
+                    raise each.unknown_name("joint", leader, self.joints, "a joint")
+                offset, factor = each.number("offset", 0.0), each.number("multiplier", 1.0)
+                graph.couplings.append(mimic(name, leader, offset, factor, each))
+        for k, element in enumerate(root.only("constraint"), 1):
+            graph.loops.append(self._constraint(element, f"constraint{k}"))
+        add_ties(graph, ((each, self._named) for each in root.children))
+        frames = self._gazebo()
+        self.beside.add(graph)
+        self._require_apart(frames)
+        for each in root.only("transmission"):
+            names = (joint.attributes.get("name", "") for joint in each.only("joint"))
+            graph.tree.actuated.update(name for name in names if name in self.joints)
+
+    def _links(self) -> None:
+        root, graph = self.root, self.graph
+        for element in root.only("link"):
+            name = element.required("name")
+            if name in graph.elements:
+                raise element.repeated_name(name, "the links")
+            graph.elements[name] = element
+            element.require_known(("name", "type"), "URDF", closed=False)
+            element.require_children(IN_LINK)
+            for each in [*element.only("inertial")][:1]:
+                graph.masses[name] = _mass(each)
+            for child in element.children:
+                if child.tag != "inertial":
+                    graph.tree.count(child.tag)
+        parents = [each for joint in root.only(*JOINTS) for each in joint.only("parent")]
+        if any(each.attributes.get("link") == WORLD for each in parents):
+            graph.elements.setdefault(WORLD, root)  # as in Drake, which has it without a link
+        if not graph.elements:
+            raise root.fault("has no link, expected a mechanism; give a robot that moves")
+
+    def _hang(self) -> None:
+        """Read the joints, and place all links from the base outwards."""
+        graph = self.graph
+        above: dict[str, str] = {}
+        below: dict[str, list[tuple[str, Element]]] = {}
+        for element in self.root.only(*JOINTS):
+            element.require_known(("name", "type"), "URDF")
+            name = element.required("name")
+            if name in self.joints:
+                raise element.repeated_name(name, "the joints")
+            element.require_children(IN_JOINT, closed=True)
+            child = self._link(element, "child")
+            below.setdefault(self._link(element, "parent"), []).append((child, element))
+            if child in above:
+                raise element.fault(
+                    f"child: found {shown(child)}, which {above[child]!r} holds already, expected a"
+                    " tree; write the joint that closes a loop as <constraint>"
+                )
+            above[child], self.joints[name] = name, element
+            self._damper(name, element)
+            for each in ("limit", "calibration", "safety_controller", "joint_properties"):
+                if any(element.only(each)):
+                    graph.tree.count(f"{each} of joints")
+        roots = [name for name in graph.elements if name not in above]
+        if len(roots) != 1:
+            listed = ", ".join(roots[:5]) or "none"
+            raise self.root.fault(
+                f"found {len(roots)} links without a joint above them ({listed}), expected one, the"
+                " base; join the others to it"
+            )
+        graph.fixed.add(roots[0])
+        graph.places[roots[0]] = ORIGIN
+        waiting = roots
+        while waiting:
+            link = waiting.pop()
+            for child, element in below.get(link, ()):
+                graph.places[child] = graph.places[link].then(_origin(element.child("origin")))
+                waiting.append(child)
+        if ring := [name for name in graph.elements if name not in graph.places]:
+            raise graph.elements[ring[0]].fault(
+                "hangs on itself by a ring of joints, expected a tree; write the joint that closes"
+                " the ring as <constraint>"
+            )
+
+    def _damper(self, name: str, element: Element) -> None:
+        for dynamics in element.only("dynamics"):
+            dynamics.require_known((*LAW, *FRICTION), "URDF")
+            if element.attributes.get("type") in ("revolute", "continuous", "prismatic"):
+                add_spring(self.graph, name, dynamics.attributes)
+            else:
+                self.graph.tree.count("dynamics of joints")
+
+    def _named(self, element: Element, name: str, key: str = "name") -> str:
+        """Return a name of a link."""
+        if name not in self.graph.elements:
+            raise element.unknown_name(key, name, self.graph.elements, "a link")
+        return name
+
+    def _link(self, element: Element, tag: str, *more: str) -> str:
+        """Return the link named by a child element."""
+        for each in (tag, *more):
+            if (child := element.child(each)) is not None:
+                child.require_known(("link",), "URDF")
+                return self._named(child, child.required("link"), "link")
+        raise element.fault(f"<{tag}>: missing, expected a link; add it")
+
+    def _joint(self, name: str, element: Element) -> Joint:
+        graph = self.graph
+        links = self._link(element, "parent"), self._link(element, "child")
+        place = graph.places[links[1]]
+        types = DRAKE_TYPES if element.tag == DRAKE_JOINT else TYPES
+        kind = self.beside.types.get(name) or element.choice("type", types, "")
+
+        def axis() -> Vec3:
+            return _axis(element, "axis", place)
+
+        freedoms: list[Freedom]
+        match kind:
+            case "revolute" | "continuous":
+                freedoms = [("", "hinge", axis())]
+            case "prismatic":
+                freedoms = [("", "slide", axis())]
+            case "spherical" | "ball":
+                freedoms = [("", "ball", X)]
+            case "floating" if links[0] in graph.fixed:
+                return Joint(name, links, (), element, is_free=True)
+            case "floating":
+                freedoms = [(f".{each}", "slide", place.direction(a)) for each, a in _AXES.items()]
+                freedoms.append(("", "ball", X))
+            case "planar":
+                f, g, h = triad((*axis(),))
+                freedoms = [(".slide1", "slide", f), (".slide2", "slide", g)]
+                freedoms.append((".rotation", "hinge", h))
+            case "fixed":
+                freedoms = []
+            case "screw":
+                freedoms = screw(graph, name, element.value(PITCH, 1)[0], axis(), element)
+            case "universal":  # of Drake: about x of the parent, then y of the child
+                axes = enumerate((X, Y), 1)
+                freedoms = [(f".{k}", "hinge", place.direction(a)) for k, a in axes]
+            case _:  # of a file beside: a universal joint, by the letters of its axes
+                letters = {each: _AXES[each.lower()] for each in kind}
+                freedoms = [(f"_{k}", "hinge", place.direction(a)) for k, a in letters.items()]
+        return Joint.of(name, links, place.at, freedoms, element)
+
+    def _constraint(self, element: Element, default: str) -> Loop:
+        """Return the joint of a <constraint>."""
+        element.require_known(("name", "type"), "URDF")
+        element.require_children(IN_CONSTRAINT, closed=True)
+        name = element.attributes.get("name", default)
+        kind = element.attributes.get("type", "").lower()
+        if kind not in CLOSING:
+            raise element.unknown_name("type", kind, CLOSING, f"one of {', '.join(CLOSING)}")
+        links: list[str] = []
+        places: list[Place] = []
+        for tag, other in (("parent", "predecessor"), ("child", "successor")):
+            link = self._link(element, tag, other)
+            origin, within = element.child(f"{tag}_origin"), element.child(other)
+            if origin is None and within is not None:
+                origin = within.child("origin")
+            links.append(link)
+            places.append(self.graph.places[link].then(_origin(origin)))
+        first, second = places
+        kinds = CLOSING[kind]
+        ball = "ball" in kinds
+        axes = [_axis(element, "parent_axis", first)] if kinds and not ball else [X]
+        if kind == "universal":
+            axes.append(_axis(element, "child_axis", second))
+        freedoms: list[Freedom] = [
+            (f".{each}{k + 1}" * (len(kinds) > 1), each, axes[min(k, len(axes) - 1)])
+            for k, each in enumerate(kinds)
+        ]
+        joint = Joint.of(name, (links[0], links[1]), first.at, freedoms, element)
+        if ball:
+            return Loop(joint, (Place(first.at, IDENTITY), Place(second.at, IDENTITY)))
+        return Loop(joint, (_fitted(first, second, joint.moves), second))
+
+    def _gazebo(self) -> Frames:
+        """Add the joints of SDF in <gazebo>, which close loops; return all frames.
+
+        Raises:
+            CaseError: see `joints_of`; or they bring links, or move the base.
+        """
+        graph, root, frames = self.graph, self.root, Frames()
+        for name, element in graph.elements.items():
+            frames.put(name, element, graph.places[name], name)
+        for name, element in self.joints.items():
+            link = self._link(element, "child")
+            if name not in frames.found:
+                frames.put(name, element, graph.places[link], link)
+        for element in root.only("frame"):  # of Drake
+            link, name = element.attributes.get("link", ""), element.attributes.get("name", "")
+            if link in graph.places and name and name not in frames.found:
+                frames.put(name, element, graph.places[link].then(_pose(element)), link)
+        for gazebo in root.only(GAZEBO):
+            for element in gazebo.only("link", "model"):
+                raise element.fault("is of SDF, expected links of URDF; write it as <link>")
+            if any(_joints_of_sdf(gazebo)):
+                frames.read(gazebo, "")
+        still = {*graph.fixed}
+        graph.loops += [Loop(joint) for joint in joints_of(graph, frames, SDF_VERSION)]
+        for full, framed in frames.joints.items():
+            base = frames.link(framed.element, framed.attached)
+            if base in still and framed.element.attributes.get("type") != "fixed":
+                raise framed.element.fault(
+                    f"{full!r} moves {base!r}, the base, which stands still, expected a joint"
+                    " between links that move; give the robot a link 'world' and this joint as one"
+                    " of URDF"
+                )
+        return frames
+
+    def _require_apart(self, frames: Frames) -> None:
+        """Refuse elements that are not read and may join links."""
+        graph = self.graph
+        names = {move.name: move.name for joint in graph.joints for move in joint.moves}
+        names |= {joint.name: joint.name for joint in graph.joints}
+        advice = f"a <joint>, <constraint> or <{BALL}>"
+        unread = Unread(frames.named(), names, graph.followers, advice)
+        for element in (self.root, *self.root.only("link")):
+            link = element.attributes["name"] if element.tag == "link" else ""
+            if link:
+                unread.require_apart(replace(element, children=[]), link)
+            unread.require_all_apart(element.children, (*READ, *IN_LINK, GAZEBO), link)
+        for gazebo in self.root.only(GAZEBO):
+            read = IN_GAZEBO if any(_joints_of_sdf(gazebo)) else ()
+            link = gazebo.attributes.get("reference", "")
+            unread.require_all_apart(gazebo.children, read, link)
+
+
+def _mass(element: Element) -> Mass | None:
+    """Return the mass of an <inertial>; None if it cannot be read, for motion does not need it."""
+    element.require_children(("mass", "inertia", "origin"), closed=True)
+    for child in element.children:
+        child.require_known({"mass": ("value",), "inertia": ENTRIES}.get(child.tag, POSE), "URDF")
+    try:
+        mass, matrix = element.child("mass"), element.child("inertia")
+        if mass is None:
+            return None
+        entries = [0.0 if matrix is None else matrix.number(name, 0.0) for name in ENTRIES]
+        return mass_in(_origin(element.child("origin")), mass.number("value"), entries)
+    except CaseError:
+        return None
+
+
+def _joints_of_sdf(element: Element) -> Iterator[Element]:
+    """Yield the joints and frames of SDF in a <gazebo> of the whole robot."""
+    if element.tag == GAZEBO and "reference" not in element.attributes:
+        yield from element.only(*IN_GAZEBO)
+
+
+def _origin(element: Element | None) -> Place:
+    if element is None:
+        return ORIGIN
+    element.require_known(POSE, "URDF")
+    return _pose(element)
+
+
+def _pose(element: Element) -> Place:
+    at, angles = (element.numbers(name, 3, default=(0.0, 0.0, 0.0)) for name in POSE)
+    return Place(vec(at), roll_pitch_yaw(angles))
+
+
+def _axis(element: Element, tag: str, place: Place) -> Vec3:
+    """Return the axis of a joint, global; x unless given."""
+    child = element.child(tag)
+    if child is None:
+        return place.direction(X)
+    child.require_known(("xyz",), "URDF")
+    return place.direction(direction(child, child.numbers("xyz", 3)))
+
+
+def _fitted(first: Place, second: Place, moves: Sequence[Move]) -> Place:
+    """Return the first frame of a loop, moved by the joint's own moves to the second one.
+
+    The rest between both is the gap of the loop.
+    """
+    kinds = [move.kind for move in moves]
+    at, turn = first.at, first.turn
+    for move in moves:
+        if move.kind == "slide":
+            at += (move.axis @ (second.at - first.at)) * move.axis
+    if kinds.count("hinge") > 1:
+        turn = second.turn
+    elif "hinge" in kinds:
+        axis = moves[kinds.index("hinge")].axis
+        between = second.turn * first.turn.conjugate()
+        twist = Quat(between.e0, (axis @ between.e) * axis)
+        if math.hypot(twist.e0, *twist.e) > 0.0:
+            turn = unit_quaternion(twist) * first.turn
+    return Place(at, turn)

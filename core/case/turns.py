@@ -1,0 +1,204 @@
+"""Angles of joints and orientations of bodies with their turns: from the samples, or of coarse
+sweeps from the way there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..algebra import Vec3, quat
+from ..jet import Jet
+from ..kinematics import (
+    DOUBTFUL,
+    agreement,
+    followed_angle,
+    followed_attitude,
+    in_doubt,
+    near_design,
+)
+from ..mechanism.mechanism import Mechanism
+from ..mechanism.motions import Path
+from ..trajectory import Array
+from .measures import JointAngle, Orientation
+from .quantity import Quantity
+from .rotation import angular_velocity, floats, signed
+
+
+def counted(
+    mechanism: Mechanism,
+    path: Path,
+    output: Quantity,
+    at: Mapping[str, Vec3],
+    design: Mapping[str, Vec3],
+) -> Jet:
+    """Return an output over the samples of a path: an angle or an orientation with its turns since
+    design, any other output as it is.
+
+    Args:
+        at, design: see `Quantity.of`; samples along the first axis.
+    """
+    if isinstance(output, Orientation):
+        return oriented(mechanism, path, output, at, design)
+    angle = output.of(at, design)
+    if not output.period:
+        return angle
+    count = turns_of(mechanism, path, output, angle.x, angle.v)
+    return Jet(angle.x + output.period * count, angle.v, angle.a)
+
+
+def turns_of(
+    mechanism: Mechanism,
+    path: Path,
+    output: Quantity,
+    x: Array,
+    v: Array,
+    samples: NDArray[np.intp] | slice = slice(None),
+) -> Array:
+    """Return the whole number of periods to add to an angle at the samples.
+
+    Samples near each other tell it by their rates. Otherwise the native solver follows the joint on
+    the way from the design, and the angle is the one near to that.
+
+    Args:
+        x, v: value and rate, samples along the first axis; NaN if unknown.
+        samples: indices of these among the samples of the path.
+    """
+    part = replace(path, times=path.times[samples])
+    count = turns(x, v, output.period, part)
+    assert isinstance(output, JointAngle)
+    if near_design(mechanism, path) and not in_doubt(x + output.period * count, v, part.times):
+        return count
+    near = _reached(followed_angle(mechanism, path, output.joint), samples, part.times)
+    if near is None:
+        return count
+    near = near.reshape(-1, *(1,) * (x.ndim - 1))
+    # of the same solution the difference is zero; of a variant it changes little between samples
+    return turns(x - near, np.full_like(x, np.nan), output.period, part)
+
+
+def oriented(
+    mechanism: Mechanism,
+    path: Path,
+    output: Orientation,
+    at: Mapping[str, Vec3],
+    design: Mapping[str, Vec3],
+    samples: NDArray[np.intp] | slice = slice(None),
+) -> Jet:
+    """Return the orientation of a body, the sign of its Euler parameters continuous from design.
+
+    Samples near each other tell it by the angular velocities. Otherwise the native solver follows
+    the body on the way from the design, and the sign is the one nearer to that.
+
+    Args:
+        at, design: see `Quantity.of`; samples along the first axis.
+        samples: indices of these among the samples of the path.
+    """
+    e = output.parameters(at, design)
+    part = replace(path, times=path.times[samples])
+    values = floats(e)
+    sign, doubt = signs(values, angular_velocity(e), part)
+    moves = any(body.name == output.body for body in mechanism.moving)
+    if moves and (doubt or not near_design(mechanism, path)):
+        near = _reached(followed_attitude(mechanism, path, output.body), samples, part.times)
+        if near is not None:
+            near = near.T.reshape(4, -1, *(1,) * (values.ndim - 2))
+            sign = np.where((near * values).sum(axis=0) < 0.0, -1.0, 1.0)
+    return output.component_of(signed(sign, e))
+
+
+def _reached(
+    followed: Array | None, samples: NDArray[np.intp] | slice, times: Array
+) -> Array | None:
+    """Return followed values at samples, those not reached like the reached ones nearest in time;
+    None if none is reached.
+    """
+    if followed is None:
+        return None
+    near = followed[samples]
+    known = np.flatnonzero(np.isfinite(near.reshape(len(near), -1)).all(axis=1))
+    if len(known) == len(near):
+        return near
+    if not known.size:
+        return None
+    return near[known[np.abs(times[:, None] - times[known]).argmin(axis=1)]]
+
+
+def turns(x: Array, v: Array, period: float, path: Path) -> Array:
+    """Return the whole number of periods to add to values known but for a multiple of the period.
+
+    From sample to sample in time the change is the one nearest to that by the velocities; without
+    velocities, the smallest. Time zero is the design and has the value zero, unless the path starts
+    elsewhere: then the sample nearest to it has the smallest value.
+
+    Args:
+        x, v: values and velocities, samples along the first axis; NaN if unknown.
+    """
+    order = np.argsort(path.times, kind="stable")
+    t, x, v = path.times[order], x[order], v[order]
+    t = t.reshape(-1, *(1,) * (x.ndim - 1))
+    before = _known_before(np.isfinite(x))
+    change = x - np.take_along_axis(x, before, 0)
+    speed = 0.5 * (v + np.take_along_axis(v, before, 0))
+    gone = speed * (t - np.take_along_axis(np.broadcast_to(t, x.shape), before, 0))
+    count = np.cumsum(_whole((np.nan_to_num(gone) - change) / period), axis=0)
+    nearest = np.argsort(np.abs(t).ravel(), kind="stable")
+    first = nearest[np.argmax(np.isfinite(x)[nearest], axis=0)][None]
+    x0, v0, n0 = (np.take_along_axis(each, first, 0) for each in (x, v, count))
+    expected = np.nan_to_num(v0 * t.ravel()[first]) * float(_through_design(path))
+    count = count - n0 + _whole((expected - x0) / period)
+    found = np.empty_like(x)
+    found[order] = count
+    return found
+
+
+def signs(e: Array, rate: Array, path: Path) -> tuple[Array, bool]:
+    """Return the signs of Euler parameters of the same rotations, shape (n, ...), and whether the
+    angular velocities leave one in doubt.
+
+    They are chosen like `turns`: from sample to sample in time the rotation is the one nearest to
+    that by the angular velocities; without these, the smallest.
+
+    Args:
+        e: Euler parameters, either sign, shape (4, n, ...); NaN if unknown.
+        rate: angular velocity [rad/s], shape (3, n, ...); NaN if unknown.
+    """
+    order = np.argsort(path.times, kind="stable")
+    t, e, rate = path.times[order], e[:, order], rate[:, order]
+    t = np.broadcast_to(t.reshape(-1, *(1,) * (e.ndim - 2)), e.shape[1:])
+    known = np.isfinite(e.sum(axis=0))
+    before = _known_before(known)
+    last, rate_there = (np.take_along_axis(each, before[None], 1) for each in (e, rate))
+    change = quat(e) * quat(last).conjugate()
+    mean = 0.5 * (rate + rate_there)
+    agrees = agreement(change, mean, t - np.take_along_axis(t, before, 0))
+    # nothing contradicts what is unknown
+    doubt = bool((np.isfinite(mean.sum(axis=0)) & (np.abs(agrees) < DOUBTFUL)).any())
+    sign = np.cumprod(np.where(agrees < 0.0, -1.0, 1.0), axis=0)
+    nearest = np.argsort(np.abs(path.times[order]), kind="stable")
+    first = nearest[np.argmax(known[nearest], axis=0)][None]
+    e0, rate0 = (np.take_along_axis(each, first[None], 1) for each in (e, rate))
+    since = np.take_along_axis(t, first, 0) * float(_through_design(path))
+    own = np.where(agreement(quat(e0), rate0, since) < 0.0, -1.0, 1.0)
+    found = np.empty(sign.shape)
+    found[order] = sign * np.take_along_axis(sign, first, 0) * own
+    return found, doubt
+
+
+def _through_design(path: Path) -> bool:
+    """Return whether all drivers have their design values at time zero."""
+    return path.covers(0.0) and bool(np.allclose(path.values(np.zeros(1)), 0.0, atol=1e-9))
+
+
+def _whole(x: Array) -> Array:
+    return np.nan_to_num(np.rint(x))
+
+
+def _known_before(known: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Return the index of the last known sample before each sample, along the first axis."""
+    indices = np.arange(len(known)).reshape(-1, *(1,) * (known.ndim - 1))
+    last = np.maximum.accumulate(np.where(known, indices, 0), axis=0)
+    return np.concatenate([last[:1], last[:-1]])

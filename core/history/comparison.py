@@ -1,0 +1,523 @@
+"""Comparison of a run with another, pair by pair, and with the history around them: new failures,
+repairs, samples no longer reached, drifts, slower solves, and changes of the solution.
+"""
+
+from __future__ import annotations
+
+import math
+import statistics
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import msgspec
+
+from ..case.io.outputs import DEFAULT_ATOL
+from ..harness.labels import UNMADE, motion_unit, number
+from ..harness.record import Deviation, Outcome, OutputSeries, Record
+from ..trajectory import QUANTITIES
+from ..unit_text import motion_word, value_text
+from .findings import Finding, Kind, Loose, Regressions, Step, changes, same_machine
+from .queries import NIGHTS, NOTHING, Entry, History, calibration, read, same
+from .run_selection import Subject
+from .steps import (
+    ENOUGH,
+    HEADROOM,
+    LOOSE,
+    OUTCOME,
+    RESIDUAL,
+    RESIDUAL_FLOOR,
+    SAME_SAMPLE,
+    SEEN,
+    TIME,
+    TIME_FLOOR,
+    UNJUDGED,
+    crept,
+    drift,
+    drifted,
+    lasting,
+    slowest,
+    steps,
+)
+from .store import Store
+
+PHASES = ("build", "first", "warm", "compare")
+RECENT = 20
+"""Number of latest runs that give the spread of times on the machine."""
+NO_REASON = "no reason is given"
+
+Values: TypeAlias = Sequence[float | None]
+References: TypeAlias = Mapping[str, Mapping[str, OutputSeries]]
+"""True values by case and output."""
+
+
+def regressions(
+    subject: Subject,
+    against: Subject | None,
+    reason: str,
+    store: Store | None,
+    *,
+    missing_is_failure: bool = False,
+) -> Regressions:
+    """Return all changes.
+
+    Args:
+        reason: the reason why there is no run to compare with.
+        missing_is_failure: whether a pair of an earlier run, missing in this one, is a regression.
+
+    Raises:
+        HistoryError: the history cannot be read.
+    """
+    around = _around(subject, store)
+    limit = slowest(_on_machine(subject, around, before=subject.before))
+    every = steps(around)
+    standing, over = lasting(every), [each for each in every if each.worse and each.repaired]
+    records, why = subject.results.records, subject.results.unread
+    found = [
+        Finding(kind=Kind.LOST, case=case, engine=engine, mode=mode, message=why.get(case, UNMADE))
+        for case, engine, mode in subject.results.missing
+    ]
+    if against is not None:
+        number = -math.inf if against.number is None else against.number
+        found += compare(subject, against, _on_machine(subject, around, before=number + 1), limit)
+        found += crept(subject, around, found)
+    found += _missing(subject, store, found)
+    return Regressions(
+        run=subject.label,
+        against=against.label if against else None,
+        reason=reason,
+        pairs=len(records),
+        failing=[record.pair for record in records if record.outcome.bad],
+        unjudged=[record.pair for record in records if record.outcome is Outcome.UNJUDGED],
+        unread=[*why],
+        passed_by=[*subject.passed_by],
+        time_limit=limit,
+        missing_is_failure=missing_is_failure,
+        findings=[_since(finding, standing) for finding in found],
+        changes=changes(subject.facts, against.facts) if against else [],
+        steps=standing + over,
+        loose=loose(around, subject.facts.get("cases", {})),
+    )
+
+
+def _around(subject: Subject, store: Store | None) -> History:
+    """Return the runs up to the subject that solve and judge as it, including the subject if the
+    history has it.
+    """
+    if store is None:
+        return NOTHING
+    cases = list(dict.fromkeys(record.case for record in subject.results.records))
+    before = subject.before if subject.number is None else subject.number + 1
+    return read(store, before=before, last=NIGHTS, cases=cases, like=subject.facts)
+
+
+def _on_machine(subject: Subject, around: History, *, before: float) -> History:
+    """Return the latest runs before a number on the subject's machine."""
+    runs = [
+        (number, row)
+        for number, row in around.runs.items()
+        if number < before and same_machine(row.circumstances, subject.facts)
+    ]
+    latest = dict(runs[-RECENT:])
+    pairs = {
+        pair: [entry for entry in entries if entry.run in latest]
+        for pair, entries in around.pairs.items()
+    }
+    return History(latest, pairs)
+
+
+def _since(finding: Finding, standing: list[Step]) -> Finding:
+    """Return the finding with its first run, if a step gives one."""
+    kinds = {Kind.SLOWER: TIME, Kind.FAILURE: OUTCOME, Kind.DRIFTED: finding.motion}
+    output = finding.output if finding.kind is Kind.DRIFTED else None
+    about = (finding.pair, kinds.get(finding.kind), output)
+    for step in standing:
+        if (step.pair, step.quantity, step.output) == about:
+            return msgspec.structs.replace(finding, since=step.first)
+    return finding
+
+
+def _missing(
+    subject: Subject, store: Store | None, findings: Sequence[Finding]
+) -> Iterator[Finding]:
+    """Yield the missing pairs of the last run of the same selection, whatever run is compared with:
+    a case or an engine left out in silence. A run of another selection has another task.
+    """
+    earlier = (
+        row
+        for row in (store.runs() if store else ())
+        if row.status != "running" and row.id < subject.before and same(row.key, subject.facts)
+    )
+    last = next(earlier, None)
+    if last is None:
+        return
+    known = subject.pairs | {each.pair for each in findings if each.kind is Kind.ABSENT}
+    why = f"in run {last.id}, by the same command"
+    for case, engine, mode in last.plan:
+        if (case, engine, mode) not in known:
+            yield Finding(kind=Kind.ABSENT, case=case, engine=engine, mode=mode, message=why)
+
+
+def compare(now: Subject, before: Subject, history: History, slowest: float) -> list[Finding]:
+    """Return the differences of all pairs, in the order of the records, and then the changes of
+    the solutions.
+
+    Args:
+        history: runs on the same machine up to the run compared with, which give the usual times.
+        slowest: the largest ratio of times that is not reported as slower.
+    """
+    earlier = {record.pair: record for record in before.results.records}
+    findings, solutions = list[Finding](), list[Finding]()
+    alike = same_machine(now.facts, before.facts)
+    references = (now.results.references, before.results.references)
+    for record in {record.pair: record for record in now.results.records}.values():
+        old = earlier.pop(record.pair, None)
+        if old is None:
+            kind = Kind.FAILURE if record.outcome.bad else Kind.ADDED
+            findings.append(Finding.of(kind, record, _result(record)))
+            continue
+        findings += _outcomes(record, old)
+        findings += _lost(record, old)
+        findings += _moved(record, old)
+        findings += _errors(record, old)
+        findings += _references(record, *references)
+        usual = _usual_times(before, old, history.pairs.get(record.pair, ()), history)
+        findings += _slower(record, *usual if alike else (None, usual[1]), now, slowest)
+        if old.solved and record.solved:
+            solutions += _numbers(record, old)
+            solutions += _residual(record, old)
+            solutions += _units(record, old)
+            solutions += _gone(record, old)
+    unfinished = set(now.results.missing)
+    findings += [
+        Finding.of(Kind.ABSENT, old, f"{old.outcome.shown} there")
+        for pair, old in earlier.items()
+        if pair not in unfinished
+    ]
+    return findings + solutions
+
+
+def _result(record: Record) -> str:
+    return f"{record.outcome.shown}: {record.message}" if record.message else record.outcome.shown
+
+
+def _outcomes(now: Record, before: Record) -> Iterator[Finding]:
+    old = before.outcome
+    if now.outcome.bad and not old.bad:
+        yield Finding.of(Kind.FAILURE, now, f"{old.shown} → {_result(now)}")
+    elif old.bad and now.outcome is Outcome.PASS:
+        yield Finding.of(Kind.FIXED, now, f"{old} → {now.outcome}")
+    elif old.judged and now.outcome is Outcome.UNJUDGED:
+        yield Finding.of(Kind.UNJUDGED, now, f"{old} → {_result(now)}")
+    elif old is Outcome.UNJUDGED and now.outcome is Outcome.PASS:
+        yield Finding.of(Kind.JUDGED, now, f"{old.shown} → {now.outcome}")
+
+
+def _lost(now: Record, before: Record) -> Iterator[Finding]:
+    """Yield lost phases, samples, motions and standards."""
+
+    def reached(record: Record, phase: str) -> bool:
+        return getattr(record.seconds, phase, None) is not None
+
+    phases = [phase for phase in PHASES if reached(before, phase) and not reached(now, phase)]
+    if phases:
+        why = f": {_result(now)}" if now.outcome is not Outcome.PASS else ""
+        yield Finding.of(Kind.LOST, now, f"{', '.join(phases)} no longer reached{why}")
+        return
+    if (now.solved or 0) < (before.solved or 0):
+        total = "" if now.samples == before.samples else f" of {before.samples}"
+        message = f"{now.solved} of {now.samples} samples solved, {before.solved}{total} before"
+        yield Finding.of(Kind.LOST, now, message)
+    # the whole pair is no longer judged, which is a separate finding
+    if now.outcome is Outcome.UNJUDGED:
+        return
+    for output, old in before.errors.items():
+        new = now.errors.get(output)
+        lost = [motion for motion, _ in old.items() if getattr(new, motion, None) is None]
+        if lost:
+            why = f"the case has no output {output!r} now" if new is None else new.reason
+            message = f"{output}: {', '.join(lost)} no longer compared: {why or NO_REASON}"
+            yield Finding.of(Kind.LOST, now, message, output=output, motion=lost[0])
+    if before.validated and not now.validated and now.outcome is Outcome.PASS:
+        against, was = (each.truth.replace("_", " ") for each in (now, before))
+        why = (
+            f"{against}, before {was}"
+            if against != was
+            else f"{against} whose source is not cited or is kincheck itself"
+        )
+        yield Finding.of(Kind.LOST, now, f"no longer validated: judged against {why}")
+
+
+@dataclass(frozen=True)
+class _Quantity:
+    """A motion of an output in two records, with its values and deviations."""
+
+    output: str
+    motion: str
+    unit: str
+    old: Values
+    new: Values
+    judged: Deviation | None
+    was_judged: Deviation | None
+
+    @property
+    def word(self) -> str:
+        return f"{self.output} {motion_word(self.motion, self.unit)}"
+
+    @property
+    def place(self) -> dict[str, Any]:
+        return {"output": self.output, "motion": self.motion}
+
+
+def _quantities(now: Record, before: Record) -> Iterator[_Quantity]:
+    """Yield the motions of all earlier outputs."""
+    for output, old in before.outputs.items():
+        for motion in QUANTITIES:
+            yield _Quantity(
+                output,
+                motion,
+                old.unit,
+                values_of(old, motion),
+                values_of(now.outputs.get(output), motion),
+                getattr(now.errors.get(output), motion, None),
+                getattr(before.errors.get(output), motion, None),
+            )
+
+
+def values_of(series: OutputSeries | None, motion: str) -> Values:
+    """Return the values of a motion over the samples; empty without such a series."""
+    return getattr(series, motion, None) or ()
+
+
+def _apart(a: Values, b: Values) -> float:
+    """Return the largest difference over the common samples."""
+    pairs = zip(a, b, strict=False)
+    return max((abs(x - y) for x, y in pairs if x is not None and y is not None), default=0.0)
+
+
+def _largest(values: Iterable[float | None]) -> float:
+    return max((abs(x) for x in values if x is not None), default=0.0)
+
+
+def same_samples(now: Record, before: Record) -> bool:
+    """Return whether all drivers have equal values, up to last digits of sines and splines that
+    differ between processors.
+    """
+    mine, other = now.driver, before.driver
+    return {name: len(each) for name, each in mine.items()} == {
+        name: len(each) for name, each in other.items()
+    } and all(
+        _apart(values, other[name]) <= SAME_SAMPLE * _largest(values)
+        for name, values in mine.items()
+    )
+
+
+def _moved(now: Record, before: Record) -> Iterator[Finding]:
+    """Yield the outputs with changed values or samples, which only this comparison shows if there
+    is no reference.
+    """
+    if not (now.driver and before.driver):
+        return
+    if not same_samples(now, before):
+        yield Finding.of(Kind.MOVED, now, "solved at other values of the drivers than before")
+        return
+    moved: set[str] = set()
+    for each in _quantities(now, before):
+        if each.judged:  # largest distance of two values within the tolerance of one standard
+            limit = 2.0 * each.judged.tolerance
+        else:  # forces set no scale for lengths
+            outputs = (other for other in before.outputs.values() if other.unit == each.unit)
+            scale = _largest(x for other in outputs for x in values_of(other, each.motion))
+            limit = DEFAULT_ATOL + UNJUDGED * scale
+        off = _apart(each.old, each.new)
+        if off > limit and each.output not in moved:
+            moved.add(each.output)
+            size = value_text(number(off), motion_unit(each.unit, each.motion))
+            message = f"{each.word} differs by up to {size} from its earlier values"
+            yield Finding.of(Kind.MOVED, now, message, now=off, limit=limit, **each.place)
+
+
+def _errors(now: Record, before: Record) -> Iterator[Finding]:
+    for output, old in before.errors.items():
+        for motion in QUANTITIES:
+            a, b = getattr(old, motion), getattr(now.errors.get(output), motion, None)
+            if a is None or b is None:
+                continue
+            unit = now.outputs[output].unit if output in now.outputs else ""
+            word = f"{output} {motion_word(motion, unit)}"
+            if a.tolerance != b.tolerance:
+                yield Finding.of(
+                    Kind.TOLERANCE,
+                    now,
+                    f"{word}: {number(a.tolerance)} → {number(b.tolerance)}",
+                    before=a.tolerance,
+                    now=b.tolerance,
+                    output=output,
+                    motion=motion,
+                )
+            # an error out of tolerance is a failure, which is reported there
+            if b.within and a.against == b.against and drifted(a.max_abs, b.max_abs, b.tolerance):
+                times = f"×{number(b.max_abs / a.max_abs)}, " if a.max_abs else ""
+                words = f" ({times}tolerance {number(b.tolerance)})"
+                yield drift(now, output, motion, a.max_abs, b, words)
+
+
+def _references(record: Record, now: References, before: References) -> Iterator[Finding]:
+    """Yield the changed reference values; other findings show new and missing ones."""
+    for output, old in before.get(record.case, {}).items():
+        new = now.get(record.case, {}).get(output)
+        for motion in QUANTITIES:
+            was = values_of(old, motion)
+            off = _apart(was, values_of(new, motion))
+            if off > SAME_SAMPLE * _largest(was):
+                message = (
+                    f"{output} {motion_word(motion, old.unit)} differs by up to {number(off)}"
+                    f" {motion_unit(old.unit, motion)} from its earlier values"
+                )
+                about: dict[str, Any] = {"now": off, "output": output, "motion": motion}
+                yield Finding.of(Kind.REFERENCE, record, message, **about)
+                break
+
+
+def _usual_times(
+    before: Subject, record: Record, entries: Sequence[Entry], history: History
+) -> tuple[float | None, float | None]:
+    """Return the usual time of a warm solve [s] and in calibration loops of its run.
+
+    It is the median over the latest runs up to the run compared with, whose own noise would affect
+    every comparison. With few runs it is the time of this run alone.
+    """
+    loops = {run: calibration(row.circumstances) for run, row in history.runs.items()}
+    times = [(entry.seconds, loops[entry.run]) for entry in entries if entry.seconds][-ENOUGH:]
+    if len(times) < ENOUGH:
+        seconds = record.seconds and record.seconds.own
+        times = [(seconds, calibration(before.facts))] if seconds is not None else []
+    in_loops = [seconds / loop for seconds, loop in times if loop]
+    return (
+        statistics.median(seconds for seconds, _ in times) if times else None,
+        statistics.median(in_loops) if in_loops else None,
+    )
+
+
+def _slower(
+    now: Record, by_clock: float | None, by_loop: float | None, subject: Subject, limit: float
+) -> Iterator[Finding]:
+    """Yield a finding if a solve is slower by the clock and by the calibration loop. One of the two
+    alone may be due to the machine.
+    """
+    seconds = now.seconds and now.seconds.own
+    loop = calibration(subject.facts)
+    expected = [by_clock] if by_clock else []
+    expected += [by_loop * loop] if by_loop and loop else []
+    if seconds is None or not expected:
+        return
+    should = max(expected)
+    if seconds > limit * should and seconds - should > TIME_FLOOR:
+        ratio = seconds / should
+        spread = f"×{number(ratio)}; by the spread from run to run, ×{number(limit)} may be chance"
+        message = f"{number(1e3 * should)} → {number(1e3 * seconds)} ms a sweep ({spread})"
+        about = {"before": should, "now": seconds, "ratio": ratio, "limit": limit}
+        yield Finding.of(Kind.SLOWER, now, message, **about)
+
+
+def _numbers(now: Record, before: Record) -> Iterator[Finding]:
+    """Yield changes of dof and rank, and numbers that are null now."""
+    for name, kind in (("dof", Kind.FREEDOM), ("rank", Kind.RANK)):
+        old, new = getattr(before, name), getattr(now, name)
+        if None not in (old, new) and new != old:
+            message = f"{name} {old} → {new}"
+            yield Finding.of(kind, now, message, before=float(old), now=float(new))
+    for name in ("dof", "rank", "residual_max"):
+        old = getattr(before, name)
+        if old is not None and getattr(now, name) is None:
+            why = now.reasons.get(name) or NO_REASON
+            yield Finding.of(
+                Kind.GONE, now, f"{name} has no value now, {number(old)} before: {why}"
+            )
+
+
+def _residual(now: Record, before: Record) -> Iterator[Finding]:
+    old, new = before.residual_max, now.residual_max
+    if old is None or new is None or new < RESIDUAL * max(old, RESIDUAL_FLOOR):
+        return
+    ratio = new / old if old else None
+    times = f" (×{number(ratio)})" if ratio else ""
+    message = f"largest residual {number(old)} → {number(new)}{times}"
+    about = {"before": old, "now": new, "ratio": ratio, "limit": RESIDUAL}
+    yield Finding.of(Kind.RESIDUAL, now, message, **about)
+
+
+def _units(now: Record, before: Record) -> Iterator[Finding]:
+    """Yield outputs with a changed unit or positive sense."""
+    for output, old in before.outputs.items():
+        new = now.outputs.get(output)
+        for what in ("unit", "sense"):
+            a, b = getattr(old, what), getattr(new, what, None)
+            if new is not None and a != b:
+                message = f"{output}: {what} {a or 'none'} → {b or 'none'}"
+                yield Finding.of(Kind.UNIT, now, message, output=output)
+
+
+def _gone(now: Record, before: Record) -> Iterator[Finding]:
+    """Yield motions of outputs with null in place of earlier numbers, unless another finding
+    reports it: motions no longer compared, and samples no longer solved, at which no output has a
+    position.
+    """
+    if not same_samples(now, before):
+        return
+    series = [output.position for output in now.outputs.values()]
+    count = max(map(len, series), default=0) if (now.solved or 0) < (before.solved or 0) else 0
+    unsolved = {
+        k for k in range(count) if all(k >= len(each) or each[k] is None for each in series)
+    }
+    for each in _quantities(now, before):
+        if each.was_judged is not None and each.judged is None:
+            continue
+        had = [k for k, value in enumerate(each.old) if value is not None]
+        there = {k for k, value in enumerate(each.new) if value is not None}
+        lost = [k for k in had if k not in there and k not in unsolved]
+        if lost:
+            at = [
+                f"{name} = {number(values[lost[0]])}"
+                for name, values in now.driver.items()
+                if lost[0] < len(values)
+            ]
+            new = now.outputs.get(each.output)
+            why = "the case has no such output now" if new is None else new.reason or NO_REASON
+            message = (
+                f"{each.word} has no value at {len(lost)} of {len(had)} samples that had one,"
+                f" first at {at[0] if at else f'sample {lost[0]}'}: {why}"
+            )
+            yield Finding.of(Kind.GONE, now, message, **each.place)
+
+
+def loose(history: History, cases: Mapping[str, Any]) -> list[Loose]:
+    """Return the outputs whose errors stayed far below their tolerances in all runs, by case.
+
+    Args:
+        cases: the facts of each case from a run's circumstances, for the reasons of its tolerances.
+    """
+    ratios: dict[tuple[str, str], dict[int, float]] = {}
+    for (case, _, _), entries in history.pairs.items():
+        for entry in entries:
+            for output, deviations in entry.errors.items():
+                for _, each in deviations.items():
+                    ratio = each.max_abs / each.tolerance if each.tolerance else 1.0
+                    by_run = ratios.setdefault((case, output), {})
+                    by_run[entry.run] = max(ratio, by_run.get(entry.run, 0.0))
+    found: list[Loose] = []
+    for (case, output), by_run in sorted(ratios.items()):
+        largest = max(by_run.values())
+        if largest * LOOSE < 1.0 and len(by_run) >= SEEN:
+            facts = cases.get(case, {}).get("outputs", {}).get(output, {})
+            found.append(
+                Loose(
+                    case=case,
+                    output=output,
+                    runs=len(by_run),
+                    largest=largest,
+                    factor=1.0 / (HEADROOM * largest) if largest else None,
+                    why=str(facts.get("why", "")),
+                )
+            )
+    return found

@@ -1,1 +1,0 @@
-"""Regression: changes between two runs, their first runs, and whether they are for the worse."""

@@ -1,0 +1,345 @@
+"""The angle of a joint and the attitude of a body with their turns, followed along the way of the
+drivers from the design.
+
+A pose gives an angle or an attitude but for whole turns, and samples far apart do not tell how many
+lie between them. The drivers' way is then solved at further samples, so near to each other that the
+rates tell. The Euler parameters e and -e are the same attitude. Along a way from the design the
+sign is continuous, so that rotations beyond half a turn differ from those the other way round.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, Protocol, TypeAlias, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..algebra import IDENTITY, ZERO, Quat, angle_about, quat, vec
+from ..caches import keep_last
+from ..errors import SolveError
+from ..joints.base import unit
+from ..mechanism.mechanism import Mechanism
+from ..mechanism.motions import Path
+from ..primitives.base import Pose
+from ..trajectory import Array, Trajectory
+from .compiled.request import Request
+from .compiled.routes import start_of
+from .forces.reactions import Follow
+from .formulation.constraints import size_of
+
+Prepare: TypeAlias = Callable[[Mechanism, Request, Path], Callable[[float], Trajectory]]
+"""Makes a mechanism ready to be solved along a path, to a tolerance."""
+
+# Way of the drivers between two samples [rad, or half the mechanism's size]: as far as turns are
+# read from the samples alone, and in the parts of longer ways, finer from one try to the next.
+NEAR, PARTS = 0.5, (0.25, 0.05, 0.01)
+# A change that differs from what the rates tell by more might be another number of turns [rad].
+DOUBT = 0.5 * math.pi
+# More samples than these would take long, and such a sweep has passed no turn unseen.
+MOST = 200_000
+# Places between two samples where the drivers' way is measured.
+AMONG = 8
+TOL = 1e-9
+"""Residual of the further samples: only whole turns are read from them."""
+
+
+class Followed(Protocol):
+    """What is followed, with its turns; hashable.
+
+    Attributes:
+        at_design: its value there; values at n samples have the shape (n, *at_design.shape).
+    """
+
+    @property
+    def at_design(self) -> Array: ...
+
+    def bodies(self, mechanism: Mechanism) -> tuple[str, ...]:
+        """Return the names of the bodies it reads, of those that move."""
+        ...
+
+    def counted(
+        self, mechanism: Mechanism, times: Array, motion: Trajectory, start: float, at: Array
+    ) -> tuple[Array, bool]:
+        """Return the value at each sample, counted both ways from the value `at` the start and NaN
+        if not reached, and whether no change is in doubt.
+        """
+        ...
+
+
+def near_design(mechanism: Mechanism, path: Path) -> bool:
+    """Return whether the drivers go from the design to all samples in short steps."""
+    times = path.times[np.isfinite(path.times)]
+    if not len(times):
+        return True
+    start = start_of(mechanism, path)
+    # turns are read from samples as if the design were at time zero
+    if not start.stands or start.time != 0.0:
+        return False
+    return bool(_way(mechanism, path, _sorted(path, start.time)).max(initial=0.0) <= NEAR)
+
+
+def followed(prepare: Prepare, mechanism: Mechanism, path: Path, what: Followed) -> Array | None:
+    """Return values at the samples of a path, turns counted on the way from the design; NaN if a
+    sample is not reached or its turns are in doubt.
+
+    None if the native solver has no solution of the mechanism.
+
+    Args:
+        prepare: makes the mechanism ready for a path.
+    """
+    # motions of other classes may change, or have no hash
+    return (_recent if path.is_builtin else _finer)(prepare, mechanism, path, what)
+
+
+def _finer(prepare: Prepare, mechanism: Mechanism, path: Path, what: Followed) -> Array | None:
+    found: Array | None = None
+    for part in PARTS:
+        try:
+            found, sure = _followed(prepare, mechanism, path, what, part)
+        except SolveError:
+            return None
+        if sure:
+            break
+    return found
+
+
+_recent = keep_last(32)(_finer)
+
+
+def _followed(
+    prepare: Prepare, mechanism: Mechanism, path: Path, what: Followed, part: float
+) -> tuple[Array, bool]:
+    """Return the values by further samples, and whether no number of turns is in doubt."""
+    start = start_of(mechanism, path)
+    times = _divided(mechanism, path, _sorted(path, start.time), part)
+    # the samples first: they decide where the motion starts
+    fine = replace(path, times=np.concatenate([path.times, times]))
+    motion = _motion(prepare, mechanism, fine, what)
+    taken = motion.details.get("start", {"time": 0.0, "lead": {}})
+    at_start, sure = what.at_design, True
+    if any(taken["lead"].values()):
+        lead = path.lead_in(taken["time"])
+        lead = replace(lead, times=_divided(mechanism, lead, np.array([0.0, 1.0]), part))
+        led = _motion(prepare, mechanism, lead, what)
+        values, sure = what.counted(mechanism, lead.times, led, 0.0, at_start)
+        at_start = np.asarray(values[-1])
+    found, certain = what.counted(mechanism, fine.times, motion, taken["time"], at_start)
+    return found[: len(path.times)], sure and certain
+
+
+def _motion(prepare: Prepare, mechanism: Mechanism, path: Path, what: Followed) -> Trajectory:
+    request = Request(tuple(path.motions), (), what.bodies(mechanism), 1)
+    return prepare(mechanism, request, path)(TOL)
+
+
+def _sorted(path: Path, start: float) -> Array:
+    """Return the times of samples and start, increasing."""
+    return np.unique([start, *path.times]) if path.covers(start) else np.unique(path.times)
+
+
+def _way(mechanism: Mechanism, path: Path, times: Array) -> Array:
+    """Return the way of the drivers between increasing times [rad, or half the mechanism's size]:
+    the longest of any driver, shape (n - 1,).
+    """
+    if len(times) < 2 or not path.motions:
+        return np.zeros(max(len(times) - 1, 0))
+    turning = [mechanism.driver(name).turns for name in path.motions]
+    scale = np.where(turning, 1.0, 0.5 * size_of(mechanism))
+    share = np.linspace(0.0, 1.0, AMONG + 1)
+    between = times[:-1, None] + np.diff(times)[:, None] * share
+    values = path.values(between.ravel()).reshape(len(scale), *between.shape)
+    ways: Array = np.abs(np.diff(values, axis=-1)).sum(axis=-1) / scale[:, None]
+    return ways.max(axis=0)
+
+
+def _divided(mechanism: Mechanism, path: Path, times: Array, part: float) -> Array:
+    """Return increasing times with further ones between them, so that drivers go a part at most."""
+    parts = np.ceil(_way(mechanism, path, times) / part).clip(1.0)
+    if parts.sum() > MOST:
+        parts = np.ceil(parts * (MOST / parts.sum()))
+    pieces: list[Array] = [
+        np.linspace(low, high, int(count), endpoint=False)
+        for low, high, count in zip(times[:-1], times[1:], parts, strict=True)
+    ]
+    return np.concatenate([*pieces, times[-1:]])
+
+
+TURN = 2.0 * math.pi
+
+
+def in_doubt(x: Array, v: Array, times: Array) -> bool:
+    """Return whether a change from sample to sample contradicts the rates by its turns.
+
+    Args:
+        x, v: angle with its turns [rad] and its rate, samples along the first axis; NaN if unknown.
+    """
+    known = np.isfinite(x).any(axis=tuple(range(1, x.ndim)))
+    order = np.flatnonzero(known)[np.argsort(times[known], kind="stable")]
+    t, x, v = times[order].reshape(-1, *(1,) * (x.ndim - 1)), x[order], v[order]
+    # nothing contradicts what is unknown
+    return bool((np.abs(_expected_change(v, t) - np.diff(x, axis=0)) > DOUBT).any())
+
+
+def followed_angle(prepare: Prepare, mechanism: Mechanism, path: Path, joint: str) -> Array | None:
+    """Return a joint's angle [rad] at the samples of a path, zero at design, turns counted on the
+    way from there; shape (n,). See `followed`.
+    """
+    return followed(prepare, mechanism, path, _OfJoint(joint))
+
+
+def follower(
+    prepare: Prepare, mechanism: Mechanism, path: Path, solved: NDArray[np.bool_]
+) -> Follow:
+    """Return the function that corrects the turns of angles at the solved samples of a path."""
+
+    def follow(joint: str, angle: Array, rate: Array) -> Array:
+        if near_design(mechanism, path) and not in_doubt(angle, rate, path.times[solved]):
+            return angle
+        if (found := followed_angle(prepare, mechanism, path, joint)) is None:
+            return angle
+        return angle + TURN * np.round((found[solved] - angle) / TURN)
+
+    return follow
+
+
+@dataclass(frozen=True)
+class _OfJoint:
+    """The angle of a joint, shape ()."""
+
+    joint: str
+
+    @property
+    def at_design(self) -> Array:
+        """Zero."""
+        return np.zeros(())
+
+    def bodies(self, mechanism: Mechanism) -> tuple[str, ...]:
+        """Return its two, or the one that moves."""
+        moving = {body.name for body in mechanism.moving}
+        return tuple(name for name in mechanism.joint(self.joint).bodies if name in moving)
+
+    def counted(
+        self, mechanism: Mechanism, times: Array, motion: Trajectory, start: float, at: Array
+    ) -> tuple[Array, bool]:
+        """Return the angle with its turns; see `Followed`."""
+        found = np.full(len(times), np.nan)
+        reached = np.flatnonzero(motion.solved)
+        order = reached[np.argsort(times[reached], kind="stable")]
+        if not len(order):
+            return found, True
+        angle, rate = _angle(mechanism, self.joint, motion)
+        t, x = times[order], angle[order]
+        change, expected = np.diff(x), _expected_change(rate[order], t)
+        change += TURN * np.rint((expected - change) / TURN)
+        smallest = change - TURN * np.rint(change / TURN)
+        doubtful = np.abs(expected - change) > DOUBT
+        # rates have no bound towards a fold, but short steps change little
+        change[doubtful] = np.where(np.abs(smallest) > DOUBT, np.nan, smallest)[doubtful]
+        first = int(np.argmin(np.abs(t - start)))
+        counted = np.full(len(order), x[first] + TURN * np.rint((at - x[first]) / TURN))
+        counted[first + 1 :] += np.cumsum(change[first:])
+        counted[:first] -= np.cumsum(change[:first][::-1])[::-1]
+        found[order] = counted
+        return found, not doubtful.any()
+
+
+def _angle(mechanism: Mechanism, joint: str, motion: Trajectory) -> tuple[Array, Array]:
+    """Return the angle of a joint but for whole turns [rad], and its rate, shape (n,)."""
+    bodies: Any = mechanism.joint(joint)
+    axis = vec([*unit(bodies.axis)])
+    turns, spins = [IDENTITY] * 2, [ZERO] * 2
+    for k, name in enumerate(bodies.bodies):
+        if (moved := motion.bodies.get(name)) is None:
+            continue
+        assert moved.v is not None
+        pose = quat(moved.p.T)
+        turns[k] = pose * quat(mechanism.body(name).euler_parameters).conjugate()
+        spins[k] = Pose.of(ZERO, pose).turn(vec([*moved.v.T[3:]]))
+    i, j = turns
+    rate = Pose.of(ZERO, i).turn(axis) @ (spins[1] - spins[0])
+    still = np.zeros(len(motion.solved))
+    return angle_about(axis, i.conjugate() * j) + still, rate + still
+
+
+def _expected_change(rate: Array, times: Array) -> Array:
+    """Return the changes between samples that the rates tell [rad]."""
+    return 0.5 * (rate[1:] + rate[:-1]) * np.diff(times, axis=0)
+
+
+DOUBTFUL = float(np.cos(0.5 * DOUBT))
+"""Agreement less than this, of either sign, might be another number of turns."""
+
+
+def followed_attitude(
+    prepare: Prepare, mechanism: Mechanism, path: Path, body: str
+) -> Array | None:
+    """Return Euler parameters of a moving body's rotation since design at the samples of a path,
+    their sign continuous on the way from there; global axes, shape (n, 4). See `followed`.
+    """
+    return followed(prepare, mechanism, path, _OfBody(body))
+
+
+def agreement(change: Quat, rate: Array, dt: Array) -> Array:
+    """Return the cosine of half the turn from the rotation that the rates tell to a change.
+
+    It is negative if the negative Euler parameters are nearer.
+
+    Args:
+        rate: mean angular velocity [rad/s], shape (3, ...); NaN if unknown, taken as rest.
+        dt: time of the change [s].
+    """
+    half = 0.5 * np.nan_to_num(rate) * dt
+    size = np.sqrt((half * half).sum(axis=0))
+    # sinc(x) is sin(pi x) / (pi x)
+    along = vec([*(np.sinc(size / np.pi) * half)])
+    found: Array = np.cos(size) * change.e0 + along @ change.e
+    return found
+
+
+@dataclass(frozen=True)
+class _OfBody:
+    """The Euler parameters of a body's rotation since design, shape (4,)."""
+
+    body: str
+
+    @property
+    def at_design(self) -> Array:
+        """No rotation."""
+        return np.array([1.0, 0.0, 0.0, 0.0])
+
+    def bodies(self, mechanism: Mechanism) -> tuple[str, ...]:
+        """Return the body."""
+        return (self.body,)
+
+    def counted(
+        self, mechanism: Mechanism, times: Array, motion: Trajectory, start: float, at: Array
+    ) -> tuple[Array, bool]:
+        """Return the parameters with a continuous sign; see `Followed`."""
+        found = np.full((len(times), 4), np.nan)
+        reached = np.flatnonzero(motion.solved)
+        order = reached[np.argsort(times[reached], kind="stable")]
+        if not len(order):
+            return found, True
+        moved = motion.bodies[self.body]
+        assert moved.v is not None
+        design = quat(mechanism.body(self.body).euler_parameters)
+        pose = quat(moved.p[order].T)
+        e = np.array([*(pose * design.conjugate())])
+        t, spin = times[order], vec([*moved.v[order].T[3:]])
+        rate = np.array([*Pose.of(ZERO, pose).turn(spin)])
+        change = quat(e[:, 1:]) * quat(e[:, :-1]).conjugate()
+        agrees = agreement(change, 0.5 * (rate[:, 1:] + rate[:, :-1]), np.diff(t))
+        smallest = cast("Array", np.asarray(change.e0))
+        doubtful = np.abs(agrees) < DOUBTFUL
+        # rates have no bound towards a fold, but short steps change little
+        kept = np.sign(np.where(doubtful, smallest, agrees))
+        kept[doubtful & (np.abs(smallest) < DOUBTFUL)] = np.nan
+        first = int(np.argmin(np.abs(t - start)))
+        sign = np.full(len(order), np.sign(e[:, first] @ at))
+        sign[first + 1 :] *= np.cumprod(kept[first:])
+        sign[:first] *= np.cumprod(kept[:first][::-1])[::-1]
+        found[order] = (sign * e).T
+        return found, not doubtful.any()

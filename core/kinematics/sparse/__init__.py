@@ -1,1 +1,0 @@
-"""Large indivisible mechanisms as one sparse system."""

@@ -1,0 +1,1 @@
+"""Checks of joint types and of engines."""

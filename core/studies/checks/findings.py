@@ -1,0 +1,212 @@
+"""Findings of the checks of a joint type or an engine, as data and as a table."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from io import StringIO
+from typing import NamedTuple, TextIO
+
+import numpy as np
+
+from ...harness.record import Deviations
+from ...trajectory import Array
+
+
+class Verdict(StrEnum):
+    """The outcome of a check. A check without a run is a row with its reason."""
+
+    PASS = "pass"
+    FAIL = "fail"
+    SKIP = "skip"
+
+
+class Limit(NamedTuple):
+    """The largest accepted figure of a check, and its reason."""
+
+    value: float
+    why: str
+
+
+# Sums of some thirty products of numbers of size one, each rounded at 1e-16.
+ROUND_OFF = Limit(1e-13, "round-off of sums of numbers of size one")
+# ROUND_OFF over the smallest singular value of accepted poses (a twentieth of the value at design),
+# and the same factor once more.
+AMPLIFIED = Limit(1e-10, "round-off over the smallest singular value, x100")
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One check.
+
+    Attributes:
+        figure: the worst number found, and `limit` the largest accepted one; None if nothing is
+            measured or limited.
+        why: the reason of the limit.
+        specimen, pose: numbers of the specimen and pose with the worst figure; the
+            seed reproduces them.
+        row: the equation with the worst figure, as "Dot11 row 2".
+        message: text beside the figure; of a failure, the remedy.
+    """
+
+    check: str
+    verdict: Verdict
+    figure: float | None = None
+    limit: float | None = None
+    why: str = ""
+    specimen: int | None = None
+    pose: int | None = None
+    row: str = ""
+    message: str = ""
+
+    @property
+    def badness(self) -> tuple[int, float]:
+        """Sort key: the worst of several findings of one check has the largest."""
+        order = {Verdict.SKIP: 0, Verdict.PASS: 1, Verdict.FAIL: 2}
+        return order[self.verdict], self.figure if self.figure is not None else 0.0
+
+    @property
+    def place(self) -> str:
+        """Where the worst figure is, in words."""
+        parts = [f"specimen {self.specimen}" if self.specimen is not None else ""]
+        parts += [f"pose {self.pose}" if self.pose is not None else "", self.row]
+        return ", ".join(part for part in parts if part)
+
+
+def skipped(check: str, why: str) -> Finding:
+    """Return the finding of a check without a run."""
+    return Finding(check, Verdict.SKIP, message=why)
+
+
+def stated(check: str, fault: str, message: str = "") -> Finding:
+    """Return the finding of a check without figures, by its fault; empty if there is none.
+
+    Args:
+        message: text without a fault.
+    """
+    return Finding(check, Verdict.FAIL if fault else Verdict.PASS, message=fault or message)
+
+
+def judged(
+    check: str,
+    figures: Array,
+    limit: Limit,
+    names: Sequence[str] = ("",),
+    message: str = "",
+    remedy: str = "",
+) -> Finding:
+    """Return the finding of figures by row and pose, shape (len(names), poses); NaN fails.
+
+    Args:
+        message: text of the finding, whatever the verdict.
+        remedy: text added to a failure.
+    """
+    figures = np.where(np.isnan(figures), math.inf, np.atleast_2d(figures))
+    row, pose = np.unravel_index(int(figures.argmax()), figures.shape)
+    worst = float(figures[row, pose])
+    good = worst <= limit.value
+    return Finding(
+        check,
+        Verdict.PASS if good else Verdict.FAIL,
+        worst,
+        *limit,
+        pose=int(pose) if worst else None,
+        row=names[int(row)] if worst else "",
+        message="; ".join(each for each in (message, "" if good else remedy) if each),
+    )
+
+
+AGREEMENT = 1.0
+"""Largest accepted error over the tolerance of its output."""
+
+
+def agreement(
+    check: str, verdict: Verdict, errors: Mapping[str, Deviations], why: str, message: str
+) -> Finding:
+    """Return the finding of a comparison of outputs.
+
+    Args:
+        errors: deviations by output.
+        why: reason of the limit.
+    """
+    shares = [
+        (off.max_abs / off.tolerance if off.tolerance else math.inf, f"{output} {quantity}", off)
+        for output, each in errors.items()
+        for quantity, off in each.items()
+    ]
+    if not shares:
+        return Finding(check, verdict, message=message)
+    worst, row, off = max(shares, key=lambda each: each[:2])
+    return Finding(check, verdict, worst, AGREEMENT, why, None, off.worst_step, row, message)
+
+
+@dataclass(frozen=True)
+class Report:
+    """The checks of a joint type or an engine.
+
+    Attributes:
+        subject: name of the class or engine.
+        specimens: the examined joints, as text.
+        seed: seed of all random numbers; None if there are none.
+    """
+
+    subject: str
+    specimens: tuple[str, ...]
+    seed: int | None
+    findings: tuple[Finding, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether no check failed."""
+        return not self.failures
+
+    @property
+    def failures(self) -> tuple[str, ...]:
+        """Names of the failed checks."""
+        return tuple(each.check for each in self.findings if each.verdict is Verdict.FAIL)
+
+    def __getitem__(self, check: str) -> Finding:
+        return next(each for each in self.findings if each.check == check)
+
+    def __str__(self) -> str:
+        text = StringIO()
+        self.print(text)
+        return text.getvalue()
+
+    def print(self, file: TextIO, *, quiet: bool = False) -> None:
+        """Print one line per check, then the messages, the specimens and a count; if quiet, the
+        failures and the count alone.
+        """
+        from rich.text import Text
+
+        from ...report import terminal
+
+        console = terminal.console(file)
+        table = terminal.columns("check", "verdict", ">worst", ">limit", "at", "limit because")
+        colours = {Verdict.PASS: "green", Verdict.FAIL: "bold red", Verdict.SKIP: "yellow"}
+        shown = [each for each in self.findings if not quiet or each.verdict is Verdict.FAIL]
+        for each in shown:
+            numbers = ("–" if x is None else f"{x:.3g}" for x in (each.figure, each.limit))
+            table.add_row(
+                each.check,
+                Text(each.verdict, colours[each.verdict]),
+                *numbers,
+                each.place,
+                each.why,
+            )
+        if shown:
+            console.print(table)
+        for each in shown:
+            if each.message:
+                console.print(Text(f"{each.check}: {each.message}"), soft_wrap=True)
+        for k, specimen in enumerate(() if quiet else self.specimens):
+            console.print(Text(f"specimen {k}: {specimen}"), soft_wrap=True)
+        counts = Counter(each.verdict for each in self.findings)
+        summary = ", ".join(
+            f"{counts[verdict]} {verdict}" for verdict in Verdict if counts[verdict]
+        )
+        seed = "" if self.seed is None else f" (seed {self.seed})"
+        console.print(Text(f"{self.subject}: {summary}{seed}"))

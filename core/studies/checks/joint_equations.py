@@ -1,0 +1,361 @@
+"""Checks of a joint's equations, and of variants of them.
+
+Each is a function of one specimen that yields its findings. A motion admitted by the specimen must
+be admitted by the variant too: position, velocity and acceleration.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ...algebra import quat
+from ...joints import AxialJoint, Kind
+from ...kinematics import Style
+from ...primitives.base import NoFormError
+from ...trajectory import Array
+from .findings import AMPLIFIED, ROUND_OFF, Finding, Limit, Verdict, judged, skipped, stated
+from .joint_drivers import coordinate
+from .manifold import NEAR, STEP, Specimen, min_norm, newton, rank, smallest, times
+from .traced_joint import COLUMNS, POSES, Place, TracedJoint, execute, precise, turned
+
+INDEPENDENT = Limit(0.0, "rows must be independent")
+NAMED = Limit(0.0, "6 - rank must be named")
+QUADRATIC = Limit(
+    6.0, "quadratic from 1e-3: 3 passes; 2 more where an exact row is made up for by others"
+)
+ON_BRANCH = Limit(0.0, f"poses within {NEAR * STEP:g} of the design are on its branch")
+FACTORS = (1e-6, 1e-3, 1e3)
+# Offset of a joint a thousand kilometres from the global origin [m].
+AWAY = 1e6
+
+
+def composition(s: Specimen) -> Iterator[Finding]:
+    """Check phi at the design position: zero, of finite numbers."""
+    remedy = (
+        "phi must vanish at the design position: check the constants that primitives() makes of the"
+        " geometry"
+    )
+    off = np.abs(s.traced.phi(s.traced.design(1)))
+    yield judged("design", off, ROUND_OFF, s.traced.names, remedy=remedy)
+
+
+def freedoms(s: Specimen) -> Iterator[Finding]:
+    """Check the rank of the rows, and 6 - rank against the freedoms named by the class."""
+    found, t = rank(s.traced.rows(s.state)), s.traced
+    apart = f"smallest singular value {smallest(s.exact).min():.2g}, rows of size one"
+    lost = np.abs(len(t.names) - found)[None, :].astype(float)
+    remedy = "take out the dependent row, or repair it"
+    yield judged("rank", lost, INDEPENDENT, ["rows less rank"], apart, remedy)
+    left = 6 - (found - len(t.coordinates))
+    relations = len(s.joint.relations) if isinstance(s.joint, AxialJoint) else 0
+    names, named = s.joint.freedoms, len(s.joint.freedoms) - relations
+    if s.joint.rows != t.rows_left:
+        message = (
+            f"rows = {s.joint.rows}, but the primitives have {t.rows_left} equations; do not define"
+            " rows"
+        )
+        off = abs(s.joint.rows - t.rows_left)
+        yield Finding("freedoms", Verdict.FAIL, off, 0.0, message=message)
+    elif not names:
+        yield stated("freedoms", "", f"leaves {left.min()} and names none: none can be driven")
+    else:
+        text = f"leaves {int(left.max())}, names {named}: {', '.join(names)}"
+        wrong = np.abs(left - named)[None, :].astype(float)
+        remedy = "name each freedom that is left, or add the missing row"
+        yield judged("freedoms", wrong, NAMED, message=text, remedy=remedy)
+
+
+def derivatives(s: Specimen) -> Iterator[Finding]:
+    """Check the rows against the derivative of phi: they have the same row space."""
+    t, declared = s.traced, s.traced.rows(s.state)
+    entrywise = np.abs(declared - s.exact).max(axis=(0, 2))
+    others = [
+        name for name, off in zip(t.names, entrywise, strict=True) if not off <= AMPLIFIED.value
+    ]
+    kind = f"equal to the derivative: {len(t.names) - len(others)} of {len(t.names)} rows" + (
+        f", others equivalent: {', '.join(others)}" if others else ""
+    )
+    astray = np.concatenate([_outside(declared, s.exact), _outside(s.exact, declared)])
+    names = [*t.names, *(f"derivative of {name}" for name in t.names)]
+    remedy = "what is named is no combination of the others' rows: differentiate phi again"
+    yield judged("rows", astray, AMPLIFIED, names, kind, remedy)
+
+
+def _outside(rows: Array, space: Array) -> Array:
+    """Return the relative part of each row outside the row space of `space`,
+    shape (rows, lanes).
+    """
+    size = np.linalg.norm(rows, axis=2).T
+    projected = np.stack(
+        [min_norm(space, times(space, rows[:, k].T)) for k in range(rows.shape[1])]
+    )
+    off = np.linalg.norm(rows.transpose(1, 2, 0) - projected, axis=1)
+    return off / np.where(size > 0.0, size, 1.0)
+
+
+def right_sides(s: Specimen) -> Iterator[Finding]:
+    """Check rows . v = nu and rows . a = gamma along motions admitted by phi."""
+    _, velocity, acceleration = _defects(s.traced, s.state, s.rate, s.acceleration)
+    remedy = "rows . v must be nu where phi stays zero; a joint has nu = 0"
+    yield judged("nu", velocity, AMPLIFIED, s.traced.names, remedy=remedy)
+    remedy = (
+        "rows . a must be gamma where phi stays zero: differentiate rows . v = nu once more, and"
+        " move all but rows . a to the right"
+    )
+    yield judged("gamma", acceleration, AMPLIFIED, s.traced.names, remedy=remedy)
+
+
+def _defects(
+    t: TracedJoint, state: Array, rate: Array, acceleration: Array, units: Any = 1.0
+) -> tuple[Array, Array, Array]:
+    """Return the defects of a motion in position, velocity and acceleration, by row and pose,
+    relative to the size of the row.
+
+    Args:
+        units: units of the equations' columns in those of the rates, shape (columns, 1).
+    """
+    jacobian = t.rows(state) * np.reshape(units, (1, 1, -1))
+    size = np.linalg.norm(jacobian, axis=2).T
+    size = np.where(size > 0.0, size, 1.0)
+    velocity = (times(jacobian, rate) - t.nu(state)) / size
+    bent = (times(jacobian, acceleration) - t.gamma(state, rate * units)) / size
+    speed, pull = np.linalg.norm(rate, axis=0), np.linalg.norm(acceleration, axis=0)
+    return (
+        np.abs(t.phi(state) / size),
+        np.abs(velocity) / (1.0 + speed),
+        np.abs(bent) / (1.0 + speed**2 + pull),
+    )
+
+
+def convergence(s: Specimen) -> Iterator[Finding]:
+    """Check Newton's iteration with the declared rows, from poses a little off the manifold."""
+    off = s.rng.normal(size=s.rate.shape)
+    start = s.traced.retract(s.state, 1e-3 * off / np.linalg.norm(off, axis=0))
+    _, taken = newton(s.traced, start, s.traced.rows, 20)
+    remedy = (
+        "the rows have the right space but not the size or sign of the derivative, so a step is too"
+        " long or too short"
+    )
+    names = ["iterations from 1e-3"]
+    yield judged("newton", taken[None, :].astype(float), QUADRATIC, names, remedy=remedy)
+
+
+def intended_branch(s: Specimen) -> Iterator[Finding]:
+    """Check that the branch tests accept poses of the intended branch."""
+    tests = len(s.traced.programs["branch"].outputs)
+    if not tests:
+        yield stated("branch tests", "", "none declared")
+        return
+    refused = (s.traced.branch(s.near) <= 0.0).astype(float)
+    far = int((s.traced.branch(s.state) <= 0.0).sum())
+    text = f"{tests} declared" + f"; {far} of {s.lanes} poses far from the design are refused" * (
+        far > 0
+    )
+    remedy = "a test must be positive on the branch of the design position: turn its sign"
+    yield judged("branch tests", refused, ON_BRANCH, ["refused"], text, remedy)
+
+
+def cost(s: Specimen) -> Iterator[Finding]:
+    """Count the operations of the traced equations, and of the conventional
+    form where one exists.
+    """
+
+    def flops(t: TracedJoint) -> str:
+        return ", ".join(f"{name} {t.programs[name].flops}" for name in ("phi", "rows", "gamma"))
+
+    other = _conventional(s)
+    text = f"flops {flops(s.traced)}"
+    text += f"; in conventional form {flops(other)}" if other is not None else ""
+    total = sum(s.traced.programs[name].flops for name in ("phi", "rows", "gamma"))
+    yield Finding("operations", Verdict.PASS, float(total), message=text)
+
+
+def _conventional(s: Specimen) -> TracedJoint | None:
+    try:
+        return TracedJoint(s.joint, s.place, Style.CONVENTIONAL)
+    except NoFormError:  # a user's primitive has no conventional form
+        return None
+
+
+def round_off(s: Specimen) -> Iterator[Finding]:
+    """Check rounding errors against the same operations with 40 digits, at the poses and very
+    near the design.
+    """
+    try:
+        kind, lift = precise(40)
+    except ModuleNotFoundError:
+        yield skipped("round-off", "mpmath is not installed: pip install mpmath")
+        return
+
+    def error(t: TracedJoint, state: Array) -> Array:
+        true = execute(t.programs["phi"], kind, lift(state), lift)
+        off = [lift(a) - b for a, b in zip(t.phi(state), true, strict=True)]
+        return np.abs(np.array([np.broadcast_to(x, state.shape[1:]) for x in off]).astype(float))
+
+    tiny = 1e-8
+    shift = tiny * s.rng.normal(size=(s.traced.columns, 8))
+    near = s.traced.retract(s.traced.design(8), shift)
+    lost = {"here": error(s.traced, near).max() / tiny}
+    other = _conventional(s) if not s.traced.coordinates else None
+    if other is not None:
+        lost["in conventional form"] = error(other, near).max() / tiny
+    text = f"of a displacement of {tiny:g} from the design phi loses " + ", ".join(
+        f"{x:.1g} {where}" for where, x in lost.items()
+    )
+    remedy = "a difference of large numbers is formed: start from what changed"
+    off = error(s.traced, s.state[:, :8])
+    yield judged("round-off", off, ROUND_OFF, s.traced.names, text, remedy)
+
+
+def exchange(s: Specimen) -> Iterator[Finding]:
+    """Check the same motion with both bodies exchanged."""
+    if not s.joint.symmetric:
+        yield skipped("exchange", "symmetric = False: geometry belongs to one of the bodies")
+        return
+    back = replace(s.joint.reversed(), i=s.joint.i, j=s.joint.j)
+    other = TracedJoint(back, Place((s.place.origins[1], s.place.origins[0]), s.place.unit))
+
+    def exchanged(a: Array, half: int) -> Array:
+        # a coordinate describes body j relative to body i
+        return np.concatenate([a[half : 2 * half], a[:half], -a[2 * half :]])
+
+    motion = (
+        exchanged(s.state, POSES // 2),
+        exchanged(s.rate, COLUMNS),
+        exchanged(s.acceleration, COLUMNS),
+    )
+    remedy = "the joint is another one with its bodies exchanged: set symmetric = False, or repair"
+    yield _same("exchange", s, other, motion, f"{remedy} it")
+
+
+def rigid_motion(s: Specimen) -> Iterator[Finding]:
+    """Check the same motion with both bodies turned and shifted together, and residuals
+    off the manifold.
+    """
+    q = s.rng.normal(size=4)
+    q /= np.linalg.norm(q)
+    shift = s.rng.normal(size=(3, 1))
+
+    def turn(a: Array) -> Array:
+        return turned(q[None], a.T).T
+
+    def pose(state: Array) -> Array:
+        parts: list[Array] = []
+        for k, origin in enumerate(s.traced.origins[:, :, None]):
+            u, e = state[7 * k : 7 * k + 3], state[7 * k + 3 : 7 * k + 7]
+            parts += [turn(origin + u) + shift - origin, np.stack([*(quat(q) * quat(e))])]
+        return np.concatenate([*parts, state[POSES:]])
+
+    def rates(a: Array) -> Array:
+        return np.concatenate([*(turn(a[3 * k : 3 * k + 3]) for k in range(4)), a[2 * COLUMNS :]])
+
+    remedy = (
+        "it must not matter where the two bodies are together: check which body each arm and axis"
+        " belongs to"
+    )
+    motion = (pose(s.state), rates(s.rate), rates(s.acceleration))
+    yield _same("rigid motion", s, s.traced, motion, remedy)
+    off = s.traced.retract(s.state, 0.3 * s.rng.normal(size=s.rate.shape))
+    here, there = s.traced.phi(off), s.traced.phi(pose(off))
+    parts = s.traced.parts
+    apart = np.array(
+        [
+            np.abs(np.linalg.norm(here[a:b], axis=0) - np.linalg.norm(there[a:b], axis=0))
+            for a, b in parts
+        ]
+    )
+    names = [s.traced.names[first].split(" row")[0] for first, _ in parts]
+    yield judged("residual elsewhere", apart, ROUND_OFF, names, remedy=remedy)
+
+
+def axis_lengths(s: Specimen) -> Iterator[Finding]:
+    """Check the same motion with longer directions, and the same residuals off the manifold.
+
+    A multiple of a row has the same solutions; but a row may become so small or large that no
+    solution meets its tolerance.
+    """
+    longer = s.joint.mapped({Kind.DIRECTION: lambda axis: tuple(137.0 * x for x in axis)})
+    long = TracedJoint(replace(s.joint, **longer), s.place)
+    remedy = "a direction may have any length: use unit() or triad()"
+    met = _same("axis lengths", s, long, (s.state, s.rate, s.acceleration), remedy)
+    off = s.traced.retract(s.state, 0.3 * s.rng.normal(size=s.rate.shape))
+    apart = np.abs(s.traced.phi(off) - long.phi(off))
+    where = "where it is not met"
+    unmet = judged("axis lengths", apart, ROUND_OFF, s.traced.names, where, remedy)
+    yield max(met, unmet, key=lambda each: each.badness)
+
+
+def size_and_place(s: Specimen) -> Iterator[Finding]:
+    """Check the same motion of the joint scaled up and down, and far from the origin."""
+    remedy = (
+        "a length that is not declared so is not scaled: declare it by position(), positions() or"
+        " length()"
+    )
+    worst: list[Finding] = []
+    slides = [k for k, name in enumerate(s.traced.coordinates) if name.endswith(".translation")]
+    for factor in FACTORS:
+        large = TracedJoint(s.joint.scaled(factor), s.place.scaled(factor))
+        state, units = s.state.copy(), np.ones((s.traced.columns, 1))
+        state[[0, 1, 2, 7, 8, 9, *(POSES + k for k in slides)]] *= factor * s.place.unit
+        units[[0, 1, 2, 6, 7, 8, *(2 * COLUMNS + k for k in slides)]] *= factor * s.place.unit
+        motion, text = (state, s.rate, s.acceleration), f"worst at x {factor:g}"
+        worst.append(_same("size", s, large, motion, remedy, units, text))
+    yield max(worst, key=lambda each: each.badness)
+    shifted = s.joint.mapped({Kind.POSITION: lambda point: tuple(x + AWAY for x in point)})
+    (a, b), unit = s.place.origins, s.place.unit
+    away = Place((tuple(x + AWAY for x in a), tuple(x + AWAY for x in b)), unit)
+    remedy = "take arms from the bodies' origins: i.arm(P), j.arm(P), never P itself"
+    far = TracedJoint(replace(s.joint, **shifted), away)
+    yield _same("place", s, far, (s.state, s.rate, s.acceleration), remedy)
+
+
+def named_coordinates(s: Specimen) -> Iterator[Finding]:
+    """Check the same motion by the mixed formulation: the joint's coordinates are unknowns."""
+    if not isinstance(s.joint, AxialJoint):
+        yield skipped("mixed style", "no AxialJoint: it has no coordinates of its own")
+        return
+    mixed = TracedJoint(s.joint, s.place, Style.MIXED)
+    own = slice(2 * COLUMNS, None)
+    still = np.zeros((len(mixed.coordinates), s.lanes))
+    state = np.concatenate([s.state[:POSES], still])
+    state, _ = newton(mixed, state, mixed.rows, 30, own)
+    jacobian = mixed.rows(state)
+    rate, acceleration = (
+        np.concatenate([each[: 2 * COLUMNS], still]) for each in (s.rate, s.acceleration)
+    )
+    rate[own] = min_norm(jacobian, mixed.nu(state) - times(jacobian, rate), own)
+    bent = mixed.gamma(state, rate) - times(jacobian, acceleration)
+    acceleration[own] = min_norm(jacobian, bent, own)
+    remedy = "mixed() must say the same as primitives(): define both"
+    met = _same("mixed style", s, mixed, (state, rate, acceleration), remedy)
+    speed = 1.0 + np.linalg.norm(rate, axis=0)
+    off = [
+        np.abs(coordinate(s, s.joint, name.rpartition(".")[2])[0][1] - own_rate) / speed
+        for name, own_rate in zip(mixed.coordinates, rate[own], strict=True)
+    ]
+    remedy = "mixed() must name the joint's own coordinates, body j relative to body i"
+    named = judged("mixed style", np.array(off), AMPLIFIED, mixed.coordinates, remedy=remedy)
+    yield max(met, named, key=lambda each: each.badness)
+
+
+def _same(
+    check: str,
+    s: Specimen,
+    other: TracedJoint,
+    motion: tuple[Array, Array, Array],
+    remedy: str,
+    units: Any = 1.0,
+    message: str = "",
+) -> Finding:
+    """Check that a motion of the specimen satisfies other equations too, and that these leave the
+    same number of freedoms.
+    """
+    worst = np.max(_defects(other, *motion, units), axis=0)
+    mine = rank(s.exact) - len(s.traced.coordinates)
+    theirs = rank(other.rows(motion[0]) * np.reshape(units, (1, 1, -1))) - len(other.coordinates)
+    figures = np.vstack([worst, np.abs(theirs - mine)])
+    return judged(check, figures, AMPLIFIED, [*other.names, "rank"], message, remedy)

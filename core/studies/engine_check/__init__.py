@@ -1,1 +1,0 @@
-"""Conformance of an engine with the engine protocol: one row for each check."""

@@ -1,1 +1,0 @@
-"""The checks of a joint type behind `kincheck check-joint`."""

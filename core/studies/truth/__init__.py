@@ -1,0 +1,3 @@
+"""Independent truth: motions and forces by equations that share nothing with the solver, in long
+double, with error bounds.
+"""

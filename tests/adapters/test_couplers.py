@@ -1,0 +1,253 @@
+"""Gears, racks and threads in every simulator, in its tree and closing loops, against closed forms
+and the native engine.
+"""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from kincheck.core.joints import (
+    ConstantVelocity,
+    Cylindrical,
+    Distance,
+    Gear,
+    RackPinion,
+    Revolute,
+    Screw,
+    Spherical,
+    Translational,
+    Universal,
+)
+from kincheck.core.mechanism.motions import JointAngle, JointDisplacement, Sine
+
+from ..support.engine_motion import (
+    ENGINES,
+    IN_TREE_OR_CUT,
+    assert_as_native,
+    assert_motion,
+    mechanism_of,
+    rotation,
+    solved,
+    tolerances,
+)
+
+TURNS = np.linspace(-7.0, 7.0, 29)
+AXIS, TIP, Z = (1.0, 2.0, -2.0), np.array([0.3, -0.2, 0.4]), (0.0, 0.0, 1.0)
+
+
+@ENGINES
+def test_a_nut_that_a_guide_keeps_from_turning(engine):
+    """A shaft in bearings drives a nut: of the 15 rows of the loop four say what others say."""
+    joints = [
+        Revolute("bearing", "ground", "shaft", (0.0, 0.0, 0.0), AXIS),
+        Screw("thread", "nut", "shaft", (0.0, 0.0, 0.0), AXIS, 0.1),
+        Translational("guide", "ground", "nut", (0.2, 0.0, 0.1), AXIS),
+    ]
+    mechanism = mechanism_of(joints, {"tip": ("nut", TIP)}, [JointAngle("turn", "bearing")])
+    found = assert_as_native(engine, mechanism, TURNS)
+    travel = -0.1 / (2.0 * math.pi) * np.array(AXIS) / 3.0
+    assert_motion(found.points["tip"], TIP + np.outer(TURNS, travel), atol=tolerances(engine))
+
+
+@IN_TREE_OR_CUT
+def test_a_train_of_gears_with_a_rack(engine, closing):
+    """A bearing that names its shaft first has the other sign of rotation. The last wheel slides
+    too, as driven.
+    """
+    cut = ["b", "c", "rail"] if closing else []
+    joints = [
+        Revolute("a", "ground", "A", (0.0, 0.0, 0.0), (0.0, 0.0, 2.0)),
+        Revolute("b", "B", "ground", (0.4, 0.0, 0.0), (0.0, 0.0, 2.0)),
+        Cylindrical("c", "ground", "C", (1.0, 0.0, 0.0), (0.0, 0.0, 2.0)),
+        Translational("rail", "ground", "R", (1.0, 0.2, 0.0), (1.0, 0.0, 0.0)),
+    ]
+    ends = {"A": (0.1, 0.0, 0.0), "B": (0.6, 0.0, 0.0), "C": (1.0, 0.1, 0.0), "R": (1.0, 0.2, 0.0)}
+    couplers = [
+        Gear("ab", ("b", "a"), 0.5),
+        Gear("bc", ("b", "c"), 3.0),
+        RackPinion("cr", ("c", "rail"), -0.2),
+    ]
+    drivers = [JointAngle("turn", "a"), JointDisplacement("shift", "c")]
+    points = {name: (name, place) for name, place in ends.items()}
+    mechanism = mechanism_of(joints, points, drivers, couplers)
+    found = assert_as_native(engine, mechanism, TURNS, cut=cut)
+    # b = a / 2 turns B by -a / 2; c = b / 3
+    half, sixth, none = TURNS / 2, TURNS / 6, 0 * TURNS
+    expected = {
+        "B": (0.4 + 0.2 * np.cos(half), -0.2 * np.sin(half), none),
+        "C": (1.0 - 0.1 * np.sin(sixth), 0.1 * np.cos(sixth), none),
+        "R": (1.0 - 0.2 * sixth, 0.2 + none, none),
+    }
+    for name, wanted in expected.items():
+        assert_motion(found.points[name], np.stack(wanted, axis=1))
+    if engine == "mujoco":
+        assert len(found.details["relations"]) == 3
+    assert_as_native(engine, replace(mechanism, drivers=drivers[::-1]), TURNS, cut=cut)
+
+
+@ENGINES
+@pytest.mark.parametrize("ratio", [2.0, -0.3])
+def test_planetary_gear(ratio, engine):
+    """The planet turns on its carrier, and rolls on a fixed sun: by the ratio more than it."""
+    hub, tip = (0.3, 0.0, 0.0), (0.4, 0.0, 0.0)
+    joints = [
+        Revolute("main", "ground", "carrier", (0.0, 0.0, 0.0), Z),
+        Revolute("hub", "carrier", "planet", hub, Z),
+    ]
+    mechanism = mechanism_of(
+        joints,
+        {"tip": ("planet", tip)},
+        [JointAngle("turn", "main")],
+        [Gear("teeth", ("hub", "main"), ratio)],
+    )
+    spin = rotation(Z, (1.0 + ratio) * TURNS) @ np.subtract(tip, hub)
+    expected = rotation(Z, TURNS) @ hub + spin
+    assert_motion(solved(engine, mechanism, TURNS).points["tip"], expected)
+
+
+@IN_TREE_OR_CUT
+def test_a_steering_gear(engine, closing):
+    """The pinion moves the rack, each end of which turns a wheel by a tie rod that cannot spin."""
+    joints = [
+        Revolute("column", "ground", "pinion", (0.2, 0.1, 0.3), (1.0, 0.2, 0.5)),
+        Translational("rail", "rack", "ground", (0.2, 0.0, 0.2), (0.0, 1.0, 0.0)),
+    ]
+    points = {"end": ("rack", (0.2, 0.35, 0.2))}
+    for side in (-1.0, 1.0):
+        wheel, rod = f"wheel {side:g}", f"rod {side:g}"
+        inner, outer = (0.2, 0.35 * side, 0.2), (0.15, 0.65 * side, 0.15)
+        pin = (0.0, 0.7 * side, 0.1), (-0.1, -0.2 * side, 1.0)
+        axes = ((0.0, side, 0.0), tuple(np.subtract(outer, inner)))
+        joints += [
+            Revolute(f"kingpin {side:g}", "ground", wheel, *pin),
+            ConstantVelocity(f"inner {side:g}", "rack", rod, inner, axes),
+            Spherical(f"outer {side:g}", rod, wheel, outer),
+        ]
+        points[wheel] = wheel, (0.1, 0.8 * side, 0.0)
+        points[rod] = rod, (0.2, 0.5 * side, 0.3)
+    gear = RackPinion("gear", ("column", "rail"), 0.008)
+    mechanism = mechanism_of(joints, points, [JointAngle("turn", "column")], [gear])
+    turn = np.linspace(-6.0, 6.0, 13)
+    found = assert_as_native(engine, mechanism, turn, cut=["rail"] if closing else [])
+    expected = np.array([0.2, 0.35, 0.2]) - np.outer(0.008 * turn, [0.0, 1.0, 0.0])
+    assert_motion(found.points["end"], expected)
+
+
+@IN_TREE_OR_CUT
+@pytest.mark.parametrize("bodies", [("spindle", "nut"), ("nut", "spindle")])
+def test_a_spindle_lifts_a_lever(bodies, engine, closing):
+    """A thread in a closed loop in space, between two Hooke's joints that let the spindle swing;
+    over several turns.
+
+    With the thread cut, bodies that turn about several moving axes carry it: the only place where
+    its angle has a bias.
+    """
+    along, eye, foot = (0.1, 0.2, 1.0), (0.05, 0.1, 0.5), (0.0, 0.0, 0.0)
+    joints = [
+        Universal("base", "ground", "housing", foot, ((1.0, 0.0, -0.1), (0.02, 1.0, 0.2))),
+        Revolute("bearing", "housing", "spindle", foot, along),
+        Screw("thread", *bodies, foot, along, 0.02),
+        Universal("eye", "lever", "nut", eye, ((0.1, 1.0, 0.0), (1.0, -0.1, 0.3))),
+        Revolute("pivot", "ground", "lever", (0.6, 0.0, 0.4), (0.3, 1.0, 0.2)),
+    ]
+    points = {
+        "end": ("spindle", (0.2, 0.0, 0.6)),
+        "nut": ("nut", (0.1, 0.2, 0.5)),
+        "tip": ("lever", (0.9, 0.0, 0.2)),
+    }
+    mechanism = mechanism_of(joints, points, [JointAngle("turn", "bearing")])
+    turn = np.linspace(-15.0, 15.0, 121)
+    found = assert_as_native(engine, mechanism, turn, cut=["thread"] if closing else [])
+    assert np.ptp(found.points["tip"].position[:, 2]) > 0.02
+    if closing:
+        assert "thread" in found.details["closures"]
+
+
+def train(reverse):
+    """On a carrier that turns about z: an input wheel, twice as large an intermediate wheel, a
+    pinion on it, and its rack.
+    """
+    joints = [
+        Revolute("carrier", "ground", "frame", (0.0, 0.0, 0.0), Z),
+        Revolute("input", "frame", "wheel", (0.2, 0.0, 0.0), Z),
+        Revolute("middle", "frame", "double", (0.5, 0.0, 0.0), Z),
+        Translational("guide", "frame", "rack", (0.5, -0.05, 0.0), (1.0, 0.0, 0.0)),
+    ]
+    joints = [joint.reversed() if joint.name in reverse else joint for joint in joints]
+    points = {"wheel": (0.3, 0.0, 0.0), "double": (0.5, 0.2, 0.1), "rack": (0.4, -0.05, 0.0)}
+    sign = {name: -1.0 if name in reverse else 1.0 for name in ("input", "middle", "guide")}
+    couplers = [
+        Gear("mesh", ("input", "middle"), -2.0 * sign["input"] * sign["middle"]),
+        RackPinion("teeth", ("middle", "guide"), 0.05 * sign["middle"] * sign["guide"]),
+    ]
+    places = {name: (name, place) for name, place in points.items()}
+    return mechanism_of(joints, places, [JointAngle("turn", "carrier")], couplers), sign
+
+
+@ENGINES
+@pytest.mark.parametrize("reverse", [(), ("input",), ("middle", "guide")])
+@pytest.mark.parametrize("driver", ["in", "middle", "rack"])
+def test_gears_and_a_rack_on_a_carrier(driver, reverse, engine):
+    """Driven at the input, in the middle and from the rack; the carrier turns with it, which adds
+    to all wheels alike.
+    """
+    mechanism, sign = train(reverse)
+    # of the input wheel in its carrier, at 1 rad/s
+    angle = np.linspace(-2.5 * math.pi, 2.5 * math.pi, 51)
+    swept, factor = {
+        "in": (JointAngle("d", "input"), sign["input"]),
+        "middle": (JointAngle("d", "middle"), -0.5 * sign["middle"]),
+        "rack": (JointDisplacement("d", "guide"), -0.025 * sign["guide"]),
+    }[driver]
+    mechanism = replace(mechanism, drivers=[swept, *mechanism.drivers])
+    motions = {"turn": Sine(0.5, 0.1)}
+    found = solved(engine, mechanism, factor * angle, factor, motions=motions)
+    swing = np.stack(Sine(0.5, 0.1).at(angle))
+    one, none = np.ones_like(angle), np.zeros_like(angle)
+
+    def turning(arm, turn):
+        """Position, velocity, acceleration of arm e^(i turn) as complex numbers."""
+        return (
+            arm * np.exp(1j * turn[0]) * np.stack([one, 1j * turn[1], 1j * turn[2] - turn[1] ** 2])
+        )
+
+    wheel, double = swing + [angle, one, none], swing + [-0.5 * angle, -0.5 * one, none]
+    s, s_t, rack = 0.4 - 0.025 * angle - 0.05j, -0.025, turning(1.0, swing)
+    expected = {
+        "wheel": turning(0.2, swing) + turning(0.1, wheel),
+        "double": turning(0.5, swing) + turning(0.2j, double),
+        "rack": (rack[0] * s, rack[1] * s + rack[0] * s_t, rack[2] * s + 2.0 * rack[1] * s_t),
+    }
+    for name, motion in found.points.items():
+        for values, true, tolerance in zip(
+            (motion.position, motion.velocity, motion.acceleration),
+            expected[name],
+            # round-off of angles of 8 rad and of a rack that tells its pinion's angle by 20 rad/m
+            (1e-12, 1e-12, 1e-11 if engine != "exudyn" else 1e-10),
+            strict=True,
+        ):
+            assert np.abs(values[:, 0] + 1j * values[:, 1] - true).max() <= tolerance
+
+
+@ENGINES
+def test_coarse_steps_of_a_fast_pinion(engine):
+    """A crank that pushes a rack, in steps of 30 degrees: the pinion turns by up to 10 rad a step,
+    and its speed changes.
+    """
+    joints = [
+        Revolute("pivot", "ground", "crank", (0.0, 0.0, 0.0), Z),
+        Distance("rod", "crank", "rack", ((0.1, 0.0, 0.0), (0.5, 0.0, 0.0))),
+        Translational("guide", "ground", "rack", (0.5, 0.0, 0.0), (1.0, 0.0, 0.0)),
+        Revolute("axle", "ground", "pinion", (0.5, 0.05, 0.0), Z),
+    ]
+    teeth = RackPinion("teeth", ("axle", "guide"), 0.005)
+    points = {"P": ("pinion", (0.6, 0.05, 0.0))}
+    mechanism = mechanism_of(joints, points, [JointAngle("t", "pivot")], [teeth])
+    angle = np.radians(np.arange(0.0, 181.0, 30.0))
+    slide = 0.1 * np.cos(angle) + np.sqrt(0.4**2 - (0.1 * np.sin(angle)) ** 2) - 0.5
+    turn = slide / 0.005
+    P = solved(engine, mechanism, angle).points["P"].position
+    # round-off of a turn of 40 rad, on 0.1 m
+    assert np.abs(P[:, 0] - 0.5 - 0.1 * np.cos(turn)).max() <= 1e-13
+    assert np.abs(P[:, 1] - 0.05 - 0.1 * np.sin(turn)).max() <= 1e-13

@@ -1,0 +1,228 @@
+"""Every simulator: right to round-off, the same numbers again, messages where a motion ends, found
+out where its model is wrong, and no danger to others where it gives up.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import importlib
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from kincheck import adapters, cases
+from kincheck.adapters.shared.tree_plan import Link
+from kincheck.core.case.case import Case, Sweep
+from kincheck.core.case.joint_probe import probe
+from kincheck.core.harness.record import Outcome
+from kincheck.core.harness.resource_limits import Limits
+from kincheck.core.harness.run import run
+from kincheck.core.harness.workers.pool import in_workers
+from kincheck.core.joints import Joint, Revolute, Spherical
+from kincheck.core.mechanism.motions import Driver
+from kincheck.core.trajectory import Array
+
+from ..support.engine_motion import ENGINES, TOL, TREES, assert_consistent, installed
+from ..support.fakes import Fake, crank
+from ..support.giving_up import GivingUp
+
+ROOT = Path(__file__).parents[2]
+# Round-off of the strut's coordinates, of about a metre, in each of the simulators [m, m/s, m/s^2].
+STRUT = {"position": 1e-14, "velocity": 1e-13, "acceleration": 1e-12}
+
+
+def strut(values: Any = (), rate: float = 1.0) -> Case:
+    """Return the McPherson strut, on other strokes and without a reference if they are given."""
+    case = cases.load("mcpherson_strut")
+    if not len(values):
+        return case
+    return replace(case, sweep=Sweep("stroke", np.asarray(values), rate), reference={})
+
+
+@ENGINES
+def test_the_strut_is_the_truth_to_round_off(engine: str) -> None:
+    (record,) = run([strut()], [installed(engine)], tol=TOL).records
+    assert record.outcome is Outcome.PASS, record.message
+    for errors in record.errors.values():
+        for quantity, each in errors.items():
+            assert each.max_abs <= STRUT[quantity]
+
+
+SHARED_ROWS = "points coincide (3 rows)", "points at constant distance (1 row)"
+CLOSED_BY = {
+    "mujoco": ("connect", "tendon"),
+    **dict.fromkeys(("pinocchio", "drake", "dart"), SHARED_ROWS),
+    "simbody": ("PointConstraint", "ConstantDistanceConstraint"),
+}
+
+
+@pytest.mark.parametrize("engine", TREES)
+def test_the_record_says_what_closes_the_loops(engine: str) -> None:
+    given, case = installed(engine), strut([0.0])
+    details = given.solve(given.build(case), case, TOL).details
+    assert details["closures"] == dict(
+        zip(("strut_top", "tie_rod"), CLOSED_BY[engine], strict=True)
+    )
+    assert details["unknowns"] == details["rank"] == 5
+
+
+@ENGINES
+def test_rates_are_those_of_the_sweep(engine: str) -> None:
+    """Forty times as fast, and backwards; points of fixed bodies stay."""
+    given, values = installed(engine), np.linspace(-0.08, 0.08, 41)
+    slow, fast = (
+        given.solve(given.build(case), case, TOL) for case in (strut(values), strut(values, -40.0))
+    )
+    for name, motion in fast.points.items():
+        assert_consistent(motion, 4e-3 / -40.0)
+        other, largest = slow.points[name], 1.0 + np.abs(motion.acceleration).max()
+        assert np.abs(motion.velocity + 40.0 * other.velocity).max() <= 1e-11
+        assert np.abs(motion.acceleration - 1600.0 * other.acceleration).max() <= 1e-11 * largest
+
+
+@ENGINES
+def test_solving_again_gives_the_same_numbers(engine: str) -> None:
+    """Nothing is left in the model by what it solved before, reached or not."""
+    given, case = installed(engine), strut(np.linspace(-0.08, 0.08, 9))
+    model = given.build(case)
+    first = given.solve(model, case, TOL)
+    assert given.solve(model, strut(np.linspace(0.0, 0.02, 3)), TOL).solved.all()
+    assert not given.solve(model, strut(np.linspace(0.0, 0.6, 61)), TOL).solved.all()
+    again = given.solve(model, case, TOL)
+    for name, motion in again.points.items():
+        # made of all before it
+        np.testing.assert_array_equal(motion.acceleration, first.points[name].acceleration)
+
+
+@ENGINES
+def test_an_end_of_motion_is_told_and_nothing_is_written(
+    engine: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    given, values = installed(engine), np.arange(-10, 601) * 1e-3
+    monkeypatch.chdir(tmp_path)
+    case = strut(values)
+    found = given.solve(given.build(case), case, TOL)
+    # the strut locks between 0.293 and 0.294 m
+    np.testing.assert_array_equal(found.solved, values < 0.2935)
+    assert "beyond stroke = 0.293" in found.message
+    assert "last reachable sample at stroke = 0.293;" in found.message
+    for motion in found.points.values():
+        for rows in (motion.position, motion.velocity, motion.acceleration):
+            np.testing.assert_array_equal(np.isfinite(rows).all(axis=1), found.solved)
+    assert [*tmp_path.iterdir()] == []
+    assert tuple(capfd.readouterr()) == ("", "")
+
+
+@dataclass(frozen=True)
+class Wind(Driver):
+    type = "wind"
+
+
+@ENGINES
+def test_unknown_joints_and_drivers_are_named(engine: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A subclass of a known joint may mean something else."""
+    monkeypatch.setattr(Joint, "registry", dict(Joint.registry))
+
+    @dataclass(frozen=True)
+    class Latch(Revolute):
+        type = "latch"
+
+    given, case = installed(engine), strut()
+    assert given.unsupported(case) is None
+    latch = Latch("bolt", "ground", "lca", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    for change, who in (
+        ({"joints": [*case.mechanism.joints, latch]}, "'bolt' (latch)"),
+        ({"drivers": [Wind("gust")]}, "'gust' (wind)"),
+    ):
+        other = replace(case, mechanism=replace(case.mechanism, **change))
+        assert who in (given.unsupported(other) or "")
+
+
+@ENGINES
+def test_a_broken_simulator_has_no_version(engine: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    given = installed(engine)
+    assert isinstance(given.version(), str)
+
+    def library(name: str) -> Any:
+        return ctypes.CDLL("there is no such library")
+
+    def interpreter(name: str) -> Any:
+        raise SystemExit(name)
+
+    for broken in (library, interpreter):
+        monkeypatch.setattr(importlib, "import_module", broken)
+        assert given.version() is None
+
+
+def test_another_package_of_the_name_is_no_pinocchio(monkeypatch: pytest.MonkeyPatch) -> None:
+    engine, other = installed("pinocchio"), SimpleNamespace(__version__="0.4")
+    monkeypatch.setattr(importlib, "import_module", lambda name: other)
+    assert engine.version() is None
+
+
+@pytest.mark.parametrize("engine", TREES)
+def test_balls_turn_by_small_angles(engine: str) -> None:
+    """By a ten-thousandth of a radian, where a simulator's rotations may be those of a series."""
+    case = probe(Spherical)
+    case = replace(case, sweep=replace(case.sweep, values=np.linspace(-2e-3, 2e-3, 9)))
+    both = installed(engine), adapters.engine("native")
+    found, expected = (each.solve(each.build(case), case, TOL) for each in both)
+    assert found.solved.all(), found.message
+    for point in case.points:
+        off = found.points[point].position - expected.points[point].position
+        assert np.abs(off).max() <= 1e-14
+
+
+@pytest.mark.parametrize("engine", TREES[1:])
+def test_a_wrong_axis_is_found_and_named_by_comparison(
+    engine: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As by a wrong convention: the arm's hinge is tilted by a tenth of a radian, and the loops
+    close all the same.
+    """
+    given, case = installed(engine), strut(np.linspace(-0.08, 0.08, 9))
+    model = type(given.build(case))
+    add = model.add_link
+
+    def tilted(self: Any, parent: int, link: Link, offset: Array) -> None:
+        if link.move == "hinge" and link.axis == (1.0, 0.0, 0.0):
+            link = replace(link, axis=(float(np.cos(0.1)), float(np.sin(0.1)), 0.0))
+        add(self, parent, link, offset)
+
+    monkeypatch.setattr(model, "add_link", tilted)
+    others = [
+        adapters.engine("native"),
+        *(e for e in map(adapters.engine, ("mujoco", "exudyn")) if e.version()),
+    ]
+    results = run([case], [*others, given], tol=TOL)
+    wrong = next(each for each in results.records if each.engine == engine)
+    assert wrong.residual_max is not None
+    assert wrong.residual_max <= TOL  # its own rows tell nothing
+    assert wrong.outcome is Outcome.FAIL
+    assert "half_track_change" in wrong.message or "wheelbase_change" in wrong.message
+    for each in results.records:
+        assert each is wrong or each.outcome is not Outcome.FAIL
+
+
+@pytest.mark.parametrize("name", ["drake", "simbody"])
+def test_a_simulator_that_gives_up_costs_its_pair_only(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Drake's checks raise SystemExit, OpenSim ends the process at a name with a blank."""
+    installed(name)
+    monkeypatch.syspath_prepend(str(ROOT))
+    results = run(
+        [crank("gives_up"), crank("goes_on")],
+        [GivingUp(name), Fake("good")],
+        tol=TOL,
+        solver=in_workers(1, Limits(timeout=60.0, memory=4.0)),
+    )
+    found = {(each.case, each.engine): each for each in results.records}
+    gave_up = found.pop(("gives_up", "giving_up"))
+    if name == "drake":
+        assert "SystemExit: Failure at" in gave_up.message
+    assert gave_up.outcome is (Outcome.ERROR if name == "drake" else Outcome.CRASHED)
+    assert {each.outcome for each in found.values()} == {Outcome.PASS}

@@ -1,0 +1,257 @@
+"""Every joint in every simulator, in its tree and closing a loop, against the native engine and
+closed forms.
+"""
+
+import math
+from itertools import product
+
+import numpy as np
+import pytest
+from kincheck.adapters.shared.constraints import CLOSURES
+from kincheck.core.joints import (
+    ConstantVelocity,
+    Cylindrical,
+    Distance,
+    Fixed,
+    Revolute,
+    Screw,
+    Spherical,
+    Universal,
+)
+from kincheck.core.mechanism.motions import JointAngle, JointDisplacement, PointCoordinate, Sine
+
+from ..support.engine_motion import (
+    ENGINES,
+    IN_TREE_OR_CUT,
+    SIMULATORS,
+    TREES,
+    assert_as_native,
+    assert_consistent,
+    assert_motion,
+    mechanism_of,
+    rotation,
+    solved,
+    tolerances,
+)
+from ..support.joint_loops import (
+    RATE,
+    TOO_LOOSE,
+    TURN,
+    TYPES,
+    assert_moves_natively,
+    on_crank,
+)
+
+TURNS = np.linspace(-7.0, 7.0, 29)
+AXIS, TIP = (1.0, 2.0, -2.0), np.array([0.3, -0.2, 0.4])
+BOTH_ORDERS = pytest.mark.parametrize("mirrored", [False, True], ids=["ij", "ji"])
+
+
+def ordered(joint, mirrored):
+    return joint.reversed() if mirrored else joint
+
+
+def all_loops():
+    """Every joint, order and cut; the night solves what the day has in another simulator or
+    order.
+    """
+    found = []
+    for engine, kind, mirrored, closing in product(SIMULATORS, TYPES, (0, 1), (0, 1)):
+        if engine == "exudyn" and closing:
+            continue
+        daily = engine in ("exudyn", "mujoco", "pinocchio") or mirrored == closing
+        marks = () if daily else pytest.mark.nightly
+        name = f"{engine}-{kind}-{'ji' if mirrored else 'ij'}-{'cut' if closing else 'tree'}"
+        given = engine, kind, "BA" if mirrored else "AB", bool(closing)
+        found.append(pytest.param(*given, id=name, marks=marks))
+    return found
+
+
+@pytest.mark.parametrize(("engine", "kind", "bodies", "closing"), all_loops())
+def test_joint_in_a_loop_moves_natively(engine, kind, bodies, closing):
+    mechanism = on_crank(kind, *bodies)
+    found = solved(engine, mechanism, TURN, RATE, ["tested"] if closing else [])
+    assert_moves_natively(found, kind, tuple(bodies), tolerances(engine))
+    if engine == "exudyn":
+        return
+    assert found.details["rank"] == found.details["unknowns"]
+    assert ("tested" in found.details["closures"]) == (closing or kind in TOO_LOOSE)
+    if engine == "pinocchio" and not closing and kind not in TOO_LOOSE:
+        # a screw is a slide and a turn tied by a row, a constant-velocity joint four by two
+        spare = {"screw": 1, "constant_velocity": 2}.get(kind, 0)
+        assert found.details["unknowns"] == 7 - mechanism.joint("tested").rows + spare
+
+
+def test_every_joint_type_has_a_closure():
+    assert {each.type for each in CLOSURES} == set(TYPES)
+
+
+def on_screw(theta, axis, point, lead, rate):
+    """Position, velocity and acceleration of a point that turns about an axis through the origin
+    and moves along it.
+    """
+    h = np.array(axis) / np.linalg.norm(axis)
+    along, across = (point @ h) * h, point - (point @ h) * h
+    c, s = np.cos(theta)[:, None], np.sin(theta)[:, None]
+    n, p = np.cross(h, across), lead / (2.0 * math.pi)
+    return (
+        along + c * across + s * n + np.outer(p * theta, h),
+        rate * (c * n - s * across + p * h),
+        -(rate**2) * (c * across + s * n),
+    )
+
+
+@IN_TREE_OR_CUT
+@BOTH_ORDERS
+@pytest.mark.parametrize("lead", [0.05, -9.0])
+@pytest.mark.parametrize("driver", [JointAngle, JointDisplacement, PointCoordinate])
+def test_screw_over_turns_is_a_helix(driver, lead, mirrored, engine, closing):
+    """By either of its coordinates or a point, with a lead above and below one radian a metre."""
+    thread = Screw("thread", "ground", "nut", (0.0, 0.0, 0.0), AXIS, lead)
+    by_point = driver is PointCoordinate
+    # exchanged bodies measure the spindle from the nut; a point is where it is
+    sign, unit = -1.0 if mirrored else 1.0, 1.0 if driver is JointAngle else lead / (2.0 * math.pi)
+    mechanism = mechanism_of(
+        [ordered(thread, mirrored)],
+        {"tip": ("nut", TIP), "hub": ("nut", (0.0, 0.0, 0.0))},
+        [PointCoordinate("drive", "hub", AXIS) if by_point else driver("drive", "thread")],
+    )
+    values = unit * TURNS * (sign if by_point else 1.0)
+    cut = ["thread"] if closing else []
+    found = solved(engine, mechanism, values, (sign if by_point else 1.0) * unit * 2.0, cut)
+    expected = on_screw(sign * TURNS, AXIS, TIP, lead, sign * 2.0)
+    assert_motion(found.points["tip"], *expected, atol=(1e-12, 1e-12, 1e-10))
+
+
+@IN_TREE_OR_CUT
+@BOTH_ORDERS
+@pytest.mark.parametrize("swept", ["turn", "push"])
+def test_both_coordinates_of_a_sleeve(swept, mirrored, engine, closing):
+    sleeve = Cylindrical("sleeve", "ground", "rod", (0.0, 0.0, 0.0), AXIS)
+    drivers = [JointAngle("turn", "sleeve"), JointDisplacement("push", "sleeve")]
+    mechanism = mechanism_of(
+        [ordered(sleeve, mirrored)],
+        {"tip": ("rod", TIP)},
+        drivers if swept == "turn" else drivers[::-1],
+    )
+    motions = {"push" if swept == "turn" else "turn": Sine(0.3, 0.05)}
+    cut = ["sleeve"] if closing else []
+    found = assert_as_native(engine, mechanism, TURNS, cut=cut, motions=motions)
+    waved, sign = 0.3 * np.sin(0.1 * math.pi * TURNS), -1.0 if mirrored else 1.0
+    turn, push = (TURNS, waved) if swept == "turn" else (waved, TURNS)
+    h = np.array(AXIS) / 3.0
+    expected = rotation(AXIS, sign * turn) @ TIP + np.outer(sign * push, h)
+    assert_motion(found.points["tip"], expected)
+
+
+CLOSED_BY = {
+    "mujoco": "weld to an auxiliary body that carries the joint's slides and hinges",
+    "simbody": "WeldConstraint, on a body that slide and hinge move on",
+}
+
+
+@ENGINES
+@BOTH_ORDERS
+def test_driven_joint_that_closes_a_loop(mirrored, engine):
+    """Two sleeves on one axis, the angle of one and the displacement of the other driven; a hinge
+    that a screw without lead repeats.
+    """
+    two = Cylindrical("two", "ground", "rod", (0.0, 0.0, 0.0), AXIS)
+    joints = [Cylindrical("one", "ground", "rod", (0.0, 0.0, 0.0), AXIS), ordered(two, mirrored)]
+    drivers = [JointAngle("turn", "two"), JointDisplacement("push", "one")]
+    mechanism = mechanism_of(joints, {"tip": ("rod", TIP)}, drivers)
+    found = solved(engine, mechanism, TURNS, motions={"push": Sine(0.3, 0.05)})
+    push = np.outer(0.3 * np.sin(0.1 * math.pi * TURNS), np.array(AXIS) / 3.0)
+    turn = -TURNS if mirrored else TURNS
+    assert_motion(found.points["tip"], rotation(AXIS, turn) @ TIP + push)
+    if engine in TREES:
+        (name, text), *_ = found.details["closures"].items()
+        assert (name, len(found.details["closures"])) == ("two", 1)
+        assert CLOSED_BY.get(engine, "on a copy of ") in text
+    joints[1] = ordered(Screw("flat", "ground", "rod", (0.0, 0.0, 0.0), AXIS, 0.0), mirrored)
+    mechanism = mechanism_of(joints, {"tip": ("rod", TIP)}, [JointAngle("turn", "one")])
+    assert_motion(
+        solved(engine, mechanism, TURNS, 2.0).points["tip"],
+        *on_screw(TURNS, AXIS, TIP, 0.0, 2.0),
+        atol=tolerances(engine),
+    )
+
+
+@IN_TREE_OR_CUT
+@BOTH_ORDERS
+@pytest.mark.parametrize("bend", [0.0, 0.6, 1.5])
+def test_constant_velocity_of_two_shafts(bend, mirrored, engine, closing):
+    """Two shafts in bearings, at an angle, over several turns: both have turned alike, which no
+    universal joint does.
+    """
+    # else the bearings carry both shafts, and the joint between them is cut
+    cut = [] if closing else ["out"]
+    k = (math.cos(bend), 0.6 * math.sin(bend), 0.8 * math.sin(bend))
+    joint = ConstantVelocity("joint", "a", "b", (0.0, 0.0, 0.0), ((1.0, 0.0, 0.0), k))
+    joints = [
+        Revolute("in", "ground", "a", (-0.5, 0.0, 0.0), (1.0, 0.0, 0.0)),
+        ordered(joint, mirrored),
+        Revolute("out", "ground", "b", tuple(0.5 * np.array(k)), k),
+    ]
+    mechanism = mechanism_of(joints, {"tip": ("b", TIP)}, [JointAngle("turn", "in")])
+    found = solved(engine, mechanism, TURNS, 2.0, cut)
+    expected = on_screw(TURNS, k, TIP, 0.0, 2.0)
+    assert_motion(found.points["tip"], *expected, atol=tolerances(engine))
+    if engine in TREES:
+        assert ("joint" in found.details["closures"]) == closing
+
+
+@IN_TREE_OR_CUT
+@BOTH_ORDERS
+@pytest.mark.parametrize("rounding", [0.0, 8e-3])
+def test_universal_joint_turns_as_hooke_found(rounding, mirrored, engine, closing):
+    """Shaft 1 along x, shaft 2 at angle b to it; the cross holds the angle of its arms, rounded or
+    not. With the second bearing cut, a body that turns about two moving axes carries a closure: the
+    only place where a direction has a bias from the angular acceleration.
+    """
+    b, values, rate = 0.6, np.linspace(0.0, np.pi, 145), 6.0
+    first, second = np.array([0.0, 0.0, 1.0]), np.array([-math.sin(b), math.cos(b), rounding])
+    axes = (tuple(first), tuple(second))
+    cross = Universal("cross", "driving", "driven", (0.0, 0.0, 0.0), axes)
+    joints = [
+        Revolute("in", "ground", "driving", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
+        Revolute("out", "ground", "driven", (0.0, 0.0, 0.0), (math.cos(b), math.sin(b), 0.0)),
+        ordered(cross, mirrored),
+    ]
+    tip = second / np.linalg.norm(second)
+    points = {"first": ("driving", first), "second": ("driven", tip)}
+    mechanism = mechanism_of(joints, points, [JointAngle("t", "in")])
+    found = solved(engine, mechanism, values, rate, ["out"] if closing else []).points
+    cosine = (found["first"].position * found["second"].position).sum(axis=1)
+    assert np.abs(cosine - tip @ first).max() <= 1e-14
+    for motion in found.values():
+        assert_consistent(motion, (values[1] - values[0]) / rate)
+    if rounding == 0.0:
+        angle = np.arctan2(np.sin(values) * math.cos(b), np.cos(values))
+        path = np.outer(np.cos(angle), tip) + np.outer(np.sin(angle), [0.0, 0.0, 1.0])
+        np.testing.assert_allclose(found["second"].position, path, rtol=0, atol=2e-14)
+
+
+@ENGINES
+@pytest.mark.parametrize("second", [Distance, Fixed, Revolute, Spherical, Universal])
+def test_second_joint_between_the_same_bodies(second, engine):
+    """Rows of a constraint within one rigid body, or on an axis that is there already: zeros, which
+    OpenSim and MuJoCo treat apart.
+    """
+    z, place = (0.0, 0.0, 1.0), (0.0, 0.0, 0.3)
+    how = {
+        Distance: (((0.1, 0.0, 0.0), (0.2, 0.1, 0.0)),),
+        Revolute: (place, z),
+        Universal: (place, (z, (1.0, 0.0, 0.0))),
+    }.get(second, (place,))
+    pivot = Revolute("pivot", "ground", "a", (0.0, 0.0, 0.0), z)
+    glued = [pivot, Fixed("glue", "a", "b", (0.1, 0.0, 0.0)), second("again", "a", "b", *how)]
+    tip, turn = (0.5, 0.2, 0.1), np.linspace(-1.0, 2.0, 7)
+    hinged = [pivot, second("again", "ground", "a", *how)]
+    for joints, body in (
+        (glued, "b"),
+        *([] if second in (Distance, Fixed) else [(hinged, "a")]),
+    ):
+        mechanism = mechanism_of(joints, {"tip": (body, tip)}, [JointAngle("turn", "pivot")])
+        found = assert_as_native(engine, mechanism, turn)
+        assert_motion(found.points["tip"], rotation(z, turn) @ tip)

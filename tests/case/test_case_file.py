@@ -1,0 +1,539 @@
+"""Case files: what they mean, motions of drivers, and their writing."""
+
+import json
+import os
+import stat
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from kincheck.adapters.native import Native
+from kincheck.core.case.case import Case, Truth
+from kincheck.core.case.io.atomic_files import write_all, written
+from kincheck.core.case.io.case_file import load_case
+from kincheck.core.case.io.outputs import DEFAULT_ATOL, DEFAULT_RTOL, DEFAULT_WHY
+from kincheck.core.cli.main import main
+from kincheck.core.joints import (
+    Distance,
+    Gear,
+    Joint,
+    OrientationLock,
+    RackPinion,
+    Screw,
+    Spherical,
+)
+from kincheck.core.joints.base import length, position
+from kincheck.core.mechanism.motions import Absolute, Ramp, Sine, Table
+
+from ..support.case_texts import BASE, INLINE, edited, write
+
+EXAMPLES = sorted((Path(__file__).parents[1] / "data" / "case_files").glob("*.toml"))
+
+
+def same(a: Case, b: Case) -> None:
+    assert (a.name, a.source, a.truth) == (b.name, b.source, b.truth)
+    assert a.mechanism == b.mechanism
+    assert a.outputs == b.outputs
+    assert (a.sweep.driver, a.sweep.rate, a.sweep.design) == (
+        b.sweep.driver,
+        b.sweep.rate,
+        b.sweep.design,
+    )
+    assert np.array_equal(a.sweep.values, b.sweep.values)
+    assert a.reference.keys() == b.reference.keys()
+
+
+def test_all_examples_are_here():
+    assert len(EXAMPLES) == 6
+
+
+@pytest.mark.parametrize("file", EXAMPLES, ids=lambda file: file.stem)
+def test_examples_are_read(file: Path):
+    text = tomllib.loads(file.read_text())
+    case = load_case(str(file))
+    assert case.name == file.stem
+    assert case.truth is Truth.CONSENSUS_ONLY  # without a reference, whatever the file claims
+    assert {joint.name: joint.type for joint in case.mechanism.joints} == {
+        k: v["type"] for k, v in text["joints"].items()
+    }
+    assert [output.name for output in case.outputs] == list(text["outputs"])
+    assert len(case.sweep.values) == text["sweep"]["steps"]
+    assert (case.sweep.values[0], case.sweep.values[-1]) == (
+        text["sweep"]["start"],
+        text["sweep"]["stop"],
+    )
+
+
+@pytest.mark.parametrize("file", EXAMPLES, ids=lambda file: file.stem)
+def test_json_is_the_same(file: Path, tmp_path: Path):
+    data = json.dumps(tomllib.loads(file.read_text()))
+    same(load_case(write(tmp_path, data, "case.json")), load_case(file))
+    same(load_case(write(tmp_path, data, "case")), load_case(file))  # told by its brace
+
+
+def test_every_value_lands_where_it_belongs(tmp_path: Path):
+    case = load_case(write(tmp_path, BASE + INLINE))
+    assert (case.name, case.source, case.truth) == (
+        "slider",
+        "made up for this test",
+        Truth.CLOSED_FORM,
+    )
+    assert case.mechanism.body("slider").origin == (1.0, 2.0, 3.0)
+    assert case.mechanism.joint("guide").bodies == ("ground", "slider")
+    assert case.mechanism.point("tip").position == (1.5, 2.0, 3.0)
+    assert (case.sweep.driver, case.sweep.rate, case.sweep.design) == ("push", 2.0, 0.0)
+    assert case.sweep.values.tolist() == [-0.1, 0.0, 0.1]
+    (output,) = case.outputs
+    assert (output.name, output.point, output.direction, output.relative) == (
+        "tip_x",
+        "tip",
+        (1.0, 0.0, 0.0),
+        False,
+    )
+    assert (output.atol, output.rtol, output.why) == (1e-9, 0.0, "made up for this test")
+    series = case.reference["tip_x"]
+    assert series.position.tolist() == [1.4, 1.5, 1.6]
+    assert series.velocity is not None
+    assert series.velocity.tolist() == [2.0, 2.0, 2.0]
+    assert series.acceleration is None
+
+
+def test_millimetres_and_degrees_are_the_same_case(tmp_path: Path):
+    """Four joints, both kinds of driver: every number of the millimetre file is 1000 times that of
+    the metre file.
+    """
+    metres = """
+    schema = "kincheck-case/1"
+    name = "arm"
+    source = "made up for this test"
+    truth = "closed_form"
+    [bodies.arm]
+    origin = [0.1, 0.2, 0.3]
+    [bodies.rod]
+    fixed = true
+    [joints.pivot]
+    type = "revolute"
+    bodies = ["ground", "arm"]
+    point = [0.1, 0.2, 0.3]
+    axis = [0, 0, 5]
+    [joints.tie]
+    type = "distance"
+    bodies = ["rod", "arm"]
+    points = [[0.4, 0.5, 0.6], [0.7, 0.8, 0.9]]
+    length = 0.52
+    [points.tip]
+    body = "arm"
+    position = [0.9, 0.8, 0.7]
+    [drivers.turn]
+    type = "joint_angle"
+    joint = "pivot"
+    [sweep]
+    driver = "turn"
+    start = 0.0
+    stop = 1.5707963267948966
+    steps = 3
+    rate = 3.141592653589793
+    [outputs.tip_y]
+    point = "tip"
+    direction = [0, 3, 4]
+    atol = 1e-3
+    rtol = 0.5
+    why = "made up for this test"
+    [reference]
+    rows = [[0.0, 0.8], [0.7853981633974483, 0.6], [1.5707963267948966, 0.4]]
+    """
+    millimetres = edited(
+        ("[bodies.arm]", '[units]\nlength = "mm"\nangle = "deg"\n[bodies.arm]'),
+        ("origin = [0.1, 0.2, 0.3]", "origin = [100, 200, 300]"),
+        ("point = [0.1, 0.2, 0.3]", "point = [100, 200, 300]"),
+        ("[[0.4, 0.5, 0.6], [0.7, 0.8, 0.9]]", "[[400, 500, 600], [700, 800, 900]]"),
+        ("length = 0.52", "length = 520"),
+        ("[0.9, 0.8, 0.7]", "[900, 800, 700]"),
+        ("stop = 1.5707963267948966", "stop = 90"),
+        ("rate = 3.141592653589793", "rate = 180"),
+        ("atol = 1e-3", "atol = 1"),
+        (
+            "[[0.0, 0.8], [0.7853981633974483, 0.6], [1.5707963267948966, 0.4]]",
+            "[[0, 800], [45, 600], [90, 400]]",
+        ),
+        base=metres,
+    )
+    a, b = load_case(write(tmp_path, metres)), load_case(write(tmp_path, millimetres))
+    same(a, b)
+    assert np.array_equal(a.reference["tip_y"].position, b.reference["tip_y"].position)
+    assert b.outputs[0].direction == (0.0, 0.6, 0.8)
+    assert b.outputs[0].rtol == 0.5
+    tie = b.mechanism.joint("tie")
+    assert isinstance(tie, Distance)
+    assert tie.length == 0.52
+
+
+def test_displacements_are_lengths(tmp_path: Path):
+    millimetres = load_case(
+        write(
+            tmp_path,
+            edited(("[bodies.slider]", '[units]\nlength = "mm"\nangle = "deg"\n[bodies.slider]')),
+        )
+    )
+    assert millimetres.sweep.values.tolist() == [-1e-4, 0.0, 1e-4]
+    assert millimetres.sweep.rate == 2e-3
+
+
+def test_design_value_of_an_absolute_point_driver(tmp_path: Path):
+    absolute = 'type = "point_coordinate"\npoint = "tip"\ndirection = [0, 3, 4]\nrelative = false'
+    text = edited(('type = "joint_displacement"\njoint = "guide"', absolute))
+    case = load_case(write(tmp_path, text))
+    assert case.sweep.design == pytest.approx((3 * 2.0 + 4 * 3.0) / 5, rel=1e-15)
+    assert (
+        load_case(write(tmp_path, text.replace("relative = false", "relative = true"))).sweep.design
+        == 0.0
+    )
+
+
+def test_default_outputs_say_that_they_are(tmp_path: Path):
+    case = load_case(write(tmp_path, BASE[: BASE.index("[outputs")]))
+    assert [output.name for output in case.outputs] == ["tip.x", "tip.y", "tip.z"]
+    assert [output.direction for output in case.outputs] == [(1, 0, 0), (0, 1, 0), (0, 0, 1)]
+    assert all(
+        not output.relative and output.atol > 0 and "default" in output.why
+        for output in case.outputs
+    )
+
+
+def test_an_output_without_tolerance_gets_the_default(tmp_path: Path):
+    (output,) = load_case(
+        write(tmp_path, edited(('atol = 1e-9\nwhy = "made up for this test"', "")))
+    ).outputs
+    assert (output.atol, output.rtol, output.why) == (DEFAULT_ATOL, DEFAULT_RTOL, DEFAULT_WHY)
+
+
+@pytest.mark.parametrize("where", ["named", "all"])
+def test_the_default_of_a_small_mechanism_is_a_millionth_of_its_size(tmp_path: Path, where: str):
+    """The tip is 5 um from the joint: a nanometre would let pass what is wrong in the fourth
+    digit.
+    """
+    text = BASE[: BASE.index("[outputs") if where == "all" else BASE.index("atol")]
+    for large, small in (
+        ("[1.5, 2.0, 3.0]", "[1.000005, 2.0, 3.0]"),
+        ("-0.1", "-1e-7"),
+        ("stop = 0.1", "stop = 1e-7"),
+    ):
+        text = text.replace(large, small)
+    assert load_case(write(tmp_path, text)).outputs[0].atol == pytest.approx(5e-12, rel=1e-9)
+
+
+def test_a_tolerance_without_a_part_of_the_range_has_none(tmp_path: Path):
+    (output,) = load_case(write(tmp_path, BASE)).outputs
+    assert (output.atol, output.rtol) == (1e-9, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("start", "stop", "steps", "values"),
+    [("0.1", "-0.1", "3", [0.1, 0.0, -0.1]), ("0.2", "0.2", "1", [0.2])],
+)
+def test_sweeps_may_run_down_or_have_one_sample(
+    tmp_path: Path, start: str, stop: str, steps: str, values: list[float]
+):
+    text = edited(
+        ("start = -0.1", f"start = {start}"),
+        ("stop = 0.1", f"stop = {stop}"),
+        ("steps = 3", f"steps = {steps}"),
+    )
+    assert load_case(write(tmp_path, text)).sweep.values.tolist() == values
+
+
+def test_rate_is_one_unless_given(tmp_path: Path):
+    assert load_case(write(tmp_path, edited(("rate = 2.0\n", "")))).sweep.rate == 1.0
+
+
+def test_a_new_joint_type_can_be_named_at_once(tmp_path: Path):
+    @dataclass(frozen=True)
+    class Offset(Spherical):
+        type = "offset_of_test_casefile"
+        shift: float = length(default=0.0)
+        second: tuple[float, float, float] | None = position(default=None)
+
+    try:
+        text = edited(
+            ("[bodies.slider]", '[units]\nlength = "mm"\n[bodies.slider]'),
+            ('type = "translational"', 'type = "offset_of_test_casefile"\nshift = 7'),
+            ("axis = [1.0, 0.0, 0.0]", ""),
+            (
+                'type = "joint_displacement"\njoint = "guide"',
+                'type = "point_coordinate"\npoint = "tip"\ndirection = [1, 0, 0]',
+            ),
+        )
+        joint = load_case(write(tmp_path, text)).mechanism.joint("guide")
+        assert isinstance(joint, Offset)
+        assert (joint.point, joint.shift, joint.second) == ((0.001, 0.002, 0.003), 0.007, None)
+    finally:
+        del Joint.registry[Offset.type]
+
+
+def test_byte_order_mark_and_windows_lines_are_read(tmp_path: Path):
+    same(
+        load_case(write(tmp_path, "\ufeff" + BASE.replace("\n", "\r\n"))),
+        load_case(write(tmp_path, BASE, "b.toml")),
+    )
+
+
+COUPLED = """
+schema = "kincheck-case/1"
+name = "steering/box"
+source = "made up for this test"
+[units]
+length = "mm"
+angle = "deg"
+[bodies.column]
+[bodies.pinion]
+[bodies.rack]
+[bodies.nut]
+[bodies.carrier]
+[joints.column_axle]
+type = "revolute"
+bodies = ["ground", "column"]
+point = [0, 0, 100]
+axis = [0, 0, 1]
+[joints.pinion_axle]
+type = "revolute"
+bodies = ["ground", "pinion"]
+point = [60, 0, 100]
+axis = [0, 0, 1]
+[joints.mesh]
+type = "gear"
+joints = ["column_axle", "pinion_axle"]
+ratio = -2.0
+[joints.guide]
+type = "translational"
+bodies = ["ground", "rack"]
+point = [60, 20, 100]
+axis = [1, 0, 0]
+[joints.rolls]
+type = "rack_pinion"
+joints = ["pinion_axle", "guide"]
+radius = -20
+[joints.thread]
+type = "screw"
+bodies = ["column", "nut"]
+point = [0, 0, 100]
+axis = [0, 0, 1]
+lead = 6
+[joints.upright]
+type = "orientation_lock"
+bodies = ["ground", "nut"]
+[joints.hangs]
+type = "spherical"
+bodies = ["nut", "carrier"]
+point = [0, 10, 100]
+[joints.level]
+type = "orientation_lock"
+bodies = ["ground", "carrier"]
+[points.rack_end]
+body = "rack"
+position = [160, 20, 100]
+[points.nut]
+body = "carrier"
+position = [0, 10, 100]
+[drivers.turn]
+type = "joint_angle"
+joint = "column_axle"
+[sweep]
+driver = "turn"
+start = -360
+stop = 360
+steps = 9
+"""
+
+
+def test_couplers_and_joints_without_geometry(tmp_path: Path):
+    """A steering column turns a pinion by a gear, that moves a rack, and lifts a nut by a
+    thread.
+    """
+    case = load_case(write(tmp_path, COUPLED))
+    assert case.mechanism.couplers == (
+        Gear("mesh", ("column_axle", "pinion_axle"), -2.0),
+        RackPinion("rolls", ("pinion_axle", "guide"), -0.02),
+    )
+    assert case.mechanism.joint("thread") == Screw(
+        "thread", "column", "nut", (0.0, 0.0, 0.1), (0.0, 0.0, 1.0), 0.006
+    )
+    assert case.mechanism.joint("upright") == OrientationLock("upright", "ground", "nut")
+    found = Native().solve(Native().build(case), case, 1e-12)
+    assert found.solved.all()
+    turn = case.sweep.values
+    assert found.points["rack_end"].position[:, 0] == pytest.approx(
+        0.16 - 0.02 * turn / -2.0, abs=1e-14
+    )
+    assert found.points["nut"].position[:, 2] == pytest.approx(
+        0.1 - 0.006 * turn / (2.0 * np.pi), abs=1e-14
+    )
+
+
+MOTION = """[drivers.turn.motion]
+type = "sine"
+amplitude = 90
+frequency = 2
+phase = 45
+[drivers.shift]
+type = "joint_displacement"
+joint = "guide"
+[drivers.shift.motion]
+type = "ramp"
+rate = 3
+[drivers.hang]
+type = "point_coordinate"
+point = "rack_end"
+direction = [0, 3, 4]
+relative = false
+[drivers.hang.motion]
+type = "table"
+times = [0, 1.5]
+values = [10, 20]
+[sweep]
+"""
+
+
+def test_motions_are_in_the_units_of_the_file(tmp_path: Path):
+    sweep = COUPLED[COUPLED.index("[sweep]") :]
+    text = edited((sweep, MOTION + "start = 0\nstop = 1.5\nsteps = 4\n"), base=COUPLED)
+    case = load_case(write(tmp_path, text))
+    assert (case.sweep.driver, case.sweep.rate, case.sweep.values.tolist()) == (
+        "time",
+        1.0,
+        [0.0, 0.5, 1.0, 1.5],
+    )
+    turn, shift, hang = case.sweep.motions.values()
+    assert turn == Sine(np.radians(90.0), 2.0, np.radians(45.0))
+    assert shift == Ramp(0.003)
+    assert isinstance(hang, Absolute)
+    assert hang.motion == Table((0.0, 1.5), (0.01, 0.02))
+    assert hang.design == pytest.approx((3 * 0.02 + 4 * 0.1) / 5, abs=1e-16)
+    named = load_case(write(tmp_path, text.replace("[sweep]", '[sweep]\ndriver = "time"')))
+    same(named, case)
+
+
+def test_what_a_table_covers_is_told_to_the_rounding_of_its_times(tmp_path: Path):
+    """2.1 m at 0.7 m/s take 3.0000000000000004 s, more than the table has."""
+    motion = MOTION[MOTION.index("[drivers.hang]") :].replace("[0, 1.5]", "[-3, 3]")
+    push = edited(
+        ("[sweep]\n", motion.replace("rack_end", "tip")),
+        ("= -0.1", "= -2.1"),
+        ("stop = 0.1", "stop = 2.1"),
+        ("= 2.0", "= 0.7"),
+    )
+    assert load_case(write(tmp_path, push)).sweep.path.times[-1] > 3.0
+
+
+CURVED = """schema = "kincheck-case/1"
+name = "knee"
+source = "test"
+units = {length = "mm", angle = "deg"}
+bodies = {carriage = {}, shank = {}}
+[joints]
+slide = {type = "translational", bodies = ["ground", "carriage"], point = [0, 0, 0], axis = [1, 0, 0]}
+flex = {type = "revolute", bodies = ["carriage", "shank"], point = [0, 0, 0], axis = [0, 1, 0]}
+[couplers]
+knee = {type = "polynomial", joints = ["slide", "flex"], coefficients = [0, 0.2, -0.006, 2e-5, 1e-7]}
+[points.pin]
+body = "carriage"
+position = [0, 0, 0]
+[drivers.flex]
+type = "joint_angle"
+joint = "flex"
+[sweep]
+driver = "flex"
+start = 0
+stop = 90
+steps = 7
+"""  # noqa: E501
+
+
+def test_a_polynomial_is_in_the_units_of_the_file(tmp_path: Path):
+    """Millimetres by powers of degrees, between the freedoms that the joints have."""
+    case = load_case(write(tmp_path, CURVED))
+    (knee,) = case.mechanism.couplers
+    assert knee.freedoms == ("translation", "rotation")
+    turn = np.linspace(0.0, 90.0, 7)
+    shift = np.polynomial.Polynomial([0, 0.2, -0.006, 2e-5, 1e-7])(turn) / 1000.0
+    found = Native().solve(Native().build(case), case, 1e-12)
+    assert found.points["pin"].position[:, 0] == pytest.approx(shift, abs=1e-15)
+
+
+def test_two_who_write_one_file_do_not_mix_their_texts(tmp_path):
+    """One begins while the other is at it: what is there in the end is the whole of the one that
+    ended last.
+    """
+    file = tmp_path / "results.json"
+
+    def first(part):
+        part.write_bytes(10 * b"A")
+        assert written(file, lambda part: part.write_bytes(4 * b"B")) == []
+        assert file.read_bytes() == 4 * b"B"
+        with part.open("ab") as more:
+            more.write(10 * b"A")
+
+    assert written(file, first) == []
+    assert file.read_bytes() == 20 * b"A"
+    assert [each.name for each in tmp_path.iterdir()] == ["results.json"]
+
+
+def test_a_file_keeps_its_rights(tmp_path):
+    file = tmp_path / "secret.json"
+    file.write_text("old")
+    file.chmod(0o600)
+    assert written(file, b"new") == []
+    assert file.read_bytes() == b"new"
+    assert stat.S_IMODE(file.stat().st_mode) == 0o600
+
+
+def test_a_name_as_long_as_may_be(tmp_path):
+    file = tmp_path / (250 * "n" + ".json")
+    assert written(file, b"there") == []
+    assert file.read_bytes() == b"there"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pipes have no names in the file system")
+def test_a_pipe_takes_what_several_have_to_say(tmp_path):
+    named, end = tmp_path / "pipe", os.pipe()
+    os.mkfifo(named)
+    reader = os.open(named, os.O_RDONLY | os.O_NONBLOCK)
+    nameless = named.with_name("link")
+    # as a shell has it: what it leads to is a name of nothing
+    nameless.symlink_to(f"/proc/self/fd/{end[1]}")
+    assert write_all([(named, b"one "), (named, b"two"), (nameless, b"three")]) == []
+    assert os.read(reader, 100) == b"one two"
+    assert os.read(end[0], 100) == b"three"
+    for each in (reader, *end):
+        os.close(each)
+
+
+@pytest.mark.skipif(
+    not os.path.exists("/dev/full"), reason="there is no device that is always full"
+)
+@pytest.mark.parametrize(
+    "command",
+    ["trace four_bar --length 1", "explain rssr --samples 3", "assemblies rssr --samples 3"],
+)
+def test_a_full_disk_is_one_message(command, capsys):
+    assert main([*command.split(), "--json", "/dev/full"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(
+        "kincheck: --json /dev/full: cannot be written (No space left on device); give a file in a"
+        " folder that "
+    )
+
+
+def test_two_options_that_name_one_pipe(tmp_path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    assert (
+        main(["run", "rssr", "--engine", "native", "--junit", str(pipe), "--markdown", str(pipe)])
+        == 0
+    )
+    text = os.read(reader, 100_000).decode()
+    os.close(reader)
+    assert "</testsuites>" in text
+    assert "| `rssr` |" in text
