@@ -39,11 +39,15 @@ IMPORTS = {
     "joints": ". primitives",
     "mechanism": ". joints",
     "kinematics/formulation": ". primitives program joints mechanism",
-    "kinematics/forces": ". primitives joints mechanism kinematics/formulation",
+    "kinematics/forces": ". primitives program joints mechanism kinematics/formulation",
     "kinematics/structure": ". primitives joints mechanism kinematics/formulation",
     "kinematics/compiled": (
         ". primitives program program/llvm joints mechanism kinematics/formulation "
         "kinematics/forces kinematics/structure"
+    ),
+    "kinematics/statics": (
+        ". primitives program program/llvm joints mechanism kinematics/formulation "
+        "kinematics/forces kinematics/structure kinematics/compiled"
     ),
     "kinematics/assembly": (
         ". primitives joints mechanism kinematics/formulation "
@@ -68,9 +72,9 @@ IMPORTS = {
         ". primitives program joints mechanism kinematics/formulation kinematics/forces "
         "kinematics/structure kinematics/compiled kinematics/assembly "
         "kinematics/continuation kinematics/verified kinematics/blocks "
-        "kinematics/diagnosis"
+        "kinematics/statics kinematics/diagnosis"
     ),
-    "case": ". joints mechanism kinematics",
+    "case": ". primitives joints mechanism kinematics",
     "case/suspension": ". mechanism case",
     "case/io": ". joints mechanism kinematics case case/suspension",
     "case/models/hardpoints": (". joints mechanism kinematics case case/suspension case/io"),
@@ -85,7 +89,7 @@ IMPORTS = {
     "studies/variation": ". joints mechanism kinematics case case/io",
     "studies/truth": ". program mechanism kinematics case",
     "studies/stress/families": ". joints mechanism case case/io studies/truth",
-    "studies": ". program joints kinematics case case/io harness",
+    "studies": ". program joints mechanism kinematics case case/io harness",
     "studies/checks": (
         ". primitives program joints mechanism kinematics case case/io "
         "harness harness/workers report"
@@ -100,6 +104,7 @@ IMPORTS = {
     ),
     "studies/paper": ". primitives program joints mechanism kinematics case harness report",
     "studies/diagnosis": ". joints kinematics case harness report studies/variation",
+    "studies/compliance": (". mechanism kinematics case case/suspension report"),
     "studies/bench": (
         ". program/llvm joints mechanism kinematics case case/io harness report "
         "studies/variation studies studies/tolerance studies/paper"
@@ -109,10 +114,12 @@ IMPORTS = {
         "case/io case/models/hardpoints case/models harness harness/workers history "
         "recorded report studies/variation studies/stress/families studies "
         "studies/checks studies/tolerance studies/stress "
-        "studies/paper studies/diagnosis studies/bench"
+        "studies/paper studies/diagnosis studies/bench studies/compliance"
     ),
     "__init__": ". joints mechanism kinematics case case/io harness studies/checks",
-    "kincheck": "case case/io harness harness/workers studies/checks cli __init__",
+    "kincheck": (
+        "case case/io harness harness/workers studies/checks studies/compliance cli __init__"
+    ),
 }
 """Folder of core: the folders it imports besides itself, whenever the import runs."""
 

@@ -53,7 +53,12 @@ def test_every_name_is_there(name):
 
 
 def test_core_has_all_but_the_functions_by_name():
-    assert set(kincheck.__all__) - set(kincheck.core.__all__) == {"check_engine", "load", "run"}
+    assert set(kincheck.__all__) - set(kincheck.core.__all__) == {
+        "check_engine",
+        "compliance",
+        "load",
+        "run",
+    }
     assert kincheck.Mechanism is kincheck.core.Mechanism
 
 

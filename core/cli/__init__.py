@@ -19,6 +19,7 @@ COMMANDS = (
     "explain",
     "assemblies",
     "trace",
+    "kc",
     "doctor",
     "history",
     "report",

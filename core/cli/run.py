@@ -117,6 +117,8 @@ def _shown(options: argparse.Namespace) -> Callable[[Results, TextIO], None]:
         return print_summary
     if options.verbose:
         return print_outputs
+    if options.reactions:
+        return partial(print_table, reactions=True)
     return print_matrix if options.joints else print_table
 
 
@@ -141,6 +143,14 @@ def _planned(options: argparse.Namespace, registry: Registry, to: Destinations) 
         named, unread, list(probes()) if options.joints else [], import_options.supplied(options)
     )
     import_options.tell_left_out(cases)
+    if options.static:
+        from ..studies.reactions import without_motion
+
+        cases = [without_motion(each) for each in cases]
+    if options.reactions:
+        from ..studies.reactions import with_reactions
+
+        cases = [with_reactions(each, options.tol) for each in cases]
     unused: list[str] = []
     recorded: list[Engine] = []
     if options.recorded and len(cases) != 1:

@@ -127,6 +127,19 @@ def add_options(run: argparse.ArgumentParser) -> None:
     recorded_options.add_options(run)
     execution_options.add_options(run, positive)
     run.add_argument(
+        "--static",
+        action="store_true",
+        help="efforts and reactions at rest, at every sample; [sweep] rate = 0 of all cases",
+    )
+    run.add_argument(
+        "--reactions",
+        action="store_true",
+        help=(
+            "every determined reaction of joints, effort of drivers and force of elements as"
+            " outputs, first in table and page; what is not determined is a note"
+        ),
+    )
+    run.add_argument(
         "--history",
         type=Path,
         metavar="FILE",

@@ -19,7 +19,7 @@ from ..forces import Forces
 from ..trajectory import Array, Trajectory
 from .compare import output_series
 from .engine import Engine
-from .held_trajectory import held_trajectory
+from .held_trajectory import held_trajectories
 from .provenance import plain, readable
 from .record import Outcome, Seconds
 from .reported import Reported
@@ -90,11 +90,16 @@ class Answer:
     judged: bool = False
 
     @staticmethod
-    def of(pair: Pair, found: Trajectory, held: Trajectory | None = None, why: str = "") -> Answer:
+    def of(
+        pair: Pair,
+        found: Trajectory,
+        held: Mapping[tuple[str, ...], Trajectory] | None = None,
+        why: str = "",
+    ) -> Answer:
         """Return the answer that a checked trajectory gives to a pair.
 
         Args:
-            held, why: from `held_trajectory`.
+            held, why: from `held_trajectories`.
         """
         case, solved = pair.case, np.asarray(found.solved, dtype=np.bool_)
         rigid = pair.engine.mode == "projection"
@@ -251,7 +256,7 @@ def _solve(pair: Pair, seconds: dict[str, float]) -> Answer:
         check(case, engine.name, found)
         return found
 
-    held, why = held_trajectory(case, engine.mode, trajectory, solve_anew)
+    held, why = held_trajectories(case, engine.mode, trajectory, solve_anew)
     return Answer.of(pair, trajectory, held, why)
 
 

@@ -197,7 +197,8 @@ def _not_judged(case: Case, errors: Mapping[str, Deviations]) -> list[str]:
     reasons: dict[str, list[str]] = {}
     for output in case.outputs:
         each = errors[output.name]
-        if len(each.items()) < output.orders or NO_VALUE in (each.reason or ""):
+        orders = 1 if case.sweep.static else output.orders
+        if len(each.items()) < orders or NO_VALUE in (each.reason or ""):
             reasons.setdefault(each.reason or "", []).append(output.name)
     return [
         reason if len(names) == len(case.outputs) else f"{', '.join(names)}: {reason}"

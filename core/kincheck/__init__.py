@@ -18,11 +18,11 @@ from typing import TYPE_CHECKING, Any
 from kincheck import core
 
 if TYPE_CHECKING:
-    from kincheck.by_name import check_engine, load, run
+    from kincheck.by_name import check_engine, compliance, load, run
     from kincheck.core import *  # noqa: F403  # pyright: ignore[reportWildcardImportFromLibrary]
 
-_BY_NAME = ("check_engine", "load", "run")
-__all__ = ["check_engine", "load", "run"]
+_BY_NAME = ("check_engine", "compliance", "load", "run")
+__all__ = ["check_engine", "compliance", "load", "run"]
 __all__ += core.__all__
 
 

@@ -1,6 +1,6 @@
 """Functions on cases and engines by name, as on the command line."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TypeVar, cast
 
@@ -17,6 +17,8 @@ from kincheck.core.harness.record import Results
 from kincheck.core.harness.scene import with_scenes
 from kincheck.core.harness.workers.pool import solver_for
 from kincheck.core.studies.checks.findings import Report
+from kincheck.core.studies.compliance import study
+from kincheck.core.studies.compliance.study import ComplianceResults
 
 _One = TypeVar("_One")
 
@@ -74,6 +76,32 @@ def run(
     solver, _ = solver_for(team, jobs)
     results = running.run(found, team, tol=tol, baseline=known.baseline(team), solver=solver)
     return with_scenes(results, found)
+
+
+def compliance(
+    case: str | Path | Case,
+    travel: Sequence[float] | None = None,
+    loads: Mapping[str, float | Sequence[float]] | None = None,
+    axle: str = "heave",
+) -> ComplianceResults:
+    """Return the kinematics and compliance of a suspension, as the command `kincheck kc` does.
+
+    Args:
+        case: name, path or case.
+        travel: of the wheel from design [m], by default 60 mm up and down; of the steering if
+            `axle` is "steer".
+        loads: values by load, "lateral", "longitudinal", "braking" or "aligning" [N, N m], each
+            applied at design; one number acts over all travel.
+        axle: motion of both wheels: "heave", "roll" or "steer".
+
+    Raises:
+        KincheckError: the case lacks facts, or a sample has no equilibrium; the message gives the
+            last load with one.
+    """
+    found = study.compliance(case if isinstance(case, Case) else load(case), travel, loads, axle)
+    if found.failures:
+        raise KincheckError("\n".join(found.failures))
+    return found
 
 
 def check_engine(engine: str | Engine) -> Report:

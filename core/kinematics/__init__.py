@@ -6,6 +6,7 @@ Solve:
 
     solve              one design over a sweep
     solve_designs      many designs over a sweep, each with its own geometry
+    StaticModel        equilibria of a mechanism whose drivers are held, and its compliance
     forces_of          reactions of joints and efforts of drivers of a solved motion
     trace              a motion by its arc length, beyond lock-ups of a driver
     assemble           a closed pose from an estimate
@@ -37,6 +38,7 @@ The folders:
     compiled         one mechanism as compiled programs: request, programs, model, routes
     continuation     the walk along a path, singular poses, curves by arc length
     blocks           large mechanisms as lists of blocks: components, or one sparse system
+    statics          equilibria with springs, bushings and loads, and their compliance
     forces           the equations of forces, and the forces of a solved motion
     assembly         closed poses from estimates and random starts
     diagnosis        rank, conditioning and screws at a pose
@@ -83,6 +85,8 @@ if TYPE_CHECKING:
     from .native_solver import Method, NativeSolver, PreparedDesigns, ProgramSize
     from .one_design import Solver, followed_angle, followed_attitude, follower, solve
     from .replay import Residuals, Worst, count_turns, judged_part, replayed, residuals
+    from .statics.equations import LoadPoint
+    from .statics.equilibrium import Equilibria, StaticModel
     from .structure.degrees_of_freedom import degrees_of_freedom, require_driven
     from .structure.redundancy import largest_residual, reduce_rows
     from .verified.exact import Exact, Reading, as_decimal, as_double
@@ -111,6 +115,8 @@ _NAMES = {
     "native_solver": "Method NativeSolver PreparedDesigns ProgramSize",
     "one_design": "Solver followed_angle followed_attitude follower solve",
     "replay": "Residuals Worst count_turns judged_part replayed residuals",
+    "statics.equations": "LoadPoint",
+    "statics.equilibrium": "Equilibria StaticModel",
     "structure.degrees_of_freedom": "degrees_of_freedom require_driven",
     "structure.redundancy": "largest_residual reduce_rows",
     "verified.exact": "Exact Reading as_decimal as_double",

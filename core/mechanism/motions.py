@@ -157,6 +157,23 @@ class Absolute(Motion):
         return value - self.design, velocity, acceleration
 
 
+@dataclass(frozen=True)
+class Slowed(Motion):
+    """A motion over times that are longer by a factor; a power of two keeps all digits."""
+
+    motion: Motion
+    factor: float
+
+    @property
+    def span(self) -> tuple[float, float]:
+        first, last = sorted(self.factor * end for end in self.motion.span)
+        return first, last
+
+    def at(self, t: Array) -> tuple[Array, Array, Array]:
+        value, velocity, acceleration = self.motion.at(t / self.factor)
+        return value, velocity / self.factor, acceleration / self.factor**2
+
+
 def as_changes(motions: Mapping[str, Motion], design: Mapping[str, float]) -> dict[str, Motion]:
     """Return motions by driver as changes from the design values; `design` lists those that are not
     zero.

@@ -14,11 +14,12 @@ import msgspec
 from ...errors import MechanismError
 from ...joints import Coupler, Joint, Kind
 from ...mechanism.body import dimension_of
-from ...mechanism.loads import ELEMENTS, SpringDamper
+from ...mechanism.loads import ELEMENTS, Bushing, SpringDamper
 from ...mechanism.motions import Motion
 from ..measures import Measure, key_of
 from ..quantity import own_keys
 from ..suspension import SuspensionOutput
+from .compliance import RestingKeys, RigKeys
 from .mechanism_sections import DRIVERS
 from .schema import (
     COORDINATE,
@@ -101,7 +102,7 @@ def type_tables() -> dict[str, Rows]:
             (
                 name,
                 f'bodies = ["first", "second"], {_keys(cls)}'
-                if issubclass(cls, SpringDamper)
+                if issubclass(cls, SpringDamper | Bushing)
                 else _keys(cls),
                 _meaning(cls),
             )
@@ -208,6 +209,8 @@ def case_schema() -> dict[str, Any]:
         "sweep": SweepKeys,
         "suspension": SuspensionKeys,
         "reference": ReferenceKeys,
+        "compliance": RigKeys,
+        "equilibrium": RestingKeys,
     }
     motions = {name: keys_of(cls) for name, cls in Motion.registry.items()}
     found = document_schema(SCHEMA, CaseKeys, tables, single, {"motion": motions})

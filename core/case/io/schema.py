@@ -45,7 +45,8 @@ left out. `kincheck list --joints` prints all types with their keys.
                          type = "table": times [s], values: the natural cubic spline through them;
                          the times must cover the sweep
     [sweep]              (driver), start, stop, steps: samples with both ends, 1 if they are equal;
-                         (rate) = 1, in driver units per second
+                         (rate) = 1, in driver units per second; 0: at rest at every sample, for
+                         static efforts and reactions; times are then those of rate 1
                          driver: its samples from start to stop; it has its design value at time
                          zero, and moves at the rate; the sign of the rate gives the direction
                          at = "reference", in place of start, stop and steps: the samples of the
@@ -104,6 +105,14 @@ left out. `kincheck list --joints` prints all types with their keys.
                          (static_toe), (static_camber), (wheel_axis), (wheel_contact), (travel);
                          the rest is as in [suspension];
                          outputs of one wheel may then have (side)
+    [equilibrium]        the case rests with gravity and springs: (held) = [DRIVER, ...], which keep
+                         their values or are swept; the others are free, and their efforts vanish;
+                         [sweep] may be left out
+    [compliance]         of `kincheck kc`: (wheel), the body that carries the wheel; (contact), the
+                         point where it touches the road; (held) = [DRIVER, ...], which keep their
+                         values, others are free, default: all; (loads) = ["longitudinal",
+                         "lateral", "braking", "aligning"]; (tire_stiffness) [N/length], vertical,
+                         for the ride rate
     [reference]          true values: file, the name of a CSV file beside the case file, or rows,
                          with (columns); (sheet), the name of one of several in an .xlsx file
                          beside: in its folder or below, also after following links; a foreign case
@@ -158,7 +167,8 @@ from msgspec import Meta
 
 from ...joints import Coupler, Joint, Kind
 from ...mechanism.body import ANGLE, SIX_NUMBERS, Inertia, dimension_of
-from ...mechanism.loads import ForceElement, SpringDamper
+from ...mechanism.curves import dimensions_of
+from ...mechanism.loads import Axes, Bushing, ForceElement, SpringDamper
 from ...mechanism.mechanism import Vector
 from ...mechanism.motions import Driver, Motion
 from ..case import TIME, Truth
@@ -220,7 +230,7 @@ class CaseKeys(msgspec.Struct, forbid_unknown_fields=True):
     ]
     bodies: Table
     drivers: Table
-    sweep: Table
+    sweep: Table | None = None
     truth: Annotated[Truth, _one_of(Truth)] | None = None
     units: Table = {}
     joints: Table = {}
@@ -232,6 +242,8 @@ class CaseKeys(msgspec.Struct, forbid_unknown_fields=True):
     reference: Table | None = None
     gravity: Numbers3 = (0.0, 0.0, 0.0)
     forces: Table = {}
+    compliance: Table | None = None
+    equilibrium: Table | None = None
 
 
 class BodyKeys(msgspec.Struct, forbid_unknown_fields=True):
@@ -409,17 +421,31 @@ _OF_FIELDS: Mapping[Any, Any] = {
     float: Number,
     Vector: Numbers3,
     tuple[float, ...]: Numbers,
+    str | None: Annotated[str | None, Meta(description="a name")],
     Vector | None: Annotated[Vector | None, Meta(description="a direction [x, y, z]")],
     tuple[Vector, Vector]: Annotated[
         tuple[Vector, Vector], Meta(description="two directions [[x, y, z], [x, y, z]]")
     ],
 }
+_PAIRS_OF_SPRING = tuple[tuple[float, float], ...] | None
+_PAIRS = Annotated[
+    tuple[tuple[float, float], ...] | None, Meta(description="a table of pairs of numbers")
+]
+_CURVES = Annotated[
+    tuple[tuple[float | tuple[float, float], ...], ...] | None,
+    Meta(description="a table [[displacement, force], ...], or one for each axis"),
+]
+_ONE_OR_THREE = Annotated[float | Vector, Meta(description="a number, or three along the axes")]
 _FRAME = Annotated[Literal["global", "body"], Meta(description='"global" or "body"')]
 
 
 def own_fields(cls: type[Described]) -> list[Field[Any]]:
     """Return the fields of a class itself, without the fields of its kind; case files give them."""
-    return [each for each in fields(cls) if each.name not in _INHERITED]
+    return [
+        each
+        for each in fields(cls)
+        if each.name not in _INHERITED and not each.metadata.get("hidden")
+    ]
 
 
 @cache
@@ -431,7 +457,7 @@ def keys_of(cls: type[Described | Measure | SuspensionOutput]) -> type[msgspec.S
     quantity = issubclass(cls, Measure | SuspensionOutput)
     if issubclass(cls, Coupler):
         keys.append(("joints", Joints))
-    elif issubclass(cls, Joint | SpringDamper):
+    elif issubclass(cls, Joint | SpringDamper | Bushing):
         keys.append(("bodies", Bodies))
     elif issubclass(cls, SuspensionOutput) and not issubclass(cls, AxleOutput):
         keys.append(("side", Sides | None, None))
@@ -448,6 +474,23 @@ def keys_of(cls: type[Described | Measure | SuspensionOutput]) -> type[msgspec.S
     )
 
 
+@cache
+def bushing_keys() -> type[msgspec.Struct]:
+    """Return the keys of a joint's bushing: bodies and point are by default the joint's."""
+    hints = get_type_hints(Bushing)
+    place = Annotated[Vector | None, Meta(description="a point [x, y, z]")]
+    keys: list[Any] = [
+        ("bodies", Annotated[Bodies | None, Meta(description="two names of bodies")], None),
+        ("point", place, None),
+    ]
+    keys += [
+        (each.name, _shape(each, hints[each.name]), each.default)
+        for each in own_fields(Bushing)
+        if each.name != "point"
+    ]
+    return msgspec.defstruct("BushingKeys", keys, kw_only=True, forbid_unknown_fields=True)
+
+
 def _shape(each: Field[Any], hint: Any) -> Any:
     """Return the annotation of a field, by its kind, dimension, name or type.
 
@@ -456,11 +499,16 @@ def _shape(each: Field[Any], hint: Any) -> Any:
     """
     if (kind := each.metadata.get("kind")) is not None:
         return Annotated[_SHAPES[kind], Meta(description=kind.value)]
-    if (dimension := dimension_of(each)) and hint != Vector:
+    if dimensions_of(each) is not None:
+        return _PAIRS if hint == _PAIRS_OF_SPRING else _CURVES
+    dimension = dimension_of(each)
+    if dimension and hint == Vector and each.default is not MISSING:
+        return _ONE_OR_THREE
+    if dimension and hint != Vector:
         return Number if dimension is ANGLE else Size
     if hint is None:
         return _OF_JOINTS.get(each.type, Number)
-    if each.name == "frame":
+    if hint is Axes:
         return _FRAME
     for words in (hint, *get_args(hint)):
         if isinstance(words, type) and issubclass(words, StrEnum):

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -311,9 +312,7 @@ class _Parts:
             except MechanismError:
                 self.tree.count(strut.described)
 
-    def _spring_of(
-        self, move: Move, spring: Spring, law: Mapping[str, float]
-    ) -> ForceElement | None:
+    def _spring_of(self, move: Move, spring: Spring, law: Mapping[str, Any]) -> ForceElement | None:
         """Return the force element of a move; None of a locked one, whose spring does nothing."""
         if not move.is_axial:
             raise MechanismError("a spring of three turns, expected one of an axis")
