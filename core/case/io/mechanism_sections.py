@@ -151,8 +151,9 @@ def _built(
     if hasattr(keys, "joints"):
         given["joints"] = keys.joints
     given |= zip("ij", getattr(keys, "bodies", ()), strict=False)
+    make: Any = cls  # type checkers would take the classes of the conditions
     with explained(section.file, section.key, units.length, section.value):
-        return cls(*name, **given)
+        return make(*name, **given)
 
 
 def _joints(root: Section, units: FileUnits) -> tuple[list[Joint], list[Coupler]]:
