@@ -44,6 +44,15 @@ def add(commands: Any) -> None:
             " braking or aligning; one number is a load that acts over all travel; may be repeated"
         ),
     )
+    command.add_argument(
+        "--bushings",
+        type=Path,
+        metavar="FILE",
+        help=(
+            "bushings of the joints, for a table of hardpoints: TOML, tables"
+            " [joints.NAME.bushings.X] as in case files, in SI"
+        ),
+    )
     command.add_argument("--csv", metavar="FILE", help="write the curves, in mm, deg, N, kN")
     command.add_argument(
         "--json", metavar="FILE", help="write the results in SI; - for standard output"
@@ -75,6 +84,10 @@ def _kc(options: argparse.Namespace, registry: Registry) -> int:
         options.travel = f"{travel[0]}:{travel[-1]}:{len(travel)}"
     case = registry.find_case(options.case, import_options.supplied(options), driven=False)
     import_options.tell_left_out([case])
+    if options.bushings is not None:
+        from ..case.io.mechanism_sections import with_bushings
+
+        case = with_bushings(case, options.bushings)
     page = None if options.out is None else options.out / "kc.html"
     if page is not None:
         page.parent.mkdir(parents=True, exist_ok=True)

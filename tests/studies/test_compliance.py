@@ -310,3 +310,33 @@ def test_released_joint_of_held_driver_is_refused(tmp_path):
     file.write_text(text)
     with pytest.raises(KincheckError, match="'turn' is held, and its joint gives way"):
         compliance(load_case(file))
+
+
+def test_bushings_in_a_file_serve_a_hardpoint_table(tmp_path, capsys):
+    table, rubber = tmp_path / "car.csv", tmp_path / "rubber.toml"
+    assert main(["templates", "double_wishbone"]) == 0
+    table.write_text(capsys.readouterr().out)
+    rubber.write_text(
+        "".join(
+            bushing_table(arm, end, ["ground", arm[:3]], place, np.eye(3), [5e6] * 3, [50.0] * 3)
+            for arm, ends in HINGES.items()
+            for end, place in ends.items()
+        )
+    )
+    out = tmp_path / "out.json"
+    options = ["--bushings", str(rubber), "--travel=-0.03:0.03:3", "--json", str(out)]
+    assert main(["kc", str(table), *options]) == 0
+    found = json.loads(out.read_text())
+    assert found["wheel_load"][1] == pytest.approx(0.0, abs=1e-6)  # it has no spring and no mass
+    C = np.array(found["compliance"][1])
+    assert np.abs(C - C.T).max() <= 1e-12 * np.abs(C).max()
+    assert C[1, 1] > 1e-8
+    rubber.write_text(rubber.read_text().replace("lca_pivot", "lower_pivot"))
+    assert main(["kc", str(table), *options]) == 2
+    assert "'lower_pivot'" in capsys.readouterr().err
+
+
+HINGES = {
+    "uca_pivot": {"front": (0.09, 0.26, 0.285), "rear": (-0.11, 0.265, 0.28)},
+    "lca_pivot": {"front": (0.12, 0.21, 0.125), "rear": (-0.13, 0.215, 0.12)},
+}

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -29,7 +30,7 @@ from ...mechanism.motions import (
 from ...trajectory import Array
 from ..case import MARKER, SLOW, TIME, Case, Sweep
 from ..units import RADIAN, SECOND, FileUnits, Unit, plain
-from .document import Section, explained, shown, toml_table
+from .document import Section, explained, parse, read_text, shown, toml_table
 from .reference import read_grid
 from .schema import (
     MOST_SAMPLES,
@@ -46,6 +47,7 @@ from .schema import (
 DRIVERS: Mapping[str, type[Driver]] = {
     cls.type: cls for cls in (PointCoordinate, JointAngle, JointDisplacement)
 }
+LARGEST_BUSHINGS = 1_000_000
 # Defaults of a body.
 PLAIN = Body("plain")
 _EVEN: Mapping[str, str] = {
@@ -80,17 +82,20 @@ def read_mechanism(root: Section, keys: CaseKeys, units: FileUnits) -> Mechanism
             *(keys.name, bodies, joints, points, drivers, couplers),
             gravity=gravity,
             forces=forces,
-            bushings=_bushings(root, joints, units),
+            bushings=read_bushings(root, joints, units),
         )
 
 
-def _bushings(root: Section, joints: Sequence[Joint], units: FileUnits) -> list[Bushing]:
+def read_bushings(root: Section, joints: Sequence[Joint], units: FileUnits) -> list[Bushing]:
     """Return the bushings of joints, [joints.NAME.bushings.X]; bodies and point are by default the
     joint's.
     """
     found: list[Bushing] = []
     for joint in joints:
-        given = root.at("joints").at(joint.name).at("bushings")
+        table = root.at("joints").at(joint.name)
+        if table.value is None:
+            continue
+        given = table.at("bushings")
         for own, section in given.each() if given.value is not None else ():
             keys: Any = section.typed(bushing_keys())
             numbers = {
@@ -139,7 +144,7 @@ def _built(
     if issubclass(cls, Joint):  # bushings are read with the mechanism
         own = {name: each for name, each in section.table.items() if name != "bushings"}
         section = Section(section.file, section.key, own)
-    sprung = issubclass(cls, SpringDamper | TorsionSpringDamper)
+    sprung = cls in (SpringDamper, TorsionSpringDamper)
     if sprung and not {"stiffness", "curve"} & section.table.keys():
         raise section.at("stiffness").fault(
             "missing, expected a number; add the key 'stiffness', or a curve"
@@ -443,3 +448,25 @@ def sweep_lines(case: Case, values: Array, *, own_grid: bool) -> list[str]:
             " give an even one"
         )
     return toml_table({"driver": sweep.driver, **grid, **rate}, "sweep")
+
+
+def with_bushings(case: Case, file: Path) -> Case:
+    """Return a case with the bushings in a file of tables [joints.NAME.bushings.X], in SI units,
+    beside its own: tables of hardpoints have none.
+
+    Raises:
+        CaseError: the file cannot be read, or names an unknown joint.
+    """
+    text = read_text(file, LARGEST_BUSHINGS, "it holds the bushings of one suspension")
+    root, joints = Section(file, "", parse(file, text)), case.mechanism.given_joints
+    names = [joint.name for joint in joints]
+    for name, section in root.at("joints").each():
+        if name not in names:
+            raise section.unknown(name, names, "a joint")
+    found = read_bushings(root, joints, FileUnits())
+    if not found:
+        raise root.at("joints").fault(
+            "found no bushing, expected tables [joints.NAME.bushings.X]; add one"
+        )
+    bushings = (*case.mechanism.bushings, *found)
+    return replace(case, mechanism=replace(case.mechanism, bushings=bushings))

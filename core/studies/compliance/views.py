@@ -123,6 +123,9 @@ def lines(results: ComplianceResults) -> Iterator[str]:
     yield f"at travel {factor * curves.at[k]:.6g} {unit}, wheel load {curves.wheel_load[k]:.6g} N"
     for name, each in curves.outputs.items():
         shown, size = SHOWN.get(each.unit, (each.unit, 1.0))
+        if not np.isfinite(each.values).any():
+            yield f"  {with_unit(name, shown)}  –"
+            continue
         low, high = (size * end(each.values) for end in (np.nanmin, np.nanmax))
         value = size * each.values[k]
         yield f"  {with_unit(name, shown)}  {value:.6g}  (from {low:.6g} to {high:.6g})"
