@@ -66,8 +66,8 @@ def add_options(command: argparse.ArgumentParser) -> None:
         "--wheel-radius",
         metavar="M",
         help=(
-            "radius of the loaded wheel [m], if no point is its contact: for roll centre, scrub"
-            " radius and trail"
+            "radius of the loaded wheel, such as 300mm, if no point is its contact: for roll"
+            " centre, scrub radius and trail"
         ),
     )
     points.add_argument(
@@ -85,16 +85,16 @@ def add_options(command: argparse.ArgumentParser) -> None:
         "--travel",
         metavar="M[:SAMPLES]",
         help=(
-            "travel of the wheel, up and down [m], default 0.05:41; or START:STOP:SAMPLES, positive"
-            " up: --travel=-0.04:0.12:33"
+            "travel of the wheel, up and down, default 50mm:41; or START:STOP:SAMPLES, positive"
+            " up: --travel=-40:120mm:33; in metres without a unit"
         ),
     )
     points.add_argument(
         "--rack",
         metavar="M",
         help=(
-            "travel of the rack while the wheel goes up [m], positive to the left: -M to M, or"
-            " START:STOP"
+            "travel of the rack while the wheel goes up, such as 20mm, positive to the left: -M to"
+            " M, or START:STOP; in metres without a unit"
         ),
     )
     points.add_argument(
@@ -126,7 +126,10 @@ def add_options(command: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="JOINT:START:STOP[:SAMPLES]",
-        help="a joint that moves [rad or m, as qpos]; several move together",
+        help=(
+            "a joint that moves, as qpos, in rad or m without a unit: knee:-30:30deg:61; several"
+            " move together"
+        ),
     )
     model.add_argument(
         "--hold",
@@ -148,8 +151,8 @@ def add_options(command: argparse.ArgumentParser) -> None:
         default=[],
         metavar="WHERE",
         help=(
-            "keyframe:NAME, or JOINT=VALUE [rad or m, as qpos], instead of qpos0; the start is"
-            " assembled to close, and a note says by how far joints moved"
+            "keyframe:NAME, or JOINT=VALUE, as qpos, in rad or m without a unit, instead of qpos0;"
+            " the start is assembled to close, and a note says by how far joints moved"
         ),
     )
 

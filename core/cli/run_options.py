@@ -171,7 +171,10 @@ def _add_curve_options(run: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="OUTPUT=NUMBER UNIT",
-        help='uncertainty of the measurement, the tolerance of the output: "toe=0.02 deg"',
+        help=(
+            'uncertainty of the measurement, the tolerance of the output: "toe=0.02 deg"; without'
+            " a unit in that of the column"
+        ),
     )
     curve.add_argument(
         "--citation",

@@ -57,14 +57,15 @@ if TYPE_CHECKING:
     from .design_batch import Designs, Variants, solve_designs
     from .design_forces import ForcesOfDesigns
     from .diagnosis.conditioning import Conditioning, Gradient, PoseConditioning, conditioning
-    from .diagnosis.instantaneous_screws import Screw, describe_screws
     from .diagnosis.rank import (
         Blocked,
         ComponentCount,
         Dependency,
         NamedRow,
         Ranks,
+        Screw,
         Violation,
+        describe_screws,
         freeing,
     )
     from .followed import DOUBTFUL, agreement, in_doubt, near_design
@@ -98,8 +99,9 @@ _NAMES = {
     "design_batch": "Designs Variants solve_designs",
     "design_forces": "ForcesOfDesigns",
     "diagnosis.conditioning": "Conditioning Gradient PoseConditioning conditioning",
-    "diagnosis.instantaneous_screws": "Screw describe_screws",
-    "diagnosis.rank": "Blocked ComponentCount Dependency NamedRow Ranks Violation freeing",
+    "diagnosis.rank": (
+        "Blocked ComponentCount Dependency NamedRow Ranks Screw Violation describe_screws freeing"
+    ),
     "followed": "DOUBTFUL agreement in_doubt near_design",
     "forces.reactions": "forces_of motion_defects with_forces",
     "formulation.acceptance_criteria": "LONGEST_TURN ROUNDING continued continuous regular_between",

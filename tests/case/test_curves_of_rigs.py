@@ -2,6 +2,7 @@
 grid, judged as the reference of a case file is.
 """
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -165,7 +166,7 @@ FAULTS = {
     "no such output": ({}, {"columns": ["toe=tow"]}, ["--map: found 'tow'", "'toe'"]),
     "no equals": ({}, {"columns": ["toe"]}, ["--map: found 'toe'", "COLUMN=OUTPUT"]),
     "stated unit contradicts": ({}, {"columns": ["toe=toe [rad]"]}, ["in 'deg' and 'rad'"]),
-    "accuracy without a unit": ({}, {"accuracy": ["toe=0.1"]}, ["--accuracy", "toe=0.02 deg"]),
+    "accuracy of two outputs": ({}, {"accuracy": ["0.1"]}, ["--accuracy", "with a column"]),
     "accuracy of nothing": ({}, {"accuracy": ["caster=1 deg"]}, ["'caster'", "with a column"]),
     "a gap": ({"form": "{},,{}"}, {}, ["line 2", "''", "finite number"]),
 }
@@ -199,3 +200,12 @@ def test_the_command_line(tmp_path, car, capsys):
     assert "give --reference FILE" in capsys.readouterr().err
     assert main([*command, "mcpherson_strut", "--reference", str(file)]) == 2
     assert "one by one" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("accuracy", ["0.02", "toe=0.02", "toe=0.02deg", "toe=0.02 deg"])
+def test_bare_accuracy_is_in_the_unit_of_the_column(tmp_path, car, accuracy):
+    case, rows = car
+    file = rig(tmp_path, rows, "Travel [mm],toe [deg]", "{0},{1}")
+    judged_by, _ = with_curve(case, file, CurveOptions(accuracy=(accuracy,)))
+    (toe,) = [output for output in judged_by.outputs if output.name == "toe"]
+    assert toe.atol == pytest.approx(math.radians(0.02), rel=1e-14)

@@ -398,23 +398,23 @@ TABLE_FAULTS = {
         Supplied(WISHBONE, "mm", "rearward,right,down"),
         ["uca_outer", "lca_outer", "expected it above"],
     ),
-    "travel": ((), Supplied(WISHBONE, "mm", "adams", "5cm"), ["--travel", "'5cm'", "METRES"]),
+    "travel": ((), Supplied(WISHBONE, "mm", "adams", "5deg"), ["--travel", "'5deg'", "a length"]),
     "separated travel": (
         (),
         Supplied(WISHBONE, "mm", "adams", "0.0_5"),
-        ["--travel", "'0.0_5'", "METRES"],
+        ["--travel", "'0.0_5'", "a length"],
     ),
     "many samples": (
         (),
         Supplied(WISHBONE, "mm", "adams", "0.05:1000000000"),
-        ["METRES:SAMPLES, 2 to 1000000 of them"],
+        ["LENGTH:SAMPLES, 2 to 1000000 of them"],
     ),
     "one sample": (
         (),
         Supplied(WISHBONE, "mm", "adams", "0.05:1"),
-        ["METRES:SAMPLES, 2 to 1000000 of them"],
+        ["LENGTH:SAMPLES, 2 to 1000000 of them"],
     ),
-    "no travel": ((), Supplied(WISHBONE, "mm", "adams", "0"), ["--travel", "'0'", "METRES"]),
+    "no travel": ((), Supplied(WISHBONE, "mm", "adams", "0"), ["--travel", "'0'", "a length"]),
     "drive": (
         (),
         Supplied(WISHBONE, "mm", "adams", drive=("a:0:1",)),

@@ -102,7 +102,7 @@ def with_curve(case: Case, file: Path, options: CurveOptions) -> tuple[Case, lis
         samples, columns=[f"{text} [{each.unit}]" if each.unit else text for text, each in columns]
     )
     unit, of = _columns(case, samples, targets)
-    outputs = _with_accuracy(file, case.outputs, [*of], options.accuracy)
+    outputs = _with_accuracy(file, case.outputs, of, options.accuracy)
     compared_outputs: list[Any] = [each for each in outputs if each.name in of and each.signs]
     convention = str(compared_outputs[0].vehicle.convention) if compared_outputs else ""
     signs = _signs(file, samples.signs, options.signs)
@@ -171,29 +171,35 @@ def _opposite(convert: Convert) -> Convert:
 
 
 def _with_accuracy(
-    file: Path, outputs: Sequence[Quantity], compared: Sequence[str], texts: Sequence[str]
+    file: Path, outputs: Sequence[Quantity], compared: Mapping[str, Column], texts: Sequence[str]
 ) -> tuple[Quantity, ...]:
-    """Return outputs with the tolerances that the user states, as "OUTPUT=NUMBER UNIT"."""
+    """Return outputs with the tolerances that the user states, as "OUTPUT=NUMBER UNIT". Without a
+    unit the number is in that of the output's column; without an output it holds for the only one.
+    """
     stated: dict[str, float] = {}
     units = {output.name: output.unit for output in outputs if output.name in compared}
     for text in texts:
-        name, _, right = (part.strip() for part in text.partition("="))
+        name, equals, right = (part.strip() for part in text.partition("="))
+        if not equals and len(compared) == 1:
+            (name,), right = compared, name
         if name not in units:
             raise unknown_name(file, "--accuracy", name, units, "an output with a column")
-        number, _, unit = right.partition(" ")
+        _, number, unit = re.split(r"^([-+.\deE]*)", right, maxsplit=1)
         try:
             size = decimal(number)
         except ValueError:
             size = float("nan")
-        if not 0.0 < size < float("inf") or not (unit.strip() or units[name] == "1"):
+        if not 0.0 < size < float("inf"):
             raise fault(
                 file,
                 "--accuracy",
                 f"found {shown(text)}, expected OUTPUT=NUMBER UNIT; say --accuracy"
                 f' "{name}=0.02 {"deg" if units[name] == "rad" else units[name]}"',
             )
-        measured = required_unit(file, "--accuracy", name, unit.strip() or "-", units[name])
-        stated[name] = measured.convert(size)
+        convert = compared[name].convert
+        if unit := unit.strip():
+            convert = required_unit(file, "--accuracy", name, unit, units[name]).convert
+        stated[name] = abs(convert(size) - convert(0.0))
     why = f"the accuracy of {file.name}, as its user states it"
     found: list[Any] = [*outputs]
     for k, output in enumerate(found):

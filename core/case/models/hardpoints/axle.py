@@ -17,10 +17,11 @@ from ....mechanism.mechanism import GROUND, Body, Mechanism, Point, Vector
 from ....mechanism.motions import Driver, JointDisplacement, Motion, PointCoordinate, Ramp, Table
 from ....trajectory import Array
 from ...case import Sweep
-from ...io.document import decimal, fault, shown, unknown_name
+from ...io.document import fault, interval, shown, unknown_name
 from ...io.outputs import AXES
 from ...io.schema import MOST_SAMPLES
 from ...suspension import Side
+from ...units import LENGTHS
 from .templates import TIEROD_INNER, WHEEL_CENTER, Template
 
 # The middle of the wheel travel of passenger cars, which is about 0.08 m each way; samples every
@@ -71,9 +72,9 @@ def read_travels(file: Path, travel: str | None, rack: str | None) -> Travels:
             raise fault(
                 file,
                 "--travel",
-                f"found {shown(travel)}, expected METRES or METRES:SAMPLES, 2 to {MOST_SAMPLES} of"
-                f" them, or START:STOP:SAMPLES, up to {FARTHEST:g} m; say --travel 0.05 for 50 mm"
-                " up and down",
+                f"found {shown(travel)}, expected a length such as 50mm, or LENGTH:SAMPLES, 2 to"
+                f" {MOST_SAMPLES} of them, or START:STOP:SAMPLES, up to {FARTHEST:g} m, in metres"
+                " unless a unit is given; say --travel 50mm for 50 mm up and down",
             )
         wheel = ends
     ends = None if rack is None else _interval(rack.split(":"))
@@ -81,16 +82,17 @@ def read_travels(file: Path, travel: str | None, rack: str | None) -> Travels:
         raise fault(
             file,
             "--rack",
-            f"found {shown(rack)}, expected METRES or START:STOP, up to {FARTHEST:g} m; say --rack"
-            " 0.04 for 40 mm to the right, then to the left",
+            f"found {shown(rack)}, expected a length such as 40mm, or START:STOP, up to"
+            f" {FARTHEST:g} m, in metres unless a unit is given; say --rack 40mm for 40 mm to the"
+            " right, then to the left",
         )
     return Travels(np.linspace(*wheel, samples), ends)
 
 
 def _interval(parts: Sequence[str]) -> tuple[float, float] | None:
-    """Return the ends of METRES, which goes both ways, or of START:STOP; None for another text."""
+    """Return the ends of LENGTH, which goes both ways, or of START:STOP; None for another text."""
     try:
-        numbers = [decimal(each) for each in parts]
+        numbers, _ = interval(parts, LENGTHS, "m")
     except ValueError:
         return None
     if len(numbers) == 1 and numbers[0] > 0.0:

@@ -17,13 +17,14 @@ from ....dual_numbers import Slope, derivatives
 from ....kinematics import places
 from ....mechanism.mechanism import Mechanism, Vector
 from ...case import Case, Hardpoint, Quantity, size
-from ...io.document import decimal, fault, shown, unknown_name
+from ...io.document import decimal, fault, measure, shown, unknown_name
 from ...io.outputs import default, with_all_coordinates, with_slopes
 from ...io.reader_options import Supplied
 from ...quantity import with_markers
 from ...suspension import Axle, Convention, Side, SuspensionOutput, Vehicle
 from ...suspension.corner import MARKER_DISTANCE
 from ...suspension.wheel import Place
+from ...units import LENGTHS
 from .axle import STROKE, AxleMotion
 from .table import Axes, HardpointTable
 from .templates import WHEEL_AXIS, WHEEL_CENTER, WHEEL_CONTACT, Template
@@ -104,12 +105,12 @@ def _length(file: Path, option: str, text: str | None) -> float | None:
     if text is None:
         return None
     try:
-        found = decimal(text)
+        found, _ = measure(text, LENGTHS, "m")
     except ValueError:
         raise fault(
             file,
             f"--{option}",
-            f"found {shown(text)}, expected metres; say --{option} 0.3",
+            f"found {shown(text)}, expected a length; say --{option} 0.3 or 300mm",
         ) from None
     if not 0.0 < found < float("inf"):
         raise fault(file, f"--{option}", f"found {found:.6g} m, expected a length; correct it")
