@@ -84,7 +84,11 @@ IMPORTS = {
     ),
     "case/models/mjcf": ". joints mechanism kinematics case case/io",
     "case/models/robots": ". joints mechanism case/io case/models/mjcf",
-    "case/models": ". case case/io case/models/hardpoints case/models/mjcf case/models/robots",
+    "case/models/adams": ". joints mechanism kinematics case case/io",
+    "case/models": (
+        ". case case/io case/models/adams case/models/hardpoints case/models/mjcf "
+        "case/models/robots"
+    ),
     "harness": (
         ". program/llvm joints mechanism kinematics case case/suspension case/measures case/io"
     ),

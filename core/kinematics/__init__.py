@@ -13,6 +13,7 @@ Solve:
     followed_angle     the angle of a joint with its turns, followed from the design
     followed_attitude  the attitude of a body with its turns, followed from the design
     residuals          what poses from elsewhere leave of the rows, and what their digits allow
+    needed_forces      the forces that a motion from elsewhere needs, and what nothing holds
     NativeSolver       settings of the solver; makes a mechanism ready for a path (`prepare`) or for
                        many designs (`prepare_designs`), and tells the size of its programs
 
@@ -111,6 +112,8 @@ if TYPE_CHECKING:
     from .replay import judged_part as judged_part
     from .replay import replayed as replayed
     from .replay import residuals as residuals
+    from .replayed_forces import Needed as Needed
+    from .replayed_forces import needed_forces as needed_forces
     from .solver_selection import Solver as Solver
     from .solver_selection import followed_angle as followed_angle
     from .solver_selection import followed_attitude as followed_attitude
@@ -162,6 +165,7 @@ _NAMES = {
     "prepared_designs": "PreparedDesigns",
     "program_size": "ProgramSize",
     "replay": "Residuals Worst judged_part replayed residuals",
+    "replayed_forces": "Needed needed_forces",
     "solver_selection": "Solver followed_angle followed_attitude follower",
     "structure.driver_count": "degrees_of_freedom require_driven",
     "structure.reduction": "largest_residual reduce_rows",

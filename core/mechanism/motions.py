@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ..errors import MechanismError
 from ..input_checks import finite, held
 from ..trajectory import Array
+from .formula import jet_of
 
 ROUNDED_TIME = 1e-12
 """Relative rounding by which a time may lie outside a motion's span."""
@@ -32,6 +33,7 @@ class Measure(Enum):
     ANGLE = "an angle"
     FREQUENCY = "Hz"
     TIME = "s"
+    TEXT = "text"
 
 
 def measured(measure: Measure, **options: Any) -> Any:
@@ -138,6 +140,33 @@ class Table(Motion):
 
 
 @dataclass(frozen=True)
+class Formula(Motion):
+    """value = offset + scale * formula, which is over TIME in units of `second`, as Adams has it.
+
+    SIN, COS, SQRT, STEP, POLY and SHF are known; 30D is an angle in degrees.
+    """
+
+    type = "formula"
+    formula: str = measured(Measure.TEXT)
+    scale: float = measured(Measure.DRIVER, default=1.0)
+    offset: float = measured(Measure.DRIVER, default=0.0)
+    second: float = measured(Measure.TIME, default=1.0)
+
+    def __post_init__(self) -> None:
+        _finite("formula", scale=self.scale, offset=self.offset, second=self.second)
+        if not self.second > 0.0:
+            raise MechanismError(f"formula motion: second is {self.second!r}; give a positive time")
+        try:
+            jet_of(self.formula, np.zeros(1))
+        except MechanismError as error:
+            raise MechanismError(f"formula motion: {error}; in {self.formula!r}") from None
+
+    def at(self, t: Array) -> tuple[Array, Array, Array]:
+        found, rate = jet_of(self.formula, t / self.second), self.scale / self.second
+        return self.offset + self.scale * found.x, rate * found.v, rate / self.second * found.a
+
+
+@dataclass(frozen=True)
 class Absolute(Motion):
     """A motion of a driver's absolute value, converted to values from design as in all other
     motions.
@@ -233,6 +262,8 @@ class Path:
         """Return value, velocity and acceleration of the drivers at times t, shape (3, names,
         *t.shape).
         """
+        if not names:
+            return np.zeros((3, 0, *t.shape))
         still = (np.zeros_like(t),) * 3
         return np.stack(
             [

@@ -221,7 +221,11 @@ def _motion(
     return Absolute(motion, design) if design else motion
 
 
-def _scaled(value: float | tuple[float, ...], convert: Convert) -> float | tuple[float, ...]:
+def _scaled(
+    value: float | str | tuple[float, ...], convert: Convert
+) -> float | str | tuple[float, ...]:
+    if isinstance(value, str):
+        return value
     return tuple(map(convert, value)) if isinstance(value, tuple) else convert(value)
 
 

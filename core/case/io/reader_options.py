@@ -30,6 +30,9 @@ class Supplied:
         hold: joints or free bodies of a model to hold in place.
         hold_rest: whether to hold further joints of a model as needed.
         start: start of a model: "keyframe:NAME", "JOINT=VALUE" [rad, m].
+        without: statements of a dataset of Adams to leave out, although they force the motion: KIND
+            or KIND/id.
+        recorded: whether a recording is there, whose motion a dataset without its own follows.
         closure: tolerance of rows redundant but for the digits of a file [m].
     """
 
@@ -52,12 +55,16 @@ class Supplied:
     cg_height: str | None = None
     brake_share: str | None = None
     drive_share: str | None = None
+    without: tuple[str, ...] = ()
+    recorded: bool = False
 
     @property
     def given(self) -> tuple[str, ...]:
         """Names of the given options, as on the command line."""
         return tuple(
-            each.name.replace("_", "-") for each in fields(self) if getattr(self, each.name)
+            each.name.replace("_", "-")
+            for each in fields(self)
+            if getattr(self, each.name) and each.name != "recorded"
         )
 
 

@@ -20,10 +20,11 @@ TABLES = (".csv", ".tsv", ".tab", ".dat", ".prn", ".m", ".hpts")
 TREES = (".yaml", ".yml")
 ADAMS_FILES = (".sub", ".tpl", ".asy", ".hpt")
 MODELS = (".xml", ".mjcf", ".urdf", ".sdf", ".world")
-SUFFIXES = (*CASE_FILES, *TABLES, *TREES, *WORKBOOKS, *ADAMS_FILES, *MODELS)
+DATASETS = (".adm",)
+SUFFIXES = (*CASE_FILES, *TABLES, *TREES, *WORKBOOKS, *ADAMS_FILES, *MODELS, *DATASETS)
 """Suffixes of names that are files, whether they exist or not."""
 
-CASE, CHRONO, ADAMS, TABLE, TREE, WORKBOOK, MODEL = (
+CASE, CHRONO, ADAMS, TABLE, TREE, WORKBOOK, MODEL, DATASET = (
     "case file",
     "Project Chrono suspension",
     "Adams/Car hardpoints",
@@ -31,6 +32,7 @@ CASE, CHRONO, ADAMS, TABLE, TREE, WORKBOOK, MODEL = (
     "tree of hardpoints",
     "workbook of hardpoints",
     "model",
+    "dataset of Adams Solver",
 )
 HARDPOINTS = (CHRONO, ADAMS, TABLE)
 UNREAD = {
@@ -38,7 +40,8 @@ UNREAD = {
     ".xacro": "holds macros; expand them: xacro FILE > robot.urdf",
     ".mjb": "is compiled; give the MJCF that it is made of",
     ".osim": "is a model of OpenSim, which kincheck writes and does not read; give MJCF or a case",
-    ".adm": "is a model of Adams/View; give its hardpoints (.sub, .csv), or MJCF, URDF or SDF",
+    ".cmd": "is a script of Adams/View; export the dataset of Adams Solver, .adm",
+    ".acf": "holds commands of Adams Solver; give the dataset that it names, .adm",
     **dict.fromkeys(
         (
             ".usd",
@@ -77,6 +80,7 @@ _OF_HARDPOINTS = (
 _OPTIONS = {
     CASE: ("closure",),
     MODEL: ("drive", "hold", "hold-rest", "start", "closure"),
+    DATASET: ("drive", "hold", "hold-rest", "without", "closure"),
     **dict.fromkeys(HARDPOINTS, _OF_HARDPOINTS),
     **dict.fromkeys((WORKBOOK, TREE, TABLE), (*_OF_HARDPOINTS, "sheet")),
 }
@@ -110,6 +114,10 @@ def load(file: Path, supplied: Supplied = NOTHING) -> Case:
             "",
             "found a file name with control characters, expected printable ones; rename the file",
         )
+    if kind == DATASET:
+        from .adams.read import read_adams
+
+        return read_adams(file, _text(file, of_spreadsheet=True), supplied)
     if kind == MODEL:
         return _model(file, _text(file), supplied)
     from .hardpoints.read import case_of_hardpoints
@@ -177,6 +185,7 @@ def kind_of(file: Path, supplied: Supplied = NOTHING) -> str:
         (WORKBOOK, WORKBOOKS),
         (ADAMS, ADAMS_FILES),
         (MODEL, MODELS),
+        (DATASET, DATASETS),
     ):
         if suffix in suffixes:
             return kind
