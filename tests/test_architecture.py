@@ -20,6 +20,7 @@ LAYERS = (
     ("kinematics",),
     ("case",),
     ("harness",),
+    ("recorded",),
     ("history",),
     ("report",),
     ("studies",),
@@ -94,6 +95,10 @@ IMPORTS = {
     ),
     "harness/workers": ". harness",
     "harness/reporting": "",
+    "recorded": (
+        ". primitives joints mechanism kinematics case case/measures case/io case/models/mjcf "
+        "harness"
+    ),
     "history": ". case case/io harness",
     "history/regression": ". case case/io harness history",
     "report": ". joints mechanism case case/io harness history history/regression",
@@ -126,7 +131,7 @@ IMPORTS = {
     "cli": (
         ". program program/llvm joints kinematics case/models/hardpoints/templates case "
         "case/io case/models/hardpoints case/models harness harness/workers history "
-        "history/regression report studies/variation studies/stress/families studies "
+        "history/regression recorded report studies/variation studies/stress/families studies "
         "studies/joint_check studies/engine_check studies/tolerance studies/stress "
         "studies/paper studies/diagnosis studies/bench"
     ),

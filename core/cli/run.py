@@ -17,7 +17,7 @@ from ..case.io.escape import visible
 from ..errors import KincheckError, SolveError
 from ..harness.interrupts import hold, status_of, words_of
 from ..report.progress import complain, lacking, progress, uncompared
-from . import execution_options, history_options, import_options
+from . import execution_options, history_options, import_options, recorded_options
 from .engine_loading import WHERE
 from .registry import Registry, Status
 from .run_options import HISTORY, add_options, curve_options
@@ -142,8 +142,18 @@ def _planned(options: argparse.Namespace, registry: Registry, to: Destinations) 
     )
     import_options.tell_left_out(cases)
     unused: list[str] = []
+    recorded: list[Engine] = []
+    if options.recorded and len(cases) != 1:
+        problems.append(
+            f"{options.recorded[0]}: found {len(cases)} cases, expected the one that it records"
+        )
+    elif options.recorded:
+        try:
+            cases[0], recorded = recorded_options.recorded_engines(options, cases[0])
+        except KincheckError as error:
+            problems += str(error).splitlines()
     curve = curve_options(options)
-    if not options.reference and curve != type(curve)():
+    if not options.reference and not options.recorded and curve != type(curve)():
         problems.append("options for measured curves need a curve: give --reference FILE")
     if options.reference and not problems:
         try:
@@ -152,6 +162,7 @@ def _planned(options: argparse.Namespace, registry: Registry, to: Destinations) 
         except KincheckError as error:
             problems += str(error).splitlines()
     engines, baseline = _engines(options, registry, problems)
+    engines += recorded
     problems += to.problems(history=options.history)
     problems = problems or execution_options.unreachable(options)
     # With output files or a history, a run without readable cases is recorded too, so that it does

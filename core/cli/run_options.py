@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from . import execution_options, import_options
+from . import execution_options, import_options, recorded_options
 from .option_types import positive
 from .verbosity import add_verbosity
 
@@ -116,6 +116,7 @@ def add_options(run: argparse.ArgumentParser) -> None:
     )
     import_options.add_options(run)
     _add_curve_options(run)
+    recorded_options.add_options(run)
     execution_options.add_options(run, positive)
     run.add_argument(
         "--history",

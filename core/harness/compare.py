@@ -184,6 +184,9 @@ def deviations(
             )
         else:
             name, reference, uncertainty = known[0]
+            own = found.uncertainty.get(quantity)
+            if own is not None:
+                uncertainty = own if uncertainty is None else own + uncertainty
             shown = labels.against(name)
             compared[quantity] = off = deviation(
                 values, reference, output.atol * rate_scale**order, output.rtol, name, uncertainty
@@ -196,7 +199,7 @@ def deviations(
                 losses += lost
             elif not (order or found.possible):
                 inputs = "forces" if force else "velocities, on which it depends"
-                reasons.append(f"{word}: the engine gives no {inputs}")
+                reasons.append(found.reason or f"{word}: the engine gives no {inputs}")
             elif off is None:
                 none = f"{word}: no sample is known to both the engine and {shown}"
                 reasons.append(found.reason or none)

@@ -11,6 +11,9 @@ from typing import Any, Protocol, runtime_checkable
 from ..case.case import Case
 from ..trajectory import Trajectory
 
+RECORDED = "recorded"
+"""Mode of engines that solve nothing: their results come from a file."""
+
 
 class Engine(Protocol):
     """A solver of cases.
@@ -18,9 +21,10 @@ class Engine(Protocol):
     Attributes:
         name: name on the command line.
         mode: "projection" (the simulator's kinematics, residuals and Jacobians in a Newton loop) or
-            "simulate" (its own solver or time stepping). Modes are separate products and never
-            share a ranking. Name and mode together identify an engine: the recommended simulate
-            mode has the simulator's name, and each variant has another name.
+            "simulate" (its own solver or time stepping), or "recorded" (results of a file). Modes
+            are separate products and never share a ranking. Name and mode together identify an
+            engine: the recommended simulate mode has the simulator's name, and each variant has
+            another name.
         loop: place of the loop over samples and iterations: "python", "simulator" or "compiled".
         settings: the settings in the report that a reader needs to repeat the run.
 

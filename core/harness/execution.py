@@ -22,6 +22,7 @@ from .engine import Engine
 from .held_trajectory import held_trajectory
 from .provenance import plain, readable
 from .record import Outcome, Seconds
+from .reported import Reported
 from .resource_limits import memory_limit
 from .scheduler_delay import waited
 from .trajectory_check import check, faults
@@ -72,6 +73,8 @@ class Answer:
         power: missing to the balance at each sample [W], NaN if unknown or no power flows; None
             without forces.
         faults: what the answer gets wrong by itself, in sentences.
+        reported: whether the outputs are reported and not solved, so that values may be missing.
+        judged: whether the engine judged its answer by itself.
     """
 
     outputs: Mapping[str, Series]
@@ -83,6 +86,8 @@ class Answer:
     failures: Sequence[FailureKind] = ()
     power: Array | None = None
     faults: Sequence[str] = ()
+    reported: bool = False
+    judged: bool = False
 
     @staticmethod
     def of(pair: Pair, found: Trajectory, held: Trajectory | None = None, why: str = "") -> Answer:
@@ -93,6 +98,18 @@ class Answer:
         """
         case, solved = pair.case, np.asarray(found.solved, dtype=np.bool_)
         rigid = pair.engine.mode == "projection"
+        if isinstance(found, Reported):
+            return Answer(
+                outputs=found.outputs,
+                solved=int(solved.sum()),
+                iterations=0,
+                residual=found.residual,
+                message="",
+                details=plain(found.facts),
+                faults=found.faults,
+                reported=True,
+                judged=found.judged,
+            )
         return Answer(
             outputs={each.name: output_series(case, each, found, held) for each in case.outputs},
             solved=int(solved.sum()),

@@ -233,7 +233,7 @@ def _motion(motion: Motion) -> dict[str, Any]:
     return (
         _motion(motion.motion)
         if isinstance(motion, Absolute)
-        else {"type": motion.type, **asdict(motion)}
+        else {"type": getattr(motion, "type", "recorded"), **asdict(motion)}
     )
 
 

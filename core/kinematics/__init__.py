@@ -12,6 +12,7 @@ Solve:
     find_assemblies    all closed poses
     followed_angle     the angle of a joint with its turns, followed from the design
     followed_attitude  the attitude of a body with its turns, followed from the design
+    count_turns        an angle known up to whole turns, from sample to sample
     residuals          what poses from elsewhere leave of the rows, and what their digits allow
     needed_forces      the forces that a motion from elsewhere needs, and what nothing holds
     NativeSolver       settings of the solver; makes a mechanism ready for a path (`prepare`) or for
@@ -109,6 +110,7 @@ if TYPE_CHECKING:
     from .program_size import ProgramSize as ProgramSize
     from .replay import Residuals as Residuals
     from .replay import Worst as Worst
+    from .replay import count_turns as count_turns
     from .replay import judged_part as judged_part
     from .replay import replayed as replayed
     from .replay import residuals as residuals
@@ -164,7 +166,7 @@ _NAMES = {
     "one_design": "solve",
     "prepared_designs": "PreparedDesigns",
     "program_size": "ProgramSize",
-    "replay": "Residuals Worst judged_part replayed residuals",
+    "replay": "Residuals Worst count_turns judged_part replayed residuals",
     "replayed_forces": "Needed needed_forces",
     "solver_selection": "Solver followed_angle followed_attitude follower",
     "structure.driver_count": "degrees_of_freedom require_driven",

@@ -21,6 +21,8 @@ from .formulation.constraints import Constraint, Relation, frames
 WIDTHS = {"poses": 7, "velocities": 6, "accelerations": 6}
 """Numbers of a body, by argument of `residuals`."""
 TURN = 2.0 * np.pi
+# Angles are this near to zero at one sample as at another: rounding must not decide [rad].
+NEAR = 1e-3
 # Lanes at once: some 10 kB each for twenty bodies.
 MOST_LANES = 20_000
 # Divides what is left where nothing is allowed: far below all rounding.
@@ -197,6 +199,16 @@ def judged_part(mechanism: Mechanism, known: Iterable[str]) -> tuple[Mechanism, 
     return part, {mechanism.given_name(name): body for name, body in without.items() if body}
 
 
+def count_turns(angle: Array) -> Array:
+    """Return an angle known up to whole turns [rad], counted from sample to sample, from the first
+    that is as near to zero as any.
+    """
+    whole = np.unwrap(angle)
+    off = np.abs(np.sin(0.5 * whole))
+    first = np.flatnonzero(off <= off.min(initial=1.0) + NEAR)[:1]
+    return whole - TURN * np.round(whole[first] / TURN)
+
+
 class _Rows:
     """The native rows of a mechanism without drivers, and of their rates as far as wanted."""
 
@@ -236,7 +248,7 @@ class _Rows:
                 a = [states.accelerations[k] for k in f.bodies]
                 a = [x for each in a for x in (*each.v_t, *each.w_t)]
                 found.append(_less(f, f.gamma(at, [*v, *own]), rows, a)[1])
-        return [unit * lines.stacked(each) for each in found]
+        return [unit * lines.stacked(each) if each else np.zeros((count, 0)) for each in found]
 
     def _turned(self, state: dict[str, Any]) -> dict[str, Any]:
         """Return a state with all turns of coupled joints: poses tell an angle up to whole turns,
@@ -246,10 +258,8 @@ class _Rows:
             (x,) = state[key]
             if key not in self.turns:
                 there = np.flatnonzero(np.isfinite(x))
-                whole = np.unwrap(x[there])
-                nearest = np.argmin(np.abs(np.sin(0.5 * whole))) if len(there) else 0
                 self.turns[key] = np.zeros(len(x))
-                self.turns[key][there] = whole - TURN * np.round(whole[nearest:][:1] / TURN)
+                self.turns[key][there] = count_turns(x[there])
             around = np.resize(self.turns[key], len(x))
             state[key] = (x - TURN * np.round((x - around) / TURN),)
         return state

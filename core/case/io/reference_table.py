@@ -32,6 +32,8 @@ _BLANKS, _BEFORE_UNIT = re.compile(r"\s+"), re.compile(r"\s+(?=[\[(])")
 _NUMBERS = re.compile(r"\s*[-+]?[\d.]+\S*(?:\s+[-+]?[\d.]+\S*)+\s*")
 _SEPARATOR = re.compile(r"\"?sep=([;\t,])\"?", re.IGNORECASE)
 
+_GAPS = ("", "nan", "+nan", "-nan")
+
 Choose: TypeAlias = Callable[[Path, str, Sequence[str]], Sequence[int]]
 """Choice of columns, see `from_table`."""
 
@@ -42,7 +44,13 @@ def every_column(_file: Path, _where: str, heads: Sequence[str]) -> Sequence[int
 
 
 def from_table(
-    file: Path, sheet: str | None, option: str, choose: Choose = every_column
+    file: Path,
+    sheet: str | None,
+    option: str,
+    choose: Choose = every_column,
+    *,
+    gaps: bool = False,
+    above: str = "",
 ) -> Samples:
     """Read the samples of a table.
 
@@ -51,17 +59,21 @@ def from_table(
         option: the option to choose a sheet, for messages.
         choose: returns the indices of the columns to read, from the place of their heads and the
             heads.
+        gaps: whether empty cells and NaN are gaps, which become NaN, and no errors.
+        above: the line of a text that ends what stands above the table, if there is one.
 
     Raises:
         CaseError: the file is unreadable, or is no table of numbers.
     """
     if file.suffix.lower() in WORKBOOKS:
-        return _of_sheet(file, sheet, option, choose)
+        return _of_sheet(file, sheet, option, choose, gaps=gaps)
     if sheet is not None:
         problem = f"found the sheet {shown(sheet)} of a file that is no workbook (.xlsx)"
         raise fault(file, "sheet", f"{problem}, expected none; leave it out")
     text = read_text(file, LARGEST_FILE, "thin out the samples", of_spreadsheet=True)
     lines = text.splitlines()
+    ends = [k for k, line in enumerate(lines) if above and line.strip().lower() == above]
+    lines[: ends[0] + 1 if ends else 0] = [""] * (ends[0] + 1 if ends else 0)
     if len(lines) > MOST_LINES:
         raise fault(
             file,
@@ -82,15 +94,17 @@ def from_table(
     )
     try:
         if delimiter == ",":
-            return _samples(file, _below_titles(rows), signs, choose, lines)
-        return _with_sign(file, [*_below_titles(rows)], signs, choose)
+            return _samples(file, _below_titles(rows), signs, choose, lines, gaps=gaps)
+        return _with_sign(file, [*_below_titles(rows)], signs, choose, gaps=gaps)
     except csv.Error as error:
         raise fault(
             file, f"line {reader.line_num}", f"not valid CSV: {error}; correct the line"
         ) from None
 
 
-def _of_sheet(file: Path, wanted: str | None, option: str, choose: Choose) -> Samples:
+def _of_sheet(
+    file: Path, wanted: str | None, option: str, choose: Choose, *, gaps: bool
+) -> Samples:
     """Read the samples of the wanted sheet of a workbook, or of its only sheet with cells."""
     sheet = one_sheet(file, read_sheets(file, wanted, MOST_LINES), option)
     comments = [str(cells[0]) for _, cells in sheet.rows]
@@ -100,13 +114,15 @@ def _of_sheet(file: Path, wanted: str | None, option: str, choose: Choose) -> Sa
         for row, text in zip(sheet.rows, comments, strict=True)
         if not text.startswith("#") or _filled(row[1]) > 1
     ]
-    return _with_sign(file, [*_below_titles(rows)], signs, choose)
+    return _with_sign(file, [*_below_titles(rows)], signs, choose, gaps=gaps)
 
 
-def _with_sign(file: Path, rows: Sequence[Row], signs: str, choose: Choose) -> Samples:
+def _with_sign(
+    file: Path, rows: Sequence[Row], signs: str, choose: Choose, *, gaps: bool
+) -> Samples:
     """Read the samples of a table whose decimal sign may be a comma."""
     if not rows:
-        return _samples(file, rows, signs, choose)
+        return _samples(file, rows, signs, choose, gaps=gaps)
     (where, heads), *body = rows
     wanted = [*choose(file, where, [str(cell).strip() for cell in heads])]
     texts = [
@@ -116,7 +132,7 @@ def _with_sign(file: Path, rows: Sequence[Row], signs: str, choose: Choose) -> S
         for cell in (cells[n] for n in wanted if n < len(cells))
         if isinstance(cell, str) and cell
     ]
-    return _samples(file, rows, signs, choose, sign=find_decimal_sign(file, texts))
+    return _samples(file, rows, signs, choose, sign=find_decimal_sign(file, texts), gaps=gaps)
 
 
 def _delimiter(lines: list[str]) -> str:
@@ -168,6 +184,7 @@ def _samples(
     choose: Choose,
     lines: Sequence[str] = (),
     sign: str = ".",
+    gaps: bool = False,
 ) -> Samples:
     """Return the samples of a head and rows of numbers; a row of units may stand between.
 
@@ -197,12 +214,16 @@ def _samples(
                 for name, unit in zip(names, units, strict=False)
             ]
             continue
+        if gaps:
+            cells = [*cells, *[""] * (len(names) - len(cells))]
         if not all_columns and not any(cells[n] != "" for n in wanted if n < len(cells)):
             continue  # a note
         if all_columns or not max(wanted) < len(cells) <= len(names):
             check_width(file, place, len(cells), names)
         # convert at once: the cells of a large file as texts would take many times its size
-        found = array("d", (_number(file, place, names[n], cells[n], sign) for n in wanted))
+        found = array(
+            "d", (_number(file, place, names[n], cells[n], sign, gaps=gaps) for n in wanted)
+        )
         numbers.append((place, found))
         for column, n in zip(printed, wanted, strict=True):
             cell = cells[n]
@@ -218,8 +239,12 @@ def _samples(
     )
 
 
-def _number(file: Path, where: str, column: str, cell: Cell, sign: str) -> float:
+def _number(
+    file: Path, where: str, column: str, cell: Cell, sign: str, *, gaps: bool = False
+) -> float:
     number = math.nan
+    if gaps and isinstance(cell, str) and cell.lower() in _GAPS:
+        return number
     with suppress(ValueError):
         number = decimal(cell.replace(sign, ".")) if isinstance(cell, str) else cell
     if not abs(number) <= LARGEST:
