@@ -104,7 +104,7 @@ def judged(name, file=None):
     p = body[:, 3:7] / np.linalg.norm(body[:, 3:7], axis=1)[:, None]
     motion = BodyMotion(body[:, :3], p, body[:, 7:13], body[:, 13:19])
     needed = needed_forces(mechanism, {BODY: motion}, times[:, 0])
-    free = float(np.nanmax(needed.free[BODY])), needed.largest
+    free = float(np.nanmax(np.abs(needed.free[BODY]))), needed.largest
     if not mechanism.joints or mechanism.forces:
         return Judged(rows, None, None, free)
     (joint,) = mechanism.joints

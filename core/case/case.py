@@ -172,6 +172,7 @@ class Case:
         assembly: notes on how the start was closed, and on rows left out.
         closure: of rows left out; None if all rows hold.
         hardpoints: rows of the table of hardpoints that the case is of; empty for another file.
+        unforced: drivers without a force, which only follow a recording.
     """
 
     name: str
@@ -187,6 +188,7 @@ class Case:
     assembly: tuple[str, ...] = ()
     closure: Closure | None = None
     hardpoints: tuple[Hardpoint, ...] = ()
+    unforced: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         """Return name, truth, sweep and outputs in one line."""
@@ -265,7 +267,7 @@ def pace(case: Case) -> float:
     _, rates, seconds = path.drive(list(path.motions), path.times)
     extent = np.where(turns, 1.0, size(case))
     rate, second = (np.abs(each).max(axis=1) for each in (rates, seconds))
-    return float(np.maximum(rate / extent, np.sqrt(second / extent)).max())
+    return float(np.maximum(rate / extent, np.sqrt(second / extent)).max(initial=0.0))
 
 
 def without_forces(case: Case) -> Case:

@@ -162,6 +162,8 @@ def _planned(options: argparse.Namespace, registry: Registry, to: Destinations) 
         except KincheckError as error:
             problems += str(error).splitlines()
     engines, baseline = _engines(options, registry, problems)
+    if recorded and recorded_options.undriven(cases[0]):
+        engines, baseline = [], None
     engines += recorded
     problems += to.problems(history=options.history)
     problems = problems or execution_options.unreachable(options)

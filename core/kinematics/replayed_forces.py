@@ -25,9 +25,9 @@ class Needed:
 
     Attributes:
         forces: reactions of joints and forces of elements; None without a joint.
-        free: by body, the largest component of the force without a joint or driver to carry it, of
-            a torque over the mechanism's unit of length [N], shape (n,). Zero for a motion of these
-            masses and loads, NaN for a spring without length.
+        free: by body, force and torque without a joint or driver to carry it, torques over the
+            mechanism's unit of length [N], shape (n, 6). Zero for a motion of these masses and
+            loads, NaN for a spring without length.
         largest: largest force of the motion, to compare with [N].
     """
 
@@ -60,10 +60,7 @@ def needed_forces(mechanism: Mechanism, motions: Mapping[str, BodyMotion], times
         along = np.where(held, np.einsum("nru,nu->nr", right, demand), 0.0)
         left = left - np.einsum("nru,nr->nu", right, along)
     columns = lines.formulation.columns
-    free = {
-        name: np.abs(left[:, first : first + 6]).max(axis=1) / unit
-        for name, first in columns.items()
-    }
+    free = {name: left[:, first : first + 6] / unit for name, first in columns.items()}
     bodies = demand[:, : 6 * len(columns)]
     known = np.abs(bodies)[np.isfinite(bodies)]
     largest = float(known.max(initial=0.0)) / unit

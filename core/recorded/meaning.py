@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ..case.case import TIME, Case
-from ..case.io.column_units import required_unit
+from ..case.io.column_units import read_unit, required_unit
 from ..case.io.document import decimal, fault, shown, unknown_name
 from ..case.io.reference_columns import DERIVATIVES, known_columns
 from ..errors import MOST_NAMED, brief, shortened
@@ -38,6 +38,10 @@ _NEEDS = (
     *(("velocity", "omega"), ("omega", "velocity"), ("acceleration", "velocity")),
     *(("acceleration", "alpha"), ("alpha", "acceleration")),
 )
+REACTIONS = {"FX": "N", "FY": "N", "FZ": "N", "TX": "N m", "TY": "N m", "TZ": "N m"}
+"""Endings of columns of a joint's reaction, with units: on its second body, about its point, along
+global axes; as Adams names those on the marker I.
+"""
 _IN_BRACKETS = re.compile(r"(.*?)\s+\[([^\[\]]*)\]")
 _QUATERNIONS = {"wxyz": ("e0", "e1", "e2", "e3"), "xyzw": ("qx", "qy", "qz", "qw")}
 FORM = (
@@ -115,6 +119,8 @@ def targets_of(case: Case) -> dict[str, str]:
         si = "rad" if driver.turns else "m"
         rates = zip(("", *DERIVATIVES), ("", "/s", "/s^2"), strict=True)
         units |= {driver.name + ending: si + per for ending, per in rates}
+    joints = case.mechanism.joints if case.mechanism.has_loads else ()
+    units |= {f"{joint.name}.{end}": si for joint in joints for end, si in REACTIONS.items()}
     return units | known_columns(case.outputs)
 
 
@@ -175,6 +181,8 @@ class Reader:
             # Adams names the abscissa time.TIME
             name = names.get(_normal(head.name), TIME if head.name == "time.TIME" else "")
             if name == "" or name in stated or k in taken:
+                continue
+            if name.rpartition(".")[2] in REACTIONS and read_unit(head.unit or "N") is None:
                 continue
             if name in found:
                 both = f"{shown(self.heads[found[name].column].name)} and {shown(head.name)}"

@@ -171,8 +171,9 @@ def read_drives(
     moved: Sequence[Drive],
     supplied: Supplied,
     weak: float,
-) -> tuple[Mechanism, Sweep]:
-    """Return the mechanism with its drivers, and the sweep.
+) -> tuple[Mechanism, Sweep, list[str]]:
+    """Return the mechanism with its drivers, the sweep, and the drivers without a force: those for
+    a recording or a held joint, unknown to the dataset.
 
     Args:
         moved: the motions of the dataset.
@@ -213,14 +214,19 @@ def read_drives(
     moving = bool(ranges) or any(each.motion for each in moved)
     if not supplied.recorded and (left or not moving or (rest and not supplied.hold_rest)):
         raise _undriven(model, mechanism, rest, left, moving=moving)
+    drives = [every[k] for k in taken]
+    if supplied.recorded and (rest or not all(each.motion for each in moved)):
+        if any(each.motion for each in moved):
+            note = "freedoms are left without a motion that is read: all follow the recording"
+            model.dataset.notes.append(note)
+        drives = [replace(each, motion=None) for each in drives]
     if left:
         model.dataset.notes.append(
-            f"{left} freedoms of {_bodies(mechanism)} are of no joint that could be driven: the"
-            " recording is judged by its joints, and no engine follows it"
+            f"{left} freedom{'s' * (left > 1)} of {_bodies(mechanism)} of no joint that could be"
+            " driven: no engine follows the recording, which is judged by its joints and loads"
         )
-    drives = [every[k] for k in taken]
     mechanism = replace(mechanism, drivers=[each.driver for each in drives])
-    return mechanism, _sweep(drives, ranges, span)
+    return mechanism, _sweep(drives, ranges, span), rest
 
 
 def _sweep(

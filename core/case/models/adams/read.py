@@ -26,8 +26,8 @@ _LONGEST_TITLE, _MOST_NAMED = 80, 12
 
 
 def read_adams(file: Path, text: str, supplied: Supplied) -> Case:
-    """Return the case of a dataset; outputs are the coordinates of the parts' origins and centres
-    of mass, those of joints, and the rotations of parts.
+    """Return the case of a dataset; outputs are the coordinates of the parts' centres of mass,
+    those of joints, and the rotations of parts.
 
     Raises:
         CaseError: a statement cannot be read and forces the motion, markers of a joint do not come
@@ -62,7 +62,7 @@ def read_adams(file: Path, text: str, supplied: Supplied) -> Case:
         raise fault(file, "", "found no part but the ground, expected parts that move; add them")
     weak = max(WEAK, ADDED_UP * tolerance / size)
     with explained(file):
-        mechanism, sweep = read_drives(model, mechanism, driven, moved, supplied, weak)
+        mechanism, sweep, rest = read_drives(model, mechanism, driven, moved, supplied, weak)
     case = Case(
         file.stem,
         _source(dataset),
@@ -71,21 +71,23 @@ def read_adams(file: Path, text: str, supplied: Supplied) -> Case:
         sweep,
         (),
         assembly=tuple(dataset.notes),
+        unforced=tuple(rest) if supplied.recorded else (),
     )
-    drivers = len(mechanism.drivers)
-    if degrees_of_freedom(mechanism) != drivers or tolerance > CLOSED * size:
+    free = degrees_of_freedom(mechanism) - len(mechanism.drivers)
+    if tolerance > CLOSED * size and not (free > 0 and supplied.recorded):
         with explained(file):
             case = within_digits(case, tolerance, why, [*joints])
     return with_all_motions(case)
 
 
 def _points(bodies: list[Body]) -> list[Point]:
-    """The origins of the parts, and their centres of mass if elsewhere."""
-    found = [Point(body.name, body.name, body.origin) for body in bodies]
-    for body in bodies:
-        if body.center_of_mass not in (None, body.origin):
-            found.append(Point(f"{body.name}.cm", body.name, body.center_of_mass or body.origin))
-    return found
+    """The centres of mass of the parts, or else their origins."""
+    return [
+        Point(body.name, body.name, body.origin)
+        if body.center_of_mass is None
+        else Point(f"{body.name}.cm", body.name, body.center_of_mass)
+        for body in bodies
+    ]
 
 
 def _gravity(dataset: Dataset, units: Units) -> Vector:
