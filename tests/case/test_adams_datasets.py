@@ -362,6 +362,41 @@ MOTION/1, ROTATION, JOINT = 1, FUNCTION = TIME
     assert joint.point == pytest.approx((0.01, 0.02, 0.03))
 
 
+def test_marker_in_the_frame_of_another(tmp_path):
+    """RM: QP and REULER are those in the marker's frame."""
+    plain = driven("TIME")
+    moved = "MARKER/12, PART = 1, RM = 13, QP = 1, 2, 3, REULER = 40D, 30D, 20D"
+    turn = Rotation.from_euler("ZXZ", [40.0, 30.0, 20.0], degrees=True)
+    _, at, axes = plain.markers[12]
+    base = axes * turn.inv()
+    plain.marker(13, 1, at - base.apply([1.0, 2.0, 3.0]), base)
+    text = "\n".join(
+        moved if line.startswith("MARKER/12") else line for line in plain.text.split("\n")
+    )
+    (one,), (other,) = (read(tmp_path, each).mechanism.joints for each in (plain, text))
+    assert one.axis == pytest.approx(other.axis, abs=1e-14)
+    assert one.point == pytest.approx(other.point, abs=1e-14)
+
+
+def test_part_with_exact_coordinates_stays(tmp_path):
+    """Of two parts whose markers are 2 mm apart, the one with EXACT coordinates keeps them."""
+    deck = Deck(4).part(2, ", EXACT = X:Y:Z:PSI:THETA:PHI").part(3)
+    deck.marker(11, 2, AT, AXES).marker(12, 1, AT, AXES)
+    deck.marker(21, 3, AT + 2.0 * X, AXES).marker(22, 2, AT, AXES)
+    deck.marker(31, 3, AT + 90.0 * Y, AXES).marker(32, 1, AT - 90.0 * Y, AXES)
+    deck.add("JPRIM/1, INPLANE, I = 11, J = 12", "JOINT/2, FIXED, I = 21, J = 22")
+    case = read(tmp_path, deck, recorded=True)
+    one, other = case.mechanism.bodies
+    assert one.origin == pytest.approx(MM * deck.parts[2][0], abs=1e-15)
+    assert other.origin == pytest.approx(MM * (deck.parts[3][0] - 2.0 * X), abs=1e-14)
+    assert any("JOINT_2 by 0.002 m" in each for each in case.assembly)
+
+
+def test_unknown_statement_may_be_left_out(tmp_path):
+    text = PLAIN.replace("END", "BLOB/1, I = 11\nEND")
+    assert "BLOB, which forces" in read(tmp_path, text, without=("BLOB",)).source
+
+
 def test_dialects_read_as_one_deck(tmp_path):
     """Abbreviations, continuations, comments, letters, separators."""
     plain = driven("30D*TIME").text
@@ -460,6 +495,8 @@ FAULTS = {
     "POINT_MASS/1, MASS = 3": ("POINT_MASS/1: forces the motion", "--without POINT_MASS"),
     "PART/8, GROUND": ("GROUND again", "remove one"),
     "UNITS/LENGTH = FURLONG": ("found again", "line"),
+    "PART/8, ZG = 0, 0, 1": ("found ZG without XG", "add XG"),
+    "MARKER/50, PART = 1, RM = 11": ("RM: found no marker of the part", "correct it"),
 }
 
 

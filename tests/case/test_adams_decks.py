@@ -2,11 +2,14 @@
 prints the table.
 """
 
+import re
+from pathlib import Path
+
 import pytest
 from kincheck import CaseError
 from kincheck.core.case.models.files import load
 
-from ..adams_decks import DECKS, WITHOUT_RESULTS, judged
+from ..adams_decks import DECKS, WITHOUT_RESULTS, judged, line
 
 # Springs whose results are of other numbers: the free force gives them away.
 OTHER_SPRINGS = ("RotSpring_Case01", "TranSpring_Case01")
@@ -59,3 +62,16 @@ def test_deck_with_the_spring_of_the_results_passes(tmp_path):
 def test_rack_on_its_pinions_axis_says_what_is_missing():
     with pytest.raises(CaseError, match=r"line 111: JOINT/3: the line of the rack's marker"):
         load(DECKS["RackPinion_Case01"])
+
+
+PAGE = Path(__file__).parents[2] / "docs" / "pages" / "how-to" / "decks.md"
+NUMBER = re.compile(r"\d[\d.]*(?:e[-+]\d+)?")
+
+
+@pytest.mark.parametrize("name", DECKS)
+def test_table_of_the_page_is_the_command_s(name):
+    """Above rounding, which differs from machine to machine."""
+    (shown,) = (x for x in PAGE.read_text("utf-8").split("\n") if x.startswith(f"| {name} |"))
+    pairs = zip(NUMBER.findall(shown), NUMBER.findall(line(name)), strict=True)
+    for one, other in ((float(a), float(b)) for a, b in pairs):
+        assert other == pytest.approx(one, rel=0.2, abs=1e-6)

@@ -41,9 +41,11 @@ def case_text(case: Case, comments: Sequence[str] = ()) -> str:
         comments: comment lines at the top.
 
     Raises:
-        CaseError: no case file can express the case: samples on no even grid, outputs of several
-            axles, or names and texts beyond their limits.
+        CaseError: no case file can express the case: nothing drives it, samples on no even grid,
+            outputs of several axles, or names and texts beyond their limits.
     """
+    if not case.mechanism.drivers:
+        raise CaseError(f"case {case.name!r}: nothing drives it; drive a joint or a point")
     values = _values(case)
     reference = reference_table(case, values)
     lines = [f"# {line}" for line in comments]

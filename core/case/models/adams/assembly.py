@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 import statistics
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -78,7 +78,7 @@ class Link:
     def rows(self) -> Sequence[str]:
         """Its rows; without the x axes if one of them is not known."""
         known = self.i.place.turned and self.j.place.turned
-        return [row for row in ROWS[self.kind] if known or row != "xy" or self.kind == "HOOKE"]
+        return [row for row in ROWS[self.kind] if known or not row.startswith("xy")]
 
 
 def tolerance_of(dataset: Dataset, size: float) -> tuple[float, str]:
@@ -100,15 +100,20 @@ def tolerance_of(dataset: Dataset, size: float) -> tuple[float, str]:
     return limit, f"the file's digits, {digits}: {limit:.2g} m"
 
 
-def size_of(links: Sequence[Link], places: Places) -> float:
-    """Return the largest extent of the markers of all links along an axis [m]."""
-    points = [frame.origin for link in links for frame in link.frames(places)]
+def size_of(markers: Collection[Marker], places: Places) -> float:
+    """Return the largest extent of the markers along an axis [m]."""
+    points = [each.place.seen_from(places[each.part]).origin for each in markers]
     extent = float(np.ptp(np.array(points), axis=0).max()) if points else 0.0
     return extent if extent > 1e-9 else 1.0
 
 
 def assembled(
-    links: Sequence[Link], places: Places, ground: int, size: float, tolerance: float
+    dataset: Dataset,
+    links: Sequence[Link],
+    places: Places,
+    moving: Collection[int],
+    size: float,
+    tolerance: float,
 ) -> tuple[dict[int, Frame], str]:
     """Return the frames of parts with both markers of each link together, and a note on how far
     they were apart; an empty one if they agreed.
@@ -132,7 +137,14 @@ def assembled(
                 " assembles them first: save the dataset after its assembly, or correct a marker"
             )
     weak = max(WEAK, ADDED_UP * tolerance / size)
-    found = _closed(links, places, ground, size, weak)
+    columns = {part: 6 * k for k, part in enumerate(sorted(moving))}
+    free = np.ones(6 * len(columns))
+    for part, first in columns.items():
+        exact = dataset.statements["PART"][part].values.get("EXACT", "").upper()
+        held = {word.strip() for word in re.split(r"[:,\x1f]", exact)}
+        free[first : first + 3] = [letter not in held for letter in "XYZ"]
+        free[first + 3 : first + 6] = held.isdisjoint(("PSI", "THETA", "PHI"))
+    found = _closed(links, places, columns, free, size, weak)
     for link in links:
         shift, turn = _gap(link, found)
         if max(shift, size * turn) > max(ADDED_UP * tolerance, CLOSED * ADDED_UP * size):
@@ -195,7 +207,7 @@ def _slopes(row: str, i: Frame, j: Frame, arms: Sequence[Array]) -> tuple[Array,
     """Return the derivatives of a row by shift and turn of I's part and of J's, shape (6,) each."""
     if row[0] == "d":
         apart = i.origin - j.origin
-        e = apart / np.linalg.norm(apart) if row == "d" else getattr(j, row[1])
+        e = apart / (np.linalg.norm(apart) or 1.0) if row == "d" else getattr(j, row[1])
         of_i = np.concatenate([e, np.cross(arms[0], e)])
         return of_i, -np.concatenate([e, np.cross(arms[1] + apart, e)])
     turn = sum((s * np.cross(a, b) for s, a, b in _products(row, i, j)), np.zeros(3))
@@ -222,16 +234,21 @@ def _rows(
 
 
 def _closed(
-    links: Sequence[Link], places: Places, ground: int, size: float, weak: float
+    links: Sequence[Link],
+    places: Places,
+    columns: Mapping[int, int],
+    free: Array,
+    size: float,
+    weak: float,
 ) -> dict[int, Frame]:
     """Return the frames of the nearest assembly found.
 
     Args:
+        columns: first unknown of each part.
+        free: one for the unknowns that may change, else zero.
         weak: singular values below this are of rows redundant within the digits.
     """
     found, best, least = {**places}, {**places}, math.inf
-    moving = {m.part for link in links for m in (link.i, link.j)} - {ground}
-    columns = {part: 6 * k for k, part in enumerate(sorted(moving))}
     for _ in range(MOST_STEPS):
         residuals, slopes = map(np.array, zip(*_rows(links, found, columns, size), strict=True))
         left = float(np.abs(residuals).max())
@@ -239,7 +256,7 @@ def _closed(
             best, least = {**found}, left
         elif left < 1e-9:
             break
-        step = -np.linalg.lstsq(slopes, residuals, rcond=weak)[0]
+        step = -free * np.linalg.lstsq(slopes * free, residuals, rcond=weak)[0]
         step *= min(1.0, LONGEST_STEP / max(float(np.abs(step).max()), 1e-300))
         for part, first in columns.items():
             shift, turn = size * step[first : first + 3], step[first + 3 : first + 6]

@@ -20,7 +20,7 @@ ARGUMENTS: Mapping[str, str] = {
     "UNITS": "SYSTEM LENGTH MASS FORCE TIME UCF",
     "PART": "GROUND MASS CM IM IP QG REULER ZG XG MATERIAL VX VY VZ WX WY WZ VM WM EXACT",
     "MARKER": (
-        "PART POINT_MASS FLEX_BODY NODE_ID QP REULER ZP XP USEXP FLOATING CURVE SURFACE VX VY VZ"
+        "PART POINT_MASS FLEX_BODY NODE_ID QP REULER ZP XP USEXP RM FLOATING CURVE SURFACE VX VY VZ"
     ),
     "JOINT": (
         "REVOLUTE TRANSLATIONAL CYLINDRICAL SPHERICAL UNIVERSAL HOOKE FIXED PLANAR SCREW CONVEL"
@@ -254,7 +254,7 @@ def read_dataset(file: Path, text: str, without: Collection[str]) -> Dataset:
             raise fault(file, "", f"found more than {MOST_STATEMENTS} statements; split the model")
         if statement.strip().upper() == "END":
             break
-        kind, identifier, rest = _headed(file, line, statement)
+        kind, identifier, rest = _headed(file, line, statement, wanted)
         bare = Statement(file, kind, identifier, line)
         named = wanted & {kind, f"{kind}/{identifier}"}
         if named:
@@ -340,7 +340,7 @@ def _separated(line: int, text: str) -> Iterator[tuple[int, str]]:
     yield from ((line, each) for each in text.split(";") if each.strip(f" \t{_CONTINUED},"))
 
 
-def _headed(file: Path, line: int, text: str) -> tuple[str, int, str]:
+def _headed(file: Path, line: int, text: str, without: Collection[str]) -> tuple[str, int, str]:
     """Return kind, identifier and the rest of a statement."""
     head = _HEAD.match(text.strip())
     if head is None:
@@ -348,7 +348,7 @@ def _headed(file: Path, line: int, text: str) -> tuple[str, int, str]:
         problem = f"found {found}, expected a statement KIND/id, ARGUMENT = value, ..."
         raise fault(file, f"line {line}", f"{problem}; correct it, or begin comments by !")
     where = f"line {line}"
-    kind = full_name(head[1].upper(), KNOWN)
+    kind = full_name(head[1].upper(), (*KNOWN, *(each.partition("/")[0] for each in without)))
     if not kind:
         raise unknown_name(
             *(file, where, _plain(head[0]), KNOWN),

@@ -34,7 +34,7 @@ def linear(
     measured: list[tuple[float, float]] = []
 
     def measure(value: float) -> Callable[..., float]:
-        def of(i: float, j: float, _: float = 0.0) -> float:
+        def of(i: float, j: float, *_: float) -> float:
             measured.append((i, j))
             first = measured[0]
             if sorted(first) != sorted((i, j)):

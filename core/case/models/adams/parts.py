@@ -67,7 +67,9 @@ def read_units(dataset: Dataset) -> Units:
     statement = dataset.once("UNITS") or Statement(dataset.file, "UNITS", 0, 1)
     system = statement.values.get("SYSTEM", "NONE").strip().upper()
     if system not in _SYSTEMS:
-        raise statement.fault(f"SYSTEM = {system}: {remedy(system, _SYSTEMS)}")
+        raise statement.fault(
+            f"found SYSTEM = {system}, expected one of Adams; {remedy(system, _SYSTEMS)}"
+        )
     sizes: list[float] = []
     assumed: list[str] = []
     for (what, text), name in zip(_UNITS.items(), _SYSTEMS[system].split(), strict=True):
@@ -76,7 +78,9 @@ def read_units(dataset: Dataset) -> Units:
         given = statement.values.get(what, "").strip().upper()
         found = full_name(given, known) if given else name
         if not found:
-            raise statement.fault(f"{what} = {given}: {remedy(given, known)}")
+            raise statement.fault(
+                f"found {what} = {given}, expected a unit; {remedy(given, known)}"
+            )
         sizes.append(known[found])
         assumed += [f"{what} = {found}"] if not given and system == "NONE" else []
     units = Units(*sizes)
@@ -107,7 +111,8 @@ class Frame:
 
     def seen_from(self, other: Frame) -> Frame:
         """Return this frame of another one in the frame of the latter."""
-        return Frame(other.origin + other.axes @ self.origin, other.axes @ self.axes, self.turned)
+        turned = self.turned and other.turned
+        return Frame(other.origin + other.axes @ self.origin, other.axes @ self.axes, turned)
 
     @property
     def x(self) -> Array:
@@ -153,6 +158,9 @@ def read_places(dataset: Dataset, units: Units) -> tuple[dict[int, Frame], int]:
         (first, *_) = parts or [Statement(dataset.file, "PART", 1, 1)]
         raise first.fault("found no part with GROUND, expected one; add PART/1, GROUND")
     frames = {part.id: _frame(part, "QG", "ZG", "XG", units.length) for part in parts}
+    for part in parts:
+        if not frames[part.id].turned:
+            raise part.fault("found ZG without XG, which leaves its turn open; add XG")
     return frames, grounds[0].id
 
 
@@ -167,6 +175,16 @@ def read_markers(dataset: Dataset, units: Units) -> dict[int, Marker]:
         if "PART" in each.values and "FLOATING" not in each.flags:
             part = dataset.member(each, "PART", "PART", dataset.one_id(each, "PART")).id
             found[each.id] = Marker(part, _frame(each, "QP", "ZP", "XP", units.length), each)
+    for marker in [*found.values()]:
+        if "RM" in marker.statement.values:
+            other = found.get(dataset.one_id(marker.statement, "RM"))
+            if other is None or other.part != marker.part or "RM" in other.statement.values:
+                raise marker.statement.fault(
+                    "RM: found no marker of the part that is stated in its frame, expected one;"
+                    " correct it"
+                )
+            place = marker.place.seen_from(other.place)
+            found[marker.statement.id] = replace(marker, place=place)
     return found
 
 
@@ -274,5 +292,7 @@ def _own_marker(part: Statement, name: str, markers: Mapping[int, Marker]) -> Ma
     marker = markers.get(wanted)
     if marker is None or marker.part != part.id:
         where = "there is none" if marker is None else f"which is on PART/{marker.part}"
-        raise part.fault(f"{name} = {wanted}: found {where}, expected a marker of the part itself")
+        raise part.fault(
+            f"{name} = {wanted}: found {where}, expected a marker of the part itself; correct it"
+        )
     return marker

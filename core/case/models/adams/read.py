@@ -39,11 +39,11 @@ def read_adams(file: Path, text: str, supplied: Supplied) -> Case:
     markers = read_markers(dataset, units)
     model = Model(dataset, units, places, ground, markers)
     links = read_links(model)
-    size = size_of(links, places)
+    size = size_of(markers.values(), places)
     tolerance, why = tolerance_of(dataset, size)
     if supplied.closure is not None:
         tolerance, why = supplied.closure, "--closure"
-    places, note = assembled(links, places, ground, size, tolerance)
+    places, note = assembled(dataset, links, places, {*places} - {ground}, size, tolerance)
     dataset.notes.extend([note] * bool(note))
     model = replace(model, places=places)
     bodies = read_bodies(dataset, units, places, ground, markers)
