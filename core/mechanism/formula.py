@@ -54,7 +54,8 @@ def evaluate(formula: str, functions: Functions) -> Any:
     """
     if len(formula) > LONGEST:
         raise MechanismError(f"found {len(formula)} characters, expected {LONGEST} at most")
-    return _Parser(formula, functions).whole()
+    with np.errstate(all="ignore"):
+        return _Parser(formula, functions).whole()
 
 
 class _Parser:
@@ -217,7 +218,10 @@ def _curve(value: Function, derivatives: Callable[[Any, Any], tuple[Any, Any]]) 
 
     def curve(x: Any) -> Any:
         if not isinstance(x, Jet):
-            return float(value(x))
+            found = float(value(x))
+            if not math.isfinite(found):
+                raise ValueError
+            return found
         at = value(x.x)
         return _composed(x, at, *derivatives(x.x, at))
 
@@ -275,8 +279,7 @@ def jet_of(formula: str, times: Any) -> Jet:
     """
     t = np.asarray(times, dtype=np.float64)
     time = Jet(t, np.ones_like(t), np.zeros_like(t))
-    with np.errstate(all="ignore"):
-        found = evaluate(formula, {**OVER_TIME, "TIME": lambda: time})
+    found = evaluate(formula, {**OVER_TIME, "TIME": lambda: time})
     if isinstance(found, Jet):
         return found
     still = np.zeros_like(t)

@@ -295,6 +295,35 @@ def test_torsion_acts_on_i_about_z_of_j(tmp_path, swapped):
     assert spring.free_angle == pytest.approx(free - 0.4)
 
 
+def test_torsion_of_the_reversed_angle_is_the_same(tmp_path):
+    deck = driven("0.4+TIME").add("SFORCE/1, ROTATIONAL, I = 11, J = 12")
+    deck.add(", FUNCTION = 3*(AZ(12, 11) + 10D) + 0.2*WZ(12, 11, 12)")
+    (spring,) = read(tmp_path, deck).mechanism.forces
+    assert spring.stiffness == pytest.approx(3e-3)
+    assert spring.damping == pytest.approx(2e-4)
+    assert spring.free_angle == pytest.approx(math.radians(10.0) - 0.4)
+
+
+def test_loads_are_in_the_units_of_time(tmp_path):
+    """A damper of 0.4 N ms/mm, and gravity in mm/ms^2."""
+    deck = sprung("SPRINGDAMPER/1, TRANSL, I=11, J=13, K=12, C=0.4, LENGTH=50")
+    deck.lines[deck.lines.index("ACCGRAV/, KGRAV = -9806.65")] = "ACCGRAV/KGRAV = -9.80665E-3"
+    deck.units = UNITS.replace("TIME = SECOND", "TIME = MILLISECOND")
+    mechanism = read(tmp_path, deck).mechanism
+    assert mechanism.forces[0].damping == pytest.approx(0.4)
+    assert mechanism.gravity == pytest.approx((0.0, 0.0, -9.80665))
+
+
+def test_recorded_deck_with_a_further_freedom_follows_all(tmp_path):
+    deck = driven("TIME").part(3)
+    deck.marker(21, 3, AT, AXES).marker(22, 2, AT, AXES).add("JOINT/2, REVOLUTE, I = 21, J = 22")
+    case = read(tmp_path, deck, recorded=True)
+    assert not case.sweep.motions
+    assert [each.name for each in case.mechanism.drivers] == ["MOTION_7", "JOINT_2"]
+    assert case.unforced == ("JOINT_2",)
+    assert any("all follow the recording" in each for each in case.assembly)
+
+
 def coupled(statement, kinds=("REVOLUTE", "REVOLUTE"), reverse=False):
     deck = Deck(8).part(2).part(3)
     for number, part, at in ((11, 2, AT), (12, 1, AT), (21, 3, AT + 60 * X), (22, 1, AT + 60 * X)):
@@ -532,6 +561,8 @@ def test_motion_beyond_the_language_is_refused(tmp_path, function):
 def test_line_that_may_be_a_sum_or_a_list_is_refused(tmp_path):
     ends = "POLY(TIME, 0, 1,\n, -2)"
     assert read(tmp_path, driven(ends)).sweep.motions
+    kept = read(tmp_path, driven("POLY(TIME, 0, 1\n, 2)")).sweep.motions["MOTION_7"]
+    assert kept.at(np.array([1.0]))[1] == pytest.approx(2.0)
     message = refused(tmp_path, driven("POLY(TIME, 0, 1\n, -2)"))
     assert "may be a sum or the next number" in message
 
